@@ -1,4 +1,4 @@
-"""A gain set made for a robot and a mission: from options to files."""
+"""Tuning of a gain set for a robot and a mission, from options to files."""
 
 from __future__ import annotations
 
@@ -31,25 +31,25 @@ def tuned_set(
     wishes: TuningOptions,
     step: Callable[[str], None],
 ) -> Tuned:
-    """Make the set.
+    """Tune a gain set.
 
     Args:
         options: of a `FlightPlan`: robot (the nominal one), mission, sensors, navigation.
-        cases: names or paths of the environments to be flown in.
-        wishes: of the user.
+        cases: names or paths of the environments.
+        wishes: the user's tuning options.
         step: called with a description of each step.
 
     Raises:
-        InputError: something named is not there, or the wishes do not go together.
+        InputError: a named file is missing, or the tuning options contradict each other.
     """
     plans = [validate(FlightPlan, {**options, "case": case}, "options") for case in cases]
     settings = [FlightSettings.resolve(plan.options(), plan.parameters) for plan in plans]
     nominal, reference = Robots(settings[0], plans[0].robot).plant, settings[0].mission
     eta = reference.base_quaternion[0] / norm(reference.base_quaternion)
     if abs(eta) <= SINGULAR_ETA:
-        raise InputError("base_quaternion: turned by 180 degrees, where the laws are singular")
+        raise InputError("base_quaternion: a rotation by 180 degrees, where the laws are singular")
     if len(reference.waypoint_times) < 2:
-        raise InputError("the mission has a single waypoint: there is nothing to tune for")
+        raise InputError("the mission has only one waypoint: tuning needs a motion")
     inertias = []
     for case, own in zip(cases, settings, strict=True):
         step(f"inertia, case {case}")
@@ -68,7 +68,7 @@ def write_set(tuned: Tuned, command: str, folder: Path) -> list[Path]:
     """Write the files of a set.
 
     Raises:
-        InputError: the folder cannot be made or written.
+        InputError: the folder cannot be created or written.
     """
     make_folder(folder)
     paths = []

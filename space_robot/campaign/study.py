@@ -1,4 +1,4 @@
-"""The file of a campaign: what is flown, what is varied, what is required of it."""
+"""The file of a campaign: flights, variables and requirements."""
 
 from __future__ import annotations
 
@@ -21,17 +21,17 @@ from ..scenario.options import FlightPlan
 
 Design = Literal["independent", "latin_hypercube", "sobol", "saltelli"]
 NOT_TO_BE_EXTENDED = ("latin_hypercube", "saltelli")
-"""Designs in which every run depends on how many there are."""
+"""Designs in which every run depends on the number of runs."""
 MOST_RUNS = 10_000_000
 OF_THE_CAMPAIGN = {
-    "controller": "name laws",
-    "seed": "each run has its own, of the campaign's --seed",
+    "controller": "use laws",
+    "seed": "each run has its own, derived from --seed",
     "plant_robot": "vary robot.*",
-    "compression": "a campaign's bags have the recorder's own",
-    "split_size": "a campaign's bags have the recorder's own",
-    **dict.fromkeys(OF_THE_GRAPH, "only a graph of nodes has it"),
+    "compression": "a campaign's bags use the recorder's default",
+    "split_size": "a campaign's bags use the recorder's default",
+    **dict.fromkeys(OF_THE_GRAPH, "only graphs of nodes have it"),
 }
-"""Options of a flight that the campaign itself gives, and what to do instead."""
+"""Options of a flight that a study cannot set, and the reason or alternative."""
 
 
 class Law(NamedTuple):
@@ -42,19 +42,19 @@ class Law(NamedTuple):
 
     @classmethod
     def parse(cls, text: str) -> Law:
-        """From ``LAW`` or ``LAW=GAINS``."""
+        """Parse ``LAW`` or ``LAW=GAINS``."""
         controller, _, gains = text.partition("=")
         return cls(controller, gains or "default")
 
 
 def short_names(laws: Sequence[str]) -> dict[str, str]:
-    """Return what tables call each law: without its gain set, if all laws have the same."""
+    """Return the name of each law in tables: without gain set, if all laws have the same."""
     sets = {Law.parse(law).gains for law in laws}
     return {law: Law.parse(law).controller if len(sets) == 1 else law for law in laws}
 
 
 class Requirement(StrictModel):
-    """A metric, in a window of time, that a share of all runs must keep below or above a bound."""
+    """A bound on a metric in a time window, to be met by a share of all runs."""
 
     metric: Annotated[str, Field(min_length=1)]
     from_s: Annotated[float, Field(ge=0.0)] = 0.0
@@ -63,7 +63,7 @@ class Requirement(StrictModel):
     below: float | None = None
     above: float | None = None
     share: Annotated[float, Field(gt=0.0, lt=1.0, alias="in")]
-    """Of the runs that must meet it."""
+    """Share of the runs that must meet the bound."""
     confidence: Annotated[float, Field(gt=0.0, lt=1.0)] = 0.9
 
     @model_validator(mode="after")
@@ -76,58 +76,58 @@ class Requirement(StrictModel):
 
     @property
     def bound(self) -> float:
-        """What the metric must be below or above."""
+        """Bound of the metric."""
         bound = self.above if self.below is None else self.below
         assert bound is not None
         return bound
 
     @property
     def sign(self) -> float:
-        """1 if more of the metric is worse, -1 if less is."""
+        """1 if a larger metric is worse, -1 if a smaller one is."""
         return 1.0 if self.above is None else -1.0
 
     def is_met(self, value: float) -> bool:
-        """Return whether a flight's value meets the bound; NaN does not."""
+        """Return True if a flight's value meets the bound; False for NaN."""
         return self.sign * value < self.sign * self.bound
 
 
 class Keep(StrictModel):
-    """What is kept of each flight beside its row."""
+    """Data kept of each flight beside its row."""
 
     bag: Literal["never", "on_failure", "always"] = "never"
 
 
 class Until(StrictModel):
-    """When to stop: at a precision of every requirement's share, or after so many runs."""
+    """Stopping rule: a precision of every requirement's share, and a maximum number of runs."""
 
     half_width: Annotated[float, Field(gt=0.0, lt=0.5)]
-    """Of the confidence interval of the share."""
+    """Half-width of the confidence interval of the share."""
     runs: Annotated[int, Field(ge=1, le=MOST_RUNS)]
 
 
 class Study(StrictModel):
-    """A campaign's file."""
+    """Content of a campaign's file."""
 
     scenario: dict[str, Any] = Field(default_factory=dict)
-    """Options of `Scenario`; those of `OF_THE_CAMPAIGN` are its own."""
+    """Options of `Scenario`, except those of `OF_THE_CAMPAIGN`."""
     laws: Annotated[list[str], Field(min_length=1)]
     """Each as ``LAW`` or ``LAW=GAINS``."""
     vary: dict[str, Any] = Field(default_factory=dict)
-    """See `space_robot.campaign.draws`."""
+    """Distribution of each variable, by the variable's name."""
     require: dict[str, Requirement] = Field(default_factory=dict)
     keep: Keep = Keep()
     until: Until | None = None
     design: Design = "independent"
     runs: Annotated[int, Field(ge=1, le=MOST_RUNS)] | None = None
     fixed_runs: bool = False
-    """The number of runs is chosen before the first one flies: none can be added, and verdicts are
-    reached once, after the last. Otherwise they hold whenever one looks, and need more runs."""
+    """True: the number of runs is fixed in advance, and there is one verdict, after the last run.
+    False: runs can be added, and verdicts are valid at any time, but need more runs."""
 
     _where: str = PrivateAttr("campaign")
 
     @property
     def where(self) -> str:
-        """The name of the file, for errors."""
+        """Name of the file, for errors."""
         return self._where
 
     @field_validator("scenario", mode="after")
@@ -151,61 +151,61 @@ class Study(StrictModel):
     @classmethod
     def _needs_require(cls, until: Until | None, info: ValidationInfo) -> Until | None:
         if until and not info.data.get("require"):
-            raise ValueError("stops at a precision of what is required: there is no require")
+            raise ValueError("needs require: the precision is that of requirements")
         return until
 
     @field_validator("design", mode="after")
     @classmethod
     def _can_stop_early(cls, design: Design, info: ValidationInfo) -> Design:
         if info.data.get("until") and design in NOT_TO_BE_EXTENDED:
-            raise ValueError("is whole only with all runs, and cannot stop early: leave out until")
+            raise ValueError("this design needs all runs and cannot stop early: remove until")
         return design
 
     @field_validator("fixed_runs", mode="after")
     @classmethod
     def _cannot_stop_early(cls, fixed_runs: bool, info: ValidationInfo) -> bool:
         if fixed_runs and info.data.get("until"):
-            raise ValueError("until chooses the number of runs: leave one of them out")
+            raise ValueError("contradicts until, which chooses the number of runs: remove one")
         return fixed_runs
 
     @property
     def has_fixed_runs(self) -> bool:
-        """True if no runs can be added to those that a campaign was begun with."""
+        """True if the number of runs cannot be increased after the start."""
         return self.fixed_runs or self.design in NOT_TO_BE_EXTENDED
 
     def runs_asked(self, runs: int | None = None) -> int:
-        """Return how many runs are to be flown: ``runs`` if given, else what the file says.
+        """Return the number of runs to fly: ``runs``, or that of the file if it is None.
 
         Raises:
-            InputError: neither says it.
+            InputError: both are None.
         """
         count = runs or self.runs or (self.until and self.until.runs)
         if not count:
-            raise InputError(f"{self.where}: runs: missing: say there how many, or with --runs")
+            raise InputError(f"{self.where}: runs: missing: set it in the file, or with --runs")
         return count
 
     @property
     def content(self) -> dict[str, Any]:
-        """Return all but the number of runs, as JSON has it."""
+        """Return all keys except the number of runs, as JSON data."""
         content: dict[str, Any] = json.loads(self.model_dump_json(by_alias=True))
         del content["runs"]
         return content
 
     def named(self, where: str) -> Study:
-        """Return the same study with its file's name for errors."""
+        """Return the same study with the name of its file for errors."""
         copied = self.model_copy()
         copied._where = where
         return copied
 
 
 def check_option(name: str) -> None:
-    """Check that a study may give an option of `Scenario`.
+    """Check that a study can set an option of `Scenario`.
 
     Raises:
-        ValueError: says what does it instead, or which options there are.
+        ValueError: with the alternative, or with the allowed options.
     """
     if name in OF_THE_CAMPAIGN:
-        raise ValueError(f"{name} cannot be given: {OF_THE_CAMPAIGN[name]}")
+        raise ValueError(f"{name} cannot be set: {OF_THE_CAMPAIGN[name]}")
     allowed = [option for option in FlightPlan.model_fields if option not in OF_THE_CAMPAIGN]
     if name not in allowed:
         raise ValueError(f"unknown option {short(name)}: {choices(name, allowed)}")

@@ -21,16 +21,16 @@ class Nominal(NamedTuple):
     scenario: Scenario
     robot: Robot
     names: RobotNames
-    """Of axes, wheels and thrusters."""
+    """Names of axes, wheels and thrusters."""
     parameters: dict[str, dict[str, Any]]
     """All parameters by node and dotted name."""
     law: str
     gains: dict[str, list[float]]
-    """Of the law in force at the start."""
+    """Gains of the law that is active at the start."""
 
     @classmethod
     def of(cls, scenario: Scenario) -> Self:
-        """Look up all that a scenario names.
+        """Resolve robot, parameters and gains of a scenario.
 
         Raises:
             InputError: it cannot be flown.
@@ -58,20 +58,20 @@ class Changes:
         self._robot: RobotArrays | None = None
 
     def on(self, nominal: Nominal) -> Changes:
-        """Return the same options of another nominal flight."""
+        """Return changes of the same options for another nominal flight."""
         changes = Changes(nominal)
         changes.options = self.options
         return changes
 
     @property
     def robot(self) -> RobotArrays:
-        """The plant's robot, to be changed."""
+        """The plant's robot; callers may change it."""
         if self._robot is None:
             self._robot = RobotArrays(self.nominal.robot)
         return self._robot
 
     def parameter(self, node: str, name: str) -> Any:
-        """Return a node's parameter as changed until now; a list may be changed."""
+        """Return the present value of a node's parameter; callers may change a list."""
         changed = self._parameters.setdefault(node, {})
         if name not in changed:
             value = self.nominal.parameters[node][name]
@@ -83,7 +83,7 @@ class Changes:
         self._parameters.setdefault(node, {})[name] = value
 
     def gain(self, name: str) -> list[float]:
-        """Return the law's gain, a number an axis, to be changed."""
+        """Return a gain of the law, one number per axis; callers may change it."""
         key = f"{self.nominal.law}.{name}"
         own = self._parameters.setdefault("controller", {})
         if key not in own:

@@ -1,4 +1,4 @@
-"""Designs of experiments: uniform numbers of the runs of a campaign."""
+"""Designs of experiments: the uniform random numbers of a campaign's runs."""
 
 from __future__ import annotations
 
@@ -17,42 +17,42 @@ from . import keys
 
 SOBOL_BITS = 30
 _BLOCK = 1024
-"""Points of Sobol's sequence that are made at a time."""
+"""Points of Sobol's sequence that are computed at a time."""
 
 
 class DesignPoint(NamedTuple):
     """Position of a run in its design."""
 
     draw: int
-    """The number of its draw; runs that share it share what they do not vary."""
+    """Number of the draw; runs with the same draw differ only in grid values or Saltelli point."""
     point: int
-    """The point of the grid, or the block of Saltelli's design."""
+    """Number of the grid point, or of the point in a row of Saltelli's design."""
 
 
 class Blocks(NamedTuple):
-    """Saltelli's design: ``rows`` of d + 2 runs that follow one another.
+    """Saltelli's design: ``rows`` of d + 2 consecutive runs.
 
     A row is point A, then A with variable 1 from B, ..., with variable d from B, then point B.
     """
 
     rows: int
     names: list[str]
-    """The d variables."""
+    """Names of the d variables."""
 
 
 @dataclass(frozen=True)
 class Design(ABC):
-    """Uniform numbers for every variable that is drawn (not those of grids)."""
+    """Base class of designs: uniform numbers for every random variable (not for grids)."""
 
     needs_all_runs: ClassVar[bool] = False
-    """True if another number of runs is another campaign."""
+    """True if the draws depend on the number of runs."""
     seed: int
     draws: int
-    """So many draws are asked of it."""
+    """Number of draws."""
 
     @abstractmethod
     def uniform(self, place: DesignPoint, name: str, number: int) -> float:
-        """Return the number between 0 and 1 of a variable, the ``number``-th that is drawn."""
+        """Return the uniform number, in (0, 1), of random variable ``number`` for a run."""
 
 
 class Independent(Design):
@@ -64,7 +64,7 @@ class Independent(Design):
 
 
 class LatinHypercube(Design):
-    """Each variable has one number in every stratum of as many as there are draws."""
+    """Each variable has one number in each of N strata, N the number of draws."""
 
     needs_all_runs: ClassVar[bool] = True
 
@@ -76,7 +76,7 @@ class LatinHypercube(Design):
 
 
 class Sobol(Design):
-    """Sobol's sequence, each variable a dimension, shifted by random bits of its own."""
+    """Sobol's sequence with a random digital shift; one dimension per variable."""
 
     def uniform(self, place: DesignPoint, name: str, number: int) -> float:
         """Return the uniform number of a variable for a draw."""
@@ -85,7 +85,7 @@ class Sobol(Design):
 
 @dataclass(frozen=True)
 class Saltelli(Design):
-    """The rows of `Blocks`, A and B of one Sobol sequence."""
+    """The rows of `Blocks`; A and B are taken from one Sobol sequence."""
 
     needs_all_runs: ClassVar[bool] = True
     variables: int = 0
@@ -106,7 +106,7 @@ DESIGNS: dict[str, type[Design]] = {
 
 
 def shifted(seed: int, name: str, index: int, dimension: int) -> float:
-    """Return a number of Sobol's sequence, its bits shifted by random ones of the name."""
+    """Return a number of Sobol's sequence with a digital shift derived from ``name``."""
     if dimension >= 21_201:
         raise InputError("a Sobol sequence has 21201 dimensions at most")
     shift = keys.bits(seed, f"{name}:shift", 0) >> (64 - keys.BITS)
@@ -116,7 +116,7 @@ def shifted(seed: int, name: str, index: int, dimension: int) -> float:
 
 
 def _dimensions(dimension: int) -> int:
-    """Return how many are made together, so that variables share what is kept."""
+    """Return how many dimensions are computed together, so that variables share the cache."""
     return min(max(16, 1 << dimension.bit_length()), 21_201)
 
 
@@ -125,7 +125,7 @@ def _sobol_block(dimensions: int, block: int) -> NDArray[np.int64]:
     from scipy.stats import qmc  # slow to import
 
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # it asks for numbers of points that are powers of two
+        warnings.simplefilter("ignore")  # SciPy warns unless the number of points is a power of two
         sequence = qmc.Sobol(dimensions, scramble=False, bits=SOBOL_BITS)
         if block:
             sequence.fast_forward(block * _BLOCK)

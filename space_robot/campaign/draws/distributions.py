@@ -1,4 +1,4 @@
-"""Distributions of variables, given by their quantiles."""
+"""Distributions of variables, defined by their quantile functions."""
 
 from __future__ import annotations
 
@@ -16,17 +16,17 @@ from space_robot_msgs_py.config.validation import StrictModel, short, validate
 from space_robot_msgs_py.errors import InputError
 
 Value = float | int | str | bool
-"""What is drawn; a whole number is one only out of a list."""
+"""A drawn value; integers occur only in lists of values."""
 Pair = Annotated[list[float], Field(min_length=2, max_length=2)]
 Values = Annotated[list[bool | int | float | str], Field(min_length=1, max_length=100_000)]
 
 
 LEAST_SHARE = 2.0**-1000
-"""Below it a normal number is not asked for."""
+"""Smallest probability of which a normal quantile is computed."""
 
 
 class Distribution(StrictModel):
-    """A distribution as a campaign's file has it."""
+    """Base class of the distributions in a campaign's file."""
 
     is_continuous: ClassVar[bool] = True
     relative: bool = False
@@ -42,11 +42,11 @@ class Distribution(StrictModel):
 
     @abstractmethod
     def quantile(self, u: float) -> Value:
-        """Return the value that a share ``u`` of all draws is below, 0 < u < 1."""
+        """Return the quantile of probability ``u``, 0 < u < 1."""
 
     @property
     def ends(self) -> list[Value]:
-        """The least and the largest value that can be drawn; all of them if it is a list."""
+        """The least and the largest value that can be drawn; all values of a list."""
         return [self.quantile(2.0**-53), self.quantile(1.0 - 2.0**-53)]
 
     @property
@@ -55,24 +55,24 @@ class Distribution(StrictModel):
         return not any(isinstance(value, (str, bool)) for value in self.ends)
 
     def on(self, nominal: float, drawn: Value) -> Any:
-        """Return what a value drawn makes of a nominal one."""
+        """Apply a drawn value to a nominal one: as factor, offset or replacement."""
         if self.relative:
             return nominal * float(drawn)
         return nominal + float(drawn) if self.offset else drawn
 
     def at_least(self, low: float) -> Distribution:
-        """Return the distribution with no value below ``low``: a normal one is truncated there.
+        """Return the distribution with no value below ``low``; a normal one is truncated there.
 
         Raises:
-            InputError: another one has values below.
+            InputError: a distribution other than normal has values below ``low``.
         """
         if min(float(value) for value in self.ends) < low:
-            raise InputError(f"can be {min(map(float, self.ends)):g}: {low:g} or more is needed")
+            raise InputError(f"can be {min(map(float, self.ends)):g}: must be {low:g} or more")
         return self
 
 
 class Normal(Distribution):
-    """Normal, cut off at ``low`` and ``high`` if given."""
+    """Normal distribution, truncated at ``low`` and ``high`` if set."""
 
     normal: float
     sigma: Annotated[float, Field(gt=0.0)]
@@ -83,7 +83,7 @@ class Normal(Distribution):
     def _has_values(self) -> Self:
         low, high = self._probabilities
         if not high - low > 1e-12:
-            raise ValueError("low and high leave nothing of it: low must be below high, near it")
+            raise ValueError("no values left: low must be below high, both near the mean")
         return self
 
     @cached_property
@@ -95,7 +95,7 @@ class Normal(Distribution):
         return low, high
 
     def quantile(self, u: float) -> float:
-        """Return the quantile for a share ``u``."""
+        """Return the quantile of probability ``u``."""
         low, high = self._probabilities
         share = min(max(low + u * (high - low), LEAST_SHARE), 1.0 - 2.0**-53)
         value = self.normal + self.sigma * quantile(share)
@@ -120,13 +120,13 @@ class Uniform(Distribution):
         return _rising(ends)
 
     def quantile(self, u: float) -> float:
-        """Return the quantile for a share ``u``."""
+        """Return the quantile of probability ``u``."""
         low, high = self.uniform
         return min(max(low + u * (high - low), low), high)
 
 
 class LogUniform(Distribution):
-    """Uniform in the logarithm."""
+    """Uniform distribution of the logarithm."""
 
     log_uniform: Pair
 
@@ -143,20 +143,20 @@ class LogUniform(Distribution):
         return log(high / low)
 
     def quantile(self, u: float) -> float:
-        """Return the quantile for a share ``u``."""
+        """Return the quantile of probability ``u``."""
         low, high = self.log_uniform
         return min(max(low * exp(u * self._span), low), high)
 
 
 class Categorical(Distribution):
-    """One of some values: numbers, or texts."""
+    """Base class of distributions over a list of numbers or texts."""
 
     is_continuous: ClassVar[bool] = False
 
     @property
     @abstractmethod
     def values(self) -> list[Any]:
-        """The values."""
+        """The possible values."""
 
     @property
     def ends(self) -> list[Value]:
@@ -168,12 +168,12 @@ class Categorical(Distribution):
         if len({isinstance(value, (str, bool)) for value in self.values}) > 1:
             raise ValueError("numbers and texts are mixed: put the numbers in quotes")
         if (self.relative or self.offset) and not self.is_number:
-            raise ValueError("only numbers can be relative to the nominal value, or an offset")
+            raise ValueError("relative and offset need numbers")
         return self
 
 
 class Choice(Categorical):
-    """One of some values at random, each with its weight; all alike if there are none."""
+    """A random value of a list, with optional weights (default: equal)."""
 
     choice: Values
     weights: list[Annotated[float, Field(ge=0.0)]] | None = None
@@ -183,9 +183,9 @@ class Choice(Categorical):
     def _fit(cls, weights: list[float] | None, info: ValidationInfo) -> list[float] | None:
         if weights is not None:
             if len(weights) != len(info.data.get("choice", weights)):
-                raise ValueError("as many numbers as choice has were expected")
+                raise ValueError("one weight for each value of choice was expected")
             if not 0.0 < sum(weights) < math.inf:
-                raise ValueError("one of them at least must be above 0")
+                raise ValueError("at least one weight must be above 0")
         return weights
 
     @property
@@ -194,7 +194,7 @@ class Choice(Categorical):
         return self.choice
 
     def quantile(self, u: float) -> Value:
-        """Return the quantile for a share ``u``."""
+        """Return the quantile of probability ``u``."""
         weights = self.weights or [1.0] * len(self.choice)
         left = u * sum(weights)
         for value, weight in zip(self.choice, weights, strict=True):
@@ -205,7 +205,7 @@ class Choice(Categorical):
 
 
 class Grid(Categorical):
-    """Every one of some values in turn."""
+    """Every value of a list in turn."""
 
     grid: Values
 
@@ -215,7 +215,7 @@ class Grid(Categorical):
         return self.grid
 
     def quantile(self, u: float) -> Value:
-        """Return the quantile for a share ``u``."""
+        """Return the quantile of probability ``u``."""
         return self.grid[int(u * len(self.grid))]
 
 
@@ -226,14 +226,14 @@ KINDS: dict[str, type[Distribution]] = {
     "choice": Choice,
     "grid": Grid,
 }
-"""Distributions by the key that tells them."""
+"""Distribution classes by the key that selects them."""
 
 
 def read_distribution(value: Any, where: str) -> Distribution:
-    """Read a distribution; a number or a text alone is a constant.
+    """Read a distribution; a plain number or text is a constant.
 
     Raises:
-        InputError: it is none; ``where`` names file and key.
+        InputError: invalid distribution; ``where`` names file and key.
     """
     if isinstance(value, (bool, int, float, str)):
         return validate(Choice, {"choice": [value]}, where)
@@ -249,5 +249,5 @@ def read_distribution(value: Any, where: str) -> Distribution:
 
 def _rising(ends: list[float]) -> list[float]:
     if not ends[0] < ends[1]:
-        raise ValueError("the lower end, then a higher one, were expected")
+        raise ValueError("a lower bound and a higher one were expected, in this order")
     return ends

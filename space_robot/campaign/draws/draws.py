@@ -21,11 +21,11 @@ from .variable import Variable
 from .variables import told_at, variables_of
 
 MOST_NOMINALS = 64
-"""Nominal flights that are kept, where options of the scenario are varied."""
+"""Size of the cache of nominal flights, used where options of the scenario are varied."""
 
 
 class Draws:
-    """The draws of a campaign; each number is a function of seed, run and the variable's name."""
+    """Random draws of a campaign; each number depends only on seed, run and variable name."""
 
     def __init__(self, study: Study, seed: int, runs: int, check: bool = True) -> None:
         """Resolve all variables of the campaign.
@@ -33,8 +33,8 @@ class Draws:
         Args:
             study: the campaign's file.
             seed: of the campaign.
-            runs: runs 0 to ``runs`` - 1 are asked for.
-            check: see that every law flies with each variable at its ends; workers need not.
+            runs: number of runs, counted from 0.
+            check: check that every law can fly the extreme values of each variable.
 
         Raises:
             InputError: something cannot be flown or varied; names the key of ``vary``.
@@ -46,7 +46,7 @@ class Draws:
         self._grids = [v for v in self._variables if isinstance(v.distribution, Grid)]
         self._drawn = [v for v in self._variables if not isinstance(v.distribution, Grid)]
         self.names = [variable.name for variable in self._variables]
-        """Of all variables, in the file's order."""
+        """Names of all variables, in the file's order."""
         self._points = math.prod(len(_values(v)) for v in self._grids)
         self._design = self._made_design()
         if check:
@@ -54,25 +54,25 @@ class Draws:
 
     @property
     def grid(self) -> dict[str, int]:
-        """The number of values of each variable that is a grid, by its name."""
+        """Number of values of each grid variable, by name."""
         return {variable.name: len(_values(variable)) for variable in self._grids}
 
     @property
     def blocks(self) -> Blocks | None:
-        """How the runs make up Saltelli's design; None: they are of another one."""
+        """Layout of the runs in Saltelli's design; None for other designs."""
         if self.study.design != "saltelli":
             return None
         return Blocks(self.runs // self._points, self.names)
 
     @property
     def needs_all_runs(self) -> bool:
-        """True if another number of runs would be another campaign, with other draws."""
+        """True if the draws depend on the number of runs."""
         return self._design.needs_all_runs
 
     def values(self, run: int) -> dict[str, float | str]:
-        """Return the values drawn in a run, by the variables' names.
+        """Return the drawn values of a run by variable name.
 
-        That is the factor, where they are relative, and what is added, where they are an offset.
+        They are factors of variables with ``relative``, and differences of those with ``offset``.
         """
         return {name: _told(value) for name, value in zip(self.names, self._raw(run), strict=True)}
 
@@ -80,10 +80,10 @@ class Draws:
         """Return the scenario of a law in a run; the plant's noise is the same for all laws.
 
         Raises:
-            InputError: the run is none, or its numbers cannot be flown together.
+            InputError: there is no such run, or its values cannot be flown together.
         """
         place = self._place(run)
-        # in Saltelli's design, too, noise is one more variable, which is never taken from B alone
+        # in Saltelli's design noise is one more variable, which is never taken from B alone
         of_b = isinstance(self._design, Saltelli) and place.point > len(self.names)
         seed = noise_seed(self.seed, 2 * place.draw + of_b)
         return self._changes(law, list(zip(self._variables, self._raw(run), strict=True))).scenario(
@@ -95,7 +95,7 @@ class Draws:
         return self._nominal(law, {}).scenario
 
     def flights_of_options(self) -> Iterator[tuple[str, Flight]]:
-        """Yield the flight with each varied option of the scenario at its ends, and their text."""
+        """Yield a description and the flight of each extreme value of each varied option."""
         for variable in self._variables:
             if isinstance(variable, OfScenario):
                 for value in variable.distribution.ends:
@@ -157,10 +157,10 @@ class Draws:
                 if not variable.distribution.is_continuous:
                     raise InputError(
                         f"{where}: vary.{variable.key}: the design saltelli needs continuous "
-                        "distributions, no list of values"
+                        "distributions, not lists of values"
                     )
             if not self.names:
-                raise InputError(f"{where}: design: saltelli needs something that is varied")
+                raise InputError(f"{where}: design: saltelli needs at least one variable")
             self._points = len(self.names) + 2
         if self.runs < 1 or self.runs % self._points:
             more = self._points * max(1, math.ceil(self.runs / self._points))

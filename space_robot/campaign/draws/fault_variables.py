@@ -1,4 +1,4 @@
-"""Variables of faults: a fault's text of which the number, or the time, is drawn."""
+"""Variables of faults: a fault's text with a random number or time."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ from .distributions import Value, read_distribution
 from .variable import Variable
 
 EACH = ":[*]"
-"""At the end of a fault's text: each axis, wheel or thruster by itself."""
+"""End of a fault's text: one variable for each axis, wheel or thruster."""
 _TIME = re.compile(r"(?<=@)T(?=$|:)")
 
 
 @dataclass(frozen=True)
 class OfFault(Variable):
-    """A fault; its text has ``{}`` where the number that is drawn belongs."""
+    """A fault; ``{}`` in its text stands for the drawn number."""
 
     text: str
 
@@ -43,7 +43,7 @@ def fault_variables(key: str, value: Any, where: str, names: RobotNames) -> list
     """Return the variables of a fault.
 
     Args:
-        key: the fault's text without what is drawn: its last number, or ``T`` for its time.
+        key: the fault's text without its last number, or with ``T`` as its time.
         value: the distribution.
         where: file and key, for errors.
         names: of axes, wheels and thrusters.
@@ -56,14 +56,14 @@ def fault_variables(key: str, value: Any, where: str, names: RobotNames) -> list
     ]
     distribution = read_distribution(value, where)
     if distribution.relative or distribution.offset:
-        raise InputError(f"{where}: a fault has no nominal value: neither relative nor offset")
+        raise InputError(f"{where}: a fault has no nominal value: relative and offset need one")
     if not distribution.is_number:
-        raise InputError(f"{where}: numbers are needed")
+        raise InputError(f"{where}: numbers were expected")
     head, each, _ = key.partition(EACH)
     if not each:
         elements = [key]
     elif not kind.argument or not kind.argument.about or not key.endswith(EACH):
-        raise InputError(f"{EACH} stands at the end of a fault that is about axes or actuators")
+        raise InputError(f"{EACH} is allowed only at the end of a fault of axes or actuators")
     else:
         elements = [f"{head}:{name}" for name in _all(kind.argument.about, names)]
     return [
@@ -79,7 +79,7 @@ def _template(text: str, kind: Kind) -> str:
         raise InputError(f"{kind.name} has no number to draw; its time has: {kind.name}@T")
     if not kind.argument.about:
         if ":" in text:
-            raise InputError(f"what is behind the colon is drawn: {short(text.partition(':')[0])}")
+            raise InputError(f"nothing may follow the colon: {short(text.partition(':')[0])}")
         return text + ":{}"
     _, colon, axis = text.partition(":")
     if not colon or not axis or "=" in axis:
@@ -104,5 +104,5 @@ def _all(about: About, names: RobotNames) -> list[str]:
 
 
 def _written(value: Value) -> str:
-    """Return a number so that it is the same number again when it is read."""
+    """Return a text that is read back as exactly the same number."""
     return repr(float(value)).removesuffix(".0")

@@ -1,4 +1,4 @@
-"""Names of variables: ``robot.links[*].mass``, and the things that they mean."""
+"""Names of variables, such as ``robot.links[*].mass``, and the elements that they select."""
 
 from __future__ import annotations
 
@@ -17,34 +17,34 @@ _PARTS = re.compile(r"([^.\[\]]+)(?:\[([^\[\]]+)\])?")
 
 
 class NamePart(NamedTuple):
-    """A word of a name, and which element of it is meant."""
+    """One word of a variable's name, with its element in brackets."""
 
     word: str
     element: str
-    """Empty: none is named."""
+    """Empty if there are no brackets."""
 
 
 def parts_of(name: str) -> list[NamePart]:
-    """Take a variable's name apart.
+    """Split a variable's name into its parts.
 
     Raises:
-        InputError: it is none.
+        InputError: invalid name.
     """
     if not _NAME.fullmatch(name):
-        raise InputError(f"{short(name)} is no name of a variable, as robot.links[*].mass is one")
+        raise InputError(f"{short(name)} is not a variable name such as robot.links[*].mass")
     return [NamePart(*match) for match in _PARTS.findall(name)]
 
 
 def chosen(element: str, names: Sequence[str], what: str) -> list[tuple[int, str]]:
-    """Return places and names of the things that an element means.
+    """Return index and name of each selected item.
 
     Args:
         element: a name, a number counted from 1, or ``*`` for all.
-        names: of all the things.
-        what: one of them is, for errors.
+        names: of all items.
+        what: kind of the items, for errors.
 
     Raises:
-        InputError: there is no such thing; names those there are.
+        InputError: there is no such item; lists the existing ones.
     """
     if element == ALL:
         return list(enumerate(names))
@@ -55,5 +55,5 @@ def chosen(element: str, names: Sequence[str], what: str) -> list[tuple[int, str
     raise InputError(
         f"no {what} {short(element)}: {choices(element, names, f', 1 to {len(names)}, or *')}"
         if names
-        else f"no {what} {short(element)}: there is none"
+        else f"no {what} {short(element)}: there are none"
     )

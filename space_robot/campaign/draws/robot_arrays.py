@@ -1,4 +1,4 @@
-"""A robot's numbers, changed in memory so that the robot stays one that can be built."""
+"""A robot's parameters as arrays, changed in memory such that they stay physically consistent."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ Array = NDArray[np.float64]
 
 
 def rotation(turn: ArrayLike) -> Array:
-    """Return a rotation about a vector, by 2 atan of half its length, rad: Cayley's form."""
+    """Return the rotation matrix (3, 3) of a Cayley vector: angle ``2 atan(|turn| / 2)``, rad."""
     x, y, z = 0.5 * np.asarray(turn, dtype=np.float64)
     cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
     scale = 2.0 / (1.0 + (x * x + y * y + z * z))
@@ -25,19 +25,21 @@ def rotation(turn: ArrayLike) -> Array:
 
 
 def spread(inertia: Array, factors: ArrayLike, turn: ArrayLike) -> Array:
-    """Return the inertia (3, 3) of a body whose mass is spread otherwise, and turned.
+    """Scale the principal second moments of mass of an inertia, and rotate it.
 
-    The second moments of the mass, ``tr(I)/2 E - I``, are positive for every body there is. Each
-    along its principal axes is multiplied by a positive factor, so the inertia that they make is
-    again one that a body can have, whatever the factors.
+    The second moments ``tr(I)/2 E - I`` of a body are positive semidefinite. Positive factors along
+    their principal axes keep them so, hence the result is physically consistent for all factors.
 
     Args:
         inertia: (3, 3) kg m2, about the centre of mass.
         factors: (3,) above 0, of the second moments in ascending order.
         turn: (3,) rad, see `rotation`.
+
+    Returns:
+        (3, 3) kg m2.
     """
     moments, axes = principal_axes(0.5 * _trace(inertia) * np.eye(3) - inertia)
-    # of a plate or a rod some are 0, and may be less by rounding
+    # some are 0 for a plate or a rod, and may be negative by rounding
     scaled = np.maximum(moments, 0.0) * np.asarray(factors, dtype=np.float64)
     second = rotate_tensor(product(rotation(turn), axes), np.diag(scaled))
     return _trace(second) * np.eye(3) - 0.5 * (second + second.T)
@@ -49,14 +51,14 @@ def _trace(matrix: Array) -> float:
 
 @dataclass
 class Spread:
-    """How the mass of a body is spread otherwise, see `spread`."""
+    """Arguments of `spread` for one body."""
 
     factors: list[float] = field(default_factory=lambda: [1.0, 1.0, 1.0])
     turn: list[float] = field(default_factory=lambda: [0.0, 0.0, 0.0])
 
 
 class RobotArrays:
-    """Copies of a robot's arrays; body 0 is the base, body j + 1 the one that joint j moves."""
+    """Copies of a robot's arrays; body 0 is the base, body j + 1 is moved by joint j."""
 
     def __init__(self, robot: Robot) -> None:
         self.nominal = robot
@@ -66,7 +68,7 @@ class RobotArrays:
         self.friction = list(robot.friction)
         self.springs = list(robot.springs)
         self.spreads: defaultdict[int, Spread] = defaultdict(Spread)
-        """By body."""
+        """By index of the body."""
 
     def robot(self) -> Robot:
         """Build the robot."""
@@ -85,7 +87,7 @@ class RobotArrays:
 
 
 def _with_base_moved(robot: Robot, shift: Array) -> Robot:
-    """Return the robot with all that is on its base shifted: the base's frame is at its CoM."""
+    """Shift everything on the base by ``shift``: the base's frame stays at its CoM."""
     offset, com = robot.offset.copy(), robot.com.copy()
     com[0] = 0.0
     for joint in np.flatnonzero(robot.parent == 0):

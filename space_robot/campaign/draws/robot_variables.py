@@ -21,7 +21,7 @@ from .names import NamePart, chosen
 from .variable import Variable
 
 LEAST = 0.01
-"""Masses and inertias are this share of the nominal ones at least."""
+"""Lower bound of masses and inertias, as a factor of the nominal ones."""
 OF_BODIES = ("mass", "inertia", "com")
 OF_JOINTS = ("friction.coulomb", "friction.viscous", "stiffness", "damping")
 XYZ = ("x", "y", "z")
@@ -29,7 +29,7 @@ XYZ = ("x", "y", "z")
 
 @dataclass(frozen=True)
 class OfRobot(Variable):
-    """A variable of a body, or of the joint that moves it."""
+    """Base class of variables of a body, or of the joint that moves it."""
 
     body: int
 
@@ -41,7 +41,7 @@ class OfRobot(Variable):
 
 @dataclass(frozen=True)
 class Mass(OfRobot):
-    """kg of a body."""
+    """Mass of a body, kg."""
 
     @property
     def place(self) -> Hashable:
@@ -56,7 +56,7 @@ class Mass(OfRobot):
 
 @dataclass(frozen=True)
 class InertiaScale(OfRobot):
-    """A factor of a body's whole inertia."""
+    """Factor of a body's inertia tensor."""
 
     @property
     def place(self) -> Hashable:
@@ -70,7 +70,7 @@ class InertiaScale(OfRobot):
 
 @dataclass(frozen=True)
 class InertiaSpread(OfRobot):
-    """One of the six numbers that spread a body's mass otherwise: three factors, three turns."""
+    """One of the six arguments of `spread`: log factors 0 to 2, rotations 3 to 5, degrees."""
 
     number: int
 
@@ -90,7 +90,7 @@ class InertiaSpread(OfRobot):
 
 @dataclass(frozen=True)
 class CentreOfMass(OfRobot):
-    """m of a body's centre of mass along an axis of its frame."""
+    """Coordinate of a body's centre of mass along an axis of the body's frame, m."""
 
     axis: int
 
@@ -107,7 +107,7 @@ class CentreOfMass(OfRobot):
 
 @dataclass(frozen=True)
 class OfJoint(OfRobot):
-    """A number of a joint: its friction, or its spring if it has no motor."""
+    """Friction of a joint, or spring constant or damping of a passive one."""
 
     field: str
 
@@ -132,12 +132,12 @@ class OfJoint(OfRobot):
 
 
 class SpreadFile(StrictModel):
-    """``{scale: 0.1, rotate_deg: 3}`` of an inertia."""
+    """Entry ``{scale: 0.1, rotate_deg: 3}`` of an inertia."""
 
     scale: Annotated[float, Field(gt=0.0, le=1.0)] | None = None
     """Standard deviation of the logarithms of the second moments' factors."""
     rotate_deg: Annotated[float, Field(gt=0.0, le=30.0)] | None = None
-    """Standard deviation of the turn about each axis, degrees."""
+    """Standard deviation of the rotation about each axis, degrees."""
 
 
 def robot_variables(
@@ -147,13 +147,13 @@ def robot_variables(
 
     Args:
         key: of ``vary``.
-        parts: the key's, behind ``robot``.
-        value: what stands there.
+        parts: of the key, without ``robot``.
+        value: of the key.
         where: file and key, for errors.
         robot: the nominal one.
 
     Raises:
-        InputError: the robot has no such thing, or it cannot have such values.
+        InputError: the robot has no such parameter, or the parameter cannot have such values.
     """
     group = one_of(parts[0].word if parts else "", ("base", "links", "joints"), "part of the robot")
     what = ".".join(part.word for part in parts[1:])
@@ -161,11 +161,11 @@ def robot_variables(
     one_of(what, allowed, f"number of robot.{group}{'' if group == 'base' else '[...]'}")
     if group == "base":
         if parts[0].element:
-            raise InputError(f"there is one base: robot.base.{what}")
+            raise InputError(f"there is only one base: robot.base.{what}")
         bodies = [(0, "robot.base")]
     else:
         if not parts[0].element:
-            raise InputError(f"which of them: robot.{group}[*].{what}, or a name in the brackets")
+            raise InputError(f"an element is missing: robot.{group}[*].{what}, or [NAME]")
         names = robot.body_names[1:] if group == "links" else robot.all_joint_names
         kind = group.rstrip("s")
         bodies = [
@@ -181,7 +181,7 @@ def robot_variables(
         ]
     if what == "com":
         if not parts[-1].element:
-            raise InputError(f"along which axis: {key}[x], [y], [z] or [*]")
+            raise InputError(f"the axis is missing: {key}[x], [y], [z] or [*]")
         distribution = _number(value, where)
         return [
             CentreOfMass(f"{name}.com[{axis_name}]", key, distribution, body, axis)
@@ -230,7 +230,7 @@ def _of_inertia(name: str, key: str, value: Any, where: str, body: int) -> list[
         return [*factors, *turns]
     distribution = _positive(value, where, 1.0)
     if not distribution.relative:
-        raise InputError(f"{where}: a factor of all of it needs relative: true")
+        raise InputError(f"{where}: a factor of an inertia needs relative: true")
     return [InertiaScale(name, key, distribution, body)]
 
 
@@ -242,8 +242,8 @@ def _of_joint(
         nominal = getattr(robot.friction[joint], what.partition(".")[2])
         if np.isnan(nominal):
             raise InputError(
-                f"the robot's file tells no friction of joint {robot.all_joint_names[joint]}, the "
-                f"case does: vary plant.{what}"
+                f"the robot's file has no friction of joint {robot.all_joint_names[joint]}, the "
+                f"case has: vary plant.{what}"
             )
     elif joint < robot.n:
         raise InputError(f"joint {robot.all_joint_names[joint]} has a motor and no spring")
@@ -257,12 +257,12 @@ def _of_joint(
 def _number(value: Any, where: str) -> Distribution:
     distribution = read_distribution(value, where)
     if not distribution.is_number:
-        raise InputError(f"{where}: numbers are needed")
+        raise InputError(f"{where}: numbers were expected")
     return distribution
 
 
 def _positive(value: Any, where: str, nominal: float) -> Distribution:
-    """Read the distribution of what must stay positive: a normal one is truncated."""
+    """Read the distribution of a positive quantity; a normal one is truncated."""
     distribution = _number(value, where)
     if distribution.relative:
         least = LEAST

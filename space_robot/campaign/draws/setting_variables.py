@@ -1,4 +1,4 @@
-"""Variables of settings: parameters of nodes, gains, where the mission starts, options."""
+"""Variables of settings: node parameters, gains, the mission's start, scenario options."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from .variable import Variable
 
 START, START_PARAMETER = "start_deg", "initial_joints_deg"
 BY_OPTION = ("robot", "mission", "case", "sensors", "actuators", "period", "controller", "gains")
-"""Parameters that choose files or laws, which options of the scenario do."""
+"""Parameters that select files or laws; scenario options set them."""
 
 
 @dataclass(frozen=True)
@@ -69,7 +69,7 @@ class OfNode(Variable):
 
 @dataclass(frozen=True)
 class OfGains(Variable):
-    """A gain on all axes or on one, of the laws that have it."""
+    """A gain on all axes or on one, for the laws that have it."""
 
     gain: str
     axis: int | None
@@ -107,13 +107,13 @@ def option_variables(
     except ValueError as error:
         raise InputError(str(error)) from None
     if name == "gains":
-        raise InputError("gain sets are the laws': laws: [LAW=SET, LAW=OTHER_SET]")
+        raise InputError("gain sets are chosen by laws: [LAW=SET, LAW=OTHER_SET]")
     if parts[-1].element or name in ("faults", "events", "swaps", "parameters"):
         raise InputError(f"the option {name} has no elements to vary; see faults, plant.*")
     distribution = read_distribution(value, where)
     has_number = type(nominal.scenario.given.get(name)) in (int, float)
     if (distribution.relative or distribution.offset) and not has_number:
-        raise InputError(f"{where}: relative to what: scenario gives no number {name}")
+        raise InputError(f"{where}: relative or offset, but scenario has no number {name}")
     return [OfScenario(f"scenario.{name}", key, distribution, name)]
 
 
@@ -127,7 +127,7 @@ def node_variables(
     """
     name = ".".join(part.word for part in parts)
     if any(part.element for part in parts[:-1]):
-        raise InputError("elements stand behind the whole name")
+        raise InputError("an element is allowed only at the end of the name")
     element = parts[-1].element if parts else ""
     distribution = read_distribution(content, where)
     if node == "mission" and name == START:
@@ -145,7 +145,7 @@ def node_variables(
         ]
     if name in BY_OPTION:
         hint = "laws" if name in ("controller", "gains") else f"scenario.{name}"
-        raise InputError(f"{name} is chosen for the whole flight: {hint}")
+        raise InputError(f"{name} applies to the whole flight: use {hint}")
     allowed = nominal.parameters[node]
     if name not in allowed:
         inner = [full for full in allowed if full.startswith(f"{name}.")]
@@ -161,7 +161,7 @@ def node_variables(
         if isinstance(value, (bool, str, type(None))) and (
             distribution.relative or distribution.offset
         ):
-            raise InputError(f"{where}: relative to what: {name} is {short(value)}")
+            raise InputError(f"{where}: relative or offset, but {name} is {short(value)}")
         return [OfNode(f"{node}.{name}", key, distribution, node, name)]
     if not element:
         raise InputError(f"{name} has {len(value)} elements: {node}.{name}[*], or [1] ...")
@@ -175,7 +175,7 @@ def node_variables(
 def gain_variables(
     key: str, parts: list[NamePart], value: Any, where: str, nominals: Sequence[Nominal]
 ) -> list[Variable]:
-    """Return the variables of ``gains.<gain>``, of all axes together or of each.
+    """Return the variables of ``gains.<gain>``: one for all axes, or one per axis.
 
     Raises:
         InputError: no law of the campaign has such a gain.
@@ -193,5 +193,5 @@ def gain_variables(
 
 def _numbers(distribution: Distribution, where: str) -> Distribution:
     if not distribution.is_number:
-        raise InputError(f"{where}: numbers are needed")
+        raise InputError(f"{where}: numbers were expected")
     return distribution

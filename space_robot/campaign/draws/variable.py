@@ -1,4 +1,4 @@
-"""A number that a campaign varies."""
+"""Base class of the quantities that a campaign varies."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from .distributions import Distribution, Value
 
 @dataclass(frozen=True)
 class Variable(ABC):
-    """A variable of a campaign: its name, how it is distributed, what its value changes."""
+    """A variable of a campaign: name, distribution, and effect on a flight."""
 
     name: str
-    """With the element's own name, as ``robot.links[joint1].mass``."""
+    """With the name of the element, such as ``robot.links[joint1].mass``."""
     key: str
-    """Of ``vary`` in the file."""
+    """Key of ``vary`` in the file."""
     distribution: Distribution
 
     @property
@@ -27,14 +27,14 @@ class Variable(ABC):
 
     @abstractmethod
     def apply(self, value: Value, changes: Changes) -> None:
-        """Change a flight as ``value``, drawn of the distribution, says."""
+        """Apply ``value``, drawn from the distribution, to a flight."""
 
     @property
     def is_of_law(self) -> bool:
-        """True if it changes the controller, whose nominal numbers each law has for itself."""
+        """True if it changes the controller, whose nominal settings depend on the law."""
         return False
 
     @property
     def is_of_plant_robot(self) -> bool:
-        """True if it changes the plant's robot alone, by construction to one that there can be."""
+        """True if it changes only the plant's robot, which stays physically consistent."""
         return False

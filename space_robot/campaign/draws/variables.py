@@ -24,7 +24,7 @@ GROUPS = ("robot", "scenario", *NODES, "gains", FAULTS)
 
 
 def variables_of(study: Study, nominals: Sequence[Nominal]) -> list[Variable]:
-    """Return all variables, in the file's order; one for each element that ``*`` means.
+    """Return all variables, in the file's order; ``*`` gives one variable per element.
 
     Args:
         study: the file.
@@ -47,7 +47,7 @@ def variables_of(study: Study, nominals: Sequence[Nominal]) -> list[Variable]:
 
 @contextmanager
 def told_at(where: str) -> Iterator[None]:
-    """Let errors name file and key."""
+    """Prefix errors with file and key."""
     try:
         yield
     except InputError as error:
@@ -95,13 +95,12 @@ def _check_places(study: Study, variables: Sequence[Variable]) -> None:
     for variable in variables:
         if isinstance(variable.place, tuple) and variable.place[:2] in whole - {variable.place}:
             raise InputError(
-                f"{study.where}: vary.{variable.key}: {variable.name} is of an inertia that is "
-                "varied as a whole"
+                f"{study.where}: vary.{variable.key}: {variable.name} is part of an inertia that "
+                "is varied as a whole"
             )
     if any(v.key.startswith("robot.") for v in variables):
         for variable in variables:
             if variable.name == "scenario.robot":
                 raise InputError(
-                    f"{study.where}: vary.scenario.robot: robots cannot be chosen while numbers "
-                    "of one are varied"
+                    f"{study.where}: vary.scenario.robot: cannot be varied together with robot.*"
                 )

@@ -1,4 +1,4 @@
-"""Campaigns: checked, flown to a table, stopped at a precision, their flights flown again."""
+"""Execution of campaigns: checks, flights, tables, stopping rule, reruns of single flights."""
 
 from .campaign import Campaign
 from .flown_campaign import FlownCampaign

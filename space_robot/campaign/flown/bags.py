@@ -1,4 +1,4 @@
-"""Flights that a campaign keeps: flown again, to the same bits, into a bag."""
+"""Bags of selected flights of a campaign: flown again, bit for bit, and recorded."""
 
 from __future__ import annotations
 
@@ -25,14 +25,14 @@ from .precision import is_met
 
 @dataclass(frozen=True)
 class BagFlyer:
-    """Flies a task into its bag."""
+    """Flies a task and records its bag."""
 
     flyer: RowFlyer
     folder: Path
-    """Of the bags."""
+    """Folder of the bags."""
 
     def __call__(self, task: Task) -> None:
-        """Fly a task; its bag takes its name when it is whole."""
+        """Fly a task; the bag gets its final name once it is complete."""
         unfinished = self.folder / f".{bag_name(task)}"
         flight = self.flyer.draws.scenario(task.run, task.law).check()
         with closing(fly_blocks(flight, unfinished)) as blocks:
@@ -45,19 +45,19 @@ class BagFlyer:
 
 
 def bag_name(task: Task) -> str:
-    """Return the folder's name of a task's bag: ``4711_tde_stc``."""
+    """Return the folder name of a task's bag, such as ``4711_tde_stc``."""
     return f"{task.run}_{re.sub(r'[^A-Za-z0-9_.=-]', '_', task.law)}"
 
 
 def fly_bags(folder: Path, flyer: RowFlyer, journal: Journal, runs: int, workers: int) -> None:
-    """Make the bags that the campaign's file asks for and that are not there yet.
+    """Record the missing bags of the flights selected by the campaign's file.
 
     Args:
-        folder: of the campaign, held.
-        flyer: of its tasks.
+        folder: of the campaign, locked by this process.
+        flyer: of the campaign's tasks.
         journal: with all rows.
-        runs: of the table.
-        workers: processes that fly.
+        runs: number of runs in the table.
+        workers: number of processes.
 
     Raises:
         InputError: a bag cannot be written.
@@ -81,7 +81,7 @@ def fly_bags(folder: Path, flyer: RowFlyer, journal: Journal, runs: int, workers
 
 
 def _wanted(study: Study, journal: Journal, runs: int) -> Iterator[Task]:
-    """Yield the tasks whose bags are asked for; those without a flight of their own have none."""
+    """Yield the tasks whose bags are requested; refused and killed flights have no bag."""
     for row in journal.rows(runs):
         has_flight = row.is_complete or row.outcome in (DIVERGED, UNANSWERED)
         if has_flight and (study.keep.bag == "always" or _has_failed(study, row)):

@@ -1,4 +1,4 @@
-"""Campaigns from Python.
+"""Python interface of campaigns.
 
 campaign = Campaign.load("my.yaml").run(runs=10_000, seed=7, out="campaigns/a")
 campaign.table, campaign.verdicts, campaign.rerun(4711).log
@@ -31,13 +31,13 @@ from .preparation import Preparation
 
 
 class Campaign:
-    """Campaign: flights of a study's variations under each of its laws."""
+    """A campaign: each random variation of a study, flown with each of its laws."""
 
     def __init__(self, study: Study) -> None:
-        """Take a study; what it names is looked up by `run`.
+        """Store a study; `run` resolves the files and laws that it names.
 
         Raises:
-            InputError: it is none.
+            InputError: ``study`` is not a `Study`.
         """
         if not isinstance(study, Study):
             raise InputError(
@@ -60,7 +60,7 @@ class Campaign:
 
     @classmethod
     def of(cls, content: Mapping[str, Any]) -> Campaign:
-        """Take what would be in a campaign's file: ``{"laws": ["ctc"], "vary": {...}}``.
+        """Build a campaign from the content of a file: ``{"laws": ["ctc"], "vary": {...}}``.
 
         Raises:
             InputError: in one line, naming the key.
@@ -81,23 +81,23 @@ class Campaign:
     ) -> FlownCampaign:
         """Fly the campaign, or its remaining flights, and write its table.
 
-        What is in the table depends on file, seed, runs and software alone: not on workers, nor on
-        how often it was interrupted. Ctrl-C (KeyboardInterrupt) leaves the table of what is done.
+        The table depends only on file, seed, runs and software, not on the number of workers or on
+        interruptions. After Ctrl-C (KeyboardInterrupt) it contains the completed flights.
 
         Args:
-            runs: draws of all that is varied, each flown by every law; None: as the file says.
+            runs: number of draws, each flown with every law; None: from the file.
             seed: of all draws.
-            out: the campaign's folder; the same one again resumes. None: a temporary one, which
-                lasts as long as what is returned.
-            workers: processes that fly; 0: this one; None: one a processor.
+            out: the campaign's folder; an existing campaign is resumed. None: a temporary folder,
+                deleted with the returned object.
+            workers: number of processes; 0: this process; None: one per processor.
             scheduler: address of a Dask scheduler whose workers fly instead.
-            timeout_s: longest wall-clock time of a flight; its row says ``out_of_time`` then.
+            timeout_s: longest wall-clock time of a flight; its outcome is then ``out_of_time``.
             progress: called at the beginning and after each flight.
-            warn: called with each line on what was damaged in the folder; what is lost is flown
+            warn: called with a line for each damaged file of the folder; lost rows are flown
                 again.
 
         Raises:
-            InputError: something cannot be flown; the folder holds something else; disk full.
+            InputError: something cannot be flown; the folder is another campaign's; disk full.
         """
         check_tables()
         asked = Preparation.of(self.study, seed, runs)
@@ -105,7 +105,7 @@ class Campaign:
         temporary = None if out is not None else ScratchFolder()
         folder = Path(temporary.name if temporary else str(out))
         if scheduler is not None and not (folder / MANIFEST).exists():
-            check_scheduler(scheduler)  # else the folder would be begun for nothing
+            check_scheduler(scheduler)  # before the folder is created
         with held_folder(folder):
             damage = begin_or_resume(folder, manifest, self._text or as_yaml(self.study))
             journal, damage_of_rows = open_journal(folder, manifest)
@@ -118,9 +118,9 @@ class Campaign:
                 try:
                     if not flights.are_complete:
                         asked.compile()
-                        journal.make_note(WRITTEN, "")  # until it has the rows to come
+                        journal.make_note(WRITTEN, "")  # the table is outdated
                         flights.fly(progress or (lambda _: None), options)
-                finally:  # whatever ended it: the rows that there are have their table
+                finally:  # also after an error: write the table of all flown rows
                     runs_of_table = flights.precision.stop
                     write_if_older(folder, journal, manifest, runs_of_table)
                 fly_bags(folder, asked.flyer, journal, runs_of_table, processes)
@@ -128,6 +128,6 @@ class Campaign:
 
 
 def as_yaml(study: Study) -> str:
-    """Write a study as a campaign's file."""
+    """Return the text of a campaign's file of a study."""
     content = study.model_dump(by_alias=True, exclude_defaults=True)
     return yaml.safe_dump(content, sort_keys=False, allow_unicode=True)

@@ -1,4 +1,4 @@
-"""The table of a folder's journal, written where it is missing, damaged or older than the rows."""
+"""Updates of a campaign's table from its journal, where it is missing, damaged or outdated."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ from ..study import Study
 from .precision import Precision
 
 WRITTEN = "table"
-"""Note of the journal: the runs in the table and the digest of its bytes; none while it flies."""
+"""Note of the journal: number of runs and digest of the table; empty during the flights."""
 
 
 def write_if_older(folder: Path, journal: Journal, manifest: Manifest, runs: int) -> None:
-    """Write the table of the first ``runs`` runs, unless it is there, undamaged."""
+    """Write the table of the first ``runs`` runs unless it exists undamaged."""
     path = folder / TABLE
     with suppress(InputError):
         check_table(path, manifest.campaign)
@@ -31,13 +31,13 @@ def write_if_older(folder: Path, journal: Journal, manifest: Manifest, runs: int
 
 
 def recover_table(folder: Path, manifest: Manifest, study: Study) -> list[str]:
-    """Write the table of a campaign that was killed, of the rows that its journal has.
+    """Write the table of a killed campaign from the rows of its journal.
 
     Returns:
-        What was damaged, a line each.
+        A line for each damaged file.
 
     Raises:
-        InputError: another process flies it now, or nothing can be written there.
+        InputError: another process is flying it, or the folder cannot be written.
     """
     with held_folder(folder):
         journal, damage = open_journal(folder, manifest)

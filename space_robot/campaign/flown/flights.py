@@ -1,4 +1,4 @@
-"""The flights of a campaign that are not in its journal yet, flown into it."""
+"""Execution of the flights of a campaign that are not in its journal yet."""
 
 from __future__ import annotations
 
@@ -22,20 +22,20 @@ class Progress(NamedTuple):
     """Progress of a campaign."""
 
     done: int
-    """Flights that have a row."""
+    """Number of flights that have a row."""
     total: int
-    """Flights that there are to be."""
+    """Total number of flights."""
     kept: int
-    """Of those done: flown before, when the campaign was begun."""
+    """Number of done flights that an earlier call had flown."""
     failed: int
-    """Of those done: ended early, or have no flight at all."""
+    """Number of done flights that ended early or were not flown."""
 
 
 class Flights:
     """The flights of a campaign."""
 
     def __init__(self, flyer: RowFlyer, runs: int, journal: Journal) -> None:
-        """Take what the journal has.
+        """Read the rows of the journal.
 
         Args:
             flyer: of the campaign's tasks.
@@ -48,14 +48,14 @@ class Flights:
         self._failed = 0
         self.precision = Precision(flyer.study, runs, flyer.draws.grid)
         for row in journal.rows(runs):
-            if row.is_final:  # what chance or the machine had a part in is tried again
+            if row.is_final:  # results that may depend on the machine are flown again
                 self._count(row)
         self.kept = int(self._done.sum())
-        """Flights that were in the journal."""
+        """Number of flights that were in the journal."""
 
     @property
     def count(self) -> int:
-        """Flights that there are to be."""
+        """Total number of flights."""
         return self.precision.stop * len(self._laws)
 
     def missing(self) -> Iterator[Task]:
@@ -68,18 +68,18 @@ class Flights:
 
     @property
     def are_complete(self) -> bool:
-        """True if there is nothing left to fly."""
+        """True if no flight is missing."""
         return next(self.missing(), None) is None
 
     def fly(self, on_progress: Callable[[Progress], object], options: Mapping[str, Any]) -> None:
-        """Fly what is missing; each row is in the journal as soon as it is there.
+        """Fly the missing flights; each row is stored in the journal at once.
 
         Args:
             on_progress: called at the beginning and after every flight.
             options: of `run_many`.
 
         Raises:
-            InputError: the journal cannot be written, or the scheduler is not there.
+            InputError: the journal cannot be written, or the scheduler does not answer.
         """
         done = run_many(self._flyer, self.missing(), **options)
         with closing(done):
@@ -93,7 +93,7 @@ class Flights:
                     return
 
     def _unflown(self, task: Task, error: Exception | None) -> Row:
-        """Return the row of a flight whose process brought none."""
+        """Return the row of a flight whose process returned none."""
         vary = self._flyer.draws.values(task.run)
         if isinstance(error, (WorkerDiedError, OutOfTimeError)):
             outcome = KILLED if isinstance(error, WorkerDiedError) else OUT_OF_TIME

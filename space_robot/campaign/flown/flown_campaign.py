@@ -1,4 +1,4 @@
-"""A campaign that was flown: its table, its verdicts, and any of its flights again."""
+"""A flown campaign: its table, its verdicts, and reruns of its flights."""
 
 from __future__ import annotations
 
@@ -46,14 +46,14 @@ class FlownCampaign:
         Args:
             folder: of the campaign.
             trust: see `open`.
-            temporary: the same, if it is to go with this object.
-            kept: flights that were there when it was flown on.
+            temporary: the folder, if it is to be deleted with this object.
+            kept: number of flights that existed when the campaign was resumed.
 
         Raises:
-            InputError: no campaign is there, or its manifest is damaged.
+            InputError: it is not a campaign folder, or its manifest is damaged.
         """
         if not (folder / MANIFEST).is_file():
-            raise InputError(f"{folder}: is no campaign's folder (it has no {MANIFEST})")
+            raise InputError(f"{folder}: not a campaign folder (it has no {MANIFEST})")
         self.folder, self.kept, self._trust, self._temporary = folder, kept, trust, temporary
         self.manifest: Manifest = read_manifest(folder / MANIFEST)
 
@@ -62,61 +62,61 @@ class FlownCampaign:
         """Open the campaign in a folder, complete or not.
 
         Args:
-            folder: of the campaign; it may be anybody's.
-            trust: let `rerun` import the ``module:Class`` and read the files that it names.
+            folder: of the campaign; it may come from anyone.
+            trust: allow `rerun` to import each ``module:Class`` and read each file it refers to.
 
         Raises:
-            InputError: no campaign is there, or its manifest is damaged.
+            InputError: it is not a campaign folder, or its manifest is damaged.
         """
         return cls(as_path(folder, "folder"), trust)
 
     @property
     def seed(self) -> int:
-        """Of all draws."""
+        """Seed of all draws."""
         return self.manifest.seed
 
     @property
     def runs(self) -> int:
-        """Runs that were asked for; fewer may be in the table."""
+        """Number of requested runs; the table may have fewer."""
         return self.manifest.runs
 
     @cached_property
     def study(self) -> Study:
-        """The study that was flown, whatever ``campaign.yaml`` says by now."""
+        """The study that was flown, even if ``campaign.yaml`` was changed since."""
         where = str(self.folder / MANIFEST)
         return validate(Study, self.manifest.study, f"{where}: study").named(where)
 
     @property
     def study_changes(self) -> str:
-        """How ``campaign.yaml`` differs from the study that was flown, in a line; or empty."""
+        """Difference of ``campaign.yaml`` from the study that was flown, in a line; or empty."""
         return study_changes(self.folder / STUDY, self.study.content)
 
     @cached_property
     def table(self) -> DataFrame:
-        """All rows: a flight each, by run, then by law.
+        """All rows, one per flight, ordered by run, then by law.
 
         Raises:
-            InputError: it cannot be read, or is damaged.
+            InputError: the table cannot be read, or is damaged.
         """
         check_table(self.folder / TABLE, self.manifest.campaign)
         return read_table(self.folder / TABLE, self.manifest.table)
 
     @cached_property
     def verdicts(self) -> list[Verdict]:
-        """Verdicts on each requirement, by law."""
+        """Verdicts on each requirement, for each law and grid point."""
         return verdicts(self.table, self.study, self.runs, list(self.manifest.table.grid))
 
     def rerun(self, run: int, law: str | None = None, bag: str | Path | None = None) -> Rerun:
-        """Fly a row's flight again, to the same bits, with its whole log.
+        """Fly a row's flight again, bit for bit, and return its complete log.
 
         Args:
             run: number of the run.
-            law: as the campaign's file has it; None: its first.
-            bag: folder to record to, which must not be there yet.
+            law: as in the campaign's file; None: its first law.
+            bag: folder to record to, which must not exist.
 
         Raises:
-            InputError: there is no such row, or its draws make no flight.
-            NotTrustedError: the campaign names a module or a file, and is not trusted, see `open`.
+            InputError: there is no such row, or its draws cannot be flown.
+            NotTrustedError: an untrusted campaign refers to a module or a file, see `open`.
         """
         if not self._trust:
             check_study(self.study)
@@ -124,7 +124,7 @@ class FlownCampaign:
         table = self.table
         rows = table[(table["run"] == task.run) & (table["law"] == task.law)]
         if rows.empty:
-            raise InputError(f"run {run}: {self.folder} has no row of it under {task.law}")
+            raise InputError(f"run {run}: {self.folder} has no row of this run under {task.law}")
         flyer = RowFlyer.of(self.study, self.seed, self.runs)
         flight = flyer.draws.scenario(task.run, task.law).check()
         flown = fly_in_process(flight, None if bag is None else Path(bag))
@@ -150,10 +150,10 @@ CAMPAIGN = "campaign"
 
 
 def check_study(study: Study) -> None:
-    """Check that a study imports no module and opens no file but those that are shipped.
+    """Check that a study refers to shipped modules and files only.
 
     Raises:
-        NotTrustedError: it names one.
+        NotTrustedError: it refers to another one.
     """
     controller = study.scenario.get("parameters", {}).get("controller", {})
     named = [Law.parse(law).controller for law in study.laws]
@@ -165,7 +165,7 @@ def check_study(study: Study) -> None:
 
 
 class Rerun(FlownFlight):
-    """A `FlownFlight` that knows whether it is the one of the campaign's table."""
+    """A flight flown again, compared with its row in the campaign's table."""
 
     def __init__(
         self,
@@ -175,14 +175,14 @@ class Rerun(FlownFlight):
         digest_of_row: str,
         other_software: Sequence[str],
     ) -> None:
-        """Take the flight, what it is of, and its digest and that of the row.
+        """Store the flight, its task, its digest and that of the row.
 
         Args:
             flown: with its log.
             task: run and law.
             digest: of this flight.
-            digest_of_row: of the table; empty if the row has no flight.
-            other_software: what differs from the software that flew the campaign.
+            digest_of_row: from the table; empty if the row's flight was not flown.
+            other_software: differences from the software that flew the campaign.
         """
         super().__init__(flown.flight, flown.ending, flown.bag, flown.log)
         self.task, self.digest, self.digest_of_row = task, digest, digest_of_row
@@ -190,15 +190,15 @@ class Rerun(FlownFlight):
 
     @property
     def is_same(self) -> bool:
-        """True if the flight has the digest of its row: then it is the same to the last bit."""
+        """True if flight and row have the same digest: then they are equal bit for bit."""
         return self.digest == self.digest_of_row
 
     @property
     def verdict(self) -> str:
-        """What there is to say of that, in a line."""
+        """Result of the comparison in a line."""
         if self.is_same:
             return f"same digest as the row: {self.digest}"
         if not self.digest_of_row:
-            return "the row has no digest: its flight was not flown to an end of its own"
-        why = "; ".join(self._other_software) or "the software is the same: is the machine?"
+            return "the row has no digest: its flight was refused, killed or out of time"
+        why = "; ".join(self._other_software) or "the software is the same, check the machine"
         return f"digest {self.digest} differs from the row's {self.digest_of_row} ({why})"

@@ -1,4 +1,4 @@
-"""When a campaign may stop: as soon as every requirement's share is known well enough."""
+"""Stopping rule of a campaign: stop when the share of every requirement is precise enough."""
 
 from __future__ import annotations
 
@@ -12,24 +12,24 @@ from ..study import Requirement, Study
 from ..verdicts.share_test import Sequential
 
 CHECKED_EVERY = 50
-"""Draws between two looks. A draw is flown by every law at every point of the grid, and looks are
-at fixed numbers of draws, so that neither workers nor kills have a say in where a campaign stops.
+"""Draws between two checks. A draw is flown by every law at every grid point. The checks are at
+fixed numbers of draws, so that the end does not depend on the workers or on interruptions.
 """
 
 
 class Precision:
-    """Counts the runs that met each requirement, and finds the number of runs at which to stop.
+    """Counts the runs that met each requirement, and computes the number of runs to stop at.
 
-    The share must be known to the precision asked for under every law at every point of the grid.
+    The required precision must be reached for every law and every grid point.
     """
 
     def __init__(self, study: Study, runs: int, grid: Mapping[str, int]) -> None:
-        """Begin without rows.
+        """Start without rows.
 
         Args:
             study: the campaign's file.
             runs: of the whole campaign.
-            grid: the number of values of each variable that is a grid.
+            grid: number of values of each grid variable.
         """
         self._require, self._until = study.require, study.until
         self._number = {law: number for number, law in enumerate(study.laws)}
@@ -39,13 +39,13 @@ class Precision:
         self._met = np.zeros((runs, laws, demands), bool)
         self._counts = np.zeros((self._points, laws, demands), np.int64)
         self._whole = 0
-        """Runs from the first on that all laws have flown."""
+        """Number of consecutive runs, from the first, that all laws have flown."""
         self.stop = runs
-        """Runs that count: those from here on are dropped."""
+        """Number of runs in the table; later ones are dropped."""
         self.is_reached = False
 
     def add(self, row: Row) -> None:
-        """Take a row, in any order."""
+        """Add a row; the order of calls does not matter."""
         if self._until is None or self.is_reached or row.task.run >= len(self._flown):
             return
         run, law = row.task.run, self._number[row.task.law]
@@ -68,12 +68,12 @@ class Precision:
 
 
 def is_narrow(demand: Requirement, failures: int, runs: int, half_width: float) -> bool:
-    """Return True if the interval of the share of runs that meet a requirement is that narrow."""
+    """Return True if the half-width of the share's interval is at most ``half_width``."""
     test = Sequential(demand.share, demand.confidence)
     return test.interval(failures, runs).half_width <= half_width
 
 
 def is_met(row: Row, require: dict[str, Requirement], name: str) -> bool:
-    """Return whether a row meets a requirement; one that did not come to its end meets none."""
+    """Return True if a row meets a requirement; False if its flight ended early."""
     value = row.require.get(name)
     return row.is_complete and value is not None and require[name].is_met(value)

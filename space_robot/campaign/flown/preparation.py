@@ -1,4 +1,4 @@
-"""A campaign before it flies: all that can be checked is, and its folder's manifest is made."""
+"""Preparation of a campaign: checks before its first flight, and the manifest of its folder."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from ..store.software import file_digests, flight_digest, software
 from ..study import Study
 
 ACTUATORS = "actuators"
-"""What the name of a variable that chooses the base's actuators ends with."""
+"""End of the name of a variable that selects the base's actuators."""
 
 
 @dataclass(frozen=True)
@@ -33,10 +33,10 @@ class Preparation:
 
     @classmethod
     def of(cls, study: Study, seed: int, runs: int | None) -> Preparation:
-        """Take what is asked for; ``runs``: None: what the file says.
+        """Check seed and number of runs; ``runs`` None: from the file.
 
         Raises:
-            InputError: nobody says how many runs there are; or the seed is negative.
+            InputError: the number of runs is missing, or the seed is negative.
         """
         if seed < 0:
             raise InputError(f"seed: 0 or more is allowed, got {seed}")
@@ -45,7 +45,7 @@ class Preparation:
 
     @cached_property
     def flyer(self) -> RowFlyer:
-        """What flies each task."""
+        """Flies each task of the campaign."""
         return RowFlyer.of(self.study, self.seed, self.runs)
 
     @cached_property
@@ -60,10 +60,10 @@ class Preparation:
 
     @cached_property
     def manifest(self) -> Manifest:
-        """What the folder is to say of it.
+        """Manifest of the campaign's folder.
 
         Raises:
-            InputError: something cannot be flown or required.
+            InputError: something cannot be flown, or a required metric does not exist.
         """
         where = self.study.where
         for flight in self.flights.values():
@@ -84,7 +84,7 @@ class Preparation:
         )
 
     def compile(self) -> None:
-        """Compile what the flights need once, before there are several processes to do so."""
+        """Compile the kernels once, before several processes need them."""
         has_hardware = any(flight.plant.names.actuators for flight in self.flights.values())
         is_varied = any(name.endswith(ACTUATORS) for name in self.flyer.draws.names)
         compile_kernels(has_hardware or is_varied)

@@ -1,4 +1,4 @@
-"""A folder for a new robot: itself, a mission, gains for all laws, each flown once."""
+"""Folder of a new robot: its description, a mission, and gains of all laws, each flown once."""
 
 from .folder import check_replaceable
 from .make import NewRobot, make_robot

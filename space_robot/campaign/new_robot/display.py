@@ -1,4 +1,4 @@
-"""The flights of a new robot as a table."""
+"""Table of the flights of a new robot."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A folder that is whole or not there: written beside its place, then renamed."""
+"""Atomic creation of a folder: written beside its destination, then renamed."""
 
 from __future__ import annotations
 
@@ -15,33 +15,33 @@ from ...console.files import make_folder
 
 
 def check_replaceable(folder: Path, force: bool, files: Collection[str]) -> None:
-    """Check that a folder can be made there, before any work is done for it.
+    """Check that a folder can be created or replaced.
 
     Args:
-        folder: to be made.
-        force: whether one that is there may be replaced.
-        files: those that tell the robot; they, mission and gains may be lost then.
+        folder: to be created.
+        force: True if an existing folder may be replaced.
+        files: names of the robot's files; only these, mission and gains may be overwritten.
 
     Raises:
-        InputError: something is there that is not to be lost.
+        InputError: something exists there that must not be overwritten.
     """
     if not folder.exists() and not folder.is_symlink():
         return
     if not force:
-        raise InputError(f"{folder}: exists already: name another with --out, or give --force")
+        raise InputError(f"{folder}: exists already: choose another with --out, or use --force")
     if not folder.is_dir():
-        raise InputError(f"{folder}: exists, and is no folder; it is not replaced")
+        raise InputError(f"{folder}: exists and is not a folder; it is not replaced")
     known = {*files, OWN_MISSION, OWN_GAINS}
     if others := sorted(entry.name for entry in folder.iterdir() if entry.name not in known):
-        raise InputError(f"{folder}: holds {others[0]!r} as well: it is not replaced")
+        raise InputError(f"{folder}: also contains {others[0]!r}: it is not replaced")
 
 
 @contextmanager
 def whole_folder(folder: Path) -> Iterator[Path]:
-    """Give a folder to write in, which takes the place of ``folder`` once all has gone well.
+    """Yield a temporary folder that replaces ``folder`` if the block ends without error.
 
     Raises:
-        InputError: it cannot be written.
+        InputError: the folder cannot be written.
     """
     make_folder(folder.parent)
     place = folder.parent / f".{folder.name}.{token_hex(4)}"

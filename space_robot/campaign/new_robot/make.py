@@ -1,4 +1,4 @@
-"""Makes the folder of a new robot, and flies all laws with what is in it."""
+"""Creates the folder of a new robot, and flies all laws with its mission and gains."""
 
 from __future__ import annotations
 
@@ -29,35 +29,35 @@ from .folder import whole_folder
 from .motion import mission_text, rest_to_rest
 
 SET, CASE = "tuned", "1"
-"""The gain set that is made, and the environment that it is made for and flown in."""
+"""Name of the tuned gain set, and the environment of tuning and flights."""
 WISHES = TuningOptions(margin=0.05, mass_uncertainty=0.2)
-"""Those of ``gains tune``."""
+"""Defaults of ``gains tune``."""
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """A law's flight."""
+    """Result of a law's flight."""
 
     rms: dict[str, float]
-    """Of attitude and joint errors and torques, mean over the axes; empty if it failed."""
+    """RMS of attitude and joint errors and torques, mean of the axes; empty if it failed."""
     failure: str
-    """Why it ended early; empty if it did not."""
+    """Why the flight ended early; empty if it did not."""
 
 
 @dataclass(frozen=True)
 class NewRobot:
-    """What was made, and how it flew."""
+    """The new robot, its files, and the results of its flights."""
 
     folder: Path
     robot: Robot
     mission: MissionSettings
     flights: dict[str, Outcome]
-    """By law."""
+    """Results by law."""
     remarks: tuple[str, ...] = ()
-    """Why laws are weak, which joints may be passive; a sentence or more each."""
+    """Remarks on weak laws and on joints that may be passive, in sentences."""
 
     def report(self) -> dict[str, Any]:
-        """Return it as data for JSON."""
+        """Return the content as data for JSON."""
         return {
             "folder": str(self.folder),
             "robot": self.robot.name,
@@ -80,18 +80,18 @@ def make_robot(
     command: str,
     step: Callable[[str], None] = lambda text: None,
 ) -> NewRobot:
-    """Make the folder of a robot and fly every law once with what is in it.
+    """Create the folder of a robot, and fly every law once with its mission and gains.
 
     Args:
-        files: texts of the files that tell the robot, by name, see `robot_texts`.
-        robot: that they tell.
-        folder: to be made, or replaced, see `check_replaceable`; nothing of it is left if anything
-            fails but a flight.
-        command: what makes it, for the files.
+        files: texts of the robot's files by name, see `robot_texts`.
+        robot: defined by these files.
+        folder: to be created or replaced, see `check_replaceable`; nothing is left of it after an
+            error other than a failed flight.
+        command: the user's command, for the files' headers.
         step: called with a description of each step.
 
     Raises:
-        InputError: no mission can be made, or the folder cannot be written.
+        InputError: no mission is possible, or the folder cannot be written.
     """
     with whole_folder(folder) as place:
         for name, text in files.items():
@@ -122,14 +122,14 @@ def _fly(folder: Path, law: str) -> Outcome:
 
 
 FREQUENCY_HZ, DAMPING_RATIO = 0.5, 0.005
-"""Of the springs that are proposed, as of a large solar panel."""
+"""Natural frequency and damping of proposed springs, typical of a large solar panel."""
 
 
 def hinges(robot: Robot) -> dict[str, dict[str, float]]:
     """Return stiffness, N m/rad, and damping, N m s/rad, of the joints that may be hinges.
 
-    They are the revolute joints that carry a single body on the base, with no tool, of a robot
-    that has an arm of more joints beside them.
+    These are revolute joints on the base that carry a single body without tool, if the robot also
+    has an arm with more joints.
     """
     if max(robot.branches) < 2:
         return {}
@@ -148,7 +148,7 @@ def hinges(robot: Robot) -> dict[str, dict[str, float]]:
 
 
 def hinge_remark(robot: Robot) -> str:
-    """Return a proposal to make hinges passive; empty if there are none."""
+    """Return a proposal to make possible hinges passive; empty if there are none."""
     names = hinges(robot)
     if not names:
         return ""
@@ -158,5 +158,5 @@ def hinge_remark(robot: Robot) -> str:
     return (
         f"{', '.join(names)}: each carries one body on the base. If that is a panel on a hinge "
         f"without a motor, add to `robot:` in robot.yaml `{flow.strip()[1:-1]}` (springs of "
-        f"{FREQUENCY_HZ:g} Hz: yours may be others), and give that file to `space-robot new`."
+        f"{FREQUENCY_HZ:g} Hz: adapt them), and run `space-robot new` with that file."
     )

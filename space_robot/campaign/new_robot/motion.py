@@ -1,8 +1,8 @@
-"""A mission for a robot that has none: rest to rest, within the limits of its joints.
+"""A rest-to-rest mission for a new robot, within the limits of its joints.
 
-Every joint starts at zero, or as near to it as its range allows, turns one way and then back
-beyond its start, neighbours in opposite directions. The legs last so long that no joint needs more
-than a share of its limits: velocities fall with the duration, torques with its square.
+Every joint starts at zero, or as near to it as its range allows, moves in one direction and then
+back beyond its start, neighbours in opposite directions. The duration of the legs keeps velocity
+and effort below a share of their limits: they scale with 1/T and 1/T^2.
 """
 
 from __future__ import annotations
@@ -25,19 +25,19 @@ LEG_S = 10.0
 """The shortest duration of a leg, s."""
 LONGEST_LEG_S = 600.0
 TURN, SLIDE = math.radians(30.0), 0.25
-"""The largest way of a joint from its start: rad, m."""
+"""Largest displacement of a joint from its start: rad, m."""
 OF_THE_RANGE, OF_THE_LIMITS = 0.25, 0.5
-"""The largest share of its range that a joint moves from its start, and of its limits of velocity
-and effort that it needs."""
+"""Largest displacement as a share of the joint's range; largest velocity and effort as shares of
+their limits."""
 PEAK_VELOCITY = 1.875
-"""Of a quintic from rest to rest, as a multiple of its mean."""
+"""Peak velocity of a rest-to-rest quintic, relative to its mean velocity."""
 
 
 def rest_to_rest(robot: Robot) -> MissionSettings:
     """Return a mission for the actuated joints of ``robot``, the base's attitude held.
 
     Raises:
-        InputError: the joints are too weak to move so within `LONGEST_LEG_S`.
+        InputError: the limits would need legs longer than `LONGEST_LEG_S`.
     """
     nominal = robot.nominal
     lower, upper, velocity, effort = (
@@ -55,19 +55,19 @@ def rest_to_rest(robot: Robot) -> MissionSettings:
     leg = math.ceil(leg)
     if leg > LONGEST_LEG_S:
         raise InputError(
-            f"robot {robot.name!r}: its limits of velocity and effort are so low that a mission "
-            f"would take legs of {leg} s: write one by hand"
+            f"robot {robot.name!r}: with its limits of velocity and effort the legs of a mission "
+            f"would last {leg} s: write a mission by hand"
         )
     return _mission(robot, points, leg)
 
 
 def mission_text(robot: Robot, mission: MissionSettings, command: str) -> str:
-    """Return a mission as the file of it, a waypoint a line.
+    """Return the text of a mission's file, one waypoint per line.
 
     Args:
         robot: whose joints the mission moves.
         mission: to be written.
-        command: what made it.
+        command: the user's command, for the header.
     """
     rows = np.reshape(mission.waypoints_deg, (-1, robot.n))
     lines = [f"[{', '.join(f'{value:g}' for value in row)}]" for row in rows.tolist()]
@@ -78,8 +78,8 @@ def mission_text(robot: Robot, mission: MissionSettings, command: str) -> str:
     waypoints = ",\n                    ".join(line[1:-1] for line in lines)
     times = ", ".join(f"{time:g}" for time in mission.waypoint_times)
     return (
-        f"# Made by `{command}`: from rest to rest within the limits of the joints; nothing looks\n"
-        f"# for collisions. A line is a waypoint: {joints}.\n"
+        f"# Made by `{command}`: from rest to rest within the limits of the joints. Collisions\n"
+        f"# are not checked. A line is a waypoint: {joints}.\n"
         "mission_node:\n"
         "  ros__parameters:\n"
         f"    waypoint_times: [{times}]\n"

@@ -1,4 +1,4 @@
-"""The files that tell a robot in a folder of its own."""
+"""Files of a new robot's folder that define the robot."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from space_robot_model.robot.urdf import read_urdf
 ROBOT_FILE = f"{OWN}.yaml"
 HEAD = """\
 # Made by `{command}`. What URDF cannot say goes here:
-#   passive: {{hinge: {{stiffness: 120.0, damping: 0.3}}}}   springs in the place of motors
+#   passive: {{hinge: {{stiffness: 120.0, damping: 0.3}}}}   springs instead of motors
 #   tools: [left_hand, right_hand]                       links whose frames are end effectors
 """
 
@@ -22,19 +22,19 @@ HEAD = """\
 def robot_texts(
     file: Path, base: str | None, repair: bool, command: str
 ) -> tuple[dict[str, str], Robot]:
-    """Return the texts of the files that tell a robot, by their names, and the robot.
+    """Return the texts of a robot's files by name, and the robot.
 
-    A URDF stays a URDF, expanded if it was xacro, beside a YAML that refers to it. Of a YAML there
-    is one that is complete in itself.
+    A URDF stays a URDF, expanded if it was xacro, with a YAML that refers to it. A YAML becomes
+    one self-contained file.
 
     Args:
         file: URDF, xacro or YAML.
-        base: the link that is the satellite, of a URDF (None: its root).
+        base: name of the link that is the satellite, of a URDF (None: its root).
         repair: whether a URDF's defects are repaired.
-        command: what asks for it, for the YAML.
+        command: the user's command, for the header.
 
     Raises:
-        InputError: the file is wrong, or what was asked is for a URDF.
+        InputError: the file is invalid, or ``base`` or ``repair`` is set for a YAML.
     """
     source = read_robot_file(file, base, repair)
     if file.suffix not in URDF:

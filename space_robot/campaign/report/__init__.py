@@ -1,1 +1,1 @@
-"""Reports of a campaign, as tables on a terminal and as one self-contained page."""
+"""Reports of a campaign, as tables on a terminal and as a self-contained HTML page."""

@@ -1,4 +1,4 @@
-"""Numbers along logarithmic axes, and the laws' legend above them."""
+"""Tick labels of logarithmic axes, and the legend of the laws."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from ...analysis.figures.style import legend_above
 from ..study import short_names
 
 NARROW = 1.6
-"""Decades below which numbers stand between powers of ten, too."""
+"""Axes with fewer decades have labels between powers of ten, too."""
 
 
 def number_log_axis(axes: Axes, name: str) -> None:
-    """Put numbers along the logarithmic axis ``x`` or ``y`` that do not run into one another."""
+    """Label the logarithmic axis ``x`` or ``y`` without overlaps."""
     axis = {"x": axes.xaxis, "y": axes.yaxis}[name]
     low, high = axis.get_view_interval()
     if 0.0 < low < high and log10(high / low) < NARROW:
@@ -27,5 +27,5 @@ def number_log_axis(axes: Axes, name: str) -> None:
 
 
 def law_legend(figure: Figure, laws: Sequence[str], dashed: bool = True) -> None:
-    """Return the shortest distinct names of the laws above a figure."""
+    """Draw a legend of the laws above a figure."""
     legend_above(figure, list(short_names(laws).values()), dashed=dashed)

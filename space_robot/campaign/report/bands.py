@@ -1,4 +1,4 @@
-"""Percentile bands over time: how a campaign's errors and torques run, law beside law."""
+"""Percentile bands over time of a campaign's errors and torques, for each law."""
 
 from __future__ import annotations
 
@@ -24,22 +24,21 @@ Array = NDArray[np.float64]
 
 SHARES = (0.05, 0.5, 0.95)
 MOST_PANELS = 12
-"""Points of a grid that are drawn."""
+"""Maximum number of grid points that are drawn."""
 DECADES = 2.0
-"""A worst flight may rise so many decades above the 95 % of all laws before it is cut off."""
+"""Decades above the largest 95 % curve at which the worst flight's curve is cut off."""
 
 
 def series_of(table: DataFrame) -> list[str]:
-    """Return the names of the series of which there are bands."""
+    """Return the names of the series that have bands."""
     names = [c.removeprefix("band.") for c in map(str, table) if c.startswith("band.")]
     return [name for name in names if table[f"band.{name}"].notna().any()]
 
 
 def bands(rows: DataFrame, series: str) -> Array:
-    """Compute the quantiles `SHARES` of a series at every time, and the largest number: (4, bins).
+    """Compute the quantiles `SHARES` and the maximum of a series at every time, (4, bins).
 
-    From its end on a flight that failed counts as worse than any number; the largest is of those
-    that still fly.
+    A failed flight counts as infinite from its end on; the maximum is that of the other flights.
 
     Args:
         rows: of one law, at one point of the grid.
@@ -62,13 +61,13 @@ def bands(rows: DataFrame, series: str) -> Array:
 def band_figure(
     parts: Sequence[GridPoint], laws: Sequence[str], series: str, time_s: float
 ) -> Figure:
-    """Draw a series over time: a panel a law, or where there is a grid a panel a point.
+    """Draw a series over time: one panel per law, or per grid point if there is a grid.
 
     Args:
-        parts: points of the grid; one if there is none.
+        parts: points of the grid; one if there is no grid.
         laws: of the campaign.
         series: a name of `series_of`.
-        time_s: what all bins last together, s.
+        time_s: duration of all bins together, s.
     """
     shown = parts[:MOST_PANELS]
     curves = {
@@ -111,13 +110,13 @@ def band_figure(
 
 
 def columns_of(panels: int) -> int:
-    """Return in how many columns so many panels stand."""
+    """Return the number of columns for a number of panels."""
     return 2 if panels in (2, 4) else min(3, panels)
 
 
 def _draw_band(axes: Axes, time: Array, drawn: Array, colour: str) -> None:
     low, middle, high, worst = drawn
-    # where more than 5 % have failed the band has no upper edge: it is open to the top
+    # where more than 5 % of the flights have failed, the band is open at the top
     top = np.where(np.isnan(high), np.nanmax(drawn, initial=0.0) * 1e6, high)
     axes.fill_between(time, low, top, color=colour, alpha=0.25, linewidth=0.0)
     axes.plot(time, middle, color=colour)
@@ -141,7 +140,7 @@ def _name_bands(figure: Figure) -> None:
 
 
 def _scale(axes: Axes, curves: Sequence[Array]) -> None:
-    """Make the common vertical axis logarithmic, from the least of the 5 % on."""
+    """Make the common vertical axis logarithmic, starting at the minimum of the 5 % curves."""
     axes.set_yscale("log", nonpositive="mask")
     low, high, worst = (
         np.concatenate([v[k][np.isfinite(v[k]) & (v[k] > 0.0)] for v in curves]) for k in (0, 2, 3)

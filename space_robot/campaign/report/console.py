@@ -1,4 +1,4 @@
-"""A report on a terminal and as Markdown: a table for every group."""
+"""A report on a terminal and as Markdown, with a table for every group."""
 
 from __future__ import annotations
 
@@ -18,15 +18,15 @@ from .sensitivity_tables import sensitivity_table, sobol_table
 from .verdict_tables import verdict_grid, verdict_table, worst_table
 
 INFLUENCES = 3
-"""Variables a law."""
+"""Variables shown per law."""
 SECOND_INTERVAL = 5
-"""The column of the league for which a terminal has no room."""
+"""Column of the league that is too wide for a terminal."""
 PLAIN, PARTIAL = 1, 2
-"""The columns of the sensitivities, for one of which it has."""
+"""Columns of the sensitivities, of which a terminal shows one."""
 
 
 def print_report(findings: Findings, console: Console) -> None:
-    """Print the tables of a report, and the worst runs with the commands that fly them again."""
+    """Print the tables of a report, and the worst runs with the commands to rerun them."""
     for table in tables(findings):
         print_table(table, console, dense=True)
         say(console, "")
@@ -40,12 +40,12 @@ def print_report(findings: Findings, console: Console) -> None:
 
 
 def markdown(findings: Findings) -> str:
-    """Write the tables as a document."""
+    """Return the tables as a Markdown document."""
     return as_markdown(f"Campaign {findings.subject.folder.name}", [*tables(findings)])
 
 
 def tables(findings: Findings) -> Iterator[Table]:
-    """Yield the tables, none of which has groups; what explains several stands below the last."""
+    """Yield the tables, without groups; notes on several tables follow the last of them."""
     yield flown_table(findings)
     yield outcome_table(findings)
     if findings.grid:
@@ -59,13 +59,13 @@ def tables(findings: Findings) -> Iterator[Table]:
 
 
 def _weaker(findings: Findings) -> int:
-    """Return which correlations are left out: the plain ones, if there are partial ones."""
+    """Return the column of correlations to omit: the plain ones, if there are partial ones."""
     has_partial = any(i.partial for _, _, s in findings.sensitivities for i in s.influences)
     return PLAIN if has_partial else PARTIAL
 
 
 def _without(table: Table, place: int) -> Table:
-    """Return a table without its column at ``place``."""
+    """Return a table without the column ``place``."""
 
     def kept(values: Any) -> list[Any]:
         return [*values[:place], *values[place + 1 :]]
@@ -75,7 +75,7 @@ def _without(table: Table, place: int) -> Table:
 
 
 def split(table: Table) -> Iterator[Table]:
-    """Yield a table for every group of a table, the notes below the last."""
+    """Split a table into one per group, with the notes below the last."""
     for number, group in enumerate(table.groups, start=1):
         notes = table.notes if number == len(table.groups) else ()
         title = ": ".join(text for text in (group.name, group.note) if text) or table.title

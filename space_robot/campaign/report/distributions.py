@@ -1,4 +1,4 @@
-"""Distributions of a quantity over the runs, law beside law."""
+"""Distributions of a quantity over the runs, for each law."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 STEPS, TAIL = 200, 60
-"""Steps of a curve; the outermost `TAIL` runs are drawn one by one."""
+"""Steps of a curve; the `TAIL` runs at either end are drawn individually."""
 SMALL = 60
 """Steps of a curve in a small panel."""
 
@@ -31,12 +31,12 @@ SMALL = 60
 def distribution_figure(
     parts: Sequence[GridPoint], laws: Sequence[str], quantity: Quantity
 ) -> Figure:
-    """Draw what share of the runs is at or below each number, and without a grid what share above.
+    """Draw the cumulative distribution, and without a grid also its complement.
 
     Args:
-        parts: points of the grid; one if there is none.
+        parts: points of the grid; one if there is no grid.
         laws: of the campaign.
-        quantity: what is drawn, with its limit if it has one.
+        quantity: to be drawn, with its limit if it has one.
     """
     if len(parts) == 1:
         return _with_tail(parts[0].table, laws, quantity)
@@ -81,13 +81,13 @@ def _with_tail(table: DataFrame, laws: Sequence[str], quantity: Quantity) -> Fig
 
 
 def _numbers(table: DataFrame, law: str, quantity: Quantity) -> Array:
-    """Return a law's numbers in order, infinite ones of failed flights last."""
+    """Return a law's sorted values; those of failed flights are infinite."""
     numbers: Array = np.sort(measured(of_law(table, law), quantity.column))
     return numbers
 
 
 def _draw(axes: Axes, values: Array, index: int, above: bool = False, small: bool = False) -> None:
-    """Draw one curve; failed flights keep it from 1, or above 0."""
+    """Draw one curve; with failed flights it does not reach 1 (or 0)."""
     runs, look = len(values), LineStyle.of(index)
     known = values[np.isfinite(values) & (values > 0.0)]
     if not len(known):
@@ -108,7 +108,7 @@ def _draw(axes: Axes, values: Array, index: int, above: bool = False, small: boo
 
 
 def _mark_limit(axes: Axes, quantity: Quantity, above: bool) -> None:
-    """Draw a requirement's limit, and the share of the runs that are to be within it."""
+    """Draw a requirement's limit, and the required share of the runs."""
     if quantity.requirement is None or quantity.limit is None or quantity.limit <= 0.0:
         return
     share = quantity.requirement.share

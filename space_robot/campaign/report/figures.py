@@ -1,4 +1,4 @@
-"""The figures of a report, one after the other, with what each shows."""
+"""The figures of a report with their captions."""
 
 from __future__ import annotations
 
@@ -16,22 +16,22 @@ from .findings import Findings
 from .influence_figures import grid_figure, influence_figure, sobol_figure
 
 MOST_INFLUENCES = 4
-"""Points of a grid of which influences are drawn; the table has all."""
+"""Maximum number of grid points with a figure of influences; the table has all."""
 
 
 class CampaignDrawing(NamedTuple):
-    """A figure that can be drawn."""
+    """A figure that is drawn on demand."""
 
     section: str
     """``league``, ``bands``, ``distributions`` or ``sensitivity``."""
     stem: str
-    """Of its file."""
+    """Name of its file."""
     caption: str
     draw: Callable[[], Figure]
 
 
 def drawings(findings: Findings) -> Iterator[CampaignDrawing]:
-    """Yield all figures that the rows allow; none is drawn yet."""
+    """Yield all figures for which there are rows, without drawing them."""
     subject, parts, laws = findings.subject, findings.parts, findings.laws
     known = [q for q in findings.metrics if is_known(subject.table, q.column)]
     several = len(parts) > 1
@@ -69,7 +69,7 @@ def drawings(findings: Findings) -> Iterator[CampaignDrawing]:
 
 
 def summary_figure(findings: Findings) -> Figure | None:
-    """Draw the one figure that says most: the first of the laws, or of the distributions."""
+    """Draw the most important figure: the first of the laws, or of the distributions."""
     by_section = {drawing.section: drawing for drawing in reversed([*drawings(findings)])}
     chosen = by_section.get("league") or by_section.get("distributions")
     return chosen.draw() if chosen else None

@@ -1,4 +1,4 @@
-"""Results of a campaign, computed once for terminal, page and JSON."""
+"""Statistical results of a campaign, computed once for terminal, page and JSON."""
 
 from __future__ import annotations
 
@@ -23,15 +23,15 @@ if TYPE_CHECKING:
     from pandas import DataFrame
 
 CONFIDENCE = 0.95
-"""Of all intervals and comparisons; a requirement has its own."""
+"""Confidence of all intervals and comparisons; a requirement has its own."""
 
 
 class Findings:
-    """What the rows of a campaign say.
+    """Statistical results of a campaign's rows.
 
     Args:
         subject: the campaign.
-        metrics: names of those that laws are compared by; the usual ones if there are none.
+        metrics: names of the metrics to compare laws by; empty: the default ones.
 
     Raises:
         InputError: there is no such metric.
@@ -43,18 +43,18 @@ class Findings:
         self.required = [of_requirement(*item) for item in subject.study.require.items()]
         self.grid = list(subject.grid)
         self.rows = independent_rows(subject.table, subject.study.design)
-        """Those that can be taken for independent draws; all, unless the design is for indices."""
+        """Rows of independent draws: all, except in a Saltelli design."""
         self.parts: list[GridPoint] = parts(self.rows, self.grid)
         self.laws = laws_of(subject.table)
 
     @cached_property
     def names(self) -> dict[str, str]:
-        """Return what tables call each law."""
+        """Return the name of each law in tables."""
         return short_names(self.laws)
 
     @property
     def whole(self) -> GridPoint:
-        """Return all rows, of whatever point of the grid."""
+        """Return the rows of all grid points together."""
         return GridPoint((), "", self.rows)
 
     @cached_property
@@ -64,7 +64,7 @@ class Findings:
 
     @property
     def family_error(self) -> float:
-        """Return the largest probability that any of the verdicts is false."""
+        """Return an upper bound of the probability that any verdict is false."""
         return family_error(self.subject.study, self.verdicts)
 
     @cached_property
@@ -79,13 +79,13 @@ class Findings:
 
     @cached_property
     def driven(self) -> list[Quantity]:
-        """Return what sensitivities and worst runs are of: requirements, or the first metric."""
+        """Return the quantities of sensitivities and worst runs: requirements, or first metric."""
         known = [q for q in self.required if q.column in self.subject.table]
         return known or self.metrics[:1]
 
     @cached_property
     def sensitivities(self) -> list[tuple[GridPoint, Quantity, Sensitivity]]:
-        """Return what drives each quantity under each law at each point of the grid."""
+        """Return the sensitivities of each quantity under each law at each grid point."""
         sensitivities = []
         for quantity in self.driven:
             for part in self.parts:
@@ -98,26 +98,26 @@ class Findings:
     def worst(
         self, part: GridPoint, quantity: Quantity, count: int = 10, law: str = ""
     ) -> DataFrame:
-        """Return the worst rows: flights that failed, the earliest first, then by their numbers.
+        """Return the worst rows: failed flights, the earliest first, then by value.
 
         Args:
-            part: of the grid.
-            quantity: by which.
-            count: rows at most.
-            law: of which law; of all if empty.
+            part: the grid point.
+            quantity: to sort by.
+            count: maximum number of rows.
+            law: rows of this law only; empty: of all.
         """
         rows = turned(part.table, quantity.column, quantity.sign)
         if law:
             rows = of_law(rows, law)
         times = rows["ended_at_s"].to_numpy(np.float64, na_value=0.0)
         values = measured(rows, quantity.column)
-        values[np.isinf(values) & ended(rows)] = -np.inf  # it has no number: neither good nor bad
+        values[np.isinf(values) & ended(rows)] = -np.inf  # not measured: sorted last
         order = np.lexsort((rows["run"], times, -values))
         return part.table.loc[rows.index[order[:count]]]
 
     @cached_property
     def sobol(self) -> list[SobolIndices]:
-        """Return Sobol indices of each quantity under each law, if the design is for them."""
+        """Return Sobol indices of each quantity under each law; empty for other designs."""
         table = self.subject.table
         if self.subject.study.design != SALTELLI:
             return []
@@ -136,7 +136,7 @@ class Findings:
 
     @property
     def _is_precise(self) -> bool:
-        """Return True if the campaign stopped at the precision that its file asks for."""
+        """Return True if the campaign stopped at the precision required by its file."""
         study = self.subject.study
         return study.until is not None and all(
             is_narrow(study.require[v.requirement], v.runs - v.met, v.runs, study.until.half_width)
@@ -145,7 +145,7 @@ class Findings:
 
     @property
     def remarks(self) -> list[str]:
-        """Return what a reader must know of these rows, a sentence each."""
+        """Return remarks on the validity of the rows, one sentence each."""
         subject, table = self.subject, self.subject.table
         remarks, asked = [*subject.remarks], subject.runs * len(subject.study.laws)
         if len(table) < asked and not self._is_precise:

@@ -1,4 +1,4 @@
-"""Tables of what was flown and how it ended."""
+"""Tables of the campaign's definition and of the outcomes of its flights."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from .findings import Findings
 
 
 def flown_table(findings: Findings) -> Table:
-    """Tabulate what the campaign is: file, seed, runs, laws, what is varied, versions."""
+    """Tabulate file, seed, runs, laws, variables and software versions of the campaign."""
     subject = findings.subject
     study, table = subject.study, subject.table
     scenario = ", ".join(f"{key}: {_short(value)}" for key, value in study.scenario.items())
@@ -41,7 +41,7 @@ def outcome_table(findings: Findings) -> Table:
 
 
 def _short(value: object) -> str:
-    """Write a value of the file in one line."""
+    """Return a value of the file as one line."""
     if isinstance(value, str):
         return value
     text = json.dumps(value, default=str).replace('"', "")

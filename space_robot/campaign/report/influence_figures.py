@@ -1,4 +1,4 @@
-"""Figures of what drives an error, and of laws over the points of a grid."""
+"""Figures of sensitivities, and of laws over the points of a grid."""
 
 from __future__ import annotations
 
@@ -16,22 +16,22 @@ from .axes import law_legend, number_log_axis
 from .quantities import Quantity
 
 SHOWN = 10
-"""Variables that are drawn: those that drive any of the laws most."""
+"""Maximum number of variables drawn: the strongest over all laws."""
 PANELS = 5
-"""Laws beside one another."""
+"""Maximum number of laws, one panel each."""
 LONGEST = 34
-"""Letters of a variable's name."""
+"""Maximum length of a variable's name, in characters."""
 
 
 @house_style()
 def influence_figure(sensitivities: Sequence[Sensitivity]) -> Figure:
-    """Draw how strongly each variable drives a quantity, a panel a law.
+    """Draw the influence of each variable on a quantity, one panel per law.
 
-    Bars are the share of the spread that it explains by itself, points its rank correlation (the
-    partial one where there is one) with the interval.
+    Bars show the share of the spread that a variable explains by itself, points its rank
+    correlation (the partial one where it exists) with the confidence interval.
 
     Args:
-        sensitivities: of one quantity, a law each.
+        sensitivities: of one quantity, one per law.
     """
     shown = sensitivities[:PANELS]
     strength: dict[str, float] = {}
@@ -71,7 +71,7 @@ def influence_figure(sensitivities: Sequence[Sensitivity]) -> Figure:
 
 @house_style()
 def sobol_figure(indices: Sequence[SobolIndices]) -> Figure:
-    """Draw first and total Sobol indices of one metric, a panel a law."""
+    """Draw first and total Sobol indices of one metric, one panel per law."""
     shown = indices[:PANELS]
     largest: dict[str, float] = {}
     for each in shown:
@@ -101,7 +101,7 @@ def sobol_figure(indices: Sequence[SobolIndices]) -> Figure:
 
 
 def _short(name: str) -> str:
-    """Cut a long name in its middle, for both ends tell it from others."""
+    """Shorten a long name in its middle: both ends distinguish it from others."""
     if len(name) <= LONGEST:
         return name
     half = (LONGEST - 1) // 2
@@ -118,9 +118,9 @@ def grid_figure(
     """Draw every metric at every point of a grid: medians, with bars from 5 % to 95 % of the runs.
 
     Args:
-        parts: the points.
+        parts: the points of the grid.
         laws: of the campaign.
-        metrics: a panel each.
+        metrics: one panel each.
         names: of the grid's variables.
     """
     figure = page(24.0 + 42.0 * len(metrics))

@@ -1,4 +1,4 @@
-"""Tables of laws beside one another: leagues, pairs, and what to fly at each point of a grid."""
+"""Tables that compare laws: leagues, pairs, and the best laws at each point of a grid."""
 
 from __future__ import annotations
 
@@ -30,18 +30,18 @@ RANKS = (
 
 
 def number(value: float, spec: str = ".3g") -> str:
-    """Write a number; one that is infinite stands for failed flights."""
+    """Format a number; infinity stands for failed flights."""
     return "failed" if math.isinf(value) else "-" if math.isnan(value) else format(value, spec)
 
 
 def span(estimate: Estimate, spec: str = ".3g") -> str:
-    """Write an interval; an end that there is not is a question mark."""
+    """Format an interval; an infinite end is a question mark."""
     low, high = (format(x, spec) if math.isfinite(x) else "?" for x in estimate[1:])
     return f"{low} to {high}"
 
 
 def league_table(findings: Findings) -> Table:
-    """Tabulate the leagues of a campaign without a grid, a group for every metric."""
+    """Tabulate the leagues of a campaign without grid, one group per metric."""
     columns = [
         Column("law", is_label=True),
         Column("rank"),
@@ -71,7 +71,7 @@ def _standing(s: Ranking, name: str) -> list[str]:
 
 
 def pair_table(findings: Findings) -> Table:
-    """Tabulate every pair of laws, a group for every metric and point of the grid."""
+    """Tabulate every pair of laws, one group per metric and grid point."""
     columns = [
         Column("law", is_label=True),
         Column("beside", is_label=True),
@@ -110,9 +110,9 @@ def _pair(c: PairedComparison, names: Mapping[str, str]) -> list[str | JudgedCel
 
 
 def choice_tables(findings: Findings) -> list[Table]:
-    """Tabulate which law to fly at each point of the grid, a table for every metric.
+    """Tabulate the best laws at each point of the grid, one table per metric.
 
-    The grid's variables and the laws are columns, points are rows. The last explains all of them.
+    The grid's variables and the laws are columns, points are rows. The last table has the notes.
     """
     tables = [_choices(findings, metric) for metric in findings.metrics]
     note = (
@@ -153,7 +153,7 @@ def _medians(findings: Findings, league: League) -> list[str]:
 
 
 def best(league: League, names: Mapping[str, str]) -> str:
-    """Name the laws of rank 1 that did not fail in every flight, unless these are all laws."""
+    """Return the laws of rank 1 that completed a flight, unless these are all laws."""
     first = [names[s.law] for s in league.standings if s.rank == 1 and s.failures < s.runs]
     if len(first) == len(league.standings) > 1:
         return "not told apart"

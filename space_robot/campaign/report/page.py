@@ -1,4 +1,4 @@
-"""One self-contained HTML page about a campaign."""
+"""Self-contained HTML page of a campaign."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from .verdict_tables import TONES, demanded, method, verdict_grid, verdict_table
 
 
 def render(findings: Findings) -> str:
-    """Render the page, without references to anything outside itself."""
+    """Render the page; it loads nothing from other files or the network."""
     figures: dict[str, list[tuple[str, str]]] = {}
     with TemporaryDirectory() as folder:
         for number, drawing in enumerate(drawings(findings)):
@@ -50,12 +50,12 @@ def render(findings: Findings) -> str:
 
 
 def lean(svg: str) -> str:
-    """Shorten the numbers of an SVG's paths to hundredths of a point, half its size."""
+    """Round the numbers of an SVG's paths to 0.01 points, which halves its size."""
     return re.sub(r' d="[^"]*"', lambda path: re.sub(r"(\.\d\d)\d+", r"\1", path[0]), svg)
 
 
 def _summaries(findings: Findings) -> list[tuple[str, list[tuple[str, str]]]]:
-    """Say of each requirement what it asks for, and which laws meet it, with tones."""
+    """Return the text of each requirement, and the laws by verdict, with their colours."""
     summaries = []
     for quantity in findings.required:
         own = [v for v in findings.verdicts if v.requirement == quantity.name]
@@ -73,12 +73,12 @@ def _summaries(findings: Findings) -> list[tuple[str, list[tuple[str, str]]]]:
 
 
 def _counted(names: list[str]) -> str:
-    """Say under what it is so: by names, or how many if there are many."""
+    """Return the list of names, or their number if there are many."""
     return f"under {', '.join(names)}" if len(names) <= 8 else f"{len(names)} times"
 
 
 def _worst(findings: Findings) -> list[tuple[Table, list[Table]]]:
-    """Return the worst runs of all laws, and without a grid those of each law."""
+    """Return the worst runs of all laws, and without a grid also those of each law."""
     rows = []
     for quantity in findings.driven:
         for part in findings.parts:

@@ -1,4 +1,4 @@
-"""The numbers of a campaign's table that a report is about, and how they are called."""
+"""Columns of a campaign's table that a report evaluates, with headings and units."""
 
 from __future__ import annotations
 
@@ -22,17 +22,17 @@ SUFFIXES = {"_rms": "RMS", "_max": "largest"}
 
 
 class Quantity(NamedTuple):
-    """A column of numbers, of which less is better unless a requirement says otherwise."""
+    """A numeric column; smaller is better unless a requirement says otherwise."""
 
     column: str
-    """As in ``metric.attitude_rms`` or ``require.pointing``."""
+    """Name of the column, such as ``metric.attitude_rms`` or ``require.pointing``."""
     heading: str
     unit: str
     requirement: Requirement | None = None
 
     @property
     def name(self) -> str:
-        """Return its name as the table has it."""
+        """Return the name of the metric or requirement."""
         return self.column.partition(".")[2]
 
     @property
@@ -42,12 +42,12 @@ class Quantity(NamedTuple):
 
     @property
     def sign(self) -> float:
-        """Return 1 if more is worse, -1 if less is."""
+        """Return 1 if larger is worse, -1 if smaller is."""
         return self.requirement.sign if self.requirement else 1.0
 
     @property
     def limit(self) -> float | None:
-        """Return the requirement's, if it is one."""
+        """Return the requirement's limit; None for a metric."""
         return self.requirement.bound if self.requirement else None
 
 
@@ -77,14 +77,14 @@ def of_requirement(name: str, requirement: Requirement) -> Quantity:
 def chosen(
     table: DataFrame, require: Mapping[str, Requirement], asked: Sequence[str] = ()
 ) -> list[Quantity]:
-    """Return the metrics that laws are compared by: those asked for, else the usual ones.
+    """Return the metrics to compare laws by: the requested ones, else the default ones.
 
-    The usual ones are RMS errors, the ripple of the base's torque, and what is required.
+    Defaults are RMS errors, the ripple of the base's torque, and the requirements.
 
     Args:
         table: rows of a campaign.
         require: its requirements by name.
-        asked: names of metrics.
+        asked: names of requested metrics.
 
     Raises:
         InputError: there is no such metric.

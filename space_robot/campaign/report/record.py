@@ -1,4 +1,4 @@
-"""What a report says, ready for JSON."""
+"""Content of a report as data for JSON."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ def record(findings: Findings) -> dict[str, Any]:
 
 
 def plain(value: Any) -> Any:
-    """Turn dataclasses and named tuples into dictionaries, all the way down."""
+    """Convert dataclasses and named tuples to dictionaries, recursively."""
     if is_dataclass(value) and not isinstance(value, type):
         return {field.name: plain(getattr(value, field.name)) for field in fields(value)}
     if isinstance(value, tuple) and hasattr(value, "_asdict"):

@@ -1,4 +1,4 @@
-"""Tables of what drives an error."""
+"""Tables of sensitivities and Sobol indices."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ from .findings import CONFIDENCE, Findings
 from .league_tables import span
 
 SHOWN = 10
-"""Variables a law."""
+"""Variables shown per law."""
 
 
 def sensitivity_table(findings: Findings, shown: int = SHOWN) -> Table:
-    """Tabulate the strongest influences under each law, a group for every law and quantity.
+    """Tabulate the strongest influences, one group per law and quantity.
 
-    Only influences that are shown to be there are in it; a note says where none is.
+    Only significant influences are listed; a note names the groups without any.
     """
     columns = [
         Column("variable", is_label=True),
@@ -62,7 +62,7 @@ def _row(influence: Influence) -> list[str]:
 
 
 def sobol_table(indices: Sequence[SobolIndices], shown: int = SHOWN) -> Table:
-    """Tabulate Sobol indices, a group for every law and metric."""
+    """Tabulate Sobol indices, one group per law and metric."""
     columns = [
         Column("variable", is_label=True),
         Column("first"),

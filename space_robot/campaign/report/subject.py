@@ -1,4 +1,4 @@
-"""What a report is about: a campaign's file, rows and software."""
+"""Input of a report: a campaign's file, rows and software."""
 
 from __future__ import annotations
 
@@ -26,50 +26,50 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Subject:
-    """The campaign that a report is about."""
+    """The campaign of a report."""
 
     folder: Path
-    """As the user wrote it, for the commands that are shown."""
+    """Path as the user wrote it, for the commands in the report."""
     study: Study
     seed: int
     runs: int
-    """That were asked for."""
+    """Number of requested runs."""
     table: DataFrame
-    """The rows that there are."""
+    """The flown rows."""
     grid: Sequence[str] = ()
-    """Names of the variables that are grids."""
+    """Names of the grid variables."""
     about: Mapping[str, str] = field(default_factory=dict)
-    """Versions and the like, by what they are of."""
+    """Versions and digests, by name."""
     remarks: Sequence[str] = ()
-    """On the folder: what is damaged, or differs from what was flown, a line each."""
+    """One line for each damaged file and each difference from the study that was flown."""
 
     @property
     def text(self) -> str:
-        """Return the campaign's file, as it was checked."""
+        """Return the text of the campaign's file."""
         content = self.study.model_dump(mode="json", by_alias=True, exclude_defaults=True)
         return yaml.safe_dump(content, sort_keys=False, allow_unicode=True, width=110)
 
     @property
     def time_s(self) -> float:
-        """Return how long the flights are that came to their end, s; 0 if none did."""
+        """Return the duration of the completed flights, s; 0 if there are none."""
         complete = self.table.loc[self.table["outcome"] == "complete", "ended_at_s"]
         return float(complete.max()) if len(complete) else 0.0
 
 
 def subject_of(campaign: FlownCampaign, study: Study | None = None) -> Subject:
-    """Return what a report on a campaign is about: all rows that have been flown.
+    """Read the input of a report: all rows that have been flown.
 
     Args:
-        campaign: that was flown.
-        study: whose requirements are judged (None: of the one that was flown).
+        campaign: the flown campaign.
+        study: with the requirements to judge (None: the study that was flown).
 
     Raises:
-        InputError: the table cannot be read, or has no row; or ``study`` cannot be judged by it.
+        InputError: the table cannot be read, is empty, or lacks a metric that ``study`` requires.
     """
     manifest = campaign.manifest
     try:
         remarks = recover_table(campaign.folder, manifest, campaign.study)
-    except InputError as error:  # another process flies it, or it cannot be written: as it is
+    except InputError as error:  # in use by another process, or read-only: used as it is
         remarks = [str(error)]
     if campaign.table.empty:
         raise InputError("; ".join([f"{campaign.folder}: no flight has been flown yet", *remarks]))
@@ -96,26 +96,26 @@ def subject_of(campaign: FlownCampaign, study: Study | None = None) -> Subject:
 
 
 FLOWN = ("scenario", "laws", "vary", "design")
-"""Parts of a study on which its flights depend."""
+"""Keys of a study that its flights depend on."""
 
 
 def judged_by(study: Study, table: DataFrame, flown: Study) -> DataFrame:
-    """Return a table whose requirements are those of a study other than the one that was flown.
+    """Return the table with the requirements of another study.
 
     Args:
-        study: gives the requirements.
+        study: with the new requirements.
         table: of the campaign.
         flown: the study that was flown.
 
     Raises:
-        InputError: the study asks for other flights, or for a metric in a window that the rows do
+        InputError: the study has other flights, or requires a metric in a window that the rows do
             not have.
     """
     now, then = study.content, flown.content
     for part in FLOWN:
         for key, old, new in differences(then[part], now[part], part):
             raise InputError(
-                f"{study.where}: {key}: {short(old)} was flown, {short(new)} is asked for: fly that"
+                f"{study.where}: {key}: {short(old)} was flown, not {short(new)}: fly the new study"
             )
     known = {_measured(demand): f"require.{name}" for name, demand in flown.require.items()}
     columns = {}
@@ -124,9 +124,9 @@ def judged_by(study: Study, table: DataFrame, flown: Study) -> DataFrame:
         column = known.get((metric, window), f"metric.{metric}" if window == Window() else "")
         if column not in table:
             raise InputError(
-                f"{study.where}: require.{name}: {metric} in that window is not in the rows; "
-                f"there are {', '.join(_words(*measured) for measured in known)}, and the metrics "
-                "of whole flights"
+                f"{study.where}: require.{name}: the rows have no {metric} in that window; they "
+                f"have {', '.join(_words(*measured) for measured in known)}, and the metrics of "
+                "whole flights"
             )
         columns[f"require.{name}"] = table[column]
     others = [column for column in table if not str(column).startswith("require.")]

@@ -1,4 +1,4 @@
-"""Tables of requirements: met, not met, undecided; and of the runs that were worst."""
+"""Tables of verdicts on requirements, and of the worst runs."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ MORE_RUNS = "more runs"
 
 
 def verdict_table(findings: Findings) -> Table:
-    """Tabulate the verdicts, a group for every requirement and point of the grid."""
+    """Tabulate the verdicts, one group per requirement and grid point."""
     columns = [
         Column("law", is_label=True),
         Column("verdict", is_label=True),
@@ -41,7 +41,7 @@ def verdict_table(findings: Findings) -> Table:
 
 
 def demanded(quantity: Quantity) -> str:
-    """Say what a requirement asks for."""
+    """Return the text of a requirement."""
     requirement = quantity.requirement
     assert requirement is not None
     way = "below" if requirement.above is None else "above"
@@ -53,7 +53,7 @@ def demanded(quantity: Quantity) -> str:
 
 
 def notes(findings: Findings) -> list[str]:
-    """Explain the columns, and how often verdicts are false."""
+    """Return the explanation of the columns and of the error probability."""
     if not findings.required:
         return []
     columns = (
@@ -76,7 +76,7 @@ def notes(findings: Findings) -> list[str]:
 
 
 def method(findings: Findings) -> str:
-    """Return how verdicts are reached, in a sentence."""
+    """Return the description of the statistical method, in a sentence."""
     if findings.subject.study.has_fixed_runs:
         return (
             "By order statistics (Hanson and Beard, NASA/TP-2010-216447): met, if so few runs "
@@ -92,7 +92,7 @@ def method(findings: Findings) -> str:
 
 
 def _how_often_false(findings: Findings) -> str:
-    """Say with which probability one verdict, and any of all, is false."""
+    """Return the error probability of one verdict, and of all together, as a sentence."""
     count = len(findings.verdicts)
     each = max(1.0 - q.requirement.confidence for q in findings.required if q.requirement)
     one = f"A verdict is false with a probability of at most {each:.2g}"
@@ -130,7 +130,7 @@ def _more(v: requirements.Verdict) -> str:
 
 
 def verdict_grid(findings: Findings, quantity: Quantity) -> Table:
-    """Tabulate a requirement's verdicts over a grid: points are rows, laws columns."""
+    """Tabulate a requirement's verdicts over a grid: points as rows, laws as columns."""
     by_place = {(v.point, v.law): v for v in findings.verdicts if v.requirement == quantity.name}
     rows = []
     for part in findings.parts:
@@ -153,7 +153,7 @@ def verdict_grid(findings: Findings, quantity: Quantity) -> Table:
 def worst_table(
     findings: Findings, part: GridPoint, quantity: Quantity, count: int = 10, law: str = ""
 ) -> Table:
-    """Tabulate the worst runs with the commands that fly them again."""
+    """Tabulate the worst runs with the commands to rerun them."""
     columns = [
         Column("run"),
         Column("law", is_label=True),
@@ -181,7 +181,7 @@ def _value(row: dict[str, object], quantity: Quantity) -> str:
 
 
 def command(folder: Path, run: int, law: str) -> str:
-    """Write the command that flies a row again, with a whole bag."""
+    """Return the command that flies a row again and records a bag."""
     words = ["space-robot", "campaign", "rerun", str(folder), str(run), "--law", law]
     name = law.replace("/", "_").replace("=", "_")
     return shlex.join([*words, "--bag", f"flights/{run}_{name}"])

@@ -1,11 +1,11 @@
-"""A flight as a row: metrics, requirements in their windows, bands over time, and a digest.
+"""Rows of a campaign's table: metrics, requirements in windows, bands over time, a digest.
 
 | module | |
 |---|---|
-| `columns` | the columns of Table V of a flight, and the names of the metrics that rows have |
-| `window` | metrics of the ticks within a window |
-| `bands` | the largest size of each column, over time |
-| `measure` | a flight's blocks to all numbers of its row |
-| `row` | the row itself, and its digest |
-| `fly` | one run of a campaign, flown in this process to its row |
+| `columns` | the columns of Table V of a flight, and the names of a row's metrics |
+| `window` | metrics of the ticks within a time window |
+| `bands` | the largest magnitude of each column, over time |
+| `measure` | evaluates a flight block by block |
+| `row` | the row and its digest |
+| `fly` | flies one run of a campaign in this process |
 """

@@ -1,4 +1,4 @@
-"""A flight over time in about a hundred numbers: the largest size of each column in each bin."""
+"""A flight over time in about a hundred numbers: the maximum of each column in each time bin."""
 
 from __future__ import annotations
 
@@ -8,21 +8,25 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 BINS = 100
-"""Of a flight; one of fewer ticks has a bin a tick."""
+"""Bins of a flight; a flight with fewer ticks has one bin per tick."""
 
 
 class Bands:
-    """Sums up the columns of a flight of so many ticks."""
+    """Accumulates the bins of a flight's columns."""
 
     def __init__(self, ticks: int) -> None:
-        """``ticks``: of the whole flight; bin k of K begins at the tick ``k ticks // K``."""
+        """Start empty; bin k of K begins at tick ``k ticks // K``.
+
+        Args:
+            ticks: of the whole flight.
+        """
         count = min(BINS, ticks)
         self._starts = np.arange(count, dtype=np.int64) * ticks // count
         self._ticks = ticks
         self._largest: dict[str, Array] = {}
 
     def add(self, first_tick: int, sizes: dict[str, Array]) -> None:
-        """Take the sizes (N,) of the ticks from ``first_tick`` on, by column."""
+        """Add the magnitudes (N,) of the ticks from ``first_tick`` on, by column."""
         for name, size in sizes.items():
             if not len(size):
                 continue
@@ -35,6 +39,6 @@ class Bands:
             np.maximum(part, np.maximum.reduceat(size, cuts), out=part)
 
     def result(self) -> dict[str, NDArray[np.float32]]:
-        """Return the bins of each column, of a flight that was flown to its end."""
+        """Return the bins of each column, for a flight that was flown to its end."""
         with np.errstate(over="ignore"):
             return {name: values.astype(np.float32) for name, values in self._largest.items()}

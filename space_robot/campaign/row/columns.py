@@ -1,4 +1,4 @@
-"""The columns of Table V that a flight has, their sizes at each tick, and the metrics of rows."""
+"""The columns of Table V of a flight, their magnitudes at each tick, and the metrics of rows."""
 
 from __future__ import annotations
 
@@ -19,27 +19,27 @@ from ...flight.plan import Flight
 Array = NDArray[np.float64]
 
 RIPPLE, FAST_RIPPLE = "ripple_", "fast_ripple_"
-"""What the names of metrics of ripple begin with; a torque column follows."""
+"""Prefixes of the names of ripple metrics; a torque column follows."""
 OF_BASE = ("attitude", "base_torque")
-"""Columns that are vectors: their size is the norm; joints are each for itself."""
+"""Vector columns: their magnitude is the norm; of joints it is the largest absolute value."""
 
 
 class Columns(NamedTuple):
-    """The axes that each column is of, by its name."""
+    """The axes of each column, by name."""
 
     errors: dict[str, AxisIndex]
     torques: dict[str, AxisIndex]
 
     @classmethod
     def of_flight(cls, flight: Flight) -> Columns:
-        """Return those of a flight before it is flown."""
+        """Return the columns of a flight before it is flown."""
         robot = flight.robot
         kinds = robot.n + 3, flight.controls_base, tuple(robot.is_prismatic), robot.branches
         return cls(error_columns(*kinds), torque_columns(*kinds))
 
     @classmethod
     def of_log(cls, log: FlightLog) -> Columns:
-        """Return those of a flight's rows."""
+        """Return the columns of a flight log."""
         kinds = log.axes, controls_base(log), log.prismatic, log.branches
         return cls(error_columns(*kinds), torque_columns(*kinds))
 
@@ -52,9 +52,9 @@ class Columns(NamedTuple):
     def metrics(self) -> tuple[str, ...]:
         """All metrics of a row, in the order of the table.
 
-        ``<column>_rms``: mean over the axes of each axis' RMS, as Table V has it.
-        ``<column>_max``: the largest size at any tick, see `sizes`. ``ripple_<torque column>`` and
-        ``fast_ripple_<torque column>``: RMS of the ripple above 2 Hz, and above 25 Hz.
+        ``<column>_rms``: mean over the axes of each axis' RMS, as in Table V.
+        ``<column>_max``: the largest magnitude at any tick, see `sizes`. ``ripple_<torque column>``
+        and ``fast_ripple_<torque column>``: RMS of the ripple above 2 Hz, and above 25 Hz.
         """
         return (
             *(f"{name}_rms" for name in self.names),
@@ -64,26 +64,26 @@ class Columns(NamedTuple):
         )
 
     def check(self, metric: str, where: str) -> str:
-        """Return the name of a metric that these columns have.
+        """Return the name of a metric if these columns have it.
 
         Args:
             metric: its name.
-            where: it stands, for the error.
+            where: source of the name, for the error.
 
         Raises:
-            InputError: there is none of that name; names those there are.
+            InputError: there is no such metric; lists the existing ones.
         """
         return one_of(metric, self.metrics, "metric", f" in {where}")
 
     def sizes(self, log: FlightLog, error: Array) -> dict[str, Array]:
-        """Compute the size of each column at every tick, (N,).
+        """Compute the magnitude of each column at every tick, (N,).
 
-        Of the base it is the norm of the vector: of the error the vector part of the quaternion
-        (half the angle, rad), of the torque N m. Of joints it is the largest absolute value of any.
+        For the base it is the norm: of the error quaternion's vector part (half the angle, rad), or
+        of the torque, N m. For the joints it is the largest absolute value.
 
         Args:
             log: rows of the flight.
-            error: (N, n+3) their tracking error.
+            error: (N, n+3) tracking error.
         """
         return {
             name: (_norms if name in OF_BASE else largest_of_columns)(values[:, axes])
@@ -93,24 +93,24 @@ class Columns(NamedTuple):
 
 
 def missing_for_ripple(metric: str, ticks: int, period: float) -> str:
-    """Return what a metric of ripple needs and a flight does not have; empty if nothing.
+    """Return why a ripple metric cannot be computed; empty if it can.
 
     Args:
         metric: any metric's name.
         ticks: of the flight, or of a window in it.
-        period: s.
+        period: of the ticks, s.
     """
     if not metric.startswith((RIPPLE, FAST_RIPPLE)):
         return ""
     above = FAST if metric.startswith(FAST_RIPPLE) else SLOWEST
     if 0.5 / period <= above:
-        return f"needs ticks less than {0.5 / above:g} s apart, they are {period:g} s apart"
+        return f"needs a period below {0.5 / above:g} s, got {period:g} s"
     if ticks * period < SHORTEST_S * (1.0 - 1e-9):
-        return f"needs {SHORTEST_S:g} s of flight, there are {ticks * period:g} s"
+        return f"needs {SHORTEST_S:g} s of flight, got {ticks * period:g} s"
     return ""
 
 
 def _norms(values: Array) -> Array:
-    """(N,) of rows (N, 3), by plain sums: the same bits on every machine."""
+    """Return the norms (N,) of rows (N, 3), by plain sums: the same bits on every machine."""
     norms: Array = np.sqrt(reduce(np.add, (values * values).T))
     return norms

@@ -1,4 +1,4 @@
-"""One run of a campaign under one law, flown in this process to its row."""
+"""Flies one run of a campaign under one law in this process, and returns its row."""
 
 from __future__ import annotations
 
@@ -22,15 +22,15 @@ from .row import REFUSED, Row, Task, Value
 
 @dataclass(frozen=True)
 class RowFlyer:
-    """Flies any task of a campaign; it can be sent to other processes, and on to other machines."""
+    """Flies any task of a campaign; it can be sent to other processes and machines."""
 
     text: str
-    """Of the study, as JSON: so a flyer is small, and two that are equal share their draws."""
+    """The study as JSON: small to send, and hashable, so equal flyers share their draws."""
     where: str
-    """The study's file, for errors."""
+    """Name of the study's file, for errors."""
     seed: int
     runs: int
-    """Of the design."""
+    """Number of runs of the design."""
 
     @classmethod
     def of(cls, study: Study, seed: int, runs: int) -> RowFlyer:
@@ -39,20 +39,20 @@ class RowFlyer:
 
     @property
     def study(self) -> Study:
-        """What the campaign is to fly."""
+        """The campaign's study."""
         return _loaded(self)[0]
 
     @property
     def draws(self) -> Draws:
-        """The campaign's draws, made once a process.
+        """The campaign's draws, computed once per process.
 
         Raises:
-            InputError: a variable that there is not; names its key.
+            InputError: an unknown variable; names its key.
         """
         return _loaded(self)[1]
 
     def __call__(self, task: Task) -> Row:
-        """Fly a task; whatever happens, a row comes of it.
+        """Fly a task and return its row, also after an error.
 
         Args:
             task: run and law.
@@ -63,13 +63,13 @@ class RowFlyer:
             return self.row_of(task, vary, self.draws.scenario(task.run, task.law).check())
         except InputError as error:
             return Row(task, REFUSED, str(error), vary=vary).digested()
-        except SpaceRobotError as error:  # as a mistake in someone's law
+        except SpaceRobotError as error:  # such as a mistake in a user's law
             return Row(task, FAILED, str(error), vary=vary).digested()
-        except Exception as error:  # one in the code here must not end a campaign either
+        except Exception as error:  # a defect of this package must not end a campaign either
             return Row(task, FAILED, one_line_of(error), vary=vary).digested()
 
     def row_of(self, task: Task, vary: dict[str, Value], flight: Flight) -> Row:
-        """Fly a flight in the memory of one block."""
+        """Fly a flight block by block and return its row; memory holds one block."""
         ending = Ending.complete(flight.ticks, flight.period)
         measure = Measure(flight, self.study.require)
         with closing(fly_blocks(flight)) as blocks:
@@ -83,13 +83,13 @@ class RowFlyer:
     def row_of_log(
         self, task: Task, flight: Flight, ending: Ending, blocks: Iterable[FlightLog]
     ) -> Row:
-        """Return the row of a flight that has been flown, with the same bits.
+        """Return the row of a flown flight, bit for bit equal to that of `row_of`.
 
         Args:
             task: run and law.
-            flight: its plant stands where the flight ended.
-            ending: of it.
-            blocks: of its log, as `blocks_of` cuts it.
+            flight: with its plant in the state at the end.
+            ending: of the flight.
+            blocks: of its log, from `blocks_of`.
         """
         measure = Measure(flight, self.study.require)
         if ending.error is None:

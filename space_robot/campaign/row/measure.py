@@ -1,4 +1,4 @@
-"""The blocks of one flight to all numbers of its row; nothing else is computed."""
+"""Evaluates the blocks of one flight for the numbers of its row."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ from .window import Window, WindowMetrics
 
 
 class Measure:
-    """Sums up a flight block by block: its metrics, its requirements' metrics and its bands."""
+    """Accumulates metrics, requirements' metrics and bands of a flight block by block."""
 
     def __init__(self, flight: Flight, require: Mapping[str, Requirement]) -> None:
-        """Take the flight, which need not have been flown, and the requirements by name."""
+        """Prepare the sums for a flight (not flown yet) and the requirements by name."""
         self._robot, columns = flight.robot, Columns.of_flight(flight)
         self._columns = columns
         self._whole = WindowMetrics(Window(), columns.metrics, columns)
@@ -35,7 +35,7 @@ class Measure:
         self._bands = Bands(flight.ticks)
 
     def add(self, block: FlightLog) -> None:
-        """Take the next block of the flight."""
+        """Add the next block of the flight."""
         error = tracking_error(block)
         sizes = self._columns.sizes(block, error)
         self._bands.add(block.first_tick, sizes)
@@ -43,7 +43,7 @@ class Measure:
             metrics.add(block, error, sizes, self._robot)
 
     def metrics(self) -> dict[str, float]:
-        """Return the metrics of the whole flight that there are, by name."""
+        """Return the available metrics of the whole flight, by name."""
         return self._whole.result()
 
     def require(self) -> dict[str, float]:
@@ -62,13 +62,13 @@ class Measure:
 def check_requirements(
     flight: Flight, require: Mapping[str, Requirement], where: str, context: str = ""
 ) -> None:
-    """Check that a flight has the numbers that are required of it.
+    """Check that a flight has the metrics of all requirements.
 
     Args:
-        flight: the nominal one, or one with an option that is varied.
+        flight: the nominal one, or one with a varied option.
         require: the requirements by name.
         where: the file, for errors.
-        context: what differs from the nominal flight, for errors.
+        context: difference from the nominal flight, for errors.
 
     Raises:
         InputError: an unknown metric, a window without ticks, or one too short for the metric.
@@ -89,8 +89,8 @@ def check_requirements(
         ticks = len(_window(demand).ticks(flight.ticks, flight.period))
         if not ticks:
             raise InputError(
-                f"{key}.to_s: no tick is from {demand.from_s:g} to {demand.to_s:g} s, "
-                f"ticks are {flight.period:g} s apart{context}"
+                f"{key}.to_s: no tick between {demand.from_s:g} and {demand.to_s:g} s, "
+                f"the period is {flight.period:g} s{context}"
             )
         if lacking := missing_for_ripple(demand.metric, ticks, flight.period):
             raise InputError(f"{key}.metric: {demand.metric} {lacking}{context}")

@@ -1,4 +1,4 @@
-"""A row of a campaign's table: what came of one run under one law."""
+"""A row of a campaign's table: the result of one run under one law."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ from typing_extensions import Self
 from ...flight.ending import COMPLETE
 
 KILLED, OUT_OF_TIME, REFUSED = "killed", "out_of_time", "refused"
-"""Outcomes beside those of `Ending`: the process that flew it died again and again; it flew for
-longer than it may; the draw makes no flight, as a robot that cannot be."""
+"""Outcomes beside those of `Ending`: the process died repeatedly; the time limit was exceeded;
+the draw cannot be flown, for example an invalid robot."""
 Value = float | str
-"""Of a variable."""
+"""Value of a variable."""
 
 
 class Task(NamedTuple):
@@ -26,43 +26,43 @@ class Task(NamedTuple):
 
     run: int
     law: str
-    """As the campaign's file has it: ``LAW`` or ``LAW=GAINS``."""
+    """As in the campaign's file: ``LAW`` or ``LAW=GAINS``."""
 
 
 @dataclass(frozen=True, eq=False)
 class Row:
-    """What came of a flight; what there is not is left out of the mappings."""
+    """Result of a flight; the mappings omit values that do not exist."""
 
     task: Task
     outcome: str
     reason: str = ""
-    """Why it ended before its time, in a line; empty if it did not."""
+    """Why the flight ended early, in a line; empty if it did not."""
     ended_at_s: float | None = None
     vary: Mapping[str, Value] = field(default_factory=dict)
-    """The run's draws, by variable."""
+    """Drawn values of the run, by variable."""
     metrics: Mapping[str, float] = field(default_factory=dict)
     require: Mapping[str, float] = field(default_factory=dict)
-    """The metric of each requirement in its window."""
+    """Metric of each requirement in its window."""
     bands: Mapping[str, NDArray[np.float32]] = field(default_factory=dict)
     digest: str = ""
-    """See `digested`; empty of a flight that was not flown to an end of its own."""
+    """Digest from `digested`; empty if the flight was refused, killed or out of time."""
 
     @property
     def is_complete(self) -> bool:
-        """True if the flight came to its planned end."""
+        """True if the flight reached its planned end."""
         return self.outcome == COMPLETE
 
     @property
     def is_final(self) -> bool:
-        """True if flying it again gives the same; else chance or the machine had a part in it."""
+        """True if the result is reproducible; False if it may depend on the machine."""
         return self.outcome not in (KILLED, OUT_OF_TIME)
 
     def digested(self, state: bytes = b"") -> Self:
         """Return the row with its digest: 32 hexadecimal digits of SHA-256.
 
-        It covers the bits of all numbers of the row (draws, end, metrics, requirements, bands), of
-        the true ``state`` at the flight's end, and outcome and reason. Run and law are left out:
-        flights with equal digests were equal.
+        It covers the bits of all numbers of the row (draws, end, metrics, requirements, bands) and
+        of the true ``state`` at the flight's end, outcome and reason, but not run and law: flights
+        with equal digests were equal.
         """
         digest = hashlib.sha256()
         for text in (self.outcome, self.reason):

@@ -1,4 +1,4 @@
-"""Metrics of the ticks within a window of time, summed up block by block; only those wanted."""
+"""Selected metrics of the ticks within a time window, accumulated block by block."""
 
 from __future__ import annotations
 
@@ -19,18 +19,18 @@ Array = NDArray[np.float64]
 
 
 class Window(NamedTuple):
-    """Some seconds of a flight; both ends belong to it."""
+    """Time window of a flight; both ends are included."""
 
     from_s: float = 0.0
     to_s: float | None = None
     """None: to the end of the flight."""
 
     def ticks(self, ticks: int, period: float) -> range:
-        """Return the ticks of a flight of so many that are within.
+        """Return the ticks of a flight within the window.
 
         Args:
-            ticks: of the flight.
-            period: s.
+            ticks: number of ticks of the flight.
+            period: of the ticks, s.
         """
         start, stop = int(np.ceil(self.from_s / period - 1e-6)), ticks
         if self.to_s is not None:
@@ -38,21 +38,21 @@ class Window(NamedTuple):
         return range(min(max(start, 0), ticks), min(max(stop, 0), ticks))
 
     def rows(self, log: FlightLog) -> slice:
-        """Return the rows of a block that are within."""
+        """Return the rows of a block within the window."""
         first = log.first_tick
         within = self.ticks(first + log.ticks, log.timebase.period)
         return slice(max(within.start - first, 0), max(within.stop - first, 0))
 
 
 class WindowMetrics:
-    """Sums up the wanted metrics of a window of one flight."""
+    """Accumulates selected metrics of a window of one flight."""
 
     def __init__(self, window: Window, wanted: Collection[str], columns: Columns) -> None:
-        """Begin without rows.
+        """Start without rows.
 
         Args:
             window: of the flight.
-            wanted: names of metrics.
+            wanted: names of the selected metrics.
             columns: of the flight.
         """
         self._window, self._wanted, self._columns = window, wanted, columns
@@ -64,13 +64,13 @@ class WindowMetrics:
         self._has_rms = any(name.endswith("_rms") for name in wanted)
 
     def add(self, log: FlightLog, error: Array, sizes: dict[str, Array], robot: Robot) -> None:
-        """Take the next block.
+        """Add the next block.
 
         Args:
             log: its rows.
-            error: (N, n+3) their tracking error.
-            sizes: of its columns, see `Columns.sizes`.
-            robot: that was flown.
+            error: (N, n+3) tracking error.
+            sizes: magnitudes of its columns, see `Columns.sizes`.
+            robot: of the flight.
         """
         rows = self._window.rows(log)
         if rows.start >= rows.stop:
@@ -93,7 +93,7 @@ class WindowMetrics:
             self._period = log.timebase.period
 
     def result(self) -> dict[str, float]:
-        """Return the metrics that this flight has, by name."""
+        """Return the available metrics of the window, by name."""
         values_by_name = {
             f"{name}_max": value for name, value in self._largest.items()
         } | self._ripples()

@@ -1,12 +1,12 @@
-"""The folder of a campaign.
+"""Storage of a campaign in a folder.
 
 | file | |
 |---|---|
-| ``campaign.yaml`` | the campaign's file as it was read, for the reader |
+| ``campaign.yaml`` | copy of the campaign's file, for information |
 | ``campaign.json`` | the manifest: study, seed, runs, software, digests of named files, columns |
-| ``journal.db`` | SQLite: a row as it ends; what is in it survives whatever kills the campaign |
-| ``journal.db.damaged`` | a journal that was damaged, without which the campaign goes on |
-| ``table.parquet`` | all rows in their order, the same bytes whatever happened on the way |
-| ``table.parquet.sha256`` | digest of the table, as ``sha256sum`` writes it |
-| ``bags/`` | flights that were kept: ``<run>_<law>`` |
+| ``journal.db`` | SQLite: each row as soon as its flight ends; survives a killed process |
+| ``journal.db.damaged`` | a damaged journal that was replaced |
+| ``table.parquet`` | all rows in order, the same bytes with or without interruptions |
+| ``table.parquet.sha256`` | digest of the table in the format of ``sha256sum`` |
+| ``bags/`` | recorded flights: ``<run>_<law>`` |
 """

@@ -32,15 +32,15 @@ _OWN = STUDY, MANIFEST, JOURNAL, TABLE, BAGS
 
 @contextmanager
 def held_folder(folder: Path) -> Iterator[None]:
-    """Hold a folder, made if it is not there, against all other processes.
+    """Lock a folder for this process; it is created if it does not exist.
 
-    Half-written files of a process that was killed are put away.
+    Incomplete files of a killed process are deleted.
 
     Args:
         folder: of the campaign.
 
     Raises:
-        InputError: another process holds it, or something else is in it.
+        InputError: another process has locked it, or it contains other files.
     """
     make_folder(folder)
     _check_own(folder)
@@ -50,10 +50,10 @@ def held_folder(folder: Path) -> Iterator[None]:
         raise InputError(f"{folder}: cannot be written ({error.strerror})") from None
     try:
         try:
-            # of this process alone: its workers, who may outlive it by a moment, do not hold it
+            # not inherited by the workers, which may outlive this process for a moment
             fcntl.lockf(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except OSError:
-            raise InputError(f"{folder}: another process flies this campaign now") from None
+            raise InputError(f"{folder}: another process is flying this campaign") from None
         for file in (STUDY, MANIFEST, JOURNAL, TABLE):
             for unfinished in folder.glob(f".{file}.*"):
                 unfinished.unlink(missing_ok=True)
@@ -63,18 +63,18 @@ def held_folder(folder: Path) -> Iterator[None]:
 
 
 def begin_or_resume(folder: Path, manifest: Manifest, study_text: str) -> list[str]:
-    """Write down what is to be flown, or see that it is what was begun here.
+    """Write the manifest of a new campaign, or check that an existing one is the same.
 
     Args:
-        folder: held.
-        manifest: of what is to be flown now.
-        study_text: the campaign's file.
+        folder: locked by this process.
+        manifest: of the campaign to be flown.
+        study_text: text of the campaign's file.
 
     Returns:
-        What was damaged and is written again, a line each.
+        A line for each damaged file that was written again.
 
     Raises:
-        InputError: another campaign was begun here; or it cannot be written.
+        InputError: the folder is another campaign's, or cannot be written.
     """
     rows, study = [], folder / STUDY
     is_begun = any((folder / name).exists() for name in (MANIFEST, JOURNAL, TABLE, BAGS))
@@ -85,35 +85,35 @@ def begin_or_resume(folder: Path, manifest: Manifest, study_text: str) -> list[s
     if not is_begun or not study.exists():
         with whole_file(study, replace=True) as file:
             file.write(study_text.encode())
-    manifest.write(folder / MANIFEST)  # last: it says that the campaign was begun
+    manifest.write(folder / MANIFEST)  # last: it marks the folder as a campaign
     return rows
 
 
 def study_changes(file: Path, flown: Mapping[str, Any]) -> str:
-    """Return in a line how a folder's copy of the study differs from what was flown, or empty.
+    """Return the difference of a folder's copy of the study from the flown one; empty if equal.
 
     Args:
-        file: of the folder.
-        flown: see `Study.content`.
+        file: the copy in the folder.
+        flown: content of the flown study, see `Study.content`.
     """
     try:
         now = read_study(file.absolute()).content
     except InputError as error:
         return f"{error}; {MANIFEST} has the study that was flown"
     for key, old, new in differences(flown, now):
-        what = f"{short(old)} was flown, {short(new)} is there now"
-        return f"{file}: was changed after the campaign was begun: {key}: {what}"
+        what = f"{short(old)} was flown, {short(new)} is in the file now"
+        return f"{file}: was changed after the campaign was started: {key}: {what}"
     return ""
 
 
 def _resumed(folder: Path, manifest: Manifest) -> list[str]:
-    """Check that a folder was begun with a manifest; return what is damaged of its own.
+    """Check that a folder has the same manifest; return the damage of its own one.
 
     Raises:
-        InputError: it was begun with another one, or nothing shows that it was not.
+        InputError: the manifest is another one, or is damaged and no row proves it to be the same.
     """
     path = folder / MANIFEST
-    damage = f"{path}: is gone"
+    damage = f"{path}: missing"
     if path.exists():
         try:
             before = read_manifest(path)
@@ -124,27 +124,27 @@ def _resumed(folder: Path, manifest: Manifest) -> list[str]:
             return []
     codec = JournalCodec(manifest.campaign, manifest.laws)
     if (folder / JOURNAL).exists() and next(whole_rows(folder / JOURNAL, codec), None):
-        return [f"{damage}; written again, for the rows are of this campaign"]
+        return [f"{damage}; written again, as the rows are of this campaign"]
     with suppress(InputError):
         check_table(folder / TABLE, manifest.campaign)
-        return [f"{damage}; written again, for the table is of this campaign"]
+        return [f"{damage}; written again, as the table is of this campaign"]
     raise InputError(
-        f"{damage}, and no row in the folder is of this campaign, so it holds something else: "
+        f"{damage}, and no row in the folder is of this campaign, so it is another one's: "
         f"{NEW_FOLDER}"
     )
 
 
 def _check_own(folder: Path) -> None:
-    """Check that nothing but a campaign is in a folder.
+    """Check that a folder contains nothing but a campaign's files.
 
     Raises:
-        InputError: something else is.
+        InputError: it contains other files.
     """
     if (folder / MANIFEST).exists():
         return
     for path in folder.iterdir():
         if path.name != LOCK and not path.name.lstrip(".").startswith(_OWN):
             raise InputError(
-                f"{folder}: has no {MANIFEST} but {path.name}, so it holds something else than a "
-                f"campaign: {NEW_FOLDER}"
+                f"{folder}: contains {path.name} and no {MANIFEST}, so it is not a campaign "
+                f"folder: {NEW_FOLDER}"
             )

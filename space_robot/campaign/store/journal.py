@@ -1,4 +1,4 @@
-"""The journal: a row as it ends, in SQLite, so that a kill at any moment loses no row before it."""
+"""Journal of a campaign in SQLite: each row is stored at once, so that a kill loses no rows."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ from .journal_file import IN_ORDER, INSERT, SELECT, connect
 
 
 class Journal:
-    """The rows of a campaign that have been flown; a context."""
+    """The flown rows of a campaign; a context manager."""
 
     def __init__(self, path: Path, codec: JournalCodec) -> None:
-        """Open a journal that is there and undamaged: see `open_journal`.
+        """Open an existing, undamaged journal; see `open_journal`.
 
         Args:
             path: of the file.
@@ -42,36 +42,36 @@ class Journal:
         self._database.close()
 
     def add(self, row: Row) -> None:
-        """Store a row, in the place of an older one of its task.
+        """Store a row; it replaces an older one of the same task.
 
         Raises:
-            InputError: it cannot be written.
+            InputError: the journal cannot be written.
         """
         with self._named_errors():
             self._database.execute(f"INSERT OR REPLACE {INSERT}", self._codec.encode(row))
 
     def rows(self, runs: int) -> Iterator[Row]:
-        """Yield the rows of the runs before ``runs`` in the order of the table: run, then law.
+        """Yield the rows of the first ``runs`` runs in the order of the table: run, then law.
 
         Raises:
-            InputError: it cannot be read, or a row was damaged since the journal was opened.
+            InputError: the journal cannot be read, or a row was damaged after it was opened.
         """
         with self._named_errors():
             query = f"{SELECT} WHERE run < ? {IN_ORDER}"
             for stored in self._database.execute(query, (runs,)):
                 if (row := self._codec.decode(stored)) is None:
-                    raise InputError(f"{self._path}: was changed while it was open")
+                    raise InputError(f"{self._path}: was modified while it was open")
                 yield row
 
     def note(self, name: str) -> str:
-        """Return a note; empty if there is none of that name."""
+        """Return a note by name; empty if it does not exist."""
         with self._named_errors():
             query = "SELECT value FROM notes WHERE name = ?"
             record = self._database.execute(query, (name,)).fetchone()
         return str(record[0]) if record else ""
 
     def make_note(self, name: str, value: str) -> None:
-        """Store a note, in the place of an older one of that name."""
+        """Store a note; it replaces an older one of the same name."""
         with self._named_errors():
             self._database.execute("INSERT OR REPLACE INTO notes VALUES (?, ?)", (name, value))
 
@@ -81,5 +81,5 @@ class Journal:
             yield
         except sqlite3.Error as error:
             raise InputError(
-                f"{self._path}: {error}; the same command flies what is not in it"
+                f"{self._path}: {error}; the same command flies the missing flights"
             ) from None

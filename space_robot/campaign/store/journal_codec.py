@@ -1,4 +1,4 @@
-"""A row of a campaign as the journal stores it, with a digest that is checked when it is read."""
+"""Format of a row in the journal, with a digest that is checked when it is read."""
 
 from __future__ import annotations
 
@@ -21,10 +21,10 @@ class JournalCodec(NamedTuple):
     campaign: str
     """`Manifest.campaign`: a row of another campaign does not decode."""
     laws: Sequence[str]
-    """Of the campaign, in their order."""
+    """Laws of the campaign, in order."""
 
     def encode(self, row: Row) -> Stored:
-        """Return a row as it is stored; JSON and the bands' bytes keep every digit."""
+        """Return a row in the stored format; JSON and the bands' bytes keep every digit."""
         numbers = json.dumps(
             {
                 "reason": row.reason,
@@ -42,7 +42,7 @@ class JournalCodec(NamedTuple):
         return row.task.run, law, row.outcome, numbers, bands, digest
 
     def decode(self, stored: Sequence[Any]) -> Row | None:
-        """Return a stored row; None if it is damaged, or of another campaign."""
+        """Return a stored row; None if it is damaged or of another campaign."""
         run, law, outcome, numbers, bands, digest = stored
         kinds = int, int, str, str, bytes
         if not all(isinstance(v, kind) for v, kind in zip(stored, kinds, strict=False)):

@@ -1,4 +1,4 @@
-"""The file of a journal: made whole, checked for damage, and its undamaged rows read."""
+"""The file of a journal: atomic creation, check for damage, recovery of undamaged rows."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ SELECT = "SELECT run, law, outcome, numbers, bands, digest FROM rows"
 IN_ORDER, BACKWARDS = "ORDER BY run, law", "ORDER BY run DESC, law DESC"
 INSERT = "INTO rows VALUES (?, ?, ?, ?, ?, ?)"
 SET_ASIDE = ".damaged"
-"""What the name of a damaged journal ends with when another one has taken its place."""
+"""Suffix of a damaged journal that was replaced."""
 NOT_OF_THE_FILE = (
     "database is locked",
     "unable to open database file",
@@ -31,31 +31,31 @@ NOT_OF_THE_FILE = (
     "attempt to write a readonly database",
     "out of memory",
 )
-"""Errors of SQLite that say nothing about the bytes of the file."""
+"""Errors of SQLite that do not indicate a damaged file."""
 
 
 def connect(path: Path) -> sqlite3.Connection:
-    """Open a database for this process alone, in which every statement is a transaction."""
+    """Open a database exclusively; every statement is a transaction."""
     database = sqlite3.connect(path, isolation_level=None)
-    # exclusive: the log ahead then needs no shared memory, which network drives lack
+    # exclusive: the write-ahead log then needs no shared memory, which network drives lack
     database.execute("PRAGMA locking_mode = EXCLUSIVE")
-    # damaged text must come to its digest, which tells
+    # damaged text must not raise an error here: the digest detects it
     database.text_factory = lambda data: data.decode("utf-8", "replace")
     return database
 
 
 def damage_of(path: Path, codec: JournalCodec) -> list[str]:
-    """Return what is damaged in a journal: its rows, or what keeps it from being read.
+    """Return the damage of a journal: names of rows, or why it cannot be read.
 
     Raises:
-        InputError: it cannot be opened, whatever is in it.
+        InputError: it cannot be opened, for a reason other than damage.
     """
     damaged, last = [], (-1, -1)
     try:
         with closing(connect(path)) as database:
             tables = [sql for (sql,) in database.execute("SELECT sql FROM sqlite_master")]
             if sorted(map(str, tables)) != [_NOTES, _ROWS]:
-                return ["its tables are not those of a journal"]
+                return ["not the tables of a journal"]
             (problem,) = database.execute("PRAGMA quick_check(1)").fetchone()
             if problem != "ok":
                 return [" ".join(str(problem).split())]
@@ -73,7 +73,7 @@ def damage_of(path: Path, codec: JournalCodec) -> list[str]:
 
 
 def whole_rows(path: Path, codec: JournalCodec) -> Iterator[Row]:
-    """Yield the undamaged rows that can be reached from either end of a journal, some twice."""
+    """Yield the undamaged rows, reading a journal from both ends; some rows come twice."""
     for order in (IN_ORDER, BACKWARDS):
         with suppress(sqlite3.Error), closing(connect(path)) as database:
             for stored in database.execute(f"{SELECT} {order}"):
@@ -82,18 +82,18 @@ def whole_rows(path: Path, codec: JournalCodec) -> Iterator[Row]:
 
 
 def write_journal(path: Path, codec: JournalCodec, rows: Iterable[Row]) -> int:
-    """Write a journal, whole or not at all; one that is there is set aside.
+    """Write a journal atomically; an existing one is renamed.
 
     Args:
         path: of the file.
         codec: of the campaign.
-        rows: to be in it; of several of a task the first is taken.
+        rows: to be written; the first one of each task.
 
     Returns:
         The number of its rows.
 
     Raises:
-        InputError: it cannot be written.
+        InputError: the journal cannot be written.
     """
     unfinished = path.with_name(f".{path.name}.{token_hex(4)}")
     try:
@@ -106,7 +106,7 @@ def write_journal(path: Path, codec: JournalCodec, rows: Iterable[Row]) -> int:
             (count,) = database.execute("SELECT COUNT(*) FROM rows").fetchone()
         if path.exists():
             shutil.copyfile(path, path.with_name(path.name + SET_ASIDE))
-        for of_the_old in ("-wal", "-shm", "-journal"):  # SQLite would take it for the new one's
+        for of_the_old in ("-wal", "-shm", "-journal"):  # SQLite would apply it to the new file
             path.with_name(path.name + of_the_old).unlink(missing_ok=True)
         unfinished.replace(path)
     except (sqlite3.Error, OSError) as error:
@@ -116,7 +116,7 @@ def write_journal(path: Path, codec: JournalCodec, rows: Iterable[Row]) -> int:
 
 
 def _named(run: object, law: object, codec: JournalCodec) -> str:
-    """Name a row by what its damaged key says."""
+    """Return the name of a row with a key that may be damaged."""
     if isinstance(law, int) and 0 <= law < len(codec.laws):
         return f"run {run} under {codec.laws[law]}"
     return f"run {run} under a law that is not flown"

@@ -1,4 +1,4 @@
-"""The manifest of a campaign's folder: of what its rows are, so that no others come among them."""
+"""Manifest of a campaign's folder: all that its rows depend on, so that rows are never mixed."""
 
 from __future__ import annotations
 
@@ -20,49 +20,49 @@ from .schema import Schema
 
 NEW_FOLDER = "choose another folder for this one"
 FORMAT: Final = 2
-"""Version of the folder; the first one had neither digests nor the grid."""
+"""Version of the folder's format; version 1 had neither digests nor the grid."""
 SHA256 = "sha256"
-"""Key of the digest of all else in the file."""
+"""Key of the digest of all other content of the file."""
 
 
 class Manifest(StrictModel):
-    """What was begun in a folder."""
+    """The campaign of a folder."""
 
     format: Literal[2] = FORMAT
     seed: Annotated[int, Field(ge=0)]
     runs: Annotated[int, Field(ge=1)]
-    """To be flown; of a design they are all its points."""
+    """Number of runs to be flown."""
     study: dict[str, Any]
-    """The campaign's file, checked, without its ``runs``."""
+    """Content of the campaign's file without ``runs``."""
     software: dict[str, str | None]
-    """See `software.software`."""
+    """Version of each package that the rows depend on, and a digest of the sources."""
     commit: str | None
-    """For the reader: the sources' digest decides."""
+    """Commit, for information; the digest of the sources is what is compared."""
     files: dict[str, str]
-    """Digests of the files that the campaign's file names."""
+    """Digests of the files that the campaign's file refers to, by name."""
     flights: dict[str, str]
-    """Digests of what the nominal flight of each law is."""
+    """Digest of the nominal flight of each law."""
     table: Schema
-    """The columns."""
+    """Columns of the table."""
 
     @property
     def laws(self) -> list[str]:
-        """Return the laws of the campaign, in their order."""
+        """Return the laws of the campaign, in order."""
         return [str(law) for law in self.study["laws"]]
 
     @property
     def campaign(self) -> str:
-        """Return a digest of all that the rows depend on: more runs are the same campaign."""
+        """Return a digest of all that the rows depend on, without the number of runs."""
         content = self.model_dump(exclude={"format", "commit", "runs"})
         if self.study.get("design") in NOT_TO_BE_EXTENDED:
             content["runs"] = self.runs
         return _digest(content)
 
     def write(self, path: Path) -> None:
-        """Write it with its digest.
+        """Write the manifest with its digest.
 
         Raises:
-            InputError: it cannot be written.
+            InputError: the file cannot be written.
         """
         content = self.model_dump()
         text = json.dumps({**content, SHA256: _digest(content)}, indent=1)
@@ -70,14 +70,14 @@ class Manifest(StrictModel):
             file.write(text.encode() + b"\n")
 
     def check_same(self, other: Manifest, where: Path) -> None:
-        """Check that ``other``, what is to be flown now, is what was begun, or more runs of it.
+        """Check that ``other`` is the same campaign, possibly with more runs.
 
         Args:
-            other: now.
+            other: manifest of the campaign to be flown now.
             where: the folder, for the error.
 
         Raises:
-            InputError: it is not; says in one line what differs.
+            InputError: the first difference, in one line.
         """
         for what, before, now in (
             ("seed", self.seed, other.seed),
@@ -89,7 +89,7 @@ class Manifest(StrictModel):
         ):
             for key, old, new in differences(before, now):
                 raise InputError(
-                    f"{where}: was begun with another {what}: {key + ': ' if key else ''}"
+                    f"{where}: was started with another {what}: {key + ': ' if key else ''}"
                     f"{short(old)} then, {short(new)} now: {NEW_FOLDER}"
                 )
         self._check_runs(other.runs, where)
@@ -97,19 +97,19 @@ class Manifest(StrictModel):
     def _check_runs(self, runs: int, where: Path) -> None:
         if runs < self.runs:
             raise InputError(
-                f"{where}: was begun with {self.runs} runs, {runs} are asked for: "
-                f"give {self.runs} or more, or {NEW_FOLDER}"
+                f"{where}: was started with {self.runs} runs, {runs} are requested: "
+                f"request {self.runs} or more, or {NEW_FOLDER}"
             )
         design = self.study.get("design")
         if runs > self.runs and design in NOT_TO_BE_EXTENDED:
             raise InputError(
-                f"{where}: was begun with {self.runs} runs, {runs} are asked for, and a "
+                f"{where}: was started with {self.runs} runs, {runs} are requested, and a "
                 f"{design} design cannot be extended: {NEW_FOLDER}"
             )
         if runs > self.runs and self.study.get("fixed_runs"):
             raise InputError(
-                f"{where}: was begun with {self.runs} runs, {runs} are asked for, but its file has "
-                f"fixed_runs: true: {NEW_FOLDER}"
+                f"{where}: was started with {self.runs} runs, {runs} are requested, but its file "
+                f"has fixed_runs: true: {NEW_FOLDER}"
             )
 
 
@@ -117,21 +117,21 @@ def read_manifest(path: Path) -> Manifest:
     """Read a manifest and check its digest.
 
     Raises:
-        InputError: it is missing, damaged, or of another version.
+        InputError: the file is missing, damaged, or of another version.
     """
     try:
         content = json.loads(read_file(path))
     except (ValueError, RecursionError) as error:
         if isinstance(error, InputError):
             raise
-        raise InputError(f"{path}: damaged: no JSON ({error})") from None
+        raise InputError(f"{path}: damaged: not JSON ({error})") from None
     if not isinstance(content, dict):
         raise InputError(f"{path}: damaged: a mapping was expected, got {short(content)}")
     sha256 = content.pop(SHA256, None)
     if content.get("format") == FORMAT - 1:
-        raise InputError(f"{path}: of version 0.7 or older, which can read it: {NEW_FOLDER}")
+        raise InputError(f"{path}: written by version 0.7 or older: use that one, or {NEW_FOLDER}")
     if sha256 != _digest(content):
-        raise InputError(f"{path}: damaged or edited: its content does not have its {SHA256}")
+        raise InputError(f"{path}: damaged or edited: its {SHA256} does not match its content")
     manifest = validate(Manifest, content, str(path))
     if not manifest.study.get("laws"):
         raise InputError(f"{path}: study.laws: missing")
@@ -143,9 +143,9 @@ def _digest(content: Mapping[str, Any]) -> str:
 
 
 def differences(before: Any, now: Any, key: str = "") -> Iterator[tuple[str, Any, Any]]:
-    """Yield the keys whose values differ, with both; None stands for one that is not there.
+    """Yield the keys whose values differ, with both values; None for a missing one.
 
-    Of the variables (``vary``) the order counts, too: draws follow it.
+    The order of the variables (``vary``) is compared, too: the draws depend on it.
     """
     if isinstance(before, Mapping) and isinstance(now, Mapping):
         for name in dict.fromkeys((*before, *now)):

@@ -1,4 +1,4 @@
-"""The journal of a folder: made, or opened with what was damaged left out."""
+"""Opening and recovery of the journal of a campaign's folder."""
 
 from __future__ import annotations
 
@@ -18,21 +18,21 @@ from .manifest import Manifest
 from .table import check_table, table_rows
 
 MOST_NAMED = 3
-"""Damaged rows that a line names."""
+"""Maximum number of damaged rows listed in a message."""
 
 
 def open_journal(folder: Path, manifest: Manifest) -> tuple[Journal, list[str]]:
-    """Open the journal of a folder.
+    """Open the journal of a folder; create or repair it if necessary.
 
-    Of a damaged journal the whole rows are kept, and the table gives those that are lost, if it is
-    whole: nothing is flown again that is known.
+    From a damaged journal all undamaged rows are kept; the others are taken from the table if it
+    is undamaged, so that as few flights as possible are flown again.
 
     Args:
-        folder: of a campaign, held.
-        manifest: of it.
+        folder: of a campaign, locked by this process.
+        manifest: of the campaign.
 
     Returns:
-        The journal, and what was damaged, a line each.
+        The journal, and a line for each damage.
 
     Raises:
         InputError: the journal cannot be opened or written.
@@ -47,20 +47,20 @@ def open_journal(folder: Path, manifest: Manifest) -> tuple[Journal, list[str]]:
     if not path.exists():
         count = write_journal(path, codec, _rows_of_table(folder, manifest))
         if (folder / TABLE).exists():
-            damaged.append(f"{path}: is gone; {count} rows are taken from {TABLE}")
+            damaged.append(f"{path}: missing; {count} rows are taken from {TABLE}")
     elif damage := damage_of(path, codec):
         rows = chain(whole_rows(path, codec), _rows_of_table(folder, manifest))
         count = write_journal(path, codec, rows)
         more = f" and {len(damage) - MOST_NAMED} more" * (len(damage) > MOST_NAMED)
         damaged.append(
             f"{path}: damaged: {', '.join(damage[:MOST_NAMED])}{more}; {count} rows are kept, "
-            f"and the damaged file is {JOURNAL}{SET_ASIDE}"
+            f"and the damaged file is renamed to {JOURNAL}{SET_ASIDE}"
         )
     return Journal(path, codec), damaged
 
 
 def _rows_of_table(folder: Path, manifest: Manifest) -> Iterator[Row]:
-    """Yield the rows of an undamaged table; none of any other."""
+    """Yield the rows of an undamaged table; nothing if it is damaged or missing."""
     with suppress(InputError):
         check_table(folder / TABLE, manifest.campaign)
         yield from table_rows(folder / TABLE, manifest.table)

@@ -1,4 +1,4 @@
-"""The columns of a campaign's table, in their order."""
+"""The columns of a campaign's table, in order."""
 
 from __future__ import annotations
 
@@ -16,17 +16,17 @@ Kind = Literal["int64", "float64", "str", "float32s"]
 
 
 class Schema(StrictModel):
-    """What the table of a campaign has columns for."""
+    """Definition of the columns of a campaign's table."""
 
     vary: dict[str, Literal["float64", "str"]]
-    """The kind of each variable."""
+    """Kind of each variable."""
     grid: dict[str, int]
-    """The number of values of each variable that is a grid."""
+    """Number of values of each grid variable."""
     metrics: list[str]
     require: list[str]
     bands: list[str]
     bins: Annotated[int, Field(ge=1)]
-    """Of a band; a row without one has a null for it."""
+    """Number of bins of a band; a row without band has a null."""
 
     def columns(self) -> Iterator[tuple[str, Kind]]:
         """Yield name and kind of each column."""
@@ -39,7 +39,7 @@ class Schema(StrictModel):
         yield "digest", "str"
 
     def values(self, row: Row) -> Iterator[Any]:
-        """Yield a row's value of each column; None where there is none."""
+        """Yield a row's value for each column; None where it has none."""
         yield from (row.task.run, row.task.law, row.outcome, row.reason, row.ended_at_s)
         for name, kind in self.vary.items():
             value = row.vary.get(name)
@@ -50,7 +50,7 @@ class Schema(StrictModel):
         yield row.digest
 
     def row(self, values: Mapping[str, Any]) -> Row:
-        """Return the row of which these are the values of each column, by name."""
+        """Return the row with the given values by column name."""
 
         def known(group: str, names: Iterable[str]) -> dict[str, Any]:
             group_values = {name: values[f"{group}.{name}"] for name in names}

@@ -1,4 +1,4 @@
-"""What a campaign was flown with: versions, sources, and the files that its own file names."""
+"""Software and input files of a campaign: versions, and digests of sources and files."""
 
 from __future__ import annotations
 
@@ -16,18 +16,18 @@ from ...flight.plan import Flight
 from ...processes.software import versions
 
 DECIDE = ("python", "space_robot", "numpy", "scipy", "numba", "llvmlite")
-"""Packages whose version may change the bits of a row."""
+"""Packages whose version may affect the bits of a row."""
 OF_TABLES = "pyarrow"
-"""The package that makes the table's bytes."""
+"""The package that writes the table."""
 SUFFIXES = (".yaml", ".yml", ".urdf", ".xacro", ".py")
-"""Of files that a campaign's file may name."""
+"""Suffixes of files that a campaign's file may refer to."""
 ROOT = Path(__file__).resolve().parents[3]
-"""Of the project's packages."""
+"""The project's packages."""
 
 
 @cache
 def software() -> dict[str, str | None]:
-    """Return the versions of all that makes the bytes of a table, and a digest of the sources."""
+    """Return the version of each package that a table depends on, and a digest of the sources."""
     known = versions()
     try:
         tables: str | None = version(OF_TABLES)
@@ -38,7 +38,7 @@ def software() -> dict[str, str | None]:
 
 
 def file_digests(values: Any) -> dict[str, str]:
-    """Return the digest of every file that is named anywhere in a file's content, by its name."""
+    """Return the digest of every file named in a campaign file's content, by name."""
     names = {str(law_file(text.partition("=")[0]) or text) for text in texts_of(values)}
     return {
         name: digest(Path(name).read_bytes())
@@ -48,11 +48,11 @@ def file_digests(values: Any) -> dict[str, str]:
 
 
 def flight_digest(flight: Flight) -> str:
-    """Return a digest of all that a flight's description says, the numbers of its files included.
+    """Return a digest of a flight's description, including the numbers of its files.
 
-    The software, which is compared separately, is left out.
+    The software is not included; it is compared separately.
     """
-    others = ("versions", "commit", "scenario")  # the scenario says the same once more
+    others = ("versions", "commit", "scenario")  # the scenario repeats the other entries
     content = {k: v for k, v in flight.description.items() if k not in others}
     return digest(json.dumps(content, sort_keys=True, default=str).encode())
 
@@ -63,7 +63,7 @@ def digest(data: bytes) -> str:
 
 
 def source_digest(root: Path) -> str:
-    """Return a digest of the project's Python files below ``root``, by their places in it."""
+    """Return a digest of the project's Python files below ``root``, with their relative paths."""
     packages = (
         "space_robot_msgs_py",
         "space_robot_model",
@@ -79,7 +79,7 @@ def source_digest(root: Path) -> str:
 
 
 def texts_of(value: Any) -> Iterator[str]:
-    """Yield all texts in a file's content, the keys of its mappings included."""
+    """Yield all texts in a file's content, including the keys of mappings."""
     if isinstance(value, str):
         yield value
     elif isinstance(value, dict):

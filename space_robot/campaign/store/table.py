@@ -1,6 +1,6 @@
-"""The table of a campaign as Parquet: the same rows give the same bytes.
+"""The table of a campaign in Parquet format: the same rows give the same bytes.
 
-Beside it stands its digest, with the campaign's; ``sha256sum -c`` reads it, too.
+A second file has its digest and that of the campaign; ``sha256sum -c`` can read it.
 """
 
 from __future__ import annotations
@@ -23,13 +23,13 @@ if TYPE_CHECKING:
     from pandas import DataFrame
 
 ROW_GROUP = 2000
-"""Rows that are in memory at a time."""
+"""Number of rows in memory at a time."""
 SHA256 = ".sha256"
-"""What the name of a table's digest ends with."""
+"""Suffix of the file with a table's digest."""
 
 
 def check_tables() -> None:
-    """Check that tables can be written, before anything is flown for one.
+    """Check that the packages for writing tables are installed.
 
     Raises:
         InputError: a package is not installed.
@@ -44,19 +44,19 @@ def check_tables() -> None:
 
 
 def write_table(path: Path, schema: Schema, campaign: str, rows: Iterable[Row]) -> str:
-    """Write the rows, whole or not at all, over an older table, and beside it the digest.
+    """Write the table and its digest atomically; an older table is replaced.
 
     Args:
         path: of the file.
         schema: its columns.
-        campaign: see `Manifest.campaign`.
-        rows: in their order; a few of them are in memory at a time.
+        campaign: digest `Manifest.campaign`.
+        rows: in order; only a few of them are in memory at a time.
 
     Returns:
         The digest of the file, see `file_digest`.
 
     Raises:
-        InputError: it cannot be written.
+        InputError: the table cannot be written.
     """
     from pyarrow.parquet import ParquetWriter
 
@@ -83,10 +83,10 @@ def write_table(path: Path, schema: Schema, campaign: str, rows: Iterable[Row]) 
 
 
 def check_table(path: Path, campaign: str) -> None:
-    """Check that a table is as it was written, and of a campaign.
+    """Check that a table is unmodified, and belongs to a campaign.
 
     Raises:
-        InputError: it is not, or is missing.
+        InputError: it is modified, of another campaign, or missing.
     """
     check_there(path)
     digest = _digest_of(path)
@@ -94,15 +94,15 @@ def check_table(path: Path, campaign: str) -> None:
         if digest.read_text("utf-8") == _digest_text(path, campaign, file_digest(path)):
             return
     raise InputError(
-        f"{path}: damaged, or of another campaign: does not have the digest in {digest.name}"
+        f"{path}: damaged, or of another campaign: its digest is not that in {digest.name}"
     )
 
 
 def check_there(path: Path) -> None:
-    """Check that a table was written.
+    """Check that a table exists.
 
     Raises:
-        InputError: it was not.
+        InputError: it does not exist.
     """
     if not path.is_file():
         raise InputError(f"{path}: no such file: the campaign has no table yet")
@@ -116,7 +116,7 @@ def read_table(path: Path, schema: Schema) -> DataFrame:
         schema: its columns.
 
     Raises:
-        InputError: it is not there, cannot be read, or has other columns.
+        InputError: it is missing, cannot be read, or has other columns.
     """
     check_tables()
     from pandas import read_parquet
@@ -128,12 +128,12 @@ def read_table(path: Path, schema: Schema) -> DataFrame:
     except (OSError, ValueError, ArrowException) as error:
         raise InputError(f"{path}: cannot be read ({' '.join(str(error).split())})") from None
     if list(frame) != [name for name, _ in schema.columns()]:
-        raise InputError(f"{path}: damaged: its columns are not those of the campaign")
+        raise InputError(f"{path}: damaged: it does not have the campaign's columns")
     return frame
 
 
 def table_rows(path: Path, schema: Schema) -> Iterator[Row]:
-    """Yield the rows of an undamaged table, with all their digits."""
+    """Yield the rows of an undamaged table, with full precision."""
     from pyarrow.parquet import ParquetFile
 
     for batch in ParquetFile(path).iter_batches(ROW_GROUP):
@@ -141,7 +141,7 @@ def table_rows(path: Path, schema: Schema) -> Iterator[Row]:
 
 
 def file_digest(path: Path) -> str:
-    """Return the SHA-256 of a file; empty if there is none."""
+    """Return the SHA-256 of a file; empty if it does not exist."""
     if not path.is_file():
         return ""
     digest = hashlib.sha256()

@@ -1,1 +1,1 @@
-"""What a campaign's table says: requirements met or not, laws compared, what drives an error."""
+"""Statistics of a campaign's table: verdicts on requirements, comparison of laws, sensitivity."""

@@ -1,4 +1,4 @@
-"""What a campaign's design makes of its rows: which are independent, which belong together."""
+"""Effect of a campaign's design on its rows: which are independent, which belong together."""
 
 from __future__ import annotations
 
@@ -24,10 +24,10 @@ def variables(table: DataFrame) -> list[str]:
 
 
 def independent_rows(table: DataFrame, design: str) -> DataFrame:
-    """Return the rows that verdicts and quantiles may take for independent draws.
+    """Return the rows that are independent draws, for verdicts and quantiles.
 
-    Of a Saltelli design these are the points A and B: the runs between share all variables but one
-    with A. Other designs keep all.
+    In a Saltelli design these are the points A and B: the runs between differ from A in only one
+    variable. In other designs these are all rows.
 
     Args:
         table: rows of the campaign.
@@ -40,12 +40,12 @@ def independent_rows(table: DataFrame, design: str) -> DataFrame:
 
 
 def saltelli_values(table: DataFrame, law: str, column: str) -> Array:
-    """Return a column as `sobol.sobol_indices` takes it, NaN where a run has not been flown.
+    """Return a column for `sobol.sobol_indices`, (rows, d + 2); NaN for runs not flown yet.
 
     Args:
-        table: rows of a campaign of the design ``saltelli``.
+        table: rows of a campaign with the design ``saltelli``.
         law: as in the table.
-        column: as in ``metric.attitude_rms``.
+        column: such as ``metric.attitude_rms``.
     """
     rows, step = of_law(table, law), len(variables(table)) + 2
     count = int(rows["run"].max()) // step + 1 if len(rows) else 0

@@ -1,4 +1,4 @@
-"""The laws of a campaign in an order, as far as it is shown."""
+"""Ranking of the laws of a campaign by significant differences."""
 
 from __future__ import annotations
 
@@ -15,19 +15,19 @@ if TYPE_CHECKING:
     from pandas import DataFrame
 
 TAIL = 0.99
-"""The quantile that stands beside the median."""
+"""The quantile shown beside the median."""
 
 
 @dataclass(frozen=True)
 class Ranking:
-    """A law in the league of a metric."""
+    """Rank of a law by a metric."""
 
     law: str
     rank: int
-    """One more than the laws shown to be better, so several laws may share a rank."""
+    """One more than the number of significantly better laws; several laws may share a rank."""
     runs: int
     failures: int
-    """Flights without a number; the quantiles count them as worse than any."""
+    """Number of flights without value; quantiles count them as infinite."""
     median: Estimate
     tail: Estimate
     """The quantile `TAIL`."""
@@ -35,21 +35,21 @@ class Ranking:
 
 @dataclass(frozen=True)
 class League:
-    """All laws by one metric at one point of the grid."""
+    """Ranking of all laws by one metric at one point of the grid."""
 
     metric: str
     standings: list[Ranking]
-    """By rank, then by median, then by the tail."""
+    """Ordered by rank, median and tail quantile."""
     comparisons: list[PairedComparison]
-    """Of all pairs, on which the ranks rest."""
+    """Comparisons of all pairs, from which the ranks follow."""
 
 
 def league(table: DataFrame, column: str, confidence: float = 0.95) -> League:
-    """Rank the laws by a metric of which less is better.
+    """Rank the laws by a metric (smaller is better).
 
     Args:
         table: rows of a campaign, at one point of its grid.
-        column: as in ``metric.attitude_rms``.
+        column: such as ``metric.attitude_rms``.
         confidence: of intervals, and of all findings of this league together.
     """
     comparisons = compare_all(table, column, confidence)

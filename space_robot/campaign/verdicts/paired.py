@@ -1,12 +1,12 @@
-"""Laws compared over the same draws, run by run.
+"""Paired comparison of laws over the same draws.
 
-A failed flight ranks below any number, and two failed flights are equal. The exact sign test
-decides which law is better in most cases; the median of the runs' ratios, with an interval by order
-statistics, says by how much. Neither assumes a distribution. (Wilcoxon's test assumes that
-differences are symmetric about their median, which errors over decades are not.)
-The same test decides whether one law fails more often, over the runs in which just one of the two
-failed (McNemar's, exact). The p values of all pairs and of both tests are corrected together after
-Holm (1979).
+A failed flight is worse than any value, and two failed flights are equal. The exact sign test
+decides which law is better in most cases; the median ratio, with an interval by order statistics,
+is the size of the effect. Neither assumes a distribution. (Wilcoxon's test assumes that
+differences are symmetric about their median, which does not hold for errors over decades.)
+The same test decides which law fails more often, over the runs in which exactly one of the two
+failed (exact McNemar test). The p values of all pairs and of both tests are corrected together
+by Holm's method (1979).
 """
 
 from __future__ import annotations
@@ -32,36 +32,36 @@ Finding = Literal["better", "worse", "alike", "contradictory"]
 
 @dataclass(frozen=True)
 class PairedComparison:
-    """A law beside another, by a metric of which less is better."""
+    """Comparison of a law with another one by a metric (smaller is better)."""
 
     law: str
     other: str
     runs: int
-    """That both flew."""
+    """Number of runs that both laws flew."""
     better: int
-    """Runs in which the law is better."""
+    """Number of runs in which the law is better."""
     worse: int
     better_share: Interval
-    """Confidence interval of the share of cases in which it is better."""
+    """Confidence interval of the share of cases in which the law is better."""
     ratio: Estimate
-    """Median of the law's number over the other's; NaN if there are no runs."""
+    """Median ratio of the law's value to the other's; NaN if there are no runs."""
     failed: int
-    """Runs in which the law alone failed."""
+    """Number of runs in which only the law failed."""
     other_failed: int
     p_better: float
-    """Of the sign test, two-sided, corrected."""
+    """Corrected two-sided p value of the sign test."""
     p_failed: float
-    """Of the test of failures, two-sided, corrected."""
+    """Corrected two-sided p value of the test of failures."""
     level: float
-    """The confidence that was asked for."""
+    """Confidence of the intervals and of the finding."""
 
     @property
     def finding(self) -> Finding:
-        """Say what is shown of the law beside the other.
+        """Return the significant difference of the law from the other.
 
-        ``better`` and ``worse``: the sign test says so and the interval of the ratio excludes 1, or
-        it fails less or more often; ``contradictory``: better in most cases, but fails more often,
-        or the other way round; ``alike``: nothing is shown.
+        ``better`` and ``worse``: by the sign test with a ratio interval that excludes 1, or by the
+        number of failures; ``contradictory``: better in most cases, but fails more often, or vice
+        versa; ``alike``: no significant difference.
         """
         signs = {self._by_sign, self._by_failures} - {0}
         if len(signs) == 2:
@@ -82,11 +82,11 @@ class PairedComparison:
 
 
 def compare_all(table: DataFrame, column: str, confidence: float = 0.95) -> list[PairedComparison]:
-    """Compare every law with every one after it, over the runs that both flew.
+    """Compare every pair of laws over the runs that both flew.
 
     Args:
         table: rows of a campaign, at one point of its grid.
-        column: of which less is better.
+        column: name of the metric's column; smaller is better.
         confidence: of the intervals, and of all findings together.
     """
     ordered = table.assign(_value=measured(table, column))
@@ -109,14 +109,14 @@ def compare_all(table: DataFrame, column: str, confidence: float = 0.95) -> list
 def compare(
     a: Array, b: Array, confidence: float = 0.95, law: str = "A", other: str = "B"
 ) -> PairedComparison:
-    """Compare two laws' numbers of the same runs, without correction for other comparisons.
+    """Compare the values of two laws in the same runs, without correction for multiple tests.
 
     Args:
-        a: (N,) of which less is better; infinite where the flight failed.
-        b: (N,) of the same runs, of the other law.
+        a: (N,) values of the law; smaller is better; infinite where the flight failed.
+        b: (N,) values of the other law in the same runs.
         confidence: of the intervals.
-        law: the first one's name.
-        other: the second one's name.
+        law: name of the law.
+        other: name of the other law.
     """
     runs, better, worse = len(a), int(np.sum(a < b)), int(np.sum(a > b))
     failed, other_failed = (
@@ -145,7 +145,7 @@ def _sign_test(one: int, two: int) -> float:
 
 
 def holm(p_values: list[float]) -> list[float]:
-    """Correct p values for their number, so that one false finding in all keeps its probability."""
+    """Return p values corrected by Holm's method, which bounds the family-wise error rate."""
     order = np.argsort(p_values, kind="stable")
     adjusted, largest = [1.0] * len(p_values), 0.0
     for place, index in enumerate(order.tolist()):

@@ -1,4 +1,4 @@
-"""Quantiles and their confidence intervals, for any distribution, by order statistics."""
+"""Distribution-free quantiles and confidence intervals by order statistics."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ Array = NDArray[np.float64]
 
 
 class Estimate(NamedTuple):
-    """A number and the two-sided confidence interval around it."""
+    """An estimate with its two-sided confidence interval."""
 
     value: float
     low: float
@@ -20,20 +20,20 @@ class Estimate(NamedTuple):
 
 
 def quantile(values: Array, share: float, confidence: float = 0.95) -> Estimate:
-    """Estimate the value that the share of the cases does not exceed.
+    """Estimate a quantile and its confidence interval.
 
-    All three numbers are values that were seen, so that infinite ones (flights that failed) need no
-    arithmetic. With too few values the interval is open: minus or plus infinite.
+    All three numbers are sample values, so infinite ones (failed flights) need no arithmetic. With
+    too few values an end of the interval is infinite.
 
     Args:
-        values: (N,) of independent runs, at least one, without NaN.
-        share: within 0 to 1; 0.5 asks for the median.
-        confidence: of the interval, within 0 to 1.
+        values: (N,) of independent runs, N > 0, without NaN.
+        share: probability of the quantile, 0 to 1; 0.5 for the median.
+        confidence: of the interval, 0 to 1.
     """
     ordered, n = np.sort(values), len(values)
     tail = 0.5 * (1.0 - confidence)
-    # Binomial(n, share) of n values lie below the quantile: fewer than `low`, or `high` and more,
-    # with a probability of at most `tail` each
+    # the number of values below the quantile is Binomial(n, share): it is less than `low`, or at
+    # least `high`, with a probability of at most `tail` each
     low = int(binom.ppf(tail, n, share))
     high = int(binom.ppf(1.0 - tail, n, share)) + 1
     return Estimate(

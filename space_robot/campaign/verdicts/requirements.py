@@ -1,4 +1,4 @@
-"""Requirements: met, not met, undecided or not measured."""
+"""Verdicts on requirements: met, not met, undecided or not measured."""
 
 from __future__ import annotations
 
@@ -25,62 +25,62 @@ Word = Literal["met", "not met", "undecided", "not measured"]
 
 @dataclass(frozen=True)
 class Verdict:
-    """What the runs of a law say about a requirement.
+    """Verdict on a requirement for one law.
 
-    A word that is false comes with a probability of at most 1 - the requirement's confidence.
+    It is false with a probability of at most 1 - the requirement's confidence.
     """
 
     requirement: str
     law: str
     point: str
-    """Of the campaign's grid; empty if it has none."""
+    """Point of the campaign's grid; empty if there is no grid."""
     word: Word
     runs: int
     failures: int
-    """Runs that miss the requirement, those that did not come to their end among them."""
+    """Number of runs that miss the requirement, including those that ended early."""
     not_ended: int
-    """Of the failures: flights that did not come to their end."""
+    """Number of failures that ended early."""
     not_of_the_law: int
-    """Of those: killed, out of time or refused."""
+    """Number of these that were killed, out of time or refused."""
     not_measured: int
-    """Runs that came to their end without the number that is required.
+    """Number of completed runs without a value of the metric.
 
-    They speak against every verdict: as failures against "met", as successes against "not met".
+    They count against every verdict: as failures for "met", as successes for "not met".
     """
     limits: Interval
-    """The share of cases that meet it is at least and at most this: each at the confidence."""
+    """One-sided confidence limits of the share of cases that meet the requirement."""
     bound: float | None
-    """The metric is no worse than this in the demanded share of the cases, at the confidence.
+    """Confidence bound of the metric in the required share of the cases.
 
-    Infinite: too many flights failed. None: there are too few runs to say.
+    Infinite: too many flights failed. None: there are too few runs.
     """
     needed_without_failure: int | None
-    """Further runs that would show it met if none of them failed; None of a fixed sample."""
+    """Further runs needed for "met" if none of them fails; None for a fixed sample."""
     projected_decision: ProjectedDecision | None
-    """When it would be decided if failures go on as they did.
+    """Decision expected at the present rate of failures.
 
-    None if it is decided, if it cannot be said, and of a fixed sample.
+    None if decided already, if it cannot be predicted, and for a fixed sample.
     """
 
     @property
     def met(self) -> int:
-        """The number of runs that met it."""
+        """Number of runs that met the requirement."""
         return self.runs - self.failures - self.not_measured
 
     @property
     def share(self) -> float:
-        """The share of the runs that met it; NaN of no runs."""
+        """Share of the runs that met the requirement; NaN without runs."""
         return self.met / self.runs if self.runs else float("nan")
 
 
 def verdicts(table: DataFrame, study: Study, runs: int, grid: Sequence[str] = ()) -> list[Verdict]:
-    """Judge every law by every requirement, at every point of the grid.
+    """Return the verdict on every requirement, for every law and grid point.
 
     Args:
         table: rows of the campaign; ``require.<name>`` are the requirements' columns.
         study: its file.
-        runs: of the campaign. If their number is fixed, nothing is judged before all are flown.
-        grid: names of the variables that are grids.
+        runs: of the campaign. A fixed number must be complete before anything is decided.
+        grid: names of the grid variables.
     """
     rows = independent_rows(table, study.design)
     test: type[ShareTest] | None = Sequential
@@ -102,13 +102,13 @@ def verdict(
     law: str = "",
     point: str = "",
 ) -> Verdict:
-    """Judge the rows of one law by one requirement.
+    """Return the verdict on one requirement for one law.
 
     Args:
         name: of the requirement.
-        demand: what it asks for.
-        rows: one a run.
-        kind: of test; None: of a fixed sample that is not complete, which shows nothing yet.
+        demand: the requirement.
+        rows: of the law, one per run.
+        kind: of test; None: a fixed sample that is not complete, so undecided.
         law: for the verdict.
         point: for the verdict.
     """
@@ -154,36 +154,36 @@ def verdict(
 
 
 def family_error(study: Study, verdicts: list[Verdict]) -> float:
-    """Return the largest probability that any of some verdicts is false (Bonferroni)."""
+    """Return an upper bound of the probability that any verdict is false (Bonferroni)."""
     return min(1.0, sum(1.0 - study.require[v.requirement].confidence for v in verdicts))
 
 
 _STEPS = 32
-"""That are looked at together first; then twice as many, and so on."""
+"""Size of the first searched interval of runs; it is doubled at each step."""
 
 
 class ProjectedDecision(NamedTuple):
-    """The number of runs after which a requirement would be decided, and how."""
+    """Expected decision on a requirement, and the number of runs it needs."""
 
     runs: int
-    """In all."""
+    """Total number of runs."""
     met: bool
 
 
 def projected_decision(test: Sequential, failures: int, runs: int) -> ProjectedDecision | None:
-    """Return the first decision if failures go on at the rate seen.
+    """Return the first decision expected at the present rate of failures.
 
-    After n runs there are then ``failures / runs * n`` failures, rounded to whole ones against the
-    decision. So the number of failures rises in steps, and what is decided just before a step may
-    be open after it: the first decision is searched step by step.
+    It assumes ``failures / runs * n`` failures after n runs, rounded to an integer against the
+    decision. This number rises in steps, and a requirement decided just before a step may be
+    undecided after it, so the first decision is searched step by step.
 
     Args:
         test: of the requirement.
-        failures: seen so far.
-        runs: flown so far, at least one.
+        failures: so far.
+        runs: so far, at least one.
 
     Returns:
-        None: failures are exactly as frequent as allowed, or it takes more than `MOST_RUNS` runs.
+        None if failures are exactly as frequent as allowed, or if more than `MOST_RUNS` are needed.
     """
     rate, allowed = failures / runs, 1.0 - test.share
     if rate == allowed:
@@ -195,7 +195,7 @@ def projected_decision(test: Sequential, failures: int, runs: int) -> ProjectedD
     level = -np.log1p(-test.confidence)
 
     def may_be_decided(n: int) -> bool:
-        """Return True if it is decided without rounding; with rounding it is no sooner."""
+        """Return True if it is decided without rounding; with rounding it is not earlier."""
         events, share = (rate * n, allowed) if met else ((1.0 - rate) * n, test.share)
         return bool(log_evidence(events, n, share) >= level - 1e-6)
 
@@ -203,15 +203,15 @@ def projected_decision(test: Sequential, failures: int, runs: int) -> ProjectedD
     step, count = max(failures, failures * start // runs), _STEPS
     while step * runs // failures <= MOST_RUNS:
         steps = np.arange(step, step + count)
-        # failures stay whole and alike from one end to the next: the last run before a step speaks
-        # most for "met", the first run of a step most for "not met"
+        # failures are constant between steps: the last run before a step is best for "met", the
+        # first run after a step is best for "not met"
         ends = steps * runs // failures if met else -(-steps * runs // failures)
         decided = test.is_met(steps, ends) if met else test.is_missed(steps, ends)
         decided &= ends >= runs
         if decided.any():
             index = int(np.argmax(decided))
             end = int(ends[index])
-            if met:  # with as many failures fewer runs may do
+            if met:  # fewer runs with the same failures may suffice
                 end = max(runs, test.runs_needed(int(steps[index])) or end)
             return ProjectedDecision(end, met) if end <= MOST_RUNS else None
         step, count = step + count, 2 * count

@@ -1,6 +1,6 @@
-"""Which of the varied quantities drives a metric: by ranks, so that neither scale nor shape counts.
+"""Sensitivity of a metric to the variables, by ranks: independent of scale and distribution.
 
-Flights that failed rank above all others, and alike.
+Failed flights share the highest rank.
 """
 
 from __future__ import annotations
@@ -22,33 +22,33 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 BINS = 8
-"""Groups of equally many runs into which a number's values are divided."""
+"""Number of groups of equal size into which a variable's values are divided."""
 FEWEST = 5
-"""Runs a group; with fewer groups of so many than two, nothing is said."""
+"""Minimum runs per group; at least two such groups are needed."""
 
 
 @dataclass(frozen=True)
 class Influence:
-    """What a variable has to do with a metric."""
+    """Influence of a variable on a metric."""
 
     variable: str
     correlation: Estimate | None
-    """Spearman's rank correlation; None of a variable whose values are words."""
+    """Spearman's rank correlation; None if the variable's values are texts."""
     partial: Estimate | None
-    """The same with the other numbers held fixed; None also where they determine this one."""
+    """Partial rank correlation, other numbers held fixed; None also if they determine this one."""
     spread: float
-    """The share of the spread of the metric's ranks that this variable explains by itself.
+    """Share of the variance of the metric's ranks that this variable explains by itself.
 
-    Whatever the shape: also where large and small values are bad and those between good, of
-    which a correlation sees nothing. Epsilon squared of Kruskal and Wallis over `BINS` groups.
+    Epsilon squared of Kruskal and Wallis over `BINS` groups: also detects non-monotone influences,
+    such as a minimum at medium values, which a correlation does not.
     """
     p: float
-    """Of no influence at all (Kruskal and Wallis), corrected for the number of variables."""
+    """p value of no influence (Kruskal and Wallis), corrected for the number of variables."""
 
 
 @dataclass(frozen=True)
 class Sensitivity:
-    """What drives a metric under a law."""
+    """Sensitivity of a metric under a law to all variables."""
 
     law: str
     metric: str
@@ -56,25 +56,25 @@ class Sensitivity:
     influences: list[Influence]
     """The strongest first."""
     explained: float | None
-    """The share of the spread of the ranks that all numbers together explain, linearly in ranks.
+    """Share of the variance of the ranks explained by a linear model of all numbers' ranks.
 
-    The rest is noise, what is not monotone, and what several do together. None: too few runs.
+    The rest is noise, non-monotone influence and interaction. None: too few runs.
     """
 
 
 def sensitivity(
     table: DataFrame, law: str, column: str, confidence: float = 0.95
 ) -> Sensitivity | None:
-    """Look for the variables that drive a metric under a law.
+    """Compute the influence of each variable on a metric under a law.
 
     Args:
         table: rows of a campaign, at one point of its grid.
         law: as in the table.
-        column: as in ``metric.attitude_rms``.
+        column: such as ``metric.attitude_rms``.
         confidence: of the intervals.
 
     Returns:
-        None: nothing is varied, or too few runs came to their end to say anything.
+        None if there are no variables, or too few completed runs.
     """
     rows = of_law(table, law)
     values = measured(rows, column)
@@ -103,17 +103,17 @@ def _strength(influence: Influence) -> float:
 def rank_correlations(
     variables: list[Array], ranked: Array, confidence: float = 0.95
 ) -> tuple[list[Estimate], list[Estimate | None], float | None]:
-    """Correlate the ranks of each variable with those of a metric, plain and partial.
+    """Compute plain and partial rank correlations of each variable with a metric.
 
     Intervals are Fisher's, with the variance of Bonett and Wright (2000) for ranks.
 
     Args:
-        variables: (N,) each.
+        variables: (N,) values of each.
         ranked: (N,) ranks of the metric.
         confidence: of the intervals.
 
     Returns:
-        Spearman's correlations; partial ones; the share explained by all (R squared, adjusted).
+        Spearman's correlations; partial ones; the share explained by all (adjusted R squared).
     """
     if not variables:
         return [], [], None
@@ -139,7 +139,7 @@ def _ranks(values: Array | Series) -> Array:
 
 
 def _interval(r: float, free: int, confidence: float) -> Estimate:
-    """Put Fisher's interval around a rank correlation; ``free``: N - 3 less what is held fixed."""
+    """Return a rank correlation with Fisher's interval; ``free``: N - 3 - fixed variables."""
     r = min(1.0, max(-1.0, r))
     if free < 1 or abs(r) == 1.0:
         return Estimate(r, -1.0 if free < 1 else r, 1.0 if free < 1 else r)
@@ -149,7 +149,7 @@ def _interval(r: float, free: int, confidence: float) -> Estimate:
 
 
 def _by_groups(series: Series, ranked: Array) -> tuple[float, float]:
-    """Return what the groups of a variable explain of the ranks, and the p value of nothing."""
+    """Return epsilon squared and the p value of Kruskal and Wallis for a variable's groups."""
     if series.dtype.kind in "fiu" and series.nunique() > BINS:
         groups = max(2, min(BINS, len(ranked) // FEWEST))
         places = np.minimum((_ranks(series) - 0.5) * groups // len(ranked), groups - 1)

@@ -1,7 +1,7 @@
-"""Whether runs show that a requirement is met in a share of all cases: two ways to judge.
+"""Tests of the share of cases that meet a requirement.
 
-`FixedSample` judges once, after a number of runs that was chosen before the first was flown.
-`Sequential` may judge after every run, so runs may be added until a verdict is reached.
+`FixedSample` is evaluated once, after a number of runs fixed in advance. `Sequential` may be
+evaluated after every run, so runs can be added until there is a verdict.
 """
 
 from __future__ import annotations
@@ -21,47 +21,47 @@ from .shares import Interval, share_limits
 Array = NDArray[np.float64]
 Bools = NDArray[np.bool_]
 Numbers = float | NDArray[Any]
-"""Counts, one or an array of them."""
+"""A count or an array of counts."""
 
 MOST_RUNS = 10**9
-"""Larger numbers of runs are not considered."""
+"""Largest number of runs considered."""
 _HALVINGS = 60
 
 
 @dataclass(frozen=True)
 class ShareTest(ABC):
-    """A one-sided test each of "met in the share" and of "not met in the share".
+    """One-sided tests of "met in the required share" and of "not met in the required share".
 
-    A verdict that is false comes with a probability of at most ``1 - confidence``.
+    A verdict is false with a probability of at most ``1 - confidence``.
     """
 
     share: float
-    """Of the cases in which the requirement is to be met, within 0 to 1."""
+    """Required share of the cases that meet the requirement, 0 to 1."""
     confidence: float
-    """Within 0 to 1."""
+    """Confidence of each test, 0 to 1."""
 
     @abstractmethod
     def is_met(self, failures: Numbers, runs: Numbers) -> Bools:
-        """Return True where so few failures among so many runs show that the share is met."""
+        """Return True where the number of failures proves the requirement met."""
 
     @abstractmethod
     def is_missed(self, failures: Numbers, runs: Numbers) -> Bools:
-        """Return True where so many failures among so many runs show that it is not met."""
+        """Return True where the number of failures proves the requirement not met."""
 
     @abstractmethod
     def limits(self, failures: int, runs: int) -> Interval:
-        """Return the limits of the share of cases that meet the requirement.
+        """Return one-sided confidence limits of the share of cases that meet the requirement.
 
-        Each holds with `confidence` by itself. The low one is no less than `share` exactly if the
-        requirement `is_met`, the high one no greater exactly if it `is_missed`.
+        The lower limit is at least `share` if and only if `is_met`, the upper one at most `share`
+        if and only if `is_missed`.
         """
 
     def allowed_failures(self, runs: int) -> int:
-        """Return the most failures with which the share is met; -1 if not even without any."""
+        """Return the largest number of failures that is still "met"; -1 if there is none."""
         return first(lambda failures: not self.is_met(failures, runs), 0, runs) - 1
 
     def runs_needed(self, failures: int) -> int | None:
-        """Return the fewest runs that meet the share with so many failures.
+        """Return the smallest number of runs for "met" with a number of failures.
 
         None: more than `MOST_RUNS`.
         """
@@ -69,42 +69,42 @@ class ShareTest(ABC):
         return runs if runs <= MOST_RUNS else None
 
     def bound_rank(self, runs: int) -> int | None:
-        """Return the rank, from 1, of the ordered values that bounds their quantile `share`.
+        """Return the rank, from 1, of the order statistic that bounds the quantile `share`.
 
-        The value of that rank is no less than the quantile, with `confidence` and for any
-        distribution: it is below a limit exactly if the requirement with that limit `is_met`.
-        None: there are too few runs.
+        It is an upper bound of the quantile with `confidence` for any distribution, and below a
+        limit if and only if the requirement with that limit `is_met`. None: too few runs.
         """
         allowed = self.allowed_failures(runs)
         return runs - allowed if allowed >= 0 else None
 
 
 class FixedSample(ShareTest):
-    """Order statistics: one look at a number of runs that was fixed before.
+    """Order statistics: one evaluation after a number of runs fixed in advance.
 
     As in Hanson and Beard, Applying Monte Carlo Simulation to Launch Vehicle Design and
-    Requirements Analysis, NASA/TP-2010-216447: the share is met if so few failures would be seen
-    with a probability (the consumer's risk) of at most ``1 - confidence`` were it just missed.
+    Requirements Analysis, NASA/TP-2010-216447: the requirement is met if, for a true share equal to
+    the required one, so few failures have a probability (consumer's risk) of at most
+    ``1 - confidence``.
     """
 
     def is_met(self, failures: Numbers, runs: Numbers) -> Bools:
-        """Return whether the requirement is met."""
+        """Return True where the requirement is met."""
         return np.asarray(binom.cdf(failures, runs, 1.0 - self.share) <= 1.0 - self.confidence)
 
     def is_missed(self, failures: Numbers, runs: Numbers) -> Bools:
-        """Return whether the requirement is missed."""
+        """Return True where the requirement is missed."""
         tail = binom.sf(failures - 1, runs, 1.0 - self.share)
         return np.asarray(tail <= 1.0 - self.confidence)
 
     def limits(self, failures: int, runs: int) -> Interval:
-        """See `ShareTest`: those of Clopper and Pearson (1934)."""
+        """Return the one-sided limits of Clopper and Pearson (1934)."""
         return share_limits(runs - failures, runs, self.confidence)
 
 
 class Sequential(ShareTest):
-    """A confidence sequence: valid after every run, however it is decided when to stop.
+    """A confidence sequence: valid after every run, for any stopping rule.
 
-    See `log_evidence`. By Ville's inequality the evidence against a true hypothesis ever exceeds
+    By Ville's inequality the evidence (`log_evidence`) against a true hypothesis ever exceeds
     ``1 / (1 - confidence)`` with a probability of at most ``1 - confidence``.
     """
 
@@ -113,29 +113,29 @@ class Sequential(ShareTest):
         return -float(np.log1p(-self.confidence))
 
     def is_met(self, failures: Numbers, runs: Numbers) -> Bools:
-        """Return whether the requirement is met."""
+        """Return True where the requirement is met."""
         evidence = log_evidence(failures, runs, 1.0 - self.share)
         return np.asarray(evidence >= self._threshold)
 
     def is_missed(self, failures: Numbers, runs: Numbers) -> Bools:
-        """Return whether the requirement is missed."""
+        """Return True where the requirement is missed."""
         evidence = log_evidence(runs - failures, runs, self.share)
         return np.asarray(evidence >= self._threshold)
 
     def limits(self, failures: int, runs: int) -> Interval:
-        """Return the limits of the share."""
+        """Return one-sided limits of the share, valid at every number of runs."""
         low = 1.0 - self._upper_limit(failures, runs)
         return Interval(low, self._upper_limit(runs - failures, runs))
 
     def interval(self, failures: int, runs: int) -> Interval:
         """Return the two-sided interval of the share of cases that meet the requirement.
 
-        Both ends hold together with `confidence`, at every number of runs.
+        The interval has the confidence `confidence` for all numbers of runs together.
         """
         return Sequential(self.share, 0.5 + 0.5 * self.confidence).limits(failures, runs)
 
     def _upper_limit(self, events: int, runs: int) -> float:
-        """Return the largest share of events for which the evidence is not above the threshold."""
+        """Return the largest share of events with an evidence not above the threshold."""
         low, high = (events / runs, 1.0) if runs else (1.0, 1.0)
         for _ in range(_HALVINGS):
             middle = 0.5 * (low + high)
@@ -151,19 +151,19 @@ class Sequential(ShareTest):
 def log_evidence(events: Numbers, runs: Numbers, share: float) -> Array:
     """Return the logarithm of the evidence against "the share of events is ``share`` or more".
 
-    It is the likelihood of what was seen, averaged over the shares below ``share`` with Jeffreys'
-    weights (Beta(1/2, 1/2), cut off there), over its likelihood at ``share``: a martingale at
-    ``share`` and a supermartingale above (Robbins 1970; Howard, Ramdas, McAuliffe and Sekhon,
-    Time-uniform, nonparametric, nonasymptotic confidence sequences, 2021).
+    It is the mean likelihood over shares below ``share`` with Jeffreys' prior (Beta(1/2, 1/2),
+    truncated there), divided by the likelihood at ``share``: a martingale at ``share`` and a
+    supermartingale above (Robbins 1970; Howard, Ramdas, McAuliffe and Sekhon, Time-uniform,
+    nonparametric, nonasymptotic confidence sequences, 2021).
 
     Args:
-        events: seen; need not be whole numbers.
-        runs: in which they were seen.
+        events: number of events; need not be an integer.
+        runs: number of runs.
         share: above 0 and below 1.
     """
     k, n = np.asarray(events, np.float64), np.asarray(runs, np.float64)
     a, b = k + 0.5, n - k + 0.5
-    with np.errstate(divide="ignore"):  # far more events than that: no evidence at all
+    with np.errstate(divide="ignore"):  # log(0) for far more events: no evidence
         average = betaln(a, b) + np.log(betainc(a, b, share))
     weights = betaln(0.5, 0.5) + np.log(betainc(0.5, 0.5, share))
     evidence: Array = average - weights - xlogy(k, share) - xlog1py(n - k, -share)
@@ -171,9 +171,9 @@ def log_evidence(events: Numbers, runs: Numbers, share: float) -> Array:
 
 
 def first(holds: Callable[[int], bool], low: int, high: int) -> int:
-    """Return the least number from ``low`` on for which ``holds`` is true; ``high`` if for none.
+    """Return the smallest integer in [low, high) for which ``holds`` is true, else ``high``.
 
-    Steps are doubled, then halved: ``holds`` must be true of all numbers above one of which it is.
+    ``holds`` must be monotone: if it is true for a number, then also for all larger ones.
     """
     step, below = 1, low - 1
     while below + step < high and not holds(below + step):

@@ -1,4 +1,4 @@
-"""A share of runs, and how well so many runs know it (Clopper and Pearson 1934, exact)."""
+"""Exact confidence intervals of a share of runs (Clopper and Pearson 1934)."""
 
 from __future__ import annotations
 
@@ -15,30 +15,30 @@ class Interval(NamedTuple):
 
     @property
     def half_width(self) -> float:
-        """Return half the distance between its ends."""
+        """Half the width of the interval."""
         return 0.5 * (self.high - self.low)
 
 
 def share_interval(successes: int, n: int, confidence: float) -> Interval:
-    """Compute the two-sided interval of the share of which ``successes`` of ``n`` runs are seen.
+    """Return the two-sided confidence interval of a share with ``successes`` in ``n`` runs.
 
     Args:
         successes: 0 to ``n``.
-        n: runs; of none the share can be anything.
-        confidence: of the interval, within 0 to 1.
+        n: number of runs; 0 gives the interval 0 to 1.
+        confidence: of the interval, 0 to 1.
     """
     return _interval(successes, n, confidence, "two-sided")
 
 
 def share_limits(successes: int, n: int, confidence: float) -> Interval:
-    """Compute the one-sided limits of a share: each of the two holds with ``confidence`` by itself.
+    """Return the one-sided confidence limits of a share, each with ``confidence`` by itself.
 
-    The low one is no less than a share exactly if order statistics call that share met.
+    The lower limit is at least a share if and only if `FixedSample` calls that share met.
 
     Args:
         successes: 0 to ``n``.
-        n: runs; of none the share can be anything.
-        confidence: of each limit, within 0 to 1.
+        n: number of runs; 0 gives the limits 0 and 1.
+        confidence: of each limit, 0 to 1.
     """
     low = _interval(successes, n, confidence, "greater").low
     return Interval(low, _interval(successes, n, confidence, "less").high)

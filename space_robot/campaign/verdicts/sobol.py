@@ -1,7 +1,7 @@
-"""Sobol indices of a campaign whose design is ``saltelli``: shares of a metric's variance.
+"""Sobol indices of a campaign with the design ``saltelli``: shares of a metric's variance.
 
-The first index of a variable is the share that it brings by itself, the total one also counts what
-it does together with others (Saltelli et al. 2010; Jansen 1999 for the totals).
+The first-order index of a variable is the share of its own effect, the total index includes its
+interactions with others (Saltelli et al. 2010; Jansen 1999 for the totals).
 """
 
 from __future__ import annotations
@@ -16,12 +16,12 @@ from .quantiles import Estimate
 Array = NDArray[np.float64]
 
 RESAMPLED = 400
-"""Bootstrap samples of an interval."""
+"""Number of bootstrap samples of an interval."""
 
 
 @dataclass(frozen=True)
 class SobolIndex:
-    """The two indices of a variable, with bootstrap intervals."""
+    """First-order and total index of a variable, with bootstrap intervals."""
 
     variable: str
     first: Estimate
@@ -35,27 +35,27 @@ class SobolIndices:
     law: str
     metric: str
     rows: int
-    """Of the design that were used: those of which all flights have a number."""
+    """Number of complete rows of the design, with a value of every flight."""
     left_out: int
     indices: list[SobolIndex]
-    """The largest total first."""
+    """Sorted by total index, largest first."""
 
 
 def sobol_indices(
     values: Array, variables: list[str], law: str = "", metric: str = "", confidence: float = 0.95
 ) -> SobolIndices | None:
-    """Compute first and total indices.
+    """Compute first-order and total indices.
 
     Args:
-        values: (rows, d + 2): of each row of the design the metric at A, at A with variable i from
-            B for each of the d variables, and at B; rows with a number missing are left out.
+        values: (rows, d + 2): the metric of each row of the design at A, at A with variable i from
+            B for each of the d variables, and at B; rows with missing values are ignored.
         variables: d names.
         law: for the result.
         metric: for the result.
-        confidence: of the intervals; their draws have a seed of their own.
+        confidence: of the intervals; the bootstrap has a fixed seed.
 
     Returns:
-        None: fewer than four rows are whole, or the metric does not vary.
+        None if fewer than four rows are complete, or the metric does not vary.
     """
     whole = np.isfinite(values).all(axis=1)
     used = values[whole]
@@ -84,7 +84,7 @@ def sobol_indices(
 
 
 def indices(values: Array) -> tuple[Array, Array]:
-    """Compute first and total indices, (d,) each, of values as `sobol_indices` takes them."""
+    """Compute first-order and total indices, (d,) each, of values as in `sobol_indices`."""
     a, mixed, b = values[:, 0], values[:, 1:-1].T, values[:, -1]
     both = np.concatenate([a, b])
     variance, middle = np.var(both), np.mean(both)

@@ -1,4 +1,4 @@
-"""Columns of a campaign's table as numbers that can be ordered, by law and by point of its grid."""
+"""Columns of a campaign's table as sortable numbers, by law and grid point."""
 
 from __future__ import annotations
 
@@ -17,25 +17,25 @@ Array = NDArray[np.float64]
 Bools = NDArray[np.bool_]
 
 NOT_OF_THE_LAW = ("killed", "out_of_time", "refused")
-"""Outcomes for which a law may be without blame; they count as failures all the same."""
+"""Outcomes that the law may not have caused; they count as failures nevertheless."""
 
 
 class GridPoint(NamedTuple):
     """The rows of one point of a campaign's grid."""
 
     values: tuple[str, ...]
-    """Of the grid's variables there."""
+    """Values of the grid's variables."""
     point: str
-    """It in words, as in ``sensors = fine``; empty if there is no grid."""
+    """Text such as ``sensors = fine``; empty if there is no grid."""
     table: DataFrame
 
 
 def parts(table: DataFrame, grid: Sequence[str]) -> list[GridPoint]:
-    """Divide a table by its points of the grid, in the order in which they come.
+    """Split a table by grid point, in order of appearance.
 
     Args:
         table: rows of a campaign.
-        grid: names of the variables that are grids.
+        grid: names of the grid variables.
     """
     if not grid:
         return [GridPoint((), "", table)]
@@ -54,49 +54,46 @@ def _word(value: Any) -> str:
 
 
 def laws_of(table: DataFrame) -> list[str]:
-    """Return the laws of a table in the order in which they come."""
+    """Return the laws of a table in order of appearance."""
     return [str(law) for law in table["law"].unique()]
 
 
 def of_law(table: DataFrame, law: str) -> DataFrame:
-    """Return the rows of a law, in the order of its runs."""
+    """Return the rows of a law, ordered by run."""
     return table[table["law"] == law].sort_values("run")
 
 
 def ended(table: DataFrame) -> Bools:
-    """Tell of each row whether its flight came to its end."""
+    """Return True for each row whose flight was completed."""
     is_complete: Bools = (table["outcome"] == COMPLETE).to_numpy(bool)
     return is_complete
 
 
 def measured(table: DataFrame, column: str) -> Array:
-    """Return a column's numbers, infinite where there is none: worse than any number.
-
-    So it is where a flight did not come to its end, whatever the column says.
-    """
+    """Return a column's values, (N,); missing ones and those of failed flights are infinite."""
     values = table[column].to_numpy(np.float64, na_value=np.nan)
     with_failures: Array = np.where(ended(table) & ~np.isnan(values), values, np.inf)
     return with_failures
 
 
 def turned(table: DataFrame, column: str, sign: float) -> DataFrame:
-    """Return a table in which more of a column's numbers is worse: times -1 if ``sign`` is."""
+    """Return a table in which larger values of a column are worse: negated if ``sign`` < 0."""
     return table if sign > 0.0 else table.assign(**{column: -table[column].astype(float)})
 
 
 def is_known(table: DataFrame, column: str) -> bool:
-    """Return whether any flight of the table has a number in that column."""
+    """Return True if any flight of the table has a value in that column."""
     return column in table and bool(np.isfinite(measured(table, column)).any())
 
 
 def metrics_of(table: DataFrame) -> list[str]:
-    """Return the metrics for which there is a number in the table."""
+    """Return the metrics that have a value in the table."""
     names = (str(column) for column in table if str(column).startswith("metric."))
     return [name.removeprefix("metric.") for name in names if is_known(table, name)]
 
 
 def variables_of(table: DataFrame) -> Iterator[tuple[str, DataFrame]]:
-    """Yield the name and the column of each variable that differs from run to run."""
+    """Yield name and column of each variable that is not constant."""
     for column in table:
         if str(column).startswith("vary.") and table[column].nunique(dropna=False) > 1:
             yield str(column).removeprefix("vary."), table[column]

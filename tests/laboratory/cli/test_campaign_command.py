@@ -101,7 +101,7 @@ def test_rerun_says_that_the_digest_is_the_same_or_fails(flown: Path, tmp_path: 
             ("run", "FILE", "--runs", "2", "--out", "x", "--scheduler", "tcp://127.0.0.1:9"),
             "scheduler 'tcp://127.0.0.1:9': ",
         ),
-        (("rerun", "nowhere", "1"), "nowhere: is no campaign's folder"),
+        (("rerun", "nowhere", "1"), "nowhere: not a campaign folder"),
     ],
 )
 def test_what_cannot_be_is_one_line_and_leaves_nothing(

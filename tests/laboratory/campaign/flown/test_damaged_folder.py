@@ -145,7 +145,7 @@ def test_a_journal_that_is_gone_costs_no_flight(
     (copy / "journal.db").unlink()
     found, remarks = numbers(copy)
     assert found == reported
-    assert "journal.db: is gone; 4 rows are taken from table.parquet" in remarks[0]
+    assert "journal.db: missing; 4 rows are taken from table.parquet" in remarks[0]
     assert run(copy).kept == 4
 
 
@@ -167,7 +167,7 @@ def test_the_table_of_another_campaign_is_none_of_this_one(copy: Path, tmp_path:
     with pytest.raises(InputError, match="of another campaign"):
         _ = FlownCampaign.open(copy).table
     (copy / "journal.db").unlink()
-    with pytest.raises(InputError, match=r"no flight has been flown yet; .* is gone; 0 rows"):
+    with pytest.raises(InputError, match=r"no flight has been flown yet; .* missing; 0 rows"):
         numbers(copy)
 
 
@@ -175,7 +175,7 @@ def test_rows_of_another_campaign_are_never_flown_over(copy: Path) -> None:
     """Without its manifest nothing but the rows say whose the folder is."""
     (copy / "campaign.json").unlink()
     before = {path.name: path.read_bytes() for path in copy.iterdir()}
-    with pytest.raises(InputError, match=r"campaign\.json: is gone, and no row .* another folder"):
+    with pytest.raises(InputError, match=r"campaign\.json: missing, and no row .* another folder"):
         CAMPAIGN.run(2, 8, copy, workers=0)
     assert {path.name: path.read_bytes() for path in copy.iterdir()} == before
 
@@ -223,7 +223,7 @@ def test_another_study_judges_the_same_rows(whole: Path, reported: str) -> None:
         ({"scenario": {"case": "1", "duration": 0.01}}, "scenario.case: '3' was flown, '1'"),
         (
             {"require": {"p": {**CONTENT["require"]["late"], "from_s": 0.006}}},
-            r"other.yaml: require.p: attitude_rms in that window is not in the rows",
+            r"other.yaml: require.p: the rows have no attitude_rms in that window",
         ),
     ):
         with pytest.raises(InputError, match=said):

@@ -59,7 +59,7 @@ def test_a_campaign_that_was_killed_has_a_report(folder: Path, report: Run) -> N
 
 def test_bad_input_is_one_line(folder: Path, tmp_path: Path, report: Run) -> None:
     for arguments, text in (
-        ([str(tmp_path)], "is no campaign's folder"),
+        ([str(tmp_path)], "not a campaign folder"),
         ([str(folder), "--metric", "x"], "unknown metric 'x': choose one of attitude_rms"),
     ):
         code, out, err = report(*arguments)

@@ -277,7 +277,7 @@ def manifest(**other: object) -> Manifest:
             "another file: vary.a.normal: 1.0 then, 2.0 now",
         ),
         ({"files": {"my.yaml": "f"}}, "another named file: my.yaml: None then, 'f' now"),
-        ({"runs": 19}, "begun with 20 runs, 19 are asked for: give 20 or more"),
+        ({"runs": 19}, "started with 20 runs, 19 are requested: request 20 or more"),
     ],
 )
 def test_another_campaign_is_refused_in_a_line(
@@ -343,14 +343,14 @@ def test_one_process_at_a_time(tmp_path: Path) -> None:
 
     with held_folder(tmp_path):
         context.Process(target=hold).start()
-        assert "another process flies this campaign now" in ours.recv()
+        assert "another process is flying this campaign" in ours.recv()
     context.Process(target=hold).start()
     assert ours.recv() == "held"
 
 
 def test_a_folder_of_something_else_is_left_alone(tmp_path: Path) -> None:
     (tmp_path / "thesis.tex").write_text("x")
-    said = r"but thesis\.tex, so it holds something else"
+    said = r"contains thesis\.tex and no "
     with pytest.raises(InputError, match=said), held_folder(tmp_path):
         pass
     assert [path.name for path in tmp_path.iterdir()] == ["thesis.tex"]
