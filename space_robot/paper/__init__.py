@@ -1,1 +1,1 @@
-"""The paper flown again: Table V, its figures, and the proofs of its Section III."""
+"""Reproduction of the paper: Table V, its figures, and the stability proofs of Section III."""

@@ -1,1 +1,1 @@
-"""The paper's Table V and Figures 5 to 9, flown again: flights, table, claims, report."""
+"""Reproduction of the paper's Table V and Figures 5 to 9: flights, table, claims, report."""

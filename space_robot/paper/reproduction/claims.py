@@ -1,4 +1,4 @@
-"""The paper's claims of its law, put as inequalities and judged by the flights."""
+"""The paper's claims about its law as inequalities, tested by the flights."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ TDE_LAWS = ("tde_smc", "tde_tsmc", "tde_stc")
 
 
 class Claim(NamedTuple):
-    """An inequality between ``value`` and ``limit``."""
+    """A claim as an inequality between ``value`` and ``limit``."""
 
     text: str
     value: float
@@ -28,12 +28,12 @@ class Claim(NamedTuple):
         return self.value <= self.limit if self.relation == "<=" else self.value >= self.limit
 
     def as_record(self) -> dict[str, Any]:
-        """Return it as a dictionary, ready for JSON."""
+        """Return the claim as a dictionary for JSON."""
         return {**self._asdict(), "holds": self.holds}
 
 
 def claims_table(records: Iterable[dict[str, Any]]) -> Table:
-    """Tabulate claims, as `Claim.as_record` has them, each with its verdict."""
+    """Tabulate claims from `Claim.as_record`, each with its verdict."""
     columns = (
         Column("claim", is_label=True),
         Column("measured", spec=".4g"),
@@ -53,7 +53,7 @@ def claims_table(records: Iterable[dict[str, Any]]) -> Table:
 
 
 def claims(results: Sequence[Result], comparison: Sequence[Cell]) -> list[Claim]:
-    """Judge every claim whose flights are among the results."""
+    """Return every claim whose flights are among the results."""
     paper = [c for c in comparison if c.definition == "mean_axis" and c.gains == "printed"]
     claims = list(_torques(paper))
     claims += _tracking(paper)

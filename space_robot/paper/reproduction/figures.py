@@ -1,4 +1,4 @@
-"""The figures of the report: the mission, the laws side by side, each row by itself."""
+"""Figures of the report: the mission, the comparison of the laws, and one per row."""
 
 from __future__ import annotations
 
@@ -22,15 +22,15 @@ COMPARISONS: dict[str, tuple[str, Callable[[Mapping[str, BaseTorque]], Figure]]]
     "chatter": ("Chatter of the base torque in case 1", chatter),
     "junctions": ("Base torque at the junction of the two motions, case 1", junctions),
 }
-"""Caption and drawing of the figures of all laws, by the name of their files."""
+"""Caption and drawing function of the figures of all laws, by file name."""
 
 
 def comparisons(
     results: Sequence[Result], duration: float | None, folder: FigureFolder
 ) -> list[Callable[[], None]]:
-    """Return what draws the mission and the comparisons of ``results``, if any is to be compared.
+    """Return functions that draw the mission and the comparisons of the laws in ``results``.
 
-    Each can be pickled, and be called in another process.
+    They can be pickled, and called in another process.
     """
     flights = {r.row.controller: r.base_torque for r in results if r.base_torque is not None}
     if not flights:
@@ -52,9 +52,9 @@ def _draw_comparison(stem: str, flights: Mapping[str, BaseTorque], folder: Figur
 
 
 def figure_groups(rows: Sequence[TableRow], folder: FigureFolder) -> dict[str, list[SavedFigure]]:
-    """Return the figures that were drawn by their heading, the mission's first, then by case."""
+    """Return the drawn figures by heading: the mission's first, then by case."""
     groups = {
-        "The mission, and the laws beside one another": [
+        "The mission, and comparison of the laws": [
             (MISSION, "Figure 5: desired joint angles"),
             *((stem, caption) for stem, (caption, _) in COMPARISONS.items()),
         ]

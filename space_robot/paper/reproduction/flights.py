@@ -1,4 +1,4 @@
-"""The flights behind Table V: which rows fly in which variants, and what is kept of each."""
+"""Flights of Table V: the rows, their variants, and the results kept of each."""
 
 from __future__ import annotations
 
@@ -22,19 +22,19 @@ from .table_v import PRINTED
 ROBOT = "paper"
 DEFINITIONS = {"mean_axis": "mean of the axes' RMS", "eq64": "RMS by (64)"}
 COMPARED_CASE = "1"
-"""The case in which the laws are set beside one another."""
+"""The case in which the laws are compared."""
 
 
 @dataclass(frozen=True)
 class Variant:
-    """The choices that Table V leaves open: the gain set, and whether the joints rub."""
+    """Choices that Table V leaves open: the gain set, and joint friction on or off."""
 
     gains: str
     friction: bool
 
     @property
     def title(self) -> str:
-        """For a person."""
+        """Text for tables and figures."""
         return f"{self.gains} gains, {'printed friction' if self.friction else 'friction-free'}"
 
 
@@ -51,7 +51,7 @@ class TableRow:
 
     @classmethod
     def parse(cls, text: str) -> TableRow:
-        """From ``CONTROLLER/CASE``.
+        """Parse ``CONTROLLER/CASE``.
 
         Raises:
             InputError: Table V has no such row.
@@ -64,12 +64,12 @@ class TableRow:
 
     @property
     def stem(self) -> str:
-        """The name of its figure's files, without their endings."""
+        """Name of the figure's files, without suffix."""
         return f"case{self.case}_{self.controller}"
 
     @property
     def shown(self) -> Variant:
-        """The variant that is drawn: the default gains, the printed friction."""
+        """The variant that is drawn: default gains, printed friction."""
         sets = read_yaml(config_directory() / "gains" / ROBOT / "default_sets.yaml")
         return Variant(sets[self.controller], True)
 
@@ -78,13 +78,13 @@ ROWS = tuple(TableRow(controller, case) for controller, case in PRINTED)
 
 
 class Equipment(NamedTuple):
-    """What stands between laws and robot: Table V's see the truth, and have what they ask for."""
+    """Sensors, navigation and actuators; Table V assumes ideal ones."""
 
     sensors: str = "ideal"
-    """Of config/sensors, or a path."""
+    """Name of a file in config/sensors, or a path."""
     navigation: Mode = "direct"
     actuators: str = "ideal"
-    """Of the base: of config/actuators, or a path."""
+    """Name of a file in config/actuators, or a path."""
 
 
 PERFECT = Equipment()
@@ -96,19 +96,19 @@ class Planned(NamedTuple):
     row: TableRow
     variant: Variant
     shown: bool
-    """True if it is drawn: the default gains, the printed friction."""
+    """True if it is drawn: default gains, printed friction."""
 
     @property
     def compared(self) -> bool:
-        """True for the flight that stands for its law in the figures of all laws."""
+        """True for the flight that represents its law in the comparison figures."""
         return self.shown and self.row.case == COMPARED_CASE
 
 
 def plan(rows: Iterable[TableRow], brief: bool = False) -> Iterator[Planned]:
-    """Yield the flights of ``rows``: all four variants, or (``brief``) what Table V asks for.
+    """Yield the flights of ``rows``: all four variants, or (``brief``) those needed for Table V.
 
-    That is the default gains with friction and without and, where the default ones are others,
-    the printed gains with the printed friction: what the paper says was flown.
+    These are the default gains with and without friction and, where they differ from the printed
+    gains, the printed gains with the printed friction: the paper's own description.
     """
     for row in rows:
         shown = row.shown
@@ -119,7 +119,7 @@ def plan(rows: Iterable[TableRow], brief: bool = False) -> Iterator[Planned]:
 
 @dataclass(frozen=True)
 class Result:
-    """A finished flight."""
+    """Results of a flight."""
 
     row: TableRow
     variant: Variant
@@ -127,11 +127,11 @@ class Result:
     """Settings of plant, controller and mission."""
     diverged_tick: int | None = None
     rms: dict[str, dict[str, float]] | None = None
-    """By definition and column; None if the flight diverged."""
+    """RMS values by definition and column; None if the flight diverged."""
     chatter: dict[str, dict[str, float]] | None = None
-    """By measure and column, of the compared case with friction."""
+    """Chatter by measure and column, for the compared case with friction."""
     base_torque: BaseTorque | None = None
-    """Known of the flights that are compared."""
+    """Base torque over time, only of compared flights."""
 
 
 def fly(
@@ -140,7 +140,7 @@ def fly(
     figures: FigureFolder | None,
     equipment: Equipment = PERFECT,
 ) -> Result:
-    """Fly one row in one variant; if it is shown it is also drawn into ``figures``."""
+    """Fly one row in one variant; draw it into ``figures`` if it is a shown one."""
     row, variant, _ = planned
     flight = Flight(
         resolve(

@@ -1,4 +1,4 @@
-"""The whole reproduction: fly, compare, draw, write a folder."""
+"""Runs the complete reproduction: flights, comparison, figures, folder of results."""
 
 from __future__ import annotations
 
@@ -26,23 +26,23 @@ from .table import cells, cells_table, chatter, chatter_table, variant_tables
 
 TABLE = "table_v"
 ERRATA = "docs/explanation/errata.md"
-"""Stands beside ``config``, in the source tree and where it is installed."""
+"""Located beside ``config``, in the source tree and in an installation."""
 FULL_DURATION = 30.0
-"""s, of the mission that Table V is about."""
+"""Duration of the mission of Table V, s."""
 
 
 def check_folder(folder: Path) -> None:
-    """Check that the results may be written there.
+    """Check that the results may be written to a folder.
 
     Raises:
-        InputError: something else is there.
+        InputError: it contains other files, or is not a folder.
     """
     if not folder.exists():
         return
     if not folder.is_dir():
-        raise InputError(f"{folder}: is no folder; name another with --out")
+        raise InputError(f"{folder}: not a folder; choose another with --out")
     if any(folder.iterdir()) and not (folder / f"{TABLE}.json").is_file():
-        raise InputError(f"{folder}: holds other files; name another folder with --out")
+        raise InputError(f"{folder}: contains other files; choose another folder with --out")
 
 
 def reproduce(
@@ -59,24 +59,24 @@ def reproduce(
 
     Args:
         rows: of Table V.
-        folder: made or renewed at the end, whole; an older reproduction there is replaced.
-        duration: s to fly (None: the mission's 30 s, which is what Table V is about).
-        brief: fly only what Table V asks for, see `plan`; figures as SVG only.
-        equipment: sensors, navigation and actuators; Table V is about ideal ones.
-        jobs: processes at work.
-        progress: called with the number of flights, gives what is called after each.
+        folder: written atomically at the end; an older reproduction is replaced.
+        duration: of the flights, s (None: 30 s, as in Table V).
+        brief: fly only what Table V needs, see `plan`; figures as SVG only.
+        equipment: sensors, navigation and actuators; Table V assumes ideal ones.
+        jobs: number of processes.
+        progress: called with the number of flights; returns a function to call after each one.
 
     Returns:
-        What is written as JSON.
+        The content of the JSON file.
 
     Raises:
-        InputError: the folder holds something else, or nothing turns the base.
+        InputError: the folder contains other files, or the base has no attitude actuators.
     """
     check_folder(folder)
     if not Flight(resolve(FlightPlan(actuators=equipment.actuators))).controls_base:
         raise InputError(
-            f"actuators {equipment.actuators}: Table V has attitude errors and base torques, which "
-            "a base that floats freely has not"
+            f"actuators {equipment.actuators}: Table V has attitude errors and base torques, so "
+            "the base needs attitude actuators"
         )
     folder.parent.mkdir(parents=True, exist_ok=True)
     with TemporaryDirectory(dir=folder.parent, prefix=".reproduce-") as temporary:
@@ -100,12 +100,12 @@ def _fly(
     jobs: int,
     progress: Callable[[int], Callable[[], None]],
 ) -> list[Result]:
-    """Fly and draw every row by itself; return the results in the order of ``planned``."""
+    """Fly and draw every flight; return the results in the order of ``planned``."""
 
     def fly_one(flight: Planned) -> Result:
         return fly(flight, duration, figures, equipment)
 
-    order = sorted(planned, key=lambda flight: not flight.shown)  # those that take longest first
+    order = sorted(planned, key=lambda flight: not flight.shown)  # longest first
     results = dict(zip(order, run_all(fly_one, order, jobs, progress), strict=True))
     return [results[flight] for flight in planned]
 

@@ -1,4 +1,4 @@
-"""The tables: measured beside printed, and the chatter of the laws beside one another."""
+"""Tables: measured and printed values, and the chatter of the laws."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ COLUMN_HEADS = (
 
 
 class Cell(NamedTuple):
-    """One number of Table V and its counterpart."""
+    """One number of Table V and the measured value."""
 
     controller: str
     case: str
@@ -27,14 +27,14 @@ class Cell(NamedTuple):
     definition: str
     column: str
     measured: float | None
-    """None if the flight diverged."""
+    """Measured value; None if the flight diverged."""
     printed: float
     ratio: float | None
     diverged_tick: int | None
 
 
 def cells(results: Sequence[Result]) -> list[Cell]:
-    """Compare every flight in every column, by both definitions."""
+    """Compare every flight with Table V in every column, by both definitions."""
     return [
         _cell(result, definition, column)
         for result in results
@@ -62,12 +62,12 @@ def _cell(result: Result, definition: str, column: str) -> Cell:
 
 
 def cells_table(comparison: Sequence[Cell]) -> Table:
-    """Tabulate every number by itself, a row a cell, for other programs."""
+    """Tabulate one cell per row, for other programs."""
     return Table.of("Table V", [Column(name) for name in Cell._fields], comparison)
 
 
 def variant_tables(comparison: Sequence[Cell]) -> list[Table]:
-    """Tabulate each variant flown by each definition, cells ``measured / printed (ratio)``."""
+    """Tabulate each variant and definition, with cells ``measured / printed (ratio)``."""
     tables = []
     for definition, meaning in DEFINITIONS.items():
         for variant in VARIANTS:
@@ -95,18 +95,18 @@ def _text(cell: Cell) -> str:
 
 
 class LawChatter(NamedTuple):
-    """The chatter of a flight of case 1 with printed friction, by torque column of Table V."""
+    """Chatter of a flight of case 1 with printed friction, by torque column of Table V."""
 
     controller: str
     gains: str
     total_variation_per_s: dict[str, float]
-    """N m/s, mean of the axes."""
+    """Total variation per time, mean of the axes, N m/s."""
     power_above_100_hz: dict[str, float]
-    """Share of the power, mean of the axes."""
+    """Share of the power above 100 Hz, mean of the axes."""
 
 
 def chatter(results: Sequence[Result]) -> list[LawChatter]:
-    """Collect it of every flight that is compared so and did not diverge."""
+    """Return the chatter of every compared flight that did not diverge."""
     return [
         LawChatter(r.row.controller, r.variant.gains, **r.chatter)
         for r in results

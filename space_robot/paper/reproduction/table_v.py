@@ -1,4 +1,4 @@
-"""Table V as printed, which the flights are compared with."""
+"""Table V as printed."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ PRINTED: dict[tuple[str, str], tuple[float, ...]] = {
     ("tde_stc", "4-1"): (7.0756e-4, 8.4966e-5, 1.2742e-4, 1.1328, 1.2610, 0.0749),
     ("tde_stc", "4-2"): (6.9310e-4, 8.4968e-5, 1.2741e-4, 1.3002, 1.4276, 0.0889),
 }
-"""By controller and case: the mean of the axes' RMS values, whatever (64) says."""
+"""Values by controller and case: mean of the axes' RMS values, which is not (64)."""
 
 
 def printed(controller: str, case: str, column: str) -> float:

@@ -1,6 +1,6 @@
-"""The paper's stability analysis (Section III-C, Appendices A and B) of a law as it flies.
+"""The paper's stability analysis (Section III-C, Appendices A and B) of a law in flight.
 
-| module | what |
+| module | content |
 |---|---|
 | `lemma_1` | norm and radius of ``W = E - H_S^-1 h_bar`` (69) |
 | `time_delay_error` | eps (65) and the bound beta of its derivative |
@@ -8,7 +8,7 @@
 | `lyapunov` | the LMI (51), M and gamma, the reaching time (56) |
 | `reaching` | a flight from an initial error |
 | `super_twisting` | the conditions on K_1 and K_2 |
-| `study` | the flights of a study, all of the above |
+| `study` | the flights of a study, and all of the above |
 | `report`, `display` | the study as JSON and as tables |
 """
 

@@ -1,4 +1,4 @@
-"""One inequality of the paper, checked: ``value < limit``, with both numbers kept."""
+"""Check of an inequality of the paper, ``value < limit``, with both numbers."""
 
 from __future__ import annotations
 
@@ -8,16 +8,16 @@ from typing import NamedTuple
 
 
 class Check(NamedTuple):
-    """An inequality: ``value`` stays below ``limit``; NaN stands for a number that is not known."""
+    """An inequality ``value < limit``; NaN stands for an unknown number."""
 
     value: float
     limit: float
     applies: bool = True
-    """False if what the limit presumes was not so: then the inequality says nothing."""
+    """False if an assumption of the limit does not hold: then the inequality is not applicable."""
 
     @property
     def holds(self) -> bool | None:
-        """Strictly below; None if a number is not known, or the limit does not apply."""
+        """True if ``value < limit``; None if a number is unknown, or the limit not applicable."""
         if not self.applies:
             return None
         if math.isnan(self.value) or math.isnan(self.limit):
@@ -26,14 +26,14 @@ class Check(NamedTuple):
 
     @property
     def verdict(self) -> str:
-        """In a word or two."""
+        """Result as text."""
         if not self.applies:
             return "not applicable"
         return {True: "holds", False: "fails", None: "open"}[self.holds]
 
 
 def checks(values: Iterable[float], limits: Iterable[float]) -> tuple[Check, ...]:
-    """Make a check an axis."""
+    """Return one check per axis."""
     return tuple(
         Check(float(value), float(limit)) for value, limit in zip(values, limits, strict=True)
     )

@@ -1,7 +1,7 @@
-"""The circle criterion of Appendix B: does G stay within the circle of radius 1 / beta?
+"""The circle criterion of Appendix B: G must stay within the circle of radius 1 / beta.
 
-The text under (71) names the radius beta; (73) has it right. Printed (77) has a wrong second case
-(its terms do not even share a unit); the one here follows from (75) and (76).
+The text under (71) says radius beta; (73) is correct. The second case of (77) is misprinted (its
+terms have different units); the one here follows from (75) and (76).
 """
 
 from __future__ import annotations
@@ -20,17 +20,17 @@ def transfer_function(k_1: float, k_2: float, omega: Array) -> ComplexArray:
 
 
 def peak_gain(k_1: float, k_2: float) -> float:
-    """(77), corrected: ``max |G(j omega)|``, infinite if G has a pole that does not decay.
+    """(77), corrected: ``max |G(j omega)|``, infinite if G is not asymptotically stable.
 
-    ``1 / K_2^2`` at omega = 0 if ``K_1^2 >= 4 K_2``, else ``16 / (8 K_2 K_1^2 - K_1^4)`` at
-    ``omega^2 = K_2 / 2 - K_1^2 / 8``, both of the square.
+    Its square is ``1 / K_2^2`` at omega = 0 if ``K_1^2 >= 4 K_2``, else
+    ``16 / (8 K_2 K_1^2 - K_1^4)`` at ``omega^2 = K_2 / 2 - K_1^2 / 8``.
     """
     tolerated = largest_tolerated_beta(k_1, k_2)
     return 1.0 / tolerated if tolerated > 0.0 else np.inf
 
 
 def largest_tolerated_beta(k_1: float, k_2: float) -> float:
-    """Return the beta up to which (73) holds, ``1 / max |G|``: K_2 itself if ``K_1^2 >= 4 K_2``."""
+    """Return the largest beta for (73), ``1 / max |G|``, which is K_2 if ``K_1^2 >= 4 K_2``."""
     if k_1 <= 0.0 or k_2 <= 0.0:
         return 0.0
     if k_1**2 >= 4.0 * k_2:

@@ -1,4 +1,4 @@
-"""A study as tables: every condition with its two numbers and a verdict."""
+"""Tables of a stability study: every condition with both numbers and a verdict."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def print_study(study: StabilityStudy, console: Console) -> None:
 def _by_axis(
     title: str, names: Sequence[str], columns: Iterable[tuple[str, Iterable[Value]]]
 ) -> Table:
-    """Make a table with a row an axis from the heads and the cells of its columns."""
+    """Return a table with one row per axis, from the heads and cells of its columns."""
     heads, cells = zip(*columns, strict=True)
     rows = list(zip(names, *cells, strict=True))
     return Table.of(title, [Column(is_label=True), *map(Column, heads)], rows)

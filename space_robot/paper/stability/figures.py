@@ -16,7 +16,7 @@ from .super_twisting import SuperTwisting
 
 BLACK, BLUE, ORANGE = COLOURS[0], COLOURS[2], COLOURS[6]
 POINTS = 1500
-"""Points of a line; more would only make the SVG larger."""
+"""Points of a line, which limits the size of the SVG."""
 
 
 def draw(study: StabilityStudy, folder: Path) -> list[Path]:
@@ -32,11 +32,11 @@ def draw(study: StabilityStudy, folder: Path) -> list[Path]:
 
 @house_style()
 def nyquist(twisting: SuperTwisting, names: tuple[str, ...]) -> Figure:
-    """G(j omega) of each distinct pair of gains, with the circles of (73).
+    """Draw G(j omega) of each distinct pair of gains, with the circles of (73).
 
-    The criterion holds where the curve lies within the circle of radius 1 / beta. The circle of
-    the tolerated beta is the smallest that the curve does not leave; that of the measured beta
-    is drawn for the axis of the group where beta is smallest.
+    The criterion holds if the curve lies within the circle of radius 1 / beta. The circle of the
+    tolerated beta is the smallest that contains the curve; the measured beta is the smallest one of
+    the axes with these gains.
     """
     groups: dict[tuple[float, float], list[int]] = {}
     for axis, gains in enumerate(twisting.gains):
@@ -77,7 +77,7 @@ def _nyquist_panel(
             linewidth=1.6 if dashes == "-" else 1.0,
         )
     panel.plot(g.real, g.imag, color=BLACK, label=r"$G(j\omega)$, all $\omega$")
-    if measured > 0.0:  # its circle may be too small to be seen
+    if measured > 0.0:  # its circle may be too small to be visible
         panel.plot(0.0, 0.0, "o", color=ORANGE, markersize=3.0)
     panel.set_aspect("equal")
     reach = 1.1 / tolerated
@@ -88,10 +88,10 @@ def _nyquist_panel(
 
 @house_style()
 def lyapunov(twisting: SuperTwisting, names: tuple[str, ...]) -> Figure:
-    """V(t) of (47) in the flight from the initial error, each axis with its bound (55).
+    """Draw V(t) of (47) in the flight from the initial error, with the bound (55), per axis.
 
-    V is shown against V(0): its own unit is that of beta^2 |s| / K_1, and tells nothing. Of each
-    step of the figure's time its largest value is drawn, so no peak above the bound is lost.
+    V is divided by V(0), because its unit, that of beta^2 |s| / K_1, has no meaning. The maximum in
+    each time step of the figure is drawn, so that no peak above the bound is lost.
     """
     figure = page(14.0 + 46.0 * math.ceil(len(names) / 3))
     panels = grid(figure, len(names), 3, shared=False)
@@ -143,7 +143,7 @@ def lyapunov(twisting: SuperTwisting, names: tuple[str, ...]) -> Figure:
 
 
 def _legend(figure: Figure, panels: list[Axes]) -> None:
-    """Name each kind of line once, above all panels."""
+    """Draw one legend of all kinds of lines above all panels."""
     lines = {
         label: handle
         for panel in panels

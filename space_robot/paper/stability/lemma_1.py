@@ -1,9 +1,9 @@
-"""Lemma 1 along a flight: does ``W = E - H_S^-1 h_bar`` (69) contract?
+"""Lemma 1 along a flight: contraction by ``W = E - H_S^-1 h_bar`` (69).
 
-By (68) the time-delay error obeys ``eps(t) = W eps(t - delta) + chi(t - delta)``. The lemma asks
-for a spectral norm of W below 1. W itself is not symmetric, but ``H_S^1/2 W H_S^-1/2`` is, so its
-spectral radius is its norm where lengths are measured with H_S: below 1, W contracts in that norm
-even if it does not in the Euclidean one. Both are given.
+By (68) the time-delay error obeys ``eps(t) = W eps(t - delta) + chi(t - delta)``. The lemma
+requires a spectral norm of W below 1. W is not symmetric, but ``H_S^1/2 W H_S^-1/2`` is, so the
+spectral radius of W is its norm induced by H_S: if it is below 1, W contracts in that norm even if
+not in the Euclidean one. Both are computed.
 """
 
 from __future__ import annotations
@@ -24,11 +24,11 @@ from .check import Check
 Array = NDArray[np.float64]
 
 SAMPLING = 0.02
-"""s between two configurations looked at."""
+"""Time between two evaluated configurations, s."""
 
 
 class Extremes(NamedTuple):
-    """The largest and the smallest value over a flight, and when."""
+    """Largest and smallest value over a flight, and their times."""
 
     max: float
     max_at_s: float
@@ -37,14 +37,14 @@ class Extremes(NamedTuple):
 
     @classmethod
     def of(cls, values: Array, time: Array) -> Extremes:
-        """Find them in ``values`` (K,) at ``time`` (K,) s."""
+        """Return the extremes of ``values`` (K,) at ``time`` (K,), s."""
         high, low = int(np.argmax(values)), int(np.argmin(values))
         return cls(float(values[high]), float(time[high]), float(values[low]), float(time[low]))
 
 
 @dataclass(frozen=True)
 class Contraction:
-    """Norm and radius of W over a flight."""
+    """Spectral norm and spectral radius of W over a flight."""
 
     norm: Extremes
     """Spectral norm, the largest singular value."""
@@ -63,7 +63,7 @@ class Contraction:
 
 
 def inertia_along(robot: Robot, log: FlightLog, ticks: NDArray[np.intp]) -> Array:
-    """(K, m, m) H_S of ``robot`` in the configurations flown at ``ticks`` (K,).
+    """Return H_S (K, m, m) of ``robot`` in the configurations at ``ticks`` (K,) of a flight.
 
     Passive joints are locked.
     """
@@ -83,12 +83,12 @@ def inertia_along(robot: Robot, log: FlightLog, ticks: NDArray[np.intp]) -> Arra
 
 
 def contraction(robot: Robot, h_bar: Array, log: FlightLog) -> Contraction:
-    """Norm and radius of W along ``log``.
+    """Return norm and radius of W along ``log``.
 
     Args:
         robot: the robot that flew, with its payload.
         h_bar: (m,) diagonal of h_bar.
-        log: the flight, looked at every `SAMPLING` seconds.
+        log: the flight, evaluated every `SAMPLING` seconds.
     """
     period = log.timebase.period
     ticks = np.arange(0, log.ticks, max(1, round(SAMPLING / period)))

@@ -1,9 +1,9 @@
-"""Finite-time reaching (53)-(56): a flight that starts off the mission, against its bound.
+"""Finite-time reaching (53)-(56): a flight from an initial error, compared with its bound.
 
 The state of (46) is ``eta = [|s|^1/2 sign(s), psi]``. Its psi is *not* the integral in the law
 (42), which appears on the other side of (44): ``psi = eps - integral of K_2 sign(s)``, hence
-``psidot = -K_2 sign(s) + epsdot`` as (45) has it. The first line of (46) gives it without either,
-``psi = sdot + K_1 |s|^1/2 sign(s)``, with sdot the mean over a tick: so it is measured here.
+``psidot = -K_2 sign(s) + epsdot`` (45). Here it is measured by the first line of (46),
+``psi = sdot + K_1 |s|^1/2 sign(s)``, with sdot the mean over a tick.
 """
 
 from __future__ import annotations
@@ -23,27 +23,27 @@ Array = NDArray[np.float64]
 REACHED = 0.01
 """Share of |s(0)| below which the sliding surface counts as reached."""
 RIPPLE_PERCENTILE = 99.9
-"""% of the ticks of a flight without initial error that define the ripple of s."""
+"""Percentile of |s| in a flight without initial error that defines the ripple of s, %."""
 DWELL = 1.0
-"""s that |s| must stay below: later, friction may push a joint off the surface again."""
+"""Time for which |s| must stay small, s; later, friction may push a joint off the surface."""
 
 
 @dataclass(frozen=True)
 class Reaching:
-    """A flight from an initial error, per axis."""
+    """Reaching phase of a flight from an initial error, per axis."""
 
     time: Array
-    """(K,) s."""
+    """(K,) time, s."""
     eta: Array
     """(K, m, 2) state of (46)."""
     threshold: Array
-    """(m,) |s| below which an axis counts as arrived, rad/s (eps: 1/s)."""
+    """(m,) |s| below which the surface counts as reached, rad/s (eps: 1/s)."""
     measured: Array
-    """(m,) s until then; NaN where that never happened."""
+    """(m,) reaching time, s; NaN if the surface was not reached."""
 
 
 def off_mission_plan(flight: Flight, initial_error: float) -> FlightPlan:
-    """Return the plan of ``flight``, started with ``e = initial_error`` on every axis, at rest."""
+    """Return the plan of ``flight``, started at rest with ``e = initial_error`` on every axis."""
     start = flight.mission.chunk(0, 1)
     eps = start.base[0, 1:4] - initial_error
     eta = np.copysign(np.sqrt(1.0 - eps @ eps), start.base[0, 0])
@@ -55,19 +55,19 @@ def off_mission_plan(flight: Flight, initial_error: float) -> FlightPlan:
 
 
 def ripple(s: Array) -> Array:
-    """(m,) how far ``s`` (N, m) is off zero anyway, by sampling, in all but the rarest ticks."""
+    """Return a high percentile (m,) of |``s``| (N, m): the ripple caused by sampling."""
     return np.asarray(np.percentile(np.abs(s), RIPPLE_PERCENTILE, axis=0))
 
 
 def lyapunov_state(s: Array, k_1: Array, period: float) -> Array:
-    """(N-1, m, 2) eta of (47) from ``s`` (N, m) and ``k_1`` (m,)."""
+    """Return eta of (47), (N-1, m, 2), from ``s`` (N, m) and ``k_1`` (m,)."""
     root = np.sqrt(np.abs(s[:-1])) * np.sign(s[:-1])
     psi = np.diff(s, axis=0) / period + k_1 * root
     return np.asarray(np.stack([root, psi], axis=-1))
 
 
 def arrival(s: Array, threshold: Array, period: float) -> Array:
-    """(m,) s after which |s| first stays below ``threshold`` for `DWELL`; NaN if never."""
+    """Return the time (m,), s, from which |s| stays below ``threshold`` for `DWELL`; or NaN."""
     ticks = max(1, round(DWELL / period))
     times = np.full(s.shape[1], np.nan)
     for axis in range(s.shape[1]):
@@ -81,10 +81,10 @@ def arrival(s: Array, threshold: Array, period: float) -> Array:
 
 
 def reaching(log: FlightLog, k_1: Array, undisturbed: Array) -> Reaching:
-    """Measure when a flight from an initial error arrives on the sliding surface.
+    """Measure when a flight from an initial error reaches the sliding surface.
 
     Args:
-        log: that flight, with telemetry.
+        log: the flight, with telemetry.
         k_1: (m,) K_1 of its law.
         undisturbed: (m,) `ripple` of the flight without an initial error.
     """

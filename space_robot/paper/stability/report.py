@@ -1,4 +1,4 @@
-"""A study as plain data for JSON: no NaN, no infinity, None where there is no number."""
+"""A study as data for JSON; NaN and infinity become None."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from .time_delay_error import ErrorDerivative
 
 
 def report(study: StabilityStudy) -> dict[str, Any]:
-    """Results of the stability check; lists hold one entry per axis, in the order of ``axes``."""
+    """Return the results of a study; lists have one entry per axis, in the order of ``axes``."""
     flight, lemma_1 = study.flight, study.lemma_1
     content = {
         **{key: flight.description[key] for key in ("controller", "case", "gains", "robot")},

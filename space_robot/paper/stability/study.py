@@ -1,4 +1,4 @@
-"""The flights and the numbers of a stability study of one law on one case."""
+"""Flights and results of a stability study of one law in one case."""
 
 from __future__ import annotations
 
@@ -16,21 +16,21 @@ from .super_twisting import SuperTwisting
 from .time_delay_error import ErrorDerivative, error_derivative, time_delay_error
 
 Fly = Callable[[Flight, str], FlightLog]
-"""Flies a checked plan; the text says which flight of the study it is."""
+"""Flies a checked plan; the text names the flight of the study."""
 
 SHORTEST = 10
-"""Ticks; fewer leave nothing to differentiate."""
+"""Minimum number of ticks, for the derivatives."""
 
 
 @dataclass(frozen=True)
 class StabilityStudy:
-    """The findings; `super_twisting` for laws with K_1 and K_2 only."""
+    """Results of a study; `super_twisting` only for laws with K_1 and K_2."""
 
     flight: Flight
     lemma_1: Contraction
     error: ErrorDerivative
     frictionless_error: ErrorDerivative | None
-    """The same flight without friction; None if there was none to leave out."""
+    """The same flight without friction; None if the flight has no friction."""
     super_twisting: SuperTwisting | None
 
     @property
@@ -40,17 +40,17 @@ class StabilityStudy:
 
 
 def check_law(flight: Flight) -> None:
-    """Check that the study has something to say of the flight's law.
+    """Check that the study applies to the flight.
 
     Raises:
-        InputError: the law does without time-delay estimation, or the flight is too short.
+        InputError: the law has no time-delay estimation, or the flight is too short.
     """
     law = flight.controller.law
     if not law.uses_time_delay_estimate():
         fitting = [name for name, cls in laws().items() if cls.uses_time_delay_estimate()]
         raise InputError(
-            f"controller {law.name!r} has no gain h_bar: the paper's stability analysis is that "
-            f"of time-delay estimation, choose one of {', '.join(sorted(fitting))}"
+            f"controller {law.name!r} has no gain h_bar: the paper's stability analysis is for "
+            f"time-delay estimation, choose one of {', '.join(sorted(fitting))}"
         )
     if flight.ticks < SHORTEST:
         raise InputError(
@@ -60,15 +60,15 @@ def check_law(flight: Flight) -> None:
 
 
 def study(plan: FlightPlan, initial_error: float, fly: Fly) -> StabilityStudy:
-    """Fly what is needed and check every condition of the paper.
+    """Fly the flights of the study and check every condition of the paper.
 
     Args:
-        plan: the flight; its friction is left out in a second one.
+        plan: the flight; a second one is without friction.
         initial_error: e on every axis (eps: dimensionless, joints: rad) at the start of a third.
-        fly: flies them.
+        fly: function that flies them.
 
     Raises:
-        InputError: the plan's law has no time-delay estimate, or the flight is too short.
+        InputError: the plan's law has no time-delay estimation, or the flight is too short.
         FlightError: a flight diverged.
     """
     flight = Flight(resolve(plan))

@@ -1,6 +1,6 @@
-"""The conditions on the super-twisting gains of a law, axis by axis.
+"""Conditions on the super-twisting gains of a law, for each axis.
 
-All are sufficient ones: where one fails nothing is proven, neither stability nor instability.
+All are sufficient conditions: if one fails, neither stability nor instability is proven.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class SuperTwisting:
-    """Sections III-B, III-C and Appendix B for a law with gains K_1 and K_2, per axis."""
+    """Conditions of Sections III-B, III-C and Appendix B for a law with K_1 and K_2, per axis."""
 
     k_1: Array
     k_2: Array
@@ -60,7 +60,7 @@ class SuperTwisting:
 
     @property
     def paper_m_residual(self) -> tuple[Check, ...]:
-        """(51) with the M of (48), gamma = 0 and beta = 0, its easiest case: below 0."""
+        """(51) with M of (48), gamma = 0 and beta = 0, the weakest condition: below 0."""
         values = [residual(paper_m(*gains), *gains, beta=0.0, gamma=0.0) for gains in self.gains]
         return checks(values, np.zeros(len(values)))
 
@@ -71,12 +71,12 @@ class SuperTwisting:
 
     @cached_property
     def measured_certificates(self) -> tuple[Certificate | None, ...]:
-        """(51) solved for the measured beta; None where that is too large."""
+        """Solutions of (51) for the measured beta; None where it is too large."""
         return self._certified(self.beta)
 
     @cached_property
     def assumed_certificates(self) -> tuple[Certificate | None, ...]:
-        """(51) solved for half of the tolerated beta: K_2 / 2 if ``K_1^2 >= 4 K_2``."""
+        """Solutions of (51) for half of the tolerated beta: K_2 / 2 if ``K_1^2 >= 4 K_2``."""
         return self._certified(0.5 * self.tolerated_beta)
 
     def _certified(self, beta: Array) -> tuple[Certificate | None, ...]:
@@ -84,21 +84,21 @@ class SuperTwisting:
 
     @cached_property
     def certificates(self) -> tuple[Certificate | None, ...]:
-        """Those of the measured beta, where there is none those of the assumed one."""
+        """Solutions for the measured beta, or for the assumed one where there is none."""
         pairs = zip(self.measured_certificates, self.assumed_certificates, strict=True)
         return tuple(measured or assumed for measured, assumed in pairs)
 
     @property
     def initial_values(self) -> Array:
-        """(m,) V(0) of the flight from the initial error; NaN where there is no M."""
+        """(m,) V(0) of the flight from the initial error; NaN without a solution M."""
         pairs = zip(self.certificates, self.reaching.eta[0], strict=True)
         return np.array([float(c.value(eta)) if c else np.nan for c, eta in pairs])
 
     @property
     def reaching_time(self) -> tuple[Check, ...]:
-        """(56): the measured reaching time below its bound; open if the flight was too short.
+        """(56): the measured reaching time is below its bound; unknown if the flight is too short.
 
-        The bound presumes ``|epsdot| <= beta``: it does not apply where the flight exceeded that.
+        The bound assumes ``|epsdot| <= beta`` and is not applicable where the flight exceeds it.
         """
         pairs = zip(self.certificates, self.initial_values, strict=True)
         bounds = [c.reaching_time(value) if c else np.nan for c, value in pairs]

@@ -1,13 +1,13 @@
 """The time-delay error (65) of a flight and the bound beta of its derivative.
 
-``eps = h_bar^-1 (N - N_hat)``, the error of the estimate in units of acceleration, from (33):
-``N = F_S - h_bar rhodd``. All three belong to one interval: a command given at tick k acts until
+``eps = h_bar^-1 (N - N_hat)`` is the error of the estimate in units of acceleration, with
+``N = F_S - h_bar rhodd`` (33). All three belong to one interval: a command of tick k acts until
 tick k+1, and the mean acceleration over it is ``(rhodot_k+1 - rhodot_k) / delta``. For a law
 ``F_S = h_bar u + N_hat`` this is the paper's ``eps = u - rhodd``.
 
-A beta measured so is that of the closed loop. By (70) chi holds ``W (u(t) - u(t - delta))``, and u
-holds ``K_1 |s|^1/2 sign(s)``, whose slope at s = 0 has no bound: beta depends on the gains
-that it is to be compared with. Coulomb friction adds jumps wherever a joint starts or stops.
+This beta is that of the closed loop. By (70) chi contains ``W (u(t) - u(t - delta))``, and u
+contains ``K_1 |s|^1/2 sign(s)``, whose slope at s = 0 is infinite: beta depends on the gains that
+it is compared with. Coulomb friction adds jumps whenever a joint starts or stops.
 """
 
 from __future__ import annotations
@@ -26,22 +26,22 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class ErrorDerivative:
-    """The largest values of eps and its derivative, per axis (m,)."""
+    """Largest values of eps and its derivative, per axis (m,)."""
 
     max_error: Array
     """Largest |eps|, rad/s2 (eps: 1/s2)."""
     beta: Array
     """Largest |eps_k+1 - eps_k| / delta, rad/s3 (eps: 1/s3)."""
     beta_at_s: Array
-    """Its time, s."""
+    """Time of this maximum, s."""
     beta_99_9_percentile: Array
-    """99.9th percentile of the same, which jumps in a thousandth of the ticks do not reach."""
+    """99.9th percentile of the same, which ignores jumps in up to 0.1 % of the ticks."""
 
 
 def time_delay_error(log: FlightLog, h_bar: Array) -> Array:
-    """(N-1, m) eps over the interval that begins at each tick, of a flight with telemetry.
+    """Return eps (N-1, m) over the interval after each tick, of a flight with telemetry.
 
-    Before tick 1 there is no estimate yet, so row 0 is that of N_hat = 0.
+    Before tick 1 there is no estimate, so row 0 has N_hat = 0.
     """
     if log.telemetry is None:
         raise ValueError("the time-delay error needs a log with the controller's telemetry")
@@ -51,7 +51,7 @@ def time_delay_error(log: FlightLog, h_bar: Array) -> Array:
 
 
 def error_derivative(error: Array, period: float) -> ErrorDerivative:
-    """Bounds of ``error`` (N-1, m), sampled each ``period`` s, from the first estimate on."""
+    """Return the bounds of ``error`` (N-1, m), sampled every ``period`` s, without row 0."""
     estimated = error[1:]
     derivative = np.abs(np.diff(estimated, axis=0)) / period
     return ErrorDerivative(

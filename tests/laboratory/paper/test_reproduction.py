@@ -252,9 +252,9 @@ def test_an_older_reproduction_is_replaced(twice: tuple[Path, Path, dict[str, An
 
 def test_a_folder_of_something_else_is_left_alone(tmp_path: Path) -> None:
     (tmp_path / "thesis.tex").write_text("years of work")
-    with pytest.raises(InputError, match="holds other files"):
+    with pytest.raises(InputError, match="contains other files"):
         check_folder(tmp_path)
-    with pytest.raises(InputError, match="is no folder"):
+    with pytest.raises(InputError, match="not a folder"):
         check_folder(tmp_path / "thesis.tex")
     assert files(tmp_path) == {"thesis.tex": b"years of work"}
 
