@@ -1,4 +1,4 @@
-"""Gains against reality: the margin and the noise that a gain set has on a robot and a mission.
+"""Gain tuning: stability margin and noise of gain sets for a robot and a mission, without flights.
 
-`check` looks at gains there are, `tune` makes a set; neither flies anything.
+`gain_check` checks existing gains, `method` computes a new set.
 """

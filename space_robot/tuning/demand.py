@@ -1,4 +1,4 @@
-"""The forces that a mission asks for: inverse dynamics along its reference."""
+"""The forces that a mission needs: inverse dynamics along its reference."""
 
 from __future__ import annotations
 
@@ -21,27 +21,30 @@ from .inertia import SAMPLING, attitude_jacobian, sampled_reference
 
 Array = NDArray[np.float64]
 NOTHING = 1e-9
-"""Of the largest acceleration asked of an axis: less is rounding."""
+"""Accelerations below this fraction of the largest one are rounding errors."""
 
 
 @dataclass(frozen=True)
 class ForceDemand:
-    """Generalised forces F_S that hold a mission's reference, per axis (m,), N m."""
+    """Generalised forces F_S needed to follow a mission's reference, per axis (m,), N m."""
 
     peak: Array
     """Largest |F_S| over all environments."""
     slope: Array
-    """Largest |dF_S/dt|, Coulomb friction left out, which jumps; N m/s."""
+    """Largest |dF_S/dt| without Coulomb friction, which has steps; N m/s."""
     unknown: Array
-    """Largest difference from the nominal robot's, alone in space."""
+    """Largest difference from F_S of the nominal robot without environment."""
     nominal: Array
-    """Largest |F_S| of the nominal robot, alone in space."""
+    """Largest |F_S| of the nominal robot without environment."""
 
     def on_all_axes(self, inertia: Array) -> ForceDemand:
-        """Return the same with a demand on the axes that the mission asks nothing of.
+        """Return the demand with nonzero values on the axes that the mission does not move.
 
-        A motion in a plane leaves some axes alone; gains of zero would as well. They count as if
-        they were asked for the smallest acceleration of all others. ``inertia``: (m,) of each axis.
+        A planar motion would otherwise lead to zero gains on some axes. They get the force for the
+        smallest acceleration of the other axes.
+
+        Args:
+            inertia: (m,) of each axis, kg m2.
         """
         return ForceDemand(*(_filled(force, inertia) for force in astuple(self)))
 
@@ -56,11 +59,11 @@ def _filled(force: Array, inertia: Array) -> Array:
 def demand(
     robot: Robot, mission: MissionSettings, cases: Sequence[EnvironmentSettings]
 ) -> ForceDemand:
-    """Return what the mission asks for in any of the ``cases``.
+    """Return the largest forces of a mission over all ``cases``.
 
     Args:
-        robot: the nominal one.
-        mission: its reference.
+        robot: the nominal robot.
+        mission: settings of the reference.
         cases: environments with friction, disturbance and payload.
 
     Raises:

@@ -1,18 +1,18 @@
 """Check of a law's gains along a mission, without flying it: stability margin and noise gain.
 
-Each law gets two results. Its **margin** against a wrong torque scale, if it estimates by
-time delay (see `spectrum`). And its **noise gain** an axis: the torque that a unit of noise of the
-measured rate of that axis becomes in the same tick, N m s, with the noise of every tick its own.
+Each law gets two results: its **margin** against a wrong torque scale, if it uses time-delay
+estimation (see `spectrum`), and its **noise gain** per axis: torque per unit of white noise of the
+axis' measured rate in the same tick, N m s.
 
-- Time-delay estimation: the differences of the rate add up in N_hat to ``w h_bar v / delta`` for
+- Time-delay estimation: the differences of the rate sum up in N_hat to ``w h_bar v / delta`` for
   the noise v of the last tick; u adds ``h_bar K_D v`` (lambda for K_D with a sliding surface).
-- Computed torque: ``H_S K_D v``, the noise of the other axes left out.
+- Computed torque: ``H_S K_D v``, without the noise of the other axes.
 - With a boundary layer: ``(H_S lambda + g / Delta) v``.
 
-Switching terms act on noise in a way that depends on its size: ``g sign(s)`` adds up to g, and
-the roots of super-twisting and of the terminal sliding mode their ``h_bar K_1 |s|^1/2``. A torque
-on the base is ``J0^T F``, about the base's axes, per unit of omega_base; rhodot is J0 of that.
-Where nothing turns the base its axes have no torque, and the joints the inertia H_f of `inertia`.
+The effect of noise on switching terms depends on its size: ``g sign(s)`` adds up to g, and the
+roots of super-twisting and of the terminal sliding mode add ``h_bar K_1 |s|^1/2``. The torque on
+the base, about its axes, is ``J0^T F``, and rhodot is ``J0 omega_base``. A base without attitude
+actuators has no torques, and the joints have the inertia H_f of `inertia`.
 """
 
 from __future__ import annotations
@@ -34,24 +34,24 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class GainCheck:
-    """The findings on one law."""
+    """Result of the check of one law."""
 
     law: str
     spectrum: Spectrum | None
-    """None for a law without time-delay estimation."""
+    """Eigenvalues and margin; None for a law without time-delay estimation."""
     noise_gain: Array
-    """(m,) N m of torque per rad/s of noise on the rate of the same axis."""
+    """(m,) torque per unit of noise on the rate of the same axis, N m s."""
 
     @property
     def is_sound(self) -> bool:
-        """True unless the law estimates by time delay with too little margin."""
+        """False if the law uses time-delay estimation with too little margin."""
         return self.spectrum is None or self.spectrum.is_sound
 
 
 def pair_corner(settings: ControllerNodeSettings) -> float:
-    """Return the corner, Hz, of a low-pass that all of the time-delay pair passes (0: none).
+    """Return the corner, Hz, of the low-pass of the whole time-delay pair (0: none).
 
-    A navigation filter lets rates and torques lag alike, and so does the pair's own low-pass.
+    It is the pair's own low-pass or the navigation filter: both delay rates and torques equally.
     """
     corners = [settings.acceleration_filter_hz]
     if settings.navigation == "filtered":
@@ -64,13 +64,13 @@ def pair_corner(settings: ControllerNodeSettings) -> float:
 def check_gains(
     law: ControlLaw, inertia: Array, quaternion: Array, acceleration_filter_hz: float = 0.0
 ) -> GainCheck:
-    """Look at a law's gains.
+    """Compute margin and noise gain of a law.
 
     Args:
         law: with its gains and period.
-        inertia: (K, m, m) H_S in the configurations that count; (K, n, n) H_f of the joints if
-            nothing turns the base.
-        quaternion: (4,) attitude that the base holds in all of them.
+        inertia: (K, m, m) H_S in all configurations; (K, n, n) H_f of the joints for a base
+            without attitude actuators.
+        quaternion: (4,) attitude of the base in all configurations.
         acceleration_filter_hz: see `pair_corner`.
     """
     weight = low_pass_weight(acceleration_filter_hz, law.period) or 1.0
@@ -80,13 +80,17 @@ def check_gains(
 
 
 def noise_gain(law: ControlLaw, inertia: Array, quaternion: Array, weight: float = 1.0) -> Array:
-    """Return (m,) the torque per rad/s of white noise on each axis' rate, N m s.
+    """Return the torque (m,) per unit of white noise on each axis' rate, N m s.
 
-    Args: see `check_gains`; ``weight`` is that of the low-pass.
+    Args:
+        law: with its gains and period.
+        inertia: (K, m, m) H_S, or (K, n, n) H_f, see `check_gains`.
+        quaternion: (4,) attitude of the base.
+        weight: of the low-pass of the time-delay pair; 1: none.
     """
     axes = inertia.shape[-1]
     gains = {name: values[-axes:] for name, values in law.gain_values.items()}
-    # the slope of a sliding surface stands where K_D does
+    # the slope of a sliding surface has the role of K_D
     damping = gains.get("k_d", gains.get("lambda", np.zeros(axes)))
     if law.h_bar.size:
         per_rate = law.h_bar[-axes:] * (weight / law.period + damping)
@@ -94,7 +98,7 @@ def noise_gain(law: ControlLaw, inertia: Array, quaternion: Array, weight: float
         per_rate = np.diagonal(inertia, axis1=1, axis2=2).max(axis=0) * damping
         if {"g", "delta"} <= gains.keys():
             per_rate = per_rate + gains["g"] / gains["delta"]
-    if axes < len(law.memory.s):  # the base has none
+    if axes < len(law.memory.s):  # no torque on the base
         return np.concatenate([np.zeros(3), per_rate])
     gain: Array = per_rate.copy()
     jacobian = attitude_jacobian(quaternion)

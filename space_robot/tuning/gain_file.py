@@ -1,4 +1,4 @@
-"""A tuned set as the files of ``config/gains/<robot>/<set>``."""
+"""Files of a tuned gain set, as in ``config/gains/<robot>/<set>``."""
 
 from __future__ import annotations
 
@@ -20,15 +20,15 @@ NOTES = {
     "tde_tsmc": "K_P = W^2, K_D = 2 W; K_1 = (W eps)^1/2.",
     "tde_stc": "lambda = W; K_2 = 1.1 W eps, K_1 = 2.2 (W eps)^1/2.",
 }
-"""The rule of each law, see `method`."""
+"""Tuning rule of each law, see `method`."""
 
 
 def gain_files(tuned: Tuned, command: str) -> Mapping[str, str]:
-    """Return the text of each file of the set by its name.
+    """Return the text of each file of the set by file name.
 
     Args:
         tuned: the set.
-        command: what made it, to be made again.
+        command: the command that reproduces it.
     """
     head = [f"Made by `{command}`."]
     files = {
@@ -77,7 +77,7 @@ def _list(values: Array, digits: int) -> str:
 
 
 def _number(value: float, digits: int) -> str:
-    """Write a number as YAML 1.1 reads one, with a point before any exponent."""
+    """Format a number for YAML 1.1, which needs a point before an exponent."""
     text = f"{value:.{digits}g}"
     mantissa, e, exponent = text.partition("e")
     return text if "." in mantissa else f"{mantissa}.0{e}{exponent}"

@@ -1,19 +1,20 @@
 """The semi-floating inertia H_S (28) in many configurations at once.
 
-The base floats freely, so its translation is eliminated: what is left of the kinetic energy is
-that about the robot's common CoM,
+The base floats freely, so its translation is eliminated. The remaining kinetic energy is that about
+the common CoM of the robot,
 
     H_r = sum_i  Jw_i^T I_i Jw_i + m_i (Jv_i - Jv_c)^T (Jv_i - Jv_c),    H_S = J^-T H_r J^-1,
 
-with the Jacobians of body i's angular velocity and CoM, Jv_c their mean weighted by mass, and
-J = blkdiag(J0, E) of (22). If nothing turns the base its rotation goes, too, and the joints keep
+with the Jacobians of body i's angular velocity and CoM, Jv_c their mass-weighted mean, and
+J = blkdiag(J0, E) of (22). Without attitude actuators the base's rotation is eliminated, too, and
+the inertia of the joints is
 
     H_f = H_MM - H_MB H_BB^-1 H_BM,    the inverse of the joints' part of H_S^-1.
 
-By Cauchy's interlacing the eigenvalues of ``H_f^-1 h_bar`` then lie between the extreme ones of
-``H_S^-1 h_bar``: a time-delay estimate has no less margin than with the base held.
-`rho_space_into` has H_S from composite bodies, one
-configuration a call; this one needs no compiled code, whose loading would make a command wait.
+By Cauchy's interlacing theorem the eigenvalues of ``H_f^-1 h_bar`` lie between the extreme ones of
+``H_S^-1 h_bar``: the time-delay estimate has at least the margin of a controlled base.
+`rho_space_into` computes H_S from composite bodies for one configuration per call; this module
+needs no compiled code, whose loading takes time.
 """
 
 from __future__ import annotations
@@ -29,13 +30,13 @@ from space_robot_msgs_py.samples import ReferenceChunk
 Array = NDArray[np.float64]
 
 SAMPLING = 0.05
-"""s between two configurations looked at; a leg of a mission takes seconds."""
+"""Time between two evaluated configurations, s; a leg of a mission takes seconds."""
 
 
 def sampled_reference(
     robot: Robot, settings: MissionSettings, step: float = SAMPLING
 ) -> ReferenceChunk:
-    """Return the whole reference of a mission every ``step`` s, its last waypoint included.
+    """Return the reference of a mission every ``step`` s, including the last waypoint.
 
     Raises:
         InputError: the waypoints do not fit the times or the joints.
@@ -49,14 +50,14 @@ def inertia_along(
 ) -> Array:
     """Return H_S (K, m, m) of ``robot`` along a mission's reference, every ``step`` s.
 
-    If nothing turns the base: H_f (K, n, n). Of a robot with passive joints every configuration is
-    there twice: with them locked at rest, as slow motion has them, and loose, as a tick has them.
+    For a base without attitude actuators: H_f (K, n, n). A robot with passive joints has every
+    configuration twice: with these joints locked (slow motion) and free (within a tick).
 
     Args:
-        robot: with its payload, if it carries one.
-        settings: of the mission; its last waypoint is looked at too.
-        step: s.
-        controls_base: whether anything turns the base.
+        robot: with its payload, if any.
+        settings: of the mission; its last waypoint is included.
+        step: between configurations, s.
+        controls_base: whether the base has attitude actuators.
 
     Raises:
         InputError: the waypoints do not fit the times or the joints.
@@ -69,17 +70,20 @@ def inertia_along(
 
 
 def free_inertia(inertia: Array) -> Array:
-    """Return H_f (K, n, n) of H_r, or of H_S, (K, m, m)."""
+    """Return H_f (K, n, n) from H_r or H_S (K, m, m)."""
     share = np.linalg.solve(inertia[:, :3, :3], inertia[:, :3, 3:])
     left: Array = inertia[:, 3:, 3:] - inertia[:, 3:, :3] @ share
     return left
 
 
 def loose_inertia(robot: Robot, joint_positions: Array) -> Array:
-    """Return ``H_aa - H_ap H_pp^-1 H_pa`` (K, m, m) of H_r, p its passive joints, at rest.
+    """Return ``H_aa - H_ap H_pp^-1 H_pa`` (K, m, m) of H_r with the passive joints p at rest.
 
-    The actuated axes a meet it in motion that is faster than the springs, which then do not count.
-    ``joint_positions`` (K, n) are those of the actuated joints, rad or m.
+    This is the inertia of the actuated axes a in motion that is fast compared with the springs.
+
+    Args:
+        robot: with passive joints.
+        joint_positions: (K, n) of the actuated joints, rad or m.
     """
     count, m = len(joint_positions), robot.n + 3
     rest = np.broadcast_to([spring.rest for spring in robot.springs], (count, len(robot.springs)))
@@ -96,7 +100,7 @@ def attitude_jacobian(quaternion: Array) -> Array:
 
 
 def inertia_in_rho(quaternion: Array, inertia: Array) -> Array:
-    """Return ``J^-T H_r J^-1`` (K, m, m) of ``inertia`` (K, m, m) at one attitude of the base."""
+    """Return ``J^-T H_r J^-1`` (K, m, m) for H_r = ``inertia`` (K, m, m) at one base attitude."""
     inverse = np.eye(inertia.shape[-1])
     inverse[:3, :3] = np.linalg.inv(attitude_jacobian(quaternion))
     moved: Array = inverse.T @ inertia @ inverse
@@ -106,7 +110,7 @@ def inertia_in_rho(quaternion: Array, inertia: Array) -> Array:
 def semi_floating_inertia(robot: Robot, joint_positions: Array) -> Array:
     """Return H_r (K, N+3, N+3) about the base's axes for all ``joint_positions`` (K, N).
 
-    They are in rad, or in m of prismatic joints; passive joints are behind.
+    Positions are in rad, or m for prismatic joints; passive joints come last.
     """
     count, n = joint_positions.shape
     angular = np.zeros((n + 1, count, 3, n + 3))
@@ -120,7 +124,7 @@ def semi_floating_inertia(robot: Robot, joint_positions: Array) -> Array:
         angular[body, :, :, :3] = np.eye(3)
         linear[body, :, :, :3] = np.cross(np.eye(3), com[:, np.newaxis, :]).swapaxes(1, 2)
         mover = body
-        while mover:  # every joint on the way to the base
+        while mover:  # every joint on the path to the base
             joint, axis = mover - 1, frames[mover].z.T
             if robot.is_prismatic[joint]:
                 linear[body, :, :, 3 + joint] = axis
@@ -128,7 +132,7 @@ def semi_floating_inertia(robot: Robot, joint_positions: Array) -> Array:
                 angular[body, :, :, 3 + joint] = axis
                 linear[body, :, :, 3 + joint] = np.cross(axis, com - frames[mover].origin.T)
             mover = int(robot.parent[joint])
-        # from here on in the body's own axes, where its inertia is constant
+        # from here in the body's axes, in which its inertia is constant
         angular[body] = np.stack((frame.x.T, frame.y.T, frame.z.T), axis=1) @ angular[body]
     linear -= np.tensordot(robot.mass / robot.mass.sum(), linear, axes=1)
     turning = angular.swapaxes(2, 3) @ robot.inertia[:, np.newaxis] @ angular

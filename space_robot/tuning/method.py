@@ -1,34 +1,34 @@
-"""A gain set for all five laws by one method, step by step.
+"""Tuning of a gain set for all five laws, in six steps.
 
 1. **Shape of h_bar.** ``d_i``, the smallest inertia of axis i when all others are free,
-   ``1 / (H_S^-1)_ii``, along the mission and with every payload. Among diagonal matrices that is
-   within a factor m of the best one can do for the ratio of the extreme eigenvalues of
-   ``H_S^-1 h_bar`` (van der Sluis 1969).
+   ``1 / (H_S^-1)_ii``, along the mission and with every payload. The ratio of the extreme
+   eigenvalues of ``H_S^-1 h_bar`` is then within a factor m of the best diagonal matrix
+   (van der Sluis 1969).
 2. **Size of h_bar.** The smallest ``h_bar = alpha d`` that leaves the margin in torque scale (see
-   `spectrum`) with masses wrong by mu: ``alpha min(lambda) / (1 + mu) = margin``. Smallest, for
-   noise grows with it.
+   `spectrum`) with a mass error mu: ``alpha min(lambda) / (1 + mu) = margin``. It is the smallest
+   because noise is proportional to h_bar.
 3. **Low-pass of the time-delay pair.** The largest eigenvalue may then exceed 1 or even 2. With a
-   low-pass of weight w the estimate's error fades by ``1 - w lambda`` a tick; w is the largest
-   that keeps this from changing sign, ``w alpha max(lambda) / (1 - mu) <= 1``, and whose noise,
-   h_bar times that of the pair's acceleration (`noise`), stays within the ripple allowed: a share
-   of the largest force that the mission asks of the axis.
-4. **Bandwidth.** With its low-pass the estimate follows after ``T = delta / w`` and the lag of the
-   navigation: an axis gets its wanted acceleration with a pole at ``margin / T`` rad/s in the
-   slowest direction. Poles at W on top of it: ``s^3 / p + s^2 + 2 W s + W^2``, whose pair has a
-   damping of 0.7 for ``W = p / 4``. Ripple and bandwidth both go with margin / T: the margin is
-   had for a low-pass, the bandwidth is paid for in ripple. Computed torque waits for no estimate.
-   Its W is four times slower than the navigation's lag, at most `MOST_PER_TICK`, and within the
-   ripple: it multiplies noise of rate and angle by ``H_S (2 W, W^2)``.
-5. **Errors of the estimate.** Between two ticks it is off by what it cannot know yet:
-   ``h_bar eps = T dF_S/dt + (1 - b) F_S``, with b the share of the torque that is reported, taken
-   wrong by half of the margin. F_S is that of inverse dynamics along the mission.
+   low-pass of weight w the estimate's error is multiplied by ``1 - w lambda`` per tick. w is the
+   largest weight for which this factor is not negative, ``w alpha max(lambda) / (1 - mu) <= 1``,
+   and for which the noise, h_bar times that of the pair's acceleration (`noise`), is within the
+   allowed ripple: a share of the largest force of the axis along the mission.
+4. **Bandwidth.** The estimate is delayed by ``T = delta / w`` plus the lag of the navigation: the
+   acceleration of an axis follows its command with a pole at ``margin / T`` rad/s in the slowest
+   direction. With poles at W the loop is ``s^3 / p + s^2 + 2 W s + W^2``, whose complex pair has
+   a damping of 0.7 for ``W = p / 4``. Ripple and bandwidth are both proportional to margin / T:
+   more margin needs a slower low-pass, more bandwidth gives more ripple. Computed torque uses no
+   estimate. Its W is four times slower than the navigation's lag, at most `MOST_PER_TICK`, and
+   within the allowed ripple: it multiplies the noise of rate and angle by ``H_S (2 W, W^2)``.
+5. **Errors of the estimate.** Within a tick the estimate has the error
+   ``h_bar eps = T dF_S/dt + (1 - b) F_S``, with b the reported share of the torque, assumed wrong
+   by half of the margin. F_S is that of inverse dynamics along the mission.
 6. **Laws.** ``K_P = W^2``, ``K_D = 2 W``, ``lambda = W``. The rate of eps within the bandwidth is
-   ``L = W eps``. TDE-SMC: ``g = h_bar eps``, the least that can hold the surface. TDE-STC: Levant's
-   (1998) ``K_2 = 1.1 L``, and ``K_1 = 2.2 L^1/2``, for the paper's ``K_1^2 > 4 K_2``. TDE-TSMC:
-   ``K_1 = L^1/2``, which balances eps at ``|s| = eps / W``. CTC-SMC: g is what the nominal model
-   does not know of, and its boundary layer the one of Slotine and Li (1991, 7.2): inside, s fades
-   with W and not faster in any direction, ``Delta = g / (W d')`` with ``d'`` shaped like h_bar and
-   ``H_S^-1 d' <= E``.
+   ``L = W eps``. TDE-SMC: ``g = h_bar eps``, the smallest gain that can hold the surface. TDE-STC:
+   ``K_2 = 1.1 L`` of Levant (1998), and ``K_1 = 2.2 L^1/2`` for the paper's ``K_1^2 > 4 K_2``.
+   TDE-TSMC: ``K_1 = L^1/2``, which balances eps at ``|s| = eps / W``. CTC-SMC: g is the force that
+   the nominal model does not contain; the boundary layer is that of Slotine and Li (1991, 7.2):
+   inside it s decays with rate W, and not faster in any direction, ``Delta = g / (W d')`` with
+   ``d'`` proportional to the shape of h_bar and ``H_S^-1 d' <= E``.
 """
 
 from __future__ import annotations
@@ -49,34 +49,34 @@ from .spectrum import eigenvalues
 Array = NDArray[np.float64]
 
 SEPARATION = 4.0
-"""How many times faster the estimate is than the poles on top of it; see step 4."""
+"""Ratio of the estimate's pole to the poles of the loop; see step 4."""
 MOST_PER_TICK = 0.05
-"""Of a bandwidth times the period, rad: K_D takes a tenth of an error of a rate in a tick."""
+"""Largest bandwidth times period, rad: K_D then removes a tenth of a rate error per tick."""
 LEAST_WEIGHT = 1e-4
-"""Of a low-pass: a corner of 0.03 Hz at 2 kHz."""
+"""Smallest weight of a low-pass: a corner of 0.03 Hz at 2 kHz."""
 BISECTIONS = 12
-"""For a weight to a thousandth, less than is written."""
+"""Bisections: the weight is then more precise than the written digits."""
 DIGITS = 3
-"""Significant digits of a gain: fewer than machines differ in."""
+"""Significant digits of a gain: few enough to be equal on all machines."""
 
 
 @dataclass(frozen=True)
 class TuningOptions:
-    """What the set is to stand."""
+    """Requirements on a gain set."""
 
     margin: float
     """Share by which the reported torque may exceed the commanded one."""
     mass_uncertainty: float
     """Share by which every mass and inertia may be wrong."""
     bandwidth: float | None = None
-    """rad/s, of all laws; None: what lag and ripple allow each."""
+    """Bandwidth of all laws, rad/s; None: the largest that lag and ripple allow each law."""
     ripple: float = 0.1
-    """Share of the largest force of an axis that noise may make of its force, RMS."""
+    """Allowed RMS force by noise, as a share of the largest force of an axis."""
 
 
 @dataclass(frozen=True)
 class Tuned:
-    """A gain set, and the numbers of the method behind it."""
+    """A gain set, with intermediate results of the method."""
 
     wishes: TuningOptions
     corner_hz: float
@@ -84,17 +84,17 @@ class Tuned:
     delay: float
     """T of step 4, s."""
     bandwidth: float
-    """W of the laws with time-delay estimation, rad/s, and..."""
+    """W of the laws with time-delay estimation, rad/s."""
     model_bandwidth: float
-    """...of those with a model."""
+    """W of the laws with a model, rad/s."""
     smallest: float
-    """Smallest and..."""
+    """Smallest eigenvalue of ``H_S^-1 h_bar`` with nominal masses and every payload."""
     largest: float
-    """...largest eigenvalue of ``H_S^-1 h_bar`` with nominal masses and every payload."""
+    """Largest eigenvalue of the same."""
     error: Array
     """(m,) eps of step 5, rad/s2 (eps: 1/s2)."""
     gains: Mapping[str, Mapping[str, Array]]
-    """By law and name, (m,) each."""
+    """Gains by law and name, (m,) each."""
 
 
 def tune(
@@ -104,17 +104,17 @@ def tune(
     period: float,
     noise: Noise | None = None,
 ) -> Tuned:
-    """Make a set.
+    """Compute a gain set.
 
     Args:
         inertia: (K, m, m) H_S in all configurations, with all payloads.
-        asked: of the mission.
-        wishes: of the user.
+        asked: forces of the mission.
+        wishes: the user's tuning options.
         period: delta, s.
-        noise: of the sensors behind the navigation, and its lag (None: neither).
+        noise: of sensors and navigation, and its lag (None: no noise, no lag).
 
     Raises:
-        InputError: the wishes do not go together.
+        InputError: the tuning options cannot be met together.
     """
     margin, share = wishes.margin, wishes.mass_uncertainty
     shape = axis_inertia(inertia)
@@ -173,25 +173,23 @@ def _critical(bandwidth: Array) -> dict[str, Array]:
 
 
 def axis_inertia(inertia: Array) -> Array:
-    """Return (m,) d_i of step 1 of ``inertia`` (K, m, m)."""
+    """Return d_i (m,) of step 1 for ``inertia`` (K, m, m), kg m2."""
     free = 1.0 / np.diagonal(np.linalg.inv(inertia), axis1=1, axis2=2)
     smallest: Array = free.min(axis=0)
     return smallest
 
 
 def _quiet_weight(largest: float, noise: Noise, allowed: Array) -> float:
-    """Return the largest weight up to ``largest`` whose noise is ``allowed`` (m,), rad/s2.
+    """Return the largest weight, at most ``largest``, with noise up to ``allowed`` (m,), rad/s2.
 
     Raises:
-        InputError: there is none.
+        InputError: there is no such weight.
     """
     if np.all(noise.acceleration(largest) <= allowed):
         return largest
     low, high = math.log(LEAST_WEIGHT), math.log(largest)
     if np.any(noise.acceleration(LEAST_WEIGHT) > allowed):
-        raise InputError(
-            "these sensors have more noise than any low-pass takes away: allow more ripple"
-        )
+        raise InputError("no low-pass reduces the noise of these sensors enough: allow more ripple")
     for _ in range(BISECTIONS):
         middle = 0.5 * (low + high)
         is_quiet = np.all(noise.acceleration(math.exp(middle)) <= allowed)
@@ -200,9 +198,9 @@ def _quiet_weight(largest: float, noise: Noise, allowed: Array) -> float:
 
 
 def _quiet_bandwidth(inertia: Array, noise: Noise | None, allowed: Array) -> float:
-    """Return the largest W of computed torque whose noise is ``allowed`` (m,), N m.
+    """Return the largest W of computed torque, rad/s, with noise up to ``allowed`` (m,), N m.
 
-    ``H^2 (4 W^2 sigma_rate^2 + W^4 sigma_e^2) = allowed^2`` on the axis that allows least.
+    ``H^2 (4 W^2 sigma_rate^2 + W^4 sigma_e^2) = allowed^2`` on the limiting axis.
     """
     if noise is None or not noise.rates.any():
         return math.inf
@@ -215,7 +213,7 @@ def _quiet_bandwidth(inertia: Array, noise: Noise | None, allowed: Array) -> flo
 
 
 def low_pass_corner(weight: float, period: float) -> float:
-    """Return the corner, Hz, of the low-pass of a ``weight``; 0 (none) for 1."""
+    """Return the corner, Hz, of a low-pass with a ``weight``; 0 (no low-pass) for 1."""
     return 0.0 if weight >= 1.0 else -math.log(1.0 - weight) / (2.0 * math.pi * period)
 
 

@@ -1,9 +1,8 @@
-"""Noise and lag of what the laws see: sensors and navigation run on a robot that stands still.
+"""Noise and lag of the laws' inputs: a simulation of sensors and navigation on a robot at rest.
 
-No formula for this sensor and that filter: the plant's own sensors measure a robot at rest, under
-no torque and nothing that disturbs it, and the controller's own navigation makes of it what it
-would in flight. All that moves then is noise. A ramp of torque is reported besides, as an echo, and
-comes out of the navigation as late as the torque that belongs to its rates.
+The plant's sensors measure a robot at rest without torque and disturbance, and the controller's
+navigation processes the measurements as in flight, so all variation is noise. A ramp of reported
+torque passes the navigation at the same time, and shows its lag.
 """
 
 from __future__ import annotations
@@ -25,30 +24,33 @@ from space_robot_sim.plant.plant import Plant, PlantSettings
 Array = NDArray[np.float64]
 
 SETTLING = 2.0
-"""s given to the filters."""
+"""Settling time of the filters, s."""
 LISTENING = 4.0
-"""s over which noise is taken."""
+"""Time over which noise is recorded, s."""
 RAMP = 1e-3
-"""N m/s, on every axis; small, so that no number loses its digits to it."""
+"""Ramp of torque on every axis, N m/s; small, to avoid loss of digits."""
 
 
 @dataclass(frozen=True)
 class Noise:
-    """A robot at rest as the laws see it."""
+    """Measured state of a robot at rest, after navigation."""
 
     rates: Array
     """(K, m) rhodot at every tick."""
     errors: Array
     """(K, m) e at every tick."""
     lag: float
-    """By which the reported torque comes late, on the axis where it is latest; s."""
+    """Largest delay of the reported torque over all axes, s."""
     period: float
 
     def acceleration(self, weight: float) -> Array:
-        """Return (m,) the standard deviation of the time-delay pair's acceleration.
+        """Return the standard deviation (m,) of the time-delay pair's acceleration, rad/s2.
 
-        ``weight`` is that of the pair's low-pass. Where nothing smooths, white noise is overrated
-        by a root of 2: in flight a difference meets the command that the one before has made.
+        Without filters white noise is overestimated by sqrt(2): in flight a difference of rates is
+        correlated with the command that the last one caused.
+
+        Args:
+            weight: of the pair's low-pass.
         """
         from scipy.signal import lfilter  # slow to import
 
@@ -65,18 +67,18 @@ def listen(
     mission: MissionSettings,
     period: float,
 ) -> Noise:
-    """Return the noise of a robot's sensors behind its navigation.
+    """Simulate sensors and navigation of a robot at rest, and return noise and lag.
 
     Args:
-        robot: any with the right number of joints: it stands still.
-        settings: of the plant, with its sensors and where the arm is.
-        navigation: settings of the filter (None: the laws see what is measured).
-        mission: its reference.
-        period: s.
+        robot: with the right number of joints; its inertia does not matter.
+        settings: of the plant, with sensors and joint positions.
+        navigation: settings of the filter (None: the laws use the measurements).
+        mission: settings of the reference.
+        period: of the ticks, s.
     """
     quiet = settings.model_copy(update={"disturbance": DisturbanceSettings()})
     plant, command = Plant(robot, quiet, period), Command(0, np.zeros(robot.n + 3))
-    kind = find_law("tde_stc")  # whichever: its command goes nowhere
+    kind = find_law("tde_stc")  # any law: its command is not used
     law = kind({name: np.ones(robot.n + 3) for name in kind.gain_descriptions()}, period)
     controller = Controller(robot, law, period, navigation=navigation)
     memory, held = controller.block[0], Mission(robot, mission, period).chunk(0, 1).references()

@@ -1,4 +1,4 @@
-"""Remarks, before a flight, on gains with too little margin, and on joints asked too much."""
+"""Warnings before a flight: gains with too little margin, missions beyond the joints' limits."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ from .method import Tuned
 from .spectrum import LEAST_MARGIN, spectrum
 
 A_LEG = 10
-"""Configurations of each leg at least."""
+"""Minimum number of configurations per leg."""
 MUCH_SLOWER = 0.1
-"""Share of the bandwidth of the laws with a model below which a law is weak."""
+"""A law is weak below this share of the bandwidth of the laws with a model."""
 COARSE = 0.5
-"""s between two configurations: nobody is to wait for a remark."""
+"""Largest time between two configurations, s; coarse, to save time."""
 
 
 def margin_remarks(
@@ -34,24 +34,24 @@ def margin_remarks(
     on_thrusters: bool = False,
     on_thin_margin: bool = True,
 ) -> list[str]:
-    """Return a line for each of the laws that diverges, or nearly does, for its h_bar alone.
+    """Return a warning for each law with an h_bar that is unstable or nearly so.
 
     Args:
-        flown: the laws in force in the flight, in turn.
-        robot: the plant's, with its payload.
-        mission: its reference.
+        flown: the laws of the flight, in order of use.
+        robot: of the plant, with its payload.
+        mission: settings of the reference.
         acceleration_filter_hz: corner of the low-pass of the time-delay pair (0: none).
-        controls_base: whether anything turns the base.
-        on_thrusters: whether thrusters alone do: their pulses come back into the demand, all but
-            the share ``H^-1 h_bar``.
-        on_thin_margin: whether a law that flies with little margin is worth a line.
+        controls_base: whether the base has attitude actuators.
+        on_thrusters: whether these are only thrusters: the estimate feeds their pulses back into
+            the demand, except the share ``H^-1 h_bar``.
+        on_thin_margin: whether to warn of stable laws with little margin, too.
     """
     laws = {law.name: law for law in flown if law.h_bar.size}
     if not laws:
         return []
     try:
         inertia = inertia_along(robot, mission, COARSE, controls_base)
-    except InputError:  # it is the flight that has to complain
+    except InputError:  # the flight itself reports it
         return []
     remarks = []
     for name, law in laws.items():
@@ -73,9 +73,9 @@ def margin_remarks(
 
 
 def estimate_remark(tuned: Tuned) -> str:
-    """Return why the laws with time-delay estimation are weak in a set, and what to do; else empty.
+    """Return a remark if a set's laws with time-delay estimation are weak; else empty.
 
-    They are where their bandwidth is less than a tenth of that of the laws with a model.
+    They are weak below a tenth of the bandwidth of the laws with a model.
     """
     if tuned.bandwidth >= MUCH_SLOWER * tuned.model_bandwidth:
         return ""
@@ -91,17 +91,17 @@ def estimate_remark(tuned: Tuned) -> str:
 
 
 def limit_remarks(robot: Robot, mission: MissionSettings) -> list[str]:
-    """Return a line for each joint that the mission asks more of than its limits allow.
+    """Return a warning for each joint whose limits the mission exceeds.
 
-    The force is that of acceleration alone, the attitude held and the passive joints locked:
-    friction, velocities and errors come on top.
+    The force is that of acceleration only, with constant attitude and locked passive joints:
+    friction, velocity terms and control errors are not included.
     """
     try:
         planned = Mission(robot, mission, COARSE)
-    except InputError:  # it is the flight that has to complain
+    except InputError:  # the flight itself reports it
         return []
     remarks = [
-        f"warning: mission: {b.joint} is to move at {b.asked:.3g} {b.unit}, its limit is "
+        f"warning: mission: {b.joint} would move at {b.asked:.3g} {b.unit}, its limit is "
         f"{b.limit:.3g} {b.unit}"
         for b in too_fast(robot, planned.times, planned.waypoints)
     ]

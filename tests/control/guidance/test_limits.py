@@ -75,7 +75,7 @@ def test_remarks_name_joint_number_and_unit() -> None:
         ("shoulder", "needs"),
         ("boom", "needs"),
     ]
-    assert said[1] == "warning: mission: boom is to move at 4.5 m/s, its limit is 0.4 m/s"
+    assert said[1] == "warning: mission: boom would move at 4.5 m/s, its limit is 0.4 m/s"
     assert said[3].endswith("N and more, its limit is 20 N")
 
 

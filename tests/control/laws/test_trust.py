@@ -99,7 +99,7 @@ def test_analyze_imports_none_and_says_so(
     log.flight = described(controller=LAW)
     log.flight.pop("gains_used")
     report = analyze(log)
-    assert "--trust imports it" in report["unavailable"]["estimate_error"]
+    assert "--trust imports a module:Class" in report["unavailable"]["estimate_error"]
     assert report["rms"]["mean_axis"]["attitude"] >= 0.0
     assert not ran()
     log.trusted = True
