@@ -1,4 +1,4 @@
-"""Flights from Python: a scenario, the flight that it makes, and the bench to fly step by step."""
+"""Python interface: scenarios, flown flights, and the bench for flights step by step."""
 
 from ..flight.bench import Bench, Snapshot
 from .flown_flight import FlownFlight

@@ -1,4 +1,4 @@
-"""A flight that was flown: its log, its metrics, its figures, and how it ended."""
+"""A flown flight: its log, metrics, figures and outcome."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
 
 class FlownFlight:
-    """What came of a `Scenario.fly`, to its end or not."""
+    """Result of `Scenario.fly`, also of a flight that ended early."""
 
     def __init__(
         self,
@@ -39,24 +39,24 @@ class FlownFlight:
         log: FlightLog | None,
         metrics: dict[str, Any] | None = None,
     ) -> None:
-        """Take what was to be flown, how that ended, where it was recorded, and what was flown.
+        """Store flight, ending, bag and log.
 
         Args:
             flight: that was flown.
-            ending: of it.
-            bag: None: it was not recorded.
-            log: None: it was not kept.
-            metrics: of the report, without the short names; None: those of the log.
+            ending: of the flight.
+            bag: folder of the bag; None if it was not recorded.
+            log: of the flight; None if it was not kept.
+            metrics: of the report, without the short names; None: computed from the log.
         """
         self.flight, self.ending, self.bag = flight, ending, bag
         self._log, self._metrics = log, metrics
 
     @property
     def log(self) -> FlightLog:
-        """What was flown, a row a tick.
+        """Log of the flight, one row per tick.
 
         Raises:
-            InputError: it was not kept.
+            InputError: the log was not kept.
         """
         if self._log is None:
             raise InputError("no log was kept (keep_log=False): record the flight and read its bag")
@@ -66,49 +66,49 @@ class FlownFlight:
     def outcome(self) -> str:
         """``complete``, ``diverged`` or ``unanswered``.
 
-        Diverged: the state left the physics. Unanswered: the law has no command for a state (the
-        attitude is near 180 degrees, a number is not finite).
+        Diverged: the simulated state is not physical any more. Unanswered: the law has no command
+        for a state (attitude near 180 degrees, or a number that is not finite).
         """
         return self.ending.outcome
 
     @property
     def reason(self) -> str:
-        """Why it ended before its time, in a line; empty if it did not."""
+        """Why the flight ended early, in a line; empty if it did not."""
         return self.ending.reason
 
     @property
     def ended_at_s(self) -> float:
-        """Simulated time of its end, s."""
+        """Simulated time of the end, s."""
         return float(self.ending.ended_at_s or 0.0)
 
     @property
     def is_complete(self) -> bool:
-        """True if it came to its planned end."""
+        """True if the flight reached its planned end."""
         return self.outcome == COMPLETE
 
     def check(self) -> Self:
-        """Return the flight itself, if it came to its end.
+        """Return the flight itself if it is complete.
 
         Raises:
-            FlightError: it did not; the one that ended it.
+            FlightError: it ended early; the error that ended it.
         """
         self.ending.check()
         return self
 
     @cached_property
     def metrics(self) -> dict[str, Any]:
-        """The metrics of ``space-robot analyze --json``, of what was flown.
+        """Metrics of the flight, as in ``space-robot analyze --json``.
 
-        The columns of Table V stand by their own names, too, as mean-axis RMS:
+        The columns of Table V have short names, too, for the mean-axis RMS:
         ``metrics["attitude"]`` is ``metrics["rms"]["mean_axis"]["attitude"]``. Empty if the flight
-        has not one whole tick.
+        has no complete tick.
         """
         report = self._report
         return {**report["rms"]["mean_axis"], **report} if report else {}
 
     @cached_property
     def table(self) -> DataFrame:
-        """What was flown as a table of pandas, with the columns of ``analyze --csv``.
+        """Log as a pandas data frame, with the columns of ``analyze --csv``.
 
         Raises:
             InputError: no log was kept, or pandas is not installed.
@@ -118,7 +118,7 @@ class FlownFlight:
         return dataframe(self.log)
 
     def report(self) -> dict[str, Any]:
-        """Return what ``space-robot simulate --json`` prints: metrics, outcome, reason, end."""
+        """Return metrics, outcome, reason and end, as ``space-robot simulate --json`` prints."""
         return flight_report(self.flight, self.ending, self._report, self.bag)
 
     @cached_property
@@ -140,8 +140,7 @@ class FlownFlight:
 
         Args:
             name: one of `plots`.
-            path: of the file, without its ending, to write as PNG and SVG; None: nothing is
-                written, a notebook shows the figure.
+            path: of the PNG and SVG files, without suffix; None: no file, for notebooks.
 
         Raises:
             InputError: there is no such figure, or it cannot be written.

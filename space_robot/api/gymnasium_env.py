@@ -1,4 +1,4 @@
-"""A bench as an environment of Gymnasium, for learning: to follow the mission with torques.
+"""Gymnasium environment of a bench, for learning to follow a mission by torques.
 
 from space_robot.api.gymnasium_env import SpaceRobotEnv
 env = SpaceRobotEnv(Scenario(controller=None, sensors="fine"))
@@ -21,7 +21,7 @@ try:
     import gymnasium
     from gymnasium.spaces import Box
 except ImportError:
-    raise ImportError("that needs gymnasium: pip install 'space_robot[gym]'") from None
+    raise ImportError("gymnasium is not installed: pip install 'space_robot[gym]'") from None
 
 from .scenario import Scenario
 
@@ -29,32 +29,32 @@ Array = NDArray[np.float64]
 ScenarioDraw = Callable[[np.random.Generator], Scenario]
 
 WORST_COST = 100.0
-"""Cost a second at which an episode is lost: that of a joint that is 10 rad off."""
+"""Cost per second that terminates an episode: that of a joint error of 10 rad."""
 RATE_WEIGHT, ACTION_WEIGHT = 0.1, 1e-3
-"""Shares of squared rates, rad2/s2, and squared actions in the cost a second; squared errors, rad2,
-count in full."""
+"""Weights of squared rates, rad2/s2, and squared actions in the cost per second; the weight of
+squared errors, rad2, is 1."""
 LARGEST = 1e4
-"""Of an observation's numbers; what exceeds it is cut."""
+"""Limit of the absolute values of an observation; larger ones are clipped."""
 NAME = "space_robot/Tracking-v0"
-"""That `gymnasium.make` knows it by, once this module is imported."""
+"""Name for `gymnasium.make`, registered when this module is imported."""
 
 
 class SpaceRobotEnv(gymnasium.Env[Array, Array]):
-    """Follows a scenario's mission, m = n+3 axes: base x, y, z, then the n joints with motors.
+    """Environment of a scenario's mission on m = n+3 axes: base x, y, z, then n actuated joints.
 
-    - Observation (2 m + n,), as the sensors measure: the error ``rho_d - rho`` (m,), of the base
-      the vector part of the quaternion, of joints rad (or m); its rate (m,), of the base the
-      angular velocity in the base frame, rad/s; the joints' positions (n,).
-    - Action (m,) from -1 to 1: the torque in parts of ``torque_scale``, held over
-      ``ticks_per_step`` ticks. On the base's axes hardware gives it as far as it can.
-    - Reward: -cost dt for every step of dt s, from the truth, with the cost a second
+    - Observation (2 m + n,), as measured by the sensors: the error ``rho_d - rho`` (m,), for the
+      base the vector part of the quaternion, for joints rad (or m); its rate (m,), for the base
+      the angular velocity in the base frame, rad/s; the joint positions (n,).
+    - Action (m,) from -1 to 1: the torque divided by ``torque_scale``, held over
+      ``ticks_per_step`` ticks. On the base's axes it is limited by the actuators.
+    - Reward: -cost dt for every step of dt s, from the true state, with the cost per second
       ``4 |e_eps|^2 + |e_theta|^2 + 0.1 |edot|^2 + 0.001 |action|^2``.
-    - Terminated: the cost is `WORST_COST` or more, or the flight has diverged. All that is left of
-      the mission is charged at `WORST_COST` a second then, so that an early end never pays.
+    - Terminated: the cost is `WORST_COST` or more, or the flight has diverged. The rest of the
+      mission then costs `WORST_COST` per second, so that an early end is never an advantage.
     - Truncated: the mission, or the scenario's ``duration``, is over.
 
-    An episode's sensors and faults have a seed of their own, which `reset` draws. ``bench`` is the
-    `Bench` below; its snapshots may be restored between two steps.
+    `reset` draws a seed of sensors and faults for each episode. ``bench`` is the underlying
+    `Bench`; its snapshots may be restored between two steps.
     """
 
     def __init__(
@@ -63,13 +63,13 @@ class SpaceRobotEnv(gymnasium.Env[Array, Array]):
         ticks_per_step: int = 20,
         torque_scale: ArrayLike = 10.0,
     ) -> None:
-        """Put the scenario on a bench.
+        """Create the bench of a scenario.
 
         Args:
-            scenario: None: the paper's. A function of a random generator is asked for another one
-                at every reset, for robots and missions at random; the joints stay as many.
-            ticks_per_step: 20 of 0.5 ms are 100 steps/s.
-            torque_scale: torque, N m (of prismatic joints N), of an action of 1: one or (m,).
+            scenario: None: the paper's. A function that draws a scenario from a random generator
+                is called at every reset; the number of joints must be constant.
+            ticks_per_step: 20 ticks of 0.5 ms give 100 steps/s.
+            torque_scale: torque, N m (prismatic joints: N), of an action of 1; scalar or (m,).
 
         Raises:
             InputError: the scenario cannot be flown, or a number is out of its range.
@@ -93,7 +93,7 @@ class SpaceRobotEnv(gymnasium.Env[Array, Array]):
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Array, dict[str, Any]]:
-        """Begin an episode; ``options`` has none."""
+        """Start an episode; ``options`` is not used."""
         super().reset(seed=seed)
         if self._draw is not None:
             bench = _drawn(self._draw, self.np_random).bench()
@@ -106,10 +106,10 @@ class SpaceRobotEnv(gymnasium.Env[Array, Array]):
         return self._observation(state), self._info()
 
     def step(self, action: Array) -> tuple[Array, float, bool, bool, dict[str, Any]]:
-        """Hold an action over ``ticks_per_step`` ticks, fewer at the end of the mission.
+        """Apply an action for ``ticks_per_step`` ticks, fewer at the end of the mission.
 
         Raises:
-            InputError: the action is not m numbers, or the episode is over.
+            InputError: the action does not have m numbers, or the episode is over.
         """
         bench, action = self.bench, as_numbers(action, "action")
         if action.shape != self.action_space.shape:
@@ -150,7 +150,7 @@ class SpaceRobotEnv(gymnasium.Env[Array, Array]):
         )
 
     def _cost(self, action: Array) -> float:
-        """Return the cost a second of the true state; NaN if that is none."""
+        """Return the cost per second of the true state; NaN if the state is not finite."""
         error, rate = self._errors(self.bench.truth)
         return float(
             4.0 * error[:3] @ error[:3]
@@ -165,10 +165,10 @@ class SpaceRobotEnv(gymnasium.Env[Array, Array]):
 
 
 def _drawn(draw: ScenarioDraw, rng: np.random.Generator | int) -> Scenario:
-    """Return a scenario that a function draws.
+    """Return a scenario drawn by a function.
 
     Raises:
-        InputError: it is no function, or returns something else.
+        InputError: ``draw`` is not a function, or does not return a scenario.
     """
     expected = "scenario: a Scenario, or a function of a random generator that returns one, was"
     if not callable(draw):

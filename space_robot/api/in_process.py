@@ -1,4 +1,4 @@
-"""A checked flight, flown in this process: what `Scenario.fly` and ``simulate`` do."""
+"""Flights in this process, for `Scenario.fly` and ``simulate``."""
 
 from __future__ import annotations
 
@@ -23,10 +23,16 @@ def fly_in_process(
     progress: Callable[[float], object] | None = None,
     keep_log: bool = True,
 ) -> FlownFlight:
-    """Fly a flight from where its plant stands: see `Scenario.fly`.
+    """Fly a checked flight from the present state of its plant.
+
+    Args:
+        flight: to be flown.
+        bag: folder to record to; None: none.
+        progress: called regularly with the simulated time, s.
+        keep_log: False: only the metrics are kept.
 
     Raises:
-        InputError: as there.
+        InputError: the bag cannot be created, or memory is too small for a log.
     """
     flight.check_in_process()
     if bag:
@@ -52,7 +58,7 @@ def _into_a_log(flight: Flight, bag: Path | None, show: Callable[[int], None]) -
 
 
 def _into_metrics(flight: Flight, bag: Path | None, show: Callable[[int], None]) -> FlownFlight:
-    """Fly with the memory of one block."""
+    """Fly and keep only the metrics; memory holds one block."""
     analysis, ending = Analysis(), _complete(flight)
     with closing(fly_blocks(flight, bag, show)) as blocks:
         try:

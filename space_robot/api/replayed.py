@@ -1,4 +1,4 @@
-"""A recorded flight played to a live controller: what ``space-robot replay`` does, from Python."""
+"""Replay of a recorded flight to a live controller, as ``space-robot replay``, from Python."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from ..flight.replay.run import replay as run
 
 
 def replay(bag: str | Path, **options: Any) -> Replay:
-    """Play a bag to a controller node of its own, and compare commands to the last bit.
+    """Replay a bag to a new controller node, and compare its commands bit for bit.
 
-    ``has_passed`` of what is returned is the verdict, ``report()`` what ``replay --json`` prints.
+    ``has_passed`` of the result is the verdict, ``report()`` is the output of ``replay --json``.
 
     Args:
         bag: folder of the recorded flight.

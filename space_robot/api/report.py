@@ -1,4 +1,4 @@
-"""The report of a flight: its metrics and how it ended, ready for JSON."""
+"""Report of a flight, its metrics and outcome, as data for JSON."""
 
 from __future__ import annotations
 
@@ -25,11 +25,11 @@ FLOWN = (
 def flight_report(
     flight: Flight, ending: Ending, metrics: dict[str, Any], bag: Path | None
 ) -> dict[str, Any]:
-    """Report the ``metrics`` of what was flown, ``outcome``, ``reason`` and ``ended_at_s``.
+    """Return the ``metrics`` of a flight with ``outcome``, ``reason`` and ``ended_at_s``.
 
-    If the flight ended before its time: also what was to be flown, as far as ``metrics`` do not
-    say it, ``planned_ticks``, ``bag`` (None: there is none), ``error`` and, if it ``diverged``, at
-    which tick and time.
+    For a flight that ended early also its description, as far as it is not in ``metrics``,
+    ``planned_ticks``, ``bag`` (None if there is none), ``error`` and, if it ``diverged``, the tick
+    and time.
     """
     if ending.error is None:
         return metrics | ending.as_record()

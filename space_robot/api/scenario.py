@@ -1,4 +1,4 @@
-"""What is to be flown, and the ways to fly it."""
+"""Scenarios: the definition of a flight, and methods to fly it."""
 
 from __future__ import annotations
 
@@ -30,40 +30,40 @@ OF_THE_GRAPH = (
     "domain",
     "namespace",
 )
-"""Options of `FlightPlan` that only a graph of nodes has: `space-robot fly`."""
+"""Options of `FlightPlan` for graphs of nodes only, as in `space-robot fly`."""
 
 
 class Scenario(FlightPlan):
-    """A flight to be flown: the options of ``space-robot simulate``, with the same defaults.
+    """Definition of a flight: the options of ``space-robot simulate``, with the same defaults.
 
         Scenario(robot="paper", controller="tde_stc", case="3", sensors="fine", seed=1)
 
-    An option that names a file may be the object itself, or its numbers:
+    An option that names a file may also be an object, or the content of the file:
 
-    - ``robot``: a `Robot`, with the mission and gains of the shipped one of its name, if any; or
-      the mapping that its file holds
-    - ``plant_robot``: what the plant is in truth, where controller and mission know another one
+    - ``robot``: a `Robot`, with the mission and gains of the shipped robot of the same name, if
+      any; or the mapping of its file
+    - ``plant_robot``: the robot of the plant, if it differs from that of controller and mission
     - ``controller``: a `ControlLaw` class or object; None: none, for `bench`
-    - ``gains``: numbers by gain, over the default set: ``{"k_1": 3.0, "h_bar": [...]}``, one for
-      all axes or n+3 (base x, y, z, joints); or such a mapping for each of several laws
+    - ``gains``: values by gain, in place of the default set's: ``{"k_1": 3.0, "h_bar": [...]}``,
+      one for all axes or n+3 (base x, y, z, joints); or such a mapping for each of several laws
     - ``mission``: `MissionSettings` or a mapping: ``waypoint_times`` s, ``waypoints_deg`` (flat,
-      degrees, or m of prismatic joints), ``base_quaternion`` ``[w, x, y, z]``,
-      ``initial_joints_deg`` (else the first waypoint), ``events``
+      degrees, or m for prismatic joints), ``base_quaternion`` ``[w, x, y, z]``,
+      ``initial_joints_deg`` (default: the first waypoint), ``events``
     - ``case``, ``sensors``, ``actuators``: their settings, objects or mappings
-    - ``assumed_actuators``: what the flight software assumes of the base's actuators
+    - ``assumed_actuators``: the base's actuators as assumed by the flight software
     - ``parameters``: any parameter of a node, ``{"plant": {"friction.coulomb": 0.0}}``
 
     The other options: ``duration`` s, ``period`` s, ``substeps``, ``navigation`` ("direct" or
     "filtered"), ``command_latency_ticks``, ``friction`` (False: none), ``faults``, ``events`` and
-    ``swaps`` (lists of texts), ``seed``, ``compression`` and ``split_size`` of a bag. A scenario
-    does not change; it can be pickled, and `replace` makes another of it.
+    ``swaps`` (lists of texts), ``seed``, ``compression`` and ``split_size`` of a bag. A scenario is
+    immutable and can be pickled; `replace` returns a modified one.
     """
 
     def __init__(self, **options: Any) -> None:
-        """Take the options; what they name is looked up by `check`, `fly` and `bench`.
+        """Store the options; `check`, `fly` and `bench` resolve the names in them.
 
         Raises:
-            InputError: (a ValueError) an option that there is not, or of another type.
+            InputError: (a ValueError) an unknown option, or one of a wrong type.
         """
         allowed = [name for name in FlightPlan.model_fields if name not in OF_THE_GRAPH]
         for name in options:
@@ -74,20 +74,20 @@ class Scenario(FlightPlan):
             raise InputError(one_line(error, type(self), "Scenario")) from None
 
     def replace(self, **options: Any) -> Self:
-        """Return the same scenario but for these options.
+        """Return a copy of the scenario with these options changed.
 
         Raises:
-            InputError: see `Scenario`.
+            InputError: an unknown option, or one of a wrong type.
         """
         return type(self)(**{**self.given, **options})
 
     @property
     def given(self) -> dict[str, Any]:
-        """The options that are not left at their defaults, by name."""
+        """The options that differ from their defaults, by name."""
         return {name: getattr(self, name) for name in sorted(self.model_fields_set)}
 
     def check(self) -> Flight:
-        """Look up all that is named, and return the flight that would be flown.
+        """Resolve all names, and return the flight that would be flown.
 
         Raises:
             InputError: something does not exist, or does not fit the rest; in one line.
@@ -97,10 +97,10 @@ class Scenario(FlightPlan):
         return flight
 
     def resolved(self) -> dict[str, Any]:
-        """Return the same scenario with every number in it, and no file left to read.
+        """Return the same scenario with all numbers, independent of files.
 
-        As plain mappings, lists, numbers and texts: ``Scenario(**resolved)`` flies the same bits,
-        and so does ``space-robot simulate --scenario`` with the mapping as a YAML file.
+        It consists of mappings, lists, numbers and texts: ``Scenario(**resolved)`` flies the same
+        bits, and so does ``space-robot simulate --scenario`` with the mapping as a YAML file.
 
         Raises:
             InputError: see `check`.
@@ -113,19 +113,19 @@ class Scenario(FlightPlan):
         progress: Callable[[float], object] | None = None,
         keep_log: bool = True,
     ) -> FlownFlight:
-        """Fly it in this process; the bits are those of ``simulate``, and of ``fly`` in lockstep.
+        """Fly in this process; the bits are those of ``simulate``, and of ``fly`` in lockstep.
 
-        A flight that diverges is a result, too: see `FlownFlight.outcome`. The first flight on a
-        machine compiles what it needs. A start away from the mission's, for which the law
-        commands far more than the mission asks for, is a `UserWarning`.
+        A diverged flight is a result, too: see `FlownFlight.outcome`. The first flight on a machine
+        compiles the kernels. A start away from the mission's, with commands far above those of the
+        mission, causes a `UserWarning`.
 
         Args:
-            bag: folder to record to, which must not be there yet.
-            progress: called now and then with the simulated seconds flown.
-            keep_log: False for flights longer than memory: the metrics alone are kept.
+            bag: folder to record to, which must not exist.
+            progress: called regularly with the simulated time, s.
+            keep_log: False: only the metrics are kept, for flights too long for memory.
 
         Raises:
-            InputError: see `check`; or the bag cannot be made, or memory is too small for a log.
+            InputError: see `check`; or the bag cannot be created, or memory is too small.
         """
         if self.controller is None:
             raise InputError("controller is None, so there is nothing to fly: use bench()")
@@ -137,7 +137,7 @@ class Scenario(FlightPlan):
         return fly_in_process(flight, path, progress, keep_log)
 
     def bench(self) -> Bench:
-        """Return a bench that stands at the flight's first tick.
+        """Return a bench at the flight's first tick.
 
         Raises:
             InputError: see `check`.

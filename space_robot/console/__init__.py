@@ -1,1 +1,1 @@
-"""What commands show and write: tables, progress, streams, files."""
+"""Output of commands: tables, progress, standard streams, files."""

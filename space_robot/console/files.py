@@ -1,4 +1,4 @@
-"""Files that are whole or not there, and never over another one unasked."""
+"""Atomic writing of files, without overwriting existing ones unless requested."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ from space_robot_msgs_py.errors import InputError
 
 
 def check_free(path: Path) -> None:
-    """Check that a file can be made there, before any work is done for it.
+    """Check that a new file can be created at a path; its folder is created.
 
     Raises:
-        InputError: it exists, or its folder cannot be made or written.
+        InputError: it exists, or its folder cannot be created or written.
     """
     if path.exists():
         raise InputError(f"{path}: exists already; it is not overwritten")
@@ -32,27 +32,27 @@ def check_free(path: Path) -> None:
 
 
 def make_folder(path: Path) -> None:
-    """Make a folder, and those above it, where they are not there yet.
+    """Create a folder and its parents if they do not exist.
 
     Raises:
-        InputError: it cannot be made.
+        InputError: it cannot be created.
     """
     try:
         path.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise InputError(f"{path}: no folder can be made there ({error.strerror})") from None
+        raise InputError(f"{path}: the folder cannot be created ({error.strerror})") from None
 
 
 def check_writable(path: Path) -> None:
-    """Check that a file can be written or replaced, before any work is done for it.
+    """Check that a file can be written or replaced.
 
     Raises:
-        InputError: it cannot.
+        InputError: it cannot be written.
     """
     with _told(path):
         if path.exists():
-            path.open("r+b", buffering=0).close()  # a folder, or one of others
-        with TemporaryFile(dir=path.parent):  # nothing is left if the work fails
+            path.open("r+b", buffering=0).close()  # fails for a folder, or without permission
+        with TemporaryFile(dir=path.parent):  # no file remains if the caller fails
             pass
 
 
@@ -74,11 +74,11 @@ def csv_writer(path: Path, replace: bool = False) -> Iterator[Any]:
 
 
 def csv_rows(integers: NDArray[np.int64], numbers: NDArray[np.float64]) -> list[list[Any]]:
-    """Return the rows of a table for `csv_writer`; a number that is not known is empty.
+    """Return the rows of a table for `csv_writer`; NaN becomes an empty cell.
 
     Args:
         integers: (N,) first column.
-        numbers: (N, C) all others.
+        numbers: (N, C) other columns.
     """
     known = np.where(np.isnan(numbers), None, numbers)  # type: ignore[call-overload]
     rows: list[list[Any]] = np.column_stack([integers.astype(object), known]).tolist()
@@ -87,11 +87,11 @@ def csv_rows(integers: NDArray[np.int64], numbers: NDArray[np.float64]) -> list[
 
 @contextmanager
 def whole_file(path: Path, replace: bool = False) -> Iterator[IO[Any]]:
-    """Open a file that takes its name only when all is in it.
+    """Open a file that gets its name only when it is complete.
 
     Args:
-        path: its name, which must not be taken yet; a pipe or device is written as it is.
-        replace: whether an older file of that name is replaced.
+        path: of the file, which must not exist; a pipe or device is written directly.
+        replace: whether an existing file is replaced.
 
     Raises:
         InputError: the file exists, or it cannot be written.
@@ -110,7 +110,7 @@ def whole_file(path: Path, replace: bool = False) -> Iterator[IO[Any]]:
             if replace:
                 unnamed.replace(path)
             else:
-                os.link(unnamed, path)  # a rename would overwrite
+                os.link(unnamed, path)  # rename would overwrite a file
         finally:
             with suppress(OSError):
                 unnamed.unlink()

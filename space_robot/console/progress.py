@@ -1,4 +1,4 @@
-"""Progress lines on standard error, for flights and for things done one by one."""
+"""Progress lines on standard error, for flights and for series of tasks."""
 
 from __future__ import annotations
 
@@ -21,32 +21,32 @@ from rich.text import Text
 from .terminal import say, terminal
 
 LINE_S = 60.0
-"""Time between two lines where no line can be redrawn."""
+"""Time between two lines in a file, where no line can be redrawn."""
 WATCH_S, WATCHED_LINE_S = 0.5, 5.0
-"""Time between two counts of things that are watched, and between two lines about them."""
+"""Time between two counts of watched tasks, and between two lines about them."""
 WATCHER = "progress"
-"""Name of the thread that counts."""
+"""Name of the counting thread."""
 
 
 class FlightProgress:
-    """A progress line on standard error; call it with simulated seconds and a remark."""
+    """Progress line on standard error; call it with the simulated time, s, and a remark."""
 
     def __init__(self, progress: Progress, total_s: float, what: str) -> None:
         self._progress = progress
         self._task = progress.add_task(what, total=total_s, remark="")
 
     def __call__(self, simulated_s: float, remark: str = "") -> None:
-        """Show how far the flight is."""
+        """Show the simulated time."""
         self._progress.update(self._task, completed=simulated_s, remark=remark)
 
     def say(self, text: str) -> None:
-        """A line above the progress, which stays."""
+        """Print a permanent line above the progress."""
         say(self._progress.console, text)
 
 
 @contextmanager
 def flight_progress(total_s: float, what: str) -> Iterator[FlightProgress]:
-    """A progress line for a flight of ``total_s``."""
+    """Show a progress line for a flight of ``total_s`` seconds."""
     remark = TextColumn("{task.fields[remark]}", markup=False)
     with _bar("{task.completed:.1f}/{task.total:.1f} s simulated", remark) as progress:
         yield FlightProgress(progress, total_s, what)
@@ -54,7 +54,11 @@ def flight_progress(total_s: float, what: str) -> Iterator[FlightProgress]:
 
 @contextmanager
 def counting_progress(what: str) -> Iterator[Callable[[int], Callable[[], None]]]:
-    """A progress line for things that are done one by one; see `reproduce` for its use."""
+    """Show a progress line for a series of tasks.
+
+    Yields:
+        A function that takes the number of tasks, and returns a function to call after each task.
+    """
     with ExitStack() as stack:
 
         def begin(total: int) -> Callable[[], None]:
@@ -67,10 +71,10 @@ def counting_progress(what: str) -> Iterator[Callable[[int], Callable[[], None]]
 
 @contextmanager
 def rated_progress(what: str, line_s: float = LINE_S) -> Iterator[Callable[[int, int, str], None]]:
-    """A progress line with rate and time left, for many things of which some may be done before.
+    """Show a progress line with rate and remaining time for many tasks.
 
-    It begins when it is first called: with how many are done, how many there are, and a remark.
-    In a file, as of a cluster's job, it is a line every ``line_s``.
+    It starts at the first call, with the number of done tasks, the total number and a remark. In a
+    file, such as the log of a cluster job, it is a line every ``line_s`` seconds.
     """
     with ExitStack() as stack:
         progress: Progress | None = None
@@ -97,12 +101,12 @@ def rated_progress(what: str, line_s: float = LINE_S) -> Iterator[Callable[[int,
 
 @contextmanager
 def watching_progress(what: str, total: int, count: Callable[[], int]) -> Iterator[None]:
-    """A progress line for things that others do, which are counted now and then.
+    """Show a progress line for tasks of other processes, which are counted regularly.
 
     Args:
-        what: the things.
-        total: how many there are.
-        count: returns how many are done.
+        what: name of the tasks.
+        total: number of tasks.
+        count: returns the number of done tasks.
     """
     is_over = threading.Event()
 
@@ -123,16 +127,16 @@ def watching_progress(what: str, total: int, count: Callable[[], int]) -> Iterat
 
 
 class _Rate(ProgressColumn):
-    """How many are done a second, of late."""
+    """Column with the recent rate of tasks per second."""
 
     def render(self, task: Task) -> Text:
-        """Return what the column shows."""
+        """Return the text of the column."""
         speed = task.finished_speed or task.speed
         return Text(f"{speed:.3g}/s" if speed else "")
 
 
 def _bar(done: str, *more: ProgressColumn) -> Progress:
-    """Make a line with a bar; ``done`` beside it tells how far things are."""
+    """Return a line with a bar; ``done`` is the format of the progress beside it."""
     return Progress(
         TextColumn("{task.description}", markup=False),
         BarColumn(bar_width=24),

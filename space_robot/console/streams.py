@@ -1,4 +1,4 @@
-"""Standard output and error that cannot be written: a full disk, a reader that has gone."""
+"""Handling of standard streams that cannot be written: full disk, closed pipe."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _WRITING = {errno.ENOSPC, errno.EPIPE, errno.EIO, errno.EBADF, errno.EFBIG, errn
 
 @contextmanager
 def standard_streams() -> Iterator[None]:
-    """Take any letters; let go what standard error does not take: a flight does not end for it."""
+    """Accept all characters, and ignore write errors of standard error: flights continue."""
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="backslashreplace")
@@ -24,9 +24,9 @@ def standard_streams() -> Iterator[None]:
 
 
 def is_of_output(error: OSError) -> bool:
-    """Return True if standard output could not be written; what it has not taken is then dropped.
+    """Return True if standard output could not be written; its remaining output is then dropped.
 
-    Errors of files name them.
+    Errors of files have a file name, errors of standard output have none.
     """
     if error.filename is not None or error.errno not in _WRITING:
         return False
@@ -35,7 +35,7 @@ def is_of_output(error: OSError) -> bool:
 
 
 class _Forgiving:
-    """A stream whose words may be lost."""
+    """A stream that ignores write errors."""
 
     def __init__(self, stream: IO[str]) -> None:
         self._stream = stream
@@ -58,7 +58,7 @@ class _Forgiving:
 
 
 def _drop(stream: IO[str]) -> None:
-    """Have what the stream still holds, and all to come, go nowhere: the interpreter flushes it."""
+    """Redirect the stream to the null device: the interpreter flushes it at its end."""
     with suppress(OSError, ValueError):
         nowhere = os.open(os.devnull, os.O_WRONLY)
         os.dup2(nowhere, stream.fileno())

@@ -1,6 +1,6 @@
-"""One model for all tables, and its forms as text: Markdown, CSV, JSON.
+"""Data model of all tables, and its text formats: Markdown, CSV, JSON.
 
-`terminal.print_table` shows it on a terminal, ``templates/table.html.j2`` in a page.
+`terminal_tables.print_table` prints it on a terminal, ``templates/table.html.j2`` in a page.
 """
 
 from __future__ import annotations
@@ -12,18 +12,18 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 NONE = "-"
-"""Stands for a number that there is not."""
+"""Text of a missing value."""
 
 
 class Column(NamedTuple):
-    """The head of a column."""
+    """Name and format of a column."""
 
     name: str = ""
     unit: str = ""
     spec: str = ""
-    """Format of the column's numbers, as in ``.3g``."""
+    """Format of the column's numbers, such as ``.3g``."""
     is_label: bool = False
-    """Labels stand left and may be folded; all else stands right and is never cut."""
+    """True: left-aligned, may be wrapped. False: right-aligned, never cut."""
 
     @property
     def heading(self) -> str:
@@ -32,36 +32,36 @@ class Column(NamedTuple):
 
 
 class JudgedCell(NamedTuple):
-    """A cell that ends in a judgement."""
+    """A cell with a verdict."""
 
     text: str
-    """The number that is judged, as in ``1.03 < 1``; may be empty."""
+    """Text before the verdict, such as ``1.03 < 1``; may be empty."""
     word: str
     tone: str
     """``good``, ``bad`` or ``open``."""
 
     def __str__(self) -> str:
-        """Return the text and the word."""
+        """Return text and verdict."""
         return f"{self.text} {self.word}".strip()
 
 
 Value = str | float | JudgedCell | None
 Row = Sequence[Any]
-"""A `Value` a column."""
+"""One `Value` per column."""
 
 
 class Group(NamedTuple):
-    """Rows that belong together."""
+    """A named group of rows."""
 
     rows: Sequence[Row]
     name: str = ""
     note: str = ""
-    """The group's meaning, for someone who sees it for the first time."""
+    """Explanation of the group for new readers."""
 
 
 @dataclass(frozen=True)
 class Table:
-    """Rows of values under columns, in groups; it is up to its columns how numbers are written."""
+    """A table: columns, which define the number formats, and groups of rows."""
 
     title: str
     columns: Sequence[Column]
@@ -71,12 +71,12 @@ class Table:
 
     @classmethod
     def of(cls, title: str, columns: Sequence[Column], rows: Sequence[Row]) -> Table:
-        """Make a table of one group without a name."""
+        """Return a table with one group without name."""
         return cls(title, columns, [Group(rows)])
 
     @property
     def has_named_groups(self) -> bool:
-        """True if the groups' names are part of the table."""
+        """True if the table shows the groups' names."""
         return any(group.name for group in self.groups)
 
     def texts(self, group: Group) -> Iterator[list[str]]:
@@ -86,14 +86,14 @@ class Table:
 
 
 def text_of(value: Value, column: Column) -> str:
-    """Write a value as its column asks for."""
+    """Format a value as defined by its column."""
     if value is None:
         return NONE
     return str(value) if isinstance(value, (str, JudgedCell)) else format(value, column.spec)
 
 
 def as_markdown(title: str, tables: Sequence[Table]) -> str:
-    """Write a document of tables."""
+    """Return tables as a Markdown document."""
     lines = [f"# {title}", ""]
     for table in tables:
         lines += [f"## {table.title}", ""]
@@ -108,7 +108,7 @@ def as_markdown(title: str, tables: Sequence[Table]) -> str:
 
 
 def as_csv(table: Table) -> str:
-    """Write the columns' names and all values in full precision; what there is not is empty."""
+    """Return the table as CSV with full precision; missing values are empty."""
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(column.name for column in table.columns)
@@ -118,6 +118,6 @@ def as_csv(table: Table) -> str:
 
 
 def as_records(table: Table) -> list[dict[str, Any]]:
-    """Return a dictionary a row, by the columns' names, ready for JSON."""
+    """Return one dictionary per row, by column name, for JSON."""
     names = [column.name for column in table.columns]
     return [dict(zip(names, row, strict=True)) for group in table.groups for row in group.rows]

@@ -1,7 +1,7 @@
-"""Words and tables on a terminal of any width, whatever letters are in them.
+"""Text and tables on a terminal of any width.
 
-What is shown comes from bags and users: nothing in it is markup, and nothing that cannot be
-printed reaches the terminal. A table whose numbers do not fit becomes lines.
+Texts from bags and users are never interpreted as markup, and unprintable characters are
+replaced. A table with numbers that do not fit is printed as lines.
 """
 
 from __future__ import annotations
@@ -18,22 +18,22 @@ from rich.text import Text
 from space_robot_msgs_py.config.text import printable
 
 _START = 8
-"""Letters of a label's word that tell it from others."""
+"""Minimum visible characters of a label, to distinguish it from others."""
 
 
 class _Console(Console):
     def render_str(self, text: str, **options: Any) -> Text:
-        """Every text that is shown comes this way, be it a sentence, a title or a cell."""
+        """Make all displayed text printable: sentences, titles and cells."""
         return super().render_str("\n".join(map(printable, text.split("\n"))), **options)
 
 
 def terminal(**options: Any) -> Console:
-    """A console that takes every text as it is; ``options``: of `rich.console.Console`."""
+    """Return a console without markup; ``options`` are those of `rich.console.Console`."""
     return _Console(markup=False, emoji=False, highlight=False, **options)
 
 
 def echo_json(report: Any) -> None:
-    """Print a report as JSON, which has no NaN and no infinity: they become null."""
+    """Print a report as JSON; NaN and infinity become null."""
     click.echo(json.dumps(_finite(report), indent=2, allow_nan=False))
 
 
@@ -46,14 +46,14 @@ def _finite(value: Any) -> Any:
 
 
 def say(console: Console, text: str) -> None:
-    """A sentence in one line, however long: it is the terminal that wraps it."""
+    """Print a text as one line; the terminal wraps it."""
     console.print(text, soft_wrap=True)
 
 
 def show(table: Table, console: Console) -> None:
-    """The table, its labels folded where it must be narrow; as lines where numbers would be cut.
+    """Print a table with wrapped labels, or as lines if numbers would be cut.
 
-    Columns that are justified to the right hold the numbers.
+    Right-justified columns hold the numbers.
     """
     numbers = [column for column in table.columns if column.justify == "right"]
     if not (has_room := _has_room(table, numbers, console)):
@@ -68,10 +68,10 @@ def show(table: Table, console: Console) -> None:
 
 
 def _has_room(table: Table, numbers: list[Column], console: Console) -> bool:
-    """Return True if no number is wrapped and the start of each label fits."""
+    """Return True if no number is wrapped and the start of each label is visible."""
     padding = table.padding[1] + table.padding[3]
     longest = (max((len(word) for word in _words(column)), default=0) for column in numbers)
-    if sum(length + padding for length in longest) > console.width:  # that is known at once
+    if sum(length + padding for length in longest) > console.width:  # too wide in any case
         return False
     shown = {
         word
@@ -93,7 +93,7 @@ def _words(column: Column) -> set[str]:
 
 
 def _print_lines(table: Table, numbers: list[Column], console: Console) -> None:
-    """Each row's labels, and below them a line for each of its numbers."""
+    """Print each row's labels, and below them one line per number."""
     for line in str(table.title or "").split("\n"):
         if line:
             say(console, _plain(line))
@@ -102,12 +102,12 @@ def _print_lines(table: Table, numbers: list[Column], console: Console) -> None:
     group = ""
     for row in range(table.row_count):
         first, *others = [cells[id(column)][row] for column in labels] or [""]
-        group = first or group  # it stands in the first row of its group only
+        group = first or group  # only the first row of a group has it
         if label := " ".join(filter(None, (group, *others))):
             say(console, label)
         for column in numbers:
             if value := cells[id(column)][row]:
-                header = _plain(str(column.header).replace("-\n", ""))  # a word in two lines
+                header = _plain(str(column.header).replace("-\n", ""))  # a hyphenated word
                 say(console, f"  {header}: {value}" if header else f"  {value}")
 
 

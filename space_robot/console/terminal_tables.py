@@ -1,4 +1,4 @@
-"""Tables on a terminal."""
+"""Printing of tables on a terminal."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ TONES = {"good": "green", "bad": "red", "open": "yellow"}
 
 
 def print_table(table: Table, console: Console, *, dense: bool = False) -> None:
-    """Print a table and its notes; one that does not fit becomes lines.
+    """Print a table and its notes; a table that is too wide is printed as lines.
 
     Args:
-        table: what to print.
-        console: where to.
-        dense: without lines at the sides, for long numbers.
+        table: to be printed.
+        console: to print on.
+        dense: without vertical lines at the sides, for long numbers.
     """
     style: dict[str, Any] = {"box": SIMPLE_HEAD, "show_edge": False} if dense else {}
     shown = RichTable(

@@ -136,7 +136,7 @@ def test_nor_is_one_that_came_meanwhile_overwritten(tmp_path: Path) -> None:
 
 def test_a_folder_that_cannot_be_is_named(log: FlightLog, tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
-    with pytest.raises(InputError, match="no folder can be made there"):
+    with pytest.raises(InputError, match="the folder cannot be created"):
         write_parquet(log, tmp_path / "file" / "flight.parquet")
 
 

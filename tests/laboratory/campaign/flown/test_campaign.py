@@ -128,7 +128,7 @@ def test_any_row_flies_again_to_the_same_bits(undisturbed: FlownCampaign) -> Non
         again = FlownCampaign.open(undisturbed.folder).rerun(11, law)
         assert again.is_same, again.verdict
         assert again.log.ticks == 400
-    with pytest.raises(InputError, match=r"run 20: .* has no row of it"):
+    with pytest.raises(InputError, match=r"run 20: .* has no row of this run"):
         undisturbed.rerun(20)
     with pytest.raises(InputError, match="unknown law 'tde': choose one of tde_stc, ctc=tuned"):
         undisturbed.rerun(0, "tde")
@@ -188,7 +188,7 @@ def test_failures_are_kept_as_bags(tmp_path: Path, monkeypatch: pytest.MonkeyPat
     )
     (tmp_path / "a/bags/.0_tde_stc").mkdir(parents=True)
     (tmp_path / "a/campaign.yaml").write_text("")
-    with pytest.raises(InputError, match="something else"):
+    with pytest.raises(InputError, match="another one"):
         keep.run(1, 7, tmp_path / "a", workers=0)
     found = keep.run(1, 7, tmp_path / "b", workers=0)
     kept = sorted(path.name for path in (tmp_path / "b/bags").iterdir())
@@ -220,7 +220,7 @@ def test_without_a_folder_it_lasts_as_long_as_the_object() -> None:
         ),
         (
             {"require": {"p": {"metric": "ripple_base_torque", "below": 1.0, "in": 0.9}}},
-            "campaign: require.p.metric: ripple_base_torque needs 1 s of flight, there are 0.2 s",
+            "campaign: require.p.metric: ripple_base_torque needs 1 s of flight, got 0.2 s",
         ),
         (
             {

@@ -186,7 +186,7 @@ def test_a_folder_of_an_older_version_is_refused_and_left_alone(copy: Path) -> N
     del content["sha256"], content["table"]["grid"]
     (copy / "campaign.json").write_text(json.dumps({**content, "format": 1}))
     before = {path.name: path.read_bytes() for path in copy.iterdir()}
-    with pytest.raises(InputError, match=r"campaign\.json: of version 0\.7 or older"):
+    with pytest.raises(InputError, match=r"campaign\.json: written by version 0\.7 or older"):
         numbers(copy)
     assert {path.name: path.read_bytes() for path in copy.iterdir()} == before
 
@@ -196,7 +196,7 @@ def test_the_study_that_was_flown_counts(copy: Path, reported: str) -> None:
     (copy / "campaign.yaml").write_text(text.replace("1.0e-09", "1.0"))
     found, remarks = numbers(copy)
     assert found == reported
-    assert "require.pointing.below: 1e-09 was flown, 1.0 is there now" in remarks[0]
+    assert "require.pointing.below: 1e-09 was flown, 1.0 is in the file now" in remarks[0]
     opened = FlownCampaign.open(copy)
     assert [v.word for v in opened.verdicts] == [v.word for v in run(copy).verdicts]
 
@@ -220,7 +220,7 @@ def test_another_study_judges_the_same_rows(whole: Path, reported: str) -> None:
     assert numbers(whole)[0] == reported
     for other, said in (
         ({"laws": ["ctc"]}, "other.yaml: laws: .* was flown"),
-        ({"scenario": {"case": "1", "duration": 0.01}}, "scenario.case: '3' was flown, '1'"),
+        ({"scenario": {"case": "1", "duration": 0.01}}, "scenario.case: '3' was flown, not '1'"),
         (
             {"require": {"p": {**CONTENT["require"]["late"], "from_s": 0.006}}},
             r"other.yaml: require.p: the rows have no attitude_rms in that window",
@@ -268,7 +268,7 @@ def test_a_folder_imports_and_opens_nothing_unless_it_is_trusted(
         manifest = read_manifest(_flown_anywhere(tmp_path) / "campaign.json")
         changed = manifest.model_copy(update={"study": study.content})
         changed.write(folder / "campaign.json")
-        with pytest.raises(NotTrustedError, match=r"only with --trust|--trust imports it"):
+        with pytest.raises(NotTrustedError, match=r"only with --trust|--trust imports a"):
             FlownCampaign.open(folder).rerun(0)
     assert "law_of_somebody" not in sys.modules
     mine = Campaign.of({**CONTENT, "require": {}, "laws": ["law_of_somebody:Free"]})

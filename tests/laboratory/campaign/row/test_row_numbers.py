@@ -106,11 +106,11 @@ def test_bins_do_not_depend_on_blocks(case: tuple[int, list[int]]) -> None:
         ({"metric": "attitude_max", "from_s": 1.2}, "from_s: must be before the end .*1.2 s"),
         (
             {"metric": "joints_1_3_rms", "from_s": 0.3001, "to_s": 0.3004},
-            r"my.yaml: require.p.to_s: no tick is from 0.3001 to 0.3004 s",
+            r"my.yaml: require.p.to_s: no tick between 0.3001 and 0.3004 s",
         ),
         (
             {"metric": "ripple_base_torque", "from_s": 0.5},
-            "my.yaml: require.p.metric: ripple_base_torque needs 1 s of flight, there are 0.7 s",
+            "my.yaml: require.p.metric: ripple_base_torque needs 1 s of flight, got 0.7 s",
         ),
         (
             {"metric": "fast_ripple_base_torque", "to_s": 0.9},
