@@ -1,7 +1,7 @@
 """Figures of flights for print, 180 mm wide, drawn by matplotlib from flight logs.
 
-Nothing here uses pyplot or leaves a trace in matplotlib's settings, so figures may be drawn in
-worker processes. The same log gives the same bytes.
+Nothing here uses pyplot or changes matplotlib's settings, so figures may be drawn in worker
+processes. The same log gives the same bytes.
 """
 
 from .base_actuators import momentum, thrusters, wheels

@@ -1,4 +1,4 @@
-"""Figures of what turned the base: momentum, wheels, thrusters; one flight each."""
+"""Figures of the base's actuators in one flight: momentum, wheels, thrusters."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ from .style import GREY, LineStyle, house_style, legend_above, page, plot_lines
 Array = NDArray[np.float64]
 
 BINS = 600
-"""Columns of the raster of pulses: each is as dark as a thruster is open in it."""
+"""Columns of the raster of pulses; brightness shows the duty cycle of a thruster."""
 POINTS = 6000
-"""Most points of a line in the phase plane."""
+"""Maximum number of points of a line in the phase plane."""
 INERTIAL = ("x", "y", "z")
 
 
@@ -32,8 +32,8 @@ INERTIAL = ("x", "y", "z")
 def momentum(log: FlightLog, budget: Momentum, flown: BaseActuatorSettings) -> Figure:
     """Draw the angular momentum of robot, wheels and both, by inertial axis.
 
-    What came from outside stands beside them; without it the sum is a straight line. Of a base
-    that nothing turned, base and arm have what the other lacks.
+    External momentum is drawn, too; without it the sum is constant. Without base actuators the
+    momenta of base, arm and both are drawn.
     """
     parts = {"robot": budget.robot, "wheels": budget.wheels, "sum": budget.total}
     if not flown.wheel_count:
@@ -55,7 +55,7 @@ def momentum(log: FlightLog, budget: Momentum, flown: BaseActuatorSettings) -> F
 
 @house_style()
 def wheels(log: FlightLog, settings: WheelSettings) -> Figure:
-    """Draw momentum and motor torque of every wheel between their limits, where they have any."""
+    """Draw momentum and motor torque of every wheel, with their limits if they have any."""
     figure = page(18.0 + 55.0 * 2)
     above, below = figure.subplots(2, 1, sharex=True)
     time, held = tick_times(log), settings.spin_momenta(log.wheel_velocities)
@@ -72,11 +72,11 @@ def wheels(log: FlightLog, settings: WheelSettings) -> Figure:
 
 @house_style()
 def thrusters(log: FlightLog, pushed: Array, settings: ThrusterSettings) -> Figure:
-    """Draw pulses, propellant, how far the robot was pushed, and the attitude's limit cycle.
+    """Draw pulses, propellant, displacement of the robot, and the limit cycle of its attitude.
 
     Args:
         log: a flight.
-        pushed: (N, 3) m of the robot's centre of mass from where it was at first.
+        pushed: (N, 3) displacement of the robot's centre of mass from its start, m.
         settings: of the thrusters.
     """
     figure, time = page(210.0, ""), tick_times(log)
@@ -101,14 +101,14 @@ def thrusters(log: FlightLog, pushed: Array, settings: ThrusterSettings) -> Figu
 
 
 def _mark_limits(axes: Axes, limits: Array) -> None:
-    """Draw limits other than 0 (none) as dotted lines on either side."""
+    """Draw limits other than 0 (no limit) as dotted lines at both signs."""
     for limit in np.unique(limits[limits > 0.0]):
         for side in (-limit, limit):
             axes.axhline(side, color=GREY, linewidth=0.8, linestyle=":", zorder=1.5)
 
 
 def _draw_pulses(axes: Axes, time: Array, is_open: Array, period: float) -> None:
-    """Draw a row a thruster, dark where it is open."""
+    """Draw one row per thruster, dark where it is open."""
     length = max(1, -(-len(time) // BINS))
     starts = np.arange(0, len(time), length)
     counts = np.diff(np.append(starts, len(time)))
@@ -130,7 +130,7 @@ def _draw_pulses(axes: Axes, time: Array, is_open: Array, period: float) -> None
 
 
 def _draw_cycle(axes: Axes, log: FlightLog) -> None:
-    """Draw the error of the base's rate over that of its attitude, both about its own axes."""
+    """Draw the base's rate error over its attitude error, both about the base's axes."""
     every = max(1, log.ticks // POINTS)
     angle = 2.0 * tracking_error(log)[::every, :3]
     rate = (log.reference_base[:, 4:7] - log.omega_base)[::every]

@@ -1,4 +1,4 @@
-"""Figures of the base torque of several flights: is a law's command smooth, or does it switch?"""
+"""Figures of the base torque of several flights, to compare the chatter of laws."""
 
 from __future__ import annotations
 
@@ -31,24 +31,24 @@ from .style import (
 Array = NDArray[np.float64]
 
 CHATTER_STRETCH = 0.05
-"""s of base torque that are shown tick by tick."""
+"""Time interval of base torque shown tick by tick, s."""
 LOUD = 2.0
-"""A flight that swings over so many times the range of the middle one does not set the scale."""
+"""A flight with more than this multiple of the median range does not affect the scale."""
 SEGMENT = 2048
 """Samples of a segment of the spectrum: about 1 Hz of resolution at 2 kHz."""
 SHORTEST = 64
-"""Samples below which a spectrum says nothing."""
+"""Minimum number of samples of a spectrum."""
 
 
 @house_style()
 def junctions(flights: Mapping[str, BaseTorque]) -> Figure:
-    """Draw the base torque x of all laws round the first junction of the mission's segments.
+    """Draw the base torque x of all laws at the first junction of the mission's segments.
 
-    All panels have one scale. A law that swings much farther than most does not set it: it is cut
-    off at the panel's edges, and its heading says how far it goes.
+    All panels have the same scale. A law with a much larger range than most does not affect it: its
+    curve is cut off at the edges, and its heading has the range.
 
     Args:
-        flights: of one mission, by the name of the law.
+        flights: of one mission, by name of the law.
     """
     moments = [
         flight.start + flight.period * row
@@ -70,13 +70,13 @@ def junctions(flights: Mapping[str, BaseTorque]) -> Figure:
 
 @house_style()
 def chatter(flights: Mapping[str, BaseTorque]) -> Figure:
-    """Draw a short stretch of base torque on one scale, and the spectrum of the whole flight.
+    """Draw a short interval of base torque on one scale, and the spectrum of the whole flight.
 
-    The stretch begins at a quarter of the longest flight: when the arm is fastest, if the mission
-    has two segments. Scale and headings are those of :func:`junctions`.
+    The interval begins at a quarter of the longest flight: when the arm is fastest, if the mission
+    has two segments. Scale and headings are those of `junctions`.
 
     Args:
-        flights: of one mission, by the name of the law.
+        flights: of one mission, by name of the law.
     """
     start = min(flight.start for flight in flights.values())
     moment = start + (max(flight.end for flight in flights.values()) - start) / 4.0
@@ -100,17 +100,17 @@ def chatter(flights: Mapping[str, BaseTorque]) -> Figure:
 
 
 def power_spectral_density(values: Array, period: float) -> tuple[Array, Array]:
-    """Estimate the density of the power of all columns together, by Welch's method.
+    """Estimate the power spectral density of all columns together by Welch's method.
 
-    Each segment's trend goes, else the slow motion leaks into the high frequencies.
+    The trend of each segment is removed, or slow motion would leak into the high frequencies.
 
     Args:
-        values: (N, axes) samples; the rows from the first that is not finite on are left out.
-        period: s, between two samples.
+        values: (N, axes) samples; rows from the first that is not finite are ignored.
+        period: between two samples, s.
 
     Returns:
-        Frequencies above 0, Hz, and the density in the square of the values' unit per Hz, NaN
-        where there is no power; both empty if there are too few samples.
+        Frequencies above 0, Hz, and the density in the square of the values' unit per Hz, NaN for
+        zero power; both empty if there are too few samples.
     """
     from scipy import signal  # slow to import
 
@@ -118,7 +118,7 @@ def power_spectral_density(values: Array, period: float) -> tuple[Array, Array]:
     samples = values[: len(values) if known.all() else int(np.argmin(known))]
     if len(samples) < SHORTEST:
         return np.empty(0), np.empty(0)
-    detrend: Any = signal.detrend  # whose overloads welch's types do not match in SciPy 1.15
+    detrend: Any = signal.detrend  # its overloads do not match welch's types in SciPy 1.15
     frequency, density = signal.welch(
         samples.T, 1.0 / period, nperseg=min(SEGMENT, len(samples)), detrend=detrend
     )
@@ -128,7 +128,7 @@ def power_spectral_density(values: Array, period: float) -> tuple[Array, Array]:
 
 def _draw_spectra(axes: Axes, spectra: Mapping[str, tuple[Array, Array]]) -> None:
     for index, (frequency, density) in enumerate(spectra.values()):
-        if not np.isfinite(density).any():  # too short, or no torque at all
+        if not np.isfinite(density).any():  # too short, or zero torque
             continue
         look = LineStyle.of(index)
         even = np.geomspace(frequency[0], frequency[-1], 1000)
@@ -142,7 +142,7 @@ def _draw_spectra(axes: Axes, spectra: Mapping[str, tuple[Array, Array]]) -> Non
             markevery=marks.tolist(),
         )
     axes.set(xscale="log", yscale="log")
-    if not axes.get_lines():  # one mark alone gives no scale
+    if not axes.get_lines():  # a single marker defines no scale
         axes.set_xlim(0.1 * CHATTER_FREQUENCY, 10.0 * CHATTER_FREQUENCY)
     mark_moments(axes, np.array([CHATTER_FREQUENCY]))
     axes.set(xlabel="frequency (Hz)", ylabel="PSD of base torque, x + y + z ((N m)²/Hz)")
@@ -150,19 +150,19 @@ def _draw_spectra(axes: Axes, spectra: Mapping[str, tuple[Array, Array]]) -> Non
 
 
 class _Stretch(NamedTuple):
-    """The part of each flight that the panels show."""
+    """Time interval shown in the panels."""
 
     axes: slice
-    """Axes of the base's torque."""
+    """Shown axes of the base's torque."""
     moment: float
-    """s, zero of the time axis."""
+    """Zero of the time axis, s."""
     begin: float
     """s from the moment."""
     end: float
     """s from the moment."""
 
     def of(self, flight: BaseTorque) -> tuple[Array, Array]:
-        """Return time from the moment, s, and torque, N m; empty if the flight ended before."""
+        """Return time from ``moment``, s, and torque, N m; empty if the flight ended before."""
         time = flight.time - self.moment
         shown = (time > self.begin - 1e-9) & (time < self.end + 1e-9)
         return time[shown], flight.torque[shown, self.axes]
@@ -176,7 +176,7 @@ def _draw_side_by_side(
     *,
     steps: bool = False,
 ) -> list[Axes]:
-    """Plot the stretch of each flight in a panel of its own, all on one scale."""
+    """Plot the interval of each flight in a separate panel, all on one scale."""
     curves = {name: stretch.of(flight) for name, flight in flights.items()}
     low, high = common_limits([torque for _, torque in curves.values()])
     panels = grid(figure, len(flights), columns)
@@ -198,7 +198,7 @@ def _draw_side_by_side(
 
 
 def common_limits(torques: Sequence[Array]) -> tuple[float, float]:
-    """Find limits that hold all but the loud ones of ``torques``, with a margin, N m."""
+    """Return limits, N m, of all ``torques`` except those above `LOUD`, with a margin."""
     known = [torque[np.isfinite(torque)] for torque in torques]
     known = [torque for torque in known if len(torque)]
     if not known:
@@ -212,7 +212,7 @@ def common_limits(torques: Sequence[Array]) -> tuple[float, float]:
 
 
 def _cut(torque: Array, low: float, high: float) -> str:
-    """Say in the heading of a flight that goes beyond the limits how far it goes."""
+    """Return the range of a torque beyond the limits, for the heading; else empty."""
     known = torque[np.isfinite(torque)]
     if not len(known) or (known.min() >= low and known.max() <= high):
         return ""

@@ -1,4 +1,4 @@
-"""The figures of one flight, or of several overlaid: the paper's figures, pointing, latency."""
+"""All figures of one flight or of several overlaid ones: the paper's, pointing, latency."""
 
 from __future__ import annotations
 
@@ -34,30 +34,30 @@ class SavedFigure(NamedTuple):
 
     @property
     def data_uri(self) -> str:
-        """Return the SVG as a data URI, for a page that refers to nothing outside itself."""
+        """Return the SVG as a data URI, for a self-contained page."""
         return "data:image/svg+xml;base64," + base64.b64encode(self.svg.read_bytes()).decode()
 
 
 class Drawing(NamedTuple):
-    """A figure that can be drawn."""
+    """A figure that is drawn on demand."""
 
     caption: str
     draw: Callable[[], Figure]
 
 
 class FigureFolder(NamedTuple):
-    """The folder that the figures go to, from whatever process draws them."""
+    """Folder of figures; can be used in several processes."""
 
     path: Path
     png: bool
-    """True if they are written as PNG too; the report has the SVG."""
+    """True to write PNG files beside the SVG files."""
 
     def save(self, figure: Figure, stem: str) -> None:
         """Write a figure."""
         save_figure(figure, self.path / stem, png=self.png)
 
     def saved(self, captions: Iterable[tuple[str, str]]) -> list[SavedFigure]:
-        """List those of the given stems that were written, with their captions."""
+        """Return those of the figures that were written, from pairs of stem and caption."""
         return [
             SavedFigure(caption, path)
             for stem, caption in captions
@@ -66,10 +66,10 @@ class FigureFolder(NamedTuple):
 
 
 class FigureSet:
-    """Takes flights one after the other, keeps of each what the figures need, and draws them.
+    """Collects the data of flights one after the other, and draws their figures.
 
-    Figures 5 to 9 of the paper are drawn of a single flight as the paper has them; of several,
-    errors and torques lie over one another as norms of the columns of Table V.
+    A single flight is drawn as in Figures 5 to 9 of the paper. For several flights, errors and
+    torques are overlaid as norms of the columns of Table V.
     """
 
     def __init__(self) -> None:
@@ -77,10 +77,10 @@ class FigureSet:
         self._missions: dict[bytes, tuple[str, Figure]] = {}
         self._first: Figure | None = None
         self._hardware: dict[str, dict[str, tuple[str, Figure]]] = {}
-        """Caption and figure by file, of each flight whose base had other than ideal actuators."""
+        """Caption and figure by file name, of each flight without ideal base actuators."""
 
     def add(self, name: str, log: FlightLog) -> None:
-        """Take a flight."""
+        """Add a flight."""
         reference = log.reference_joints[:: max(1, log.ticks // 100)]
         self._missions.setdefault(reference.tobytes(), (name, desired_joints(log)))
         if not self._flights:
@@ -91,12 +91,12 @@ class FigureSet:
                 self._hardware[name] = dict(_of_hardware(log.longest_stretch()))
 
     def save(self, folder: Path) -> list[SavedFigure]:
-        """Draw all figures into ``folder``, each as PNG and SVG; older ones are replaced.
+        """Draw all figures into ``folder`` as PNG and SVG; existing files are replaced.
 
-        Those without a panel are left out: these flights have nothing to show there.
+        Figures without data are omitted.
 
         Raises:
-            InputError: a figure cannot be written there.
+            InputError: a figure cannot be written.
         """
         return [
             SavedFigure(drawing.caption, save_figure(figure, folder / stem)[-1])
@@ -105,7 +105,7 @@ class FigureSet:
         ]
 
     def drawings(self) -> dict[str, Drawing]:
-        """Return the figures that there are, by name of the file; none is drawn yet."""
+        """Return the available figures by file name, without drawing them."""
         flights = self._flights
         torques = {n: s.base_torque for n, s in flights.items() if s.base_torque is not None}
         drawings: dict[str, Drawing] = {}
@@ -142,10 +142,10 @@ def _drawn(figure: Figure) -> Figure:
 
 
 def _of_hardware(log: FlightLog) -> Iterator[tuple[str, tuple[str, Figure]]]:
-    """Draw what turned the base, or that nothing did: by the file's name, with the caption.
+    """Yield file name, caption and figure of the momentum and of the base's actuators.
 
     Raises:
-        InputError: robot, actuators or environment are not known, or there is no whole tick.
+        InputError: robot, actuators or environment are unknown, or there is no complete tick.
     """
     if not log.ticks:
         raise InputError("no tick has both a state and a reference")
@@ -162,6 +162,6 @@ def _of_hardware(log: FlightLog) -> Iterator[tuple[str, tuple[str, Figure]]]:
 
 
 def title(name: str, log: FlightLog) -> str:
-    """Say what was flown, in a line."""
+    """Return a title of a flight, in a line."""
     laws = as_data(laws_of(log), log.timebase)
     return f"{name}: {flown({**log.flight, 'laws': laws})}"

@@ -1,4 +1,4 @@
-"""Figures of several flights in common panels: errors, torques, pointing, latency."""
+"""Figures of several overlaid flights: errors, torques, pointing, latency."""
 
 from __future__ import annotations
 
@@ -18,21 +18,21 @@ from .style import LineStyle, house_style, legend_above, mark_events, page, plot
 Array = NDArray[np.float64]
 
 USUAL = 0.5
-"""% of the ticks that may lie below a logarithmic panel: an error begins at zero."""
+"""Share of the ticks below the range of a logarithmic panel, %: errors begin at zero."""
 BINS = 80
 """Bins of the latency's histogram."""
 
 
 class _Panel(NamedTuple):
     curves: dict[str, tuple[Array, Array]]
-    """Time, s, and values of each flight that has them."""
+    """Time, s, and values of each flight with data for a panel."""
     label: str
     is_logarithmic: bool
 
 
 @house_style()
 def errors_and_torques(flights: Mapping[str, PlotSeries]) -> Figure:
-    """Draw Figs. 6 to 9 of several flights: norms of errors (left, logarithmic), torques (right).
+    """Draw Figs. 6 to 9 of several flights: norms of errors (left, logarithmic) and torques.
 
     Args:
         flights: by name.
@@ -54,7 +54,7 @@ def errors_and_torques(flights: Mapping[str, PlotSeries]) -> Figure:
 
 @house_style()
 def pointing(flights: Mapping[str, PlotSeries]) -> Figure:
-    """Draw the end effector's pointing: boresight angle, whole rotation, position, base's drift."""
+    """Draw the end effector's errors of boresight, rotation and position, and the base's drift."""
     known = {name: series for name, series in flights.items() if series.pointing is not None}
     if not known:
         return page(12.0, "No robot is known for these flights, so no pointing error.")
@@ -76,7 +76,7 @@ def pointing(flights: Mapping[str, PlotSeries]) -> Figure:
 
 @house_style()
 def latency_histogram(flights: Mapping[str, PlotSeries]) -> Figure:
-    """Draw how many answers took how long, of the flights that know."""
+    """Draw the histogram of latencies, for flights that were flown as a graph."""
     known = {name: s.latency_ms for name, s in flights.items() if s.latency_ms is not None}
     if not known:
         return page(12.0, "None of these flights was flown as a graph, so no latency.")
@@ -104,13 +104,13 @@ def latency_histogram(flights: Mapping[str, PlotSeries]) -> Figure:
 
 
 def _events(flights: Mapping[str, PlotSeries]) -> Array:
-    """Return the times at which something was captured or released in any flight, s."""
+    """Return the times of captures and releases in any flight, s."""
     times: Array = np.unique(np.concatenate([series.events for series in flights.values()]))
     return times
 
 
 def _draw(columns: list[list[_Panel]], names: list[str], events: Array) -> Figure:
-    """Plot columns of as many panels over time, under one legend of all flights."""
+    """Plot columns of equally many panels over time, with one legend of all flights."""
     rows = len(columns[0])
     figure = page(18.0 + 38.0 * rows)
     grid = figure.subplots(rows, len(columns), sharex="col", squeeze=False)
@@ -126,7 +126,7 @@ def _draw(columns: list[list[_Panel]], names: list[str], events: Array) -> Figur
 
 def _draw_panel(axes: Axes, panel: _Panel, names: list[str]) -> None:
     wildest_first = sorted(panel.curves, key=lambda name: -_roughness(panel.curves[name][1]))
-    for depth, name in enumerate(wildest_first):  # at the back, for it would hide the others
+    for depth, name in enumerate(wildest_first):  # at the back, so that it does not hide the others
         time, value = panel.curves[name]
         plot_lines(axes, time, value[:, np.newaxis], looks=[names.index(name)], dashed=True)
         axes.get_lines()[-1].set_zorder(2.0 + 0.01 * depth)
@@ -149,7 +149,7 @@ def _panels(
     label: Callable[[str], str],
     is_logarithmic: bool,
 ) -> list[_Panel]:
-    """Make a panel of every column that any of the flights has."""
+    """Return a panel for every column of any flight."""
     curves: dict[str, dict[str, tuple[Array, Array]]] = {}
     for name, series in flights.items():
         for key, values in values_of(series).items():
@@ -158,7 +158,7 @@ def _panels(
 
 
 def words(key: str) -> str:
-    """Write ``joints_1_3`` as in a label: joints 1-3."""
+    """Return the label of a column: "joints 1-3" for ``joints_1_3``."""
     word, _, axes = key.partition("_")
     if not axes or not axes[0].isdigit():
         return key.replace("_", " ")

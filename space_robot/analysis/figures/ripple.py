@@ -1,4 +1,4 @@
-"""The spectrum of the torques' ripple, law beside law."""
+"""Spectrum of the torques' ripple of several laws."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ Array = NDArray[np.float64]
 
 @house_style()
 def ripple(flights: Mapping[str, PlotSeries]) -> Figure:
-    """Draw the spectral density of the ripple, a panel a group of axes (the mean over them).
+    """Draw the spectral density of the ripple, one panel per group of axes (mean of the axes).
 
     Args:
         flights: by name.
@@ -59,7 +59,7 @@ def ripple(flights: Mapping[str, PlotSeries]) -> Figure:
 
 
 def _marks(frequency: Array, index: int, count: int) -> list[int]:
-    """Choose the frequencies to mark, evenly along the logarithmic axis."""
+    """Return the indices of the frequencies to mark, evenly along the logarithmic axis."""
     even = np.geomspace(frequency[0], frequency[-1], 1000)
     marks: list[int] = np.searchsorted(frequency, even[scattered(1000, index, count)]).tolist()
     return marks

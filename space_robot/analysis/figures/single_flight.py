@@ -29,18 +29,18 @@ Array = NDArray[np.float64]
 
 BASE_AXES = ("base x", "base y", "base z")
 JUNCTION_HALF_WIDTH = 0.15
-"""s on either side of a junction: long enough for the ripple to rise and die down."""
+"""Time before and after a junction, s: long enough for the ripple to rise and decay."""
 MOST_LETTERS = 16
-"""Of names of joints in a label."""
+"""Maximum length of joint names in a label, in characters."""
 MOST_JUNCTIONS = 3
-"""Junctions enlarged, from the first on: more would not fit beside one another."""
+"""Maximum number of enlarged junctions, from the first, that fit side by side."""
 
 
 @house_style()
 def desired_joints(log: FlightLog) -> Figure:
-    """Draw Fig. 5: the desired joint angles over time, each marked at the waypoints.
+    """Draw Fig. 5: the desired joint angles over time, with markers at the waypoints.
 
-    The positions of prismatic joints have a panel of their own.
+    Prismatic joints have a separate panel.
     """
     slides = np.array(log.prismatic[: len(log.joint_names)])
     desired, time, waypoints = log.reference_joints[:, 0], tick_times(log), waypoint_ticks(log)
@@ -69,13 +69,13 @@ def desired_joints(log: FlightLog) -> Figure:
 def control_results(log: FlightLog, title: str) -> Figure:
     """Draw Figs. 6 to 9: errors and torques of the base (left) and of the joints (right).
 
-    Below, the torques are enlarged round the junctions of the mission's segments, if the flight
-    has reached one; upright lines are captures and releases. Where nothing turned the base, its
-    drift stands in the place of its error.
+    Below, the torques are enlarged at the junctions of the mission's segments that the flight has
+    reached; vertical lines are captures and releases. Without base actuators the base's drift is
+    shown instead of its error.
 
     Args:
-        log: a flight, whole or cut short.
-        title: what was flown.
+        log: a flight, complete or not.
+        title: of the figure.
     """
     error, torque, time = tracking_error(log), log.applied_torque, tick_times(log)
     of_base = "attitude error"
@@ -110,7 +110,7 @@ def control_results(log: FlightLog, title: str) -> Figure:
 
 
 def _joint_labels(log: FlightLog) -> tuple[str, str]:
-    """Return the labels of the joints' errors and torques, with the units that there are."""
+    """Return the labels of the joints' errors and torques, with the units of the joints."""
     slides = log.prismatic[: len(log.joint_names)]
     if all(slides):
         return "joint error (m)", "joint force (N)"
@@ -124,7 +124,7 @@ def _joint_labels(log: FlightLog) -> tuple[str, str]:
 def _enlarge(
     figure: Figure, cells: GridSpec, column: int, moments: Array, time: Array, torque: Array
 ) -> Axes:
-    """Plot the torque round the junctions, beside one another on one scale; the first panel."""
+    """Plot the torque at the junctions side by side on one scale; return the first panel."""
     below = cells[2, column].subgridspec(1, len(moments))
     panels = below.subplots(sharey=True, squeeze=False)[0].tolist()
     for axes, moment in zip(panels, moments, strict=True):

@@ -1,8 +1,8 @@
-"""The looks that all figures share, and how they become files.
+"""Common style of all figures, and writing of their files.
 
-Colours are those of Okabe and Ito, safe for the colour-blind, without their yellow, which is too
-pale for a line. They are ordered so that neighbours differ in brightness too, and every line has a
-marker of its own shape, so that lines can be distinguished in grey print.
+The colours are those of Okabe and Ito, safe for colour-blind readers, without yellow, which is too
+pale for lines. Consecutive colours also differ in brightness, and each line has a marker of its
+own shape, so that lines can be distinguished in greyscale.
 """
 
 from __future__ import annotations
@@ -33,28 +33,28 @@ Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
 
 MOST_LETTERS = 40
-"""Of a name in a legend: layout of long texts takes minutes."""
+"""Maximum length of a name in a legend, in characters: the layout of long texts takes minutes."""
 RESOLUTION = 150
-"""dpi of a PNG."""
+"""Resolution of a PNG, dpi."""
 PAGE_WIDTH = 180.0
-"""mm; A4 less its margins."""
+"""Width of a page, mm: A4 without margins."""
 GREY = "#707070"
 COLOURS = ("#000000", "#E69F00", "#0072B2", "#CC79A7", "#009E73", "#56B4E9", "#D55E00")
 MARKERS = ("o", "s", "^", "D", "v", "<", "P", ">", "*")
 DASHES: tuple[Any, ...] = ("-", "--", "-.", (0, (5, 1, 1, 1, 1, 1)), (0, (8, 2)), (0, (2, 1)))
 STRETCHES = 250
-"""Stretches of a long line, narrower than the line is thick."""
+"""Number of intervals of a long line, each narrower than the line width."""
 MARKS = 4
-"""Markers a line."""
+"""Number of markers per line."""
 
 house_style = partial(
     matplotlib.style.context, Path(__file__).with_name("space_robot.mplstyle"), after_reset=True
 )
-"""Applies the style sheet on top of matplotlib's defaults, not the user's; undone afterwards."""
+"""Temporarily applies the style sheet to matplotlib's defaults, ignoring the user's settings."""
 
 
 class LineStyle(NamedTuple):
-    """Colour, marker and dashes that tell one of several lines from the others."""
+    """Colour, marker and dashes of a line."""
 
     colour: str
     marker: str
@@ -62,7 +62,7 @@ class LineStyle(NamedTuple):
 
     @classmethod
     def of(cls, index: int) -> LineStyle:
-        """Return the look of the line ``index``: no two of 63 share colour and marker."""
+        """Return the style of the line ``index``; 63 lines have distinct colour and marker."""
         return cls(
             COLOURS[index % len(COLOURS)],
             MARKERS[index % len(MARKERS)],
@@ -71,7 +71,7 @@ class LineStyle(NamedTuple):
 
 
 def page(height: float, title: str = "") -> Figure:
-    """Make an empty page of ``height`` mm, with a title if there is one."""
+    """Return an empty page of ``height`` mm, with a title unless it is empty."""
     figure = Figure(figsize=(PAGE_WIDTH / 25.4, height / 25.4), dpi=RESOLUTION)
     if title:
         figure.suptitle(plain(textwrap.fill(shortened(title, 5 * MOST_LETTERS), 95)))
@@ -79,7 +79,7 @@ def page(height: float, title: str = "") -> Figure:
 
 
 def plain(text: str) -> str:
-    """Escape ``text`` so that it is drawn as it is, and a $ does not begin a formula."""
+    """Escape ``text`` so that $ does not start a formula."""
     return text.replace("$", r"\$")
 
 
@@ -93,16 +93,16 @@ def plot_lines(
     dashed: bool = False,
     steps: bool = False,
 ) -> None:
-    """Plot the columns of ``values``, the wildest at the back, for it would hide the others.
+    """Plot the columns of ``values``, those with the largest variation at the back.
 
     Args:
-        axes: where to.
+        axes: to plot in.
         x: (N,) in the unit of the horizontal axis.
-        values: (N, m), one line a column; what is not finite is left out.
-        looks: of each column; by default counted from 0.
-        marks: samples with a marker; by default `MARKS` of each line, where no other has one.
-        dashed: tell the lines apart by dashes too; chatter would make a muddle of them.
-        steps: draw each value as having held since the one before it.
+        values: (N, m), one line per column; only finite values are drawn.
+        looks: style numbers of the columns; by default 0, 1, ...
+        marks: samples with a marker; by default `MARKS` per line, at different samples.
+        dashed: use dashes, too; not suitable for lines with chatter.
+        steps: draw each value as constant since the previous sample.
     """
     looks = range(values.shape[1]) if looks is None else looks
     shown = np.where(np.isfinite(values), values, np.nan)
@@ -126,10 +126,10 @@ def plot_lines(
 
 
 def thinned(signal: Array, stretches: int = STRETCHES) -> Indices:
-    """Choose the lowest and the highest sample of each of so many stretches, and both ends.
+    """Return the indices of minimum and maximum of each of ``stretches`` intervals, and both ends.
 
-    They draw the same line as all samples, in half the time and file: no peak is lost, and chatter
-    stays a band of its full width. NaN is chosen only where a stretch has nothing else.
+    They give the same line as all samples, with half the time and file size: no peak is lost, and
+    chatter keeps its full width. NaN is chosen only if an interval has no other values.
     """
     last = len(signal) - 1
     length = -(-len(signal) // stretches)
@@ -146,19 +146,19 @@ def thinned(signal: Array, stretches: int = STRETCHES) -> Indices:
 
 
 def scattered(samples: int, index: int, count: int) -> Indices:
-    """Choose the samples of the line ``index`` of ``count`` to mark: none where another is."""
+    """Return the samples of line ``index`` of ``count`` to mark, different from other lines'."""
     places = (np.arange(MARKS) + (index + 0.5) / count) / MARKS
     return np.unique((places * samples).astype(np.intp))
 
 
 def mark_moments(axes: Axes, moments: Array) -> None:
-    """Draw dotted upright lines at ``moments``, in the unit of the horizontal axis."""
+    """Draw dotted vertical lines at ``moments``, in the unit of the horizontal axis."""
     for moment in moments:
         axes.axvline(moment, color=GREY, linewidth=0.8, linestyle=":", zorder=1.5)
 
 
 def mark_events(axes: Axes, times: Array) -> None:
-    """Draw upright lines where something was captured or released, s."""
+    """Draw vertical lines at the ``times`` of captures and releases, s."""
     for time in times:
         axes.axvline(time, color=GREY, linewidth=0.8, zorder=1.5)
 
@@ -166,13 +166,13 @@ def mark_events(axes: Axes, times: Array) -> None:
 def legend_above(
     where: Axes | FigureBase, names: Sequence[str], *, dashed: bool, width: float = PAGE_WIDTH - 20
 ) -> Legend:
-    """Name the lines above all else in a figure or above one panel, where it hides nothing.
+    """Draw a legend above a figure or a panel.
 
     Args:
         where: figure, part of a figure, or panel.
-        names: of the lines, in the order of their looks.
+        names: of the lines, in the order of their styles.
         dashed: as in `plot_lines`.
-        width: mm that there are.
+        width: available width, mm.
     """
     names = [shortened(name, MOST_LETTERS) for name in names]
     looks = [LineStyle.of(index) for index in range(len(names))]
@@ -181,16 +181,16 @@ def legend_above(
         for x in looks
     ]
     options: dict[str, Any] = {"loc": "outside upper left"}
-    if isinstance(where, Axes):  # above the power of ten that its axis may have
+    if isinstance(where, Axes):  # above the exponent of the axis
         options = {"loc": "lower left", "bbox_to_anchor": (0.0, 1.0), "borderaxespad": 1.5}
     legend = where.legend(handles, ["-"] * len(names), ncols=_columns(names, width), **options)
     for text, name in zip(legend.get_texts(), names, strict=True):
-        text.set_text(plain(name))  # a label that begins with _ would be left out
+        text.set_text(plain(name))  # matplotlib omits labels that begin with _
     return legend
 
 
 def _columns(names: Sequence[str], width: float) -> int:
-    """Count the columns in which the legend of ``names`` fits into ``width`` mm."""
+    """Return the number of columns with which a legend of ``names`` fits into ``width`` mm."""
     entries = [11.0 + 1.6 * len(name) for name in names]
     for columns in range(len(names), 1, -1):
         if sum(max(column) for column in np.array_split(entries, columns)) <= width:
@@ -199,9 +199,13 @@ def _columns(names: Sequence[str], width: float) -> int:
 
 
 def grid(figure: FigureBase, count: int, columns: int, *, shared: bool = True) -> list[Axes]:
-    """Make ``count`` panels in rows of ``columns``.
+    """Return ``count`` panels in rows of ``columns``.
 
-    ``shared``: on common scales, with numbers at the outer panels only.
+    Args:
+        figure: to divide.
+        count: of panels.
+        columns: panels per row.
+        shared: common scales, with tick labels at the outer panels only.
     """
     cells = figure.add_gridspec(max(1, -(-count // columns)), columns)
     panels: list[Axes] = []
@@ -218,9 +222,9 @@ def grid(figure: FigureBase, count: int, columns: int, *, shared: bool = True) -
 
 @house_style()
 def save_figure(figure: Figure, stem: Path, *, png: bool = True) -> tuple[Path, ...]:
-    """Write ``stem``.svg and, if wanted, ``stem``.png; of equal figures the same bytes at any time.
+    """Write ``stem``.svg and, if ``png``, ``stem``.png; equal figures give equal bytes.
 
-    Older files of these names are replaced.
+    Existing files are replaced.
 
     Returns:
         The files, the SVG last.
@@ -229,14 +233,14 @@ def save_figure(figure: Figure, stem: Path, *, png: bool = True) -> tuple[Path, 
         InputError: they cannot be written.
     """
     if not stem.name:
-        raise InputError(f"{stem}: is a folder; name the file, without its ending")
+        raise InputError(f"{stem}: is a folder; choose a file name, without suffix")
     make_folder(stem.parent)
-    with warnings.catch_warnings():  # of letters that the font does not have: drawn as boxes
+    with warnings.catch_warnings():  # characters missing in the font: drawn as boxes
         warnings.filterwarnings("ignore", "Glyph .* missing")
         engine = figure.get_layout_engine()
         if engine and figure.get_axes():
             engine.execute(figure)
-            figure.set_layout_engine("none")  # else each file would lay it out again
+            figure.set_layout_engine("none")  # avoids a new layout for each file
         files = []
         for format in ("png", "svg") if png else ("svg",):
             path = stem.with_name(f"{stem.name}.{format}")
@@ -247,10 +251,10 @@ def save_figure(figure: Figure, stem: Path, *, png: bool = True) -> tuple[Path, 
 
 
 def _print(figure: Figure, file: IO[Any], format: str) -> None:
-    """Do what `Figure.savefig` does, which draws everything twice, in half the time."""
-    canvas: Any  # its methods have no types
+    """Write a figure as `Figure.savefig` does, but without drawing it twice."""
+    canvas: Any  # untyped
     if format == "png":
-        figure.dpi = RESOLUTION  # that of an SVG stays behind
+        figure.dpi = RESOLUTION  # writing an SVG changes it
         canvas = FigureCanvasAgg(figure)
         canvas.print_png(file, metadata={"Software": None})
     else:

@@ -55,7 +55,7 @@ WRONG_FILES: list[tuple[dict[str, Any], str]] = [
     ({"until": {"half_width": 0.9, "runs": 5}}, "until.half_width: "),
     ({"until": {"half_width": 0.1, "runs": 5}, "require": {}}, "until: "),
     ({"until": {"half_width": 0.1, "runs": 5}, "design": "latin_hypercube"}, "design: "),
-    ({"until": {"half_width": 0.1, "runs": 5}, "fixed_runs": True}, "fixed_runs: contradicts until"),
+    ({"until": {"half_width": 0.1, "runs": 5}, "fixed_runs": True}, "fixed_runs: contradicts"),
     ({"design": "halton"}, "design: "),
     ({"runs": 0}, "runs: "),
     ({"runs": None}, "runs: missing"),
