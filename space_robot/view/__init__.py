@@ -1,1 +1,1 @@
-"""Views of flights: a robot in 3-D with synchronised plots, as a page or live."""
+"""3-D views of flights with synchronised plots, as a page or live."""

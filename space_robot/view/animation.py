@@ -1,4 +1,4 @@
-"""Animated picture of a flight: the scene, drawn by a browser, with a few curves."""
+"""Animated picture of a flight: the scene, rendered by a browser, with a few curves."""
 
 from __future__ import annotations
 
@@ -22,14 +22,14 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 FORMATS = (".webp", ".gif", ".png")
-"""Those that browsers animate; PNG as APNG."""
+"""File formats; PNG is APNG."""
 SIZE = (760, 500)
-"""px, width and height."""
+"""Width and height, px."""
 RATE_HZ = 12.5
 LENGTH_S = 10.0
-"""Of the picture, whatever the flight's length."""
+"""Duration of the animation, independent of the flight's."""
 ASIDE = 0.17
-"""Of the picture's width, by which the robot stands left of the middle: curves are on the right."""
+"""Shift of the robot to the left, relative to the picture's width: curves are on the right."""
 INK, FAINT = "#c9d1d9", "#57606a"
 TOP, BOTTOM = (13, 17, 23), (27, 35, 48)
 """Colours of the background."""
@@ -41,17 +41,17 @@ def animate(
     caption: str,
     advance: Callable[[int], Callable[[], None]],
 ) -> list[Image]:
-    """Draw the frames of a flight.
+    """Render the frames of a flight.
 
     Args:
         flight: to be shown.
-        plots: whose curves grow beside the robot.
+        plots: curves drawn beside the robot.
         caption: one line.
         advance: called with the number of frames, then after each frame.
 
     Raises:
         InputError: there is no browser, or the flight has no state.
-        FlightError: the browser did not come up.
+        FlightError: the browser did not start.
     """
     from PIL import Image
 
@@ -82,7 +82,7 @@ def animate(
                 )
 
             done = advance(len(times))
-            draw(0)  # the first one may lack what the browser has yet to make
+            draw(0)  # the first picture may be incomplete
             for k in range(len(times)):
                 frame = ground.copy()
                 for layer in (draw(k), overlay.draw(k)):
@@ -93,7 +93,7 @@ def animate(
 
 
 def encoded(frames: Sequence[Image], file: Path) -> bytes:
-    """Return an endless animation in the format of a file's ending, one of `FORMATS`."""
+    """Return an endless animation in the format of the file's suffix, one of `FORMATS`."""
     first, *others = frames
     options: Any = {".webp": {"quality": 72, "method": 6}, ".gif": {"optimize": True}, ".png": {}}
     written = io.BytesIO()
@@ -110,7 +110,7 @@ def encoded(frames: Sequence[Image], file: Path) -> bytes:
 
 
 def _camera(position: Array, look_at: Array) -> tuple[Array, Array]:
-    """Return attitude ``[w, x, y, z]`` and position of a camera that has the robot on its left."""
+    """Return attitude ``[w, x, y, z]`` and position of a camera with the robot on the left."""
     from scipy.spatial.transform import Rotation
 
     back = position - look_at

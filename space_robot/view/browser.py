@@ -1,4 +1,4 @@
-"""A browser without a window that draws a scene for this process."""
+"""A headless browser that renders a scene for this process."""
 
 from __future__ import annotations
 
@@ -26,40 +26,40 @@ OPTIONS = (
     "--disable-sync",
     "--no-first-run",
 )
-"""It draws without a graphics card, and asks nobody but this process."""
+"""Options: software rendering, and no network requests except to this process."""
 TIMEOUT_S = 60.0
 LOOK_S = 0.1
 FRAME_TIMEOUT_S = 120.0
-"""The first one is slow where there is no graphics card."""
+"""Timeout of a picture; the first one is slow without a graphics card."""
 
 
 def find_browser() -> str:
     """Return the path of Chromium or Chrome.
 
     Raises:
-        InputError: there is none.
+        InputError: none is installed.
     """
     path = next(filter(None, map(shutil.which, NAMES)), None)
     if not path:
-        raise InputError(f"a browser is needed, one of {', '.join(NAMES)}: none is here")
+        raise InputError(f"no browser is installed: one of {', '.join(NAMES)} is needed")
     return path
 
 
 @contextmanager
 def headless_browser(server: ViserServer) -> Iterator[ClientHandle]:
-    """Open the scene of a server in a browser of its own, which ends with the context.
+    """Open the scene of a server in a headless browser, which ends with the context.
 
-    Its window, which nobody sees, is small; what it is asked to draw may be larger.
+    Its window is small; rendered pictures may be larger.
 
     Args:
         server: of viser.
 
     Raises:
-        InputError: there is no browser.
-        FlightError: it did not come up.
+        InputError: no browser is installed.
+        FlightError: the browser did not start.
     """
     options = [*OPTIONS]
-    if os.geteuid() == 0:  # Chromium's sandbox refuses root
+    if os.geteuid() == 0:  # Chromium's sandbox does not run as root
         options.append("--no-sandbox")
     with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as profile:
         command = [

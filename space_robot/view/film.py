@@ -1,4 +1,4 @@
-"""Flights in one scene, moved from frame to frame, as the page that viser makes of it."""
+"""Animated scene of flights, recorded as a page of viser."""
 
 from __future__ import annotations
 
@@ -25,11 +25,11 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 POSES = 12
-"""Of a flight that the first camera must see."""
+"""Number of poses of a flight that the initial camera must contain."""
 GAP = 0.15
-"""Between robots side by side, by their width."""
+"""Gap between robots side by side, relative to their width."""
 GHOST = 0.4
-"""Opacity of robots that are drawn over another one."""
+"""Opacity of robots that overlap another one."""
 
 
 class FilmedFlight(NamedTuple):
@@ -40,7 +40,7 @@ class FilmedFlight(NamedTuple):
     robot: Robot
     law: str
     colour: str
-    """That tells it from the others, as ``#E69F00``."""
+    """Colour of the flight, such as ``#E69F00``."""
 
 
 def film(
@@ -50,13 +50,13 @@ def film(
     dark: bool,
     advance: Callable[[int], Callable[[], None]],
 ) -> str:
-    """Return the page of a scene with the flights, from the first time on.
+    """Return the page of an animated scene of flights.
 
     Args:
         flights: to be shown.
-        times: (K,) s, of the frames.
-        side_by_side: whether each robot has a place of its own; else they are drawn over another.
-        dark: whether the page is.
+        times: (K,) of the frames, s.
+        side_by_side: whether the robots are side by side instead of overlapping.
+        dark: whether the page is light on dark.
         advance: called with the number of frames, then after each frame.
 
     Raises:
@@ -82,15 +82,18 @@ def add_flights(
     dark: bool,
     shadows: bool = True,
 ) -> list[Move]:
-    """Add robots, trails and targets to a server's empty scene; return what moves them.
+    """Add robots, trails and targets to a server's empty scene.
 
     Args:
         server: whose scene it is.
         flights: to be shown.
-        times: (K,) s, of the frames.
-        side_by_side: whether each robot has a place of its own.
-        dark: whether the page is.
-        shadows: whether there are any.
+        times: (K,) of the frames, s.
+        side_by_side: whether the robots are side by side.
+        dark: whether the page is light on dark.
+        shadows: whether shadows are drawn.
+
+    Returns:
+        Functions that move everything to a frame.
 
     Raises:
         InputError: a flight has no state.
@@ -130,7 +133,7 @@ def _seen(robot: Robot, frames: Frames) -> Array:
 
 
 def _places(seen: Sequence[Array]) -> list[Array]:
-    """Return where robots stand side by side along x, the first one where it flew."""
+    """Return offsets of robots side by side along x, m; that of the first one is zero."""
     places: list[Array] = [np.zeros(3)]
     end = float(seen[0][:, 0].max())
     for before, points in pairwise(seen):

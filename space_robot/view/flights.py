@@ -1,4 +1,4 @@
-"""Page of several flights: robots, scene, plots and marks."""
+"""Page of flights: robots, scene, plots and marks."""
 
 from __future__ import annotations
 
@@ -25,10 +25,10 @@ from .plots import plots_of
 
 ON_DARK = ("#56B4E9", "#E98FC0", "#2CC295", "#E69F00", "#F0E442", "#FF7F41")
 ON_WHITE = ("#0072B2", "#CC79A7", "#009E73", "#E69F00", "#8A7F00", "#D55E00")
-"""Okabe's and Ito's colours, brighter or darker where the page asks for it."""
+"""Colours of Okabe and Ito, adapted to dark and light pages."""
 OF_TRAIL = "#FFB000"
 PICTURED, MOST_PLOTS = ("attitude", "base torque", "torque"), 3
-"""Beginnings of the titles of plots beside an animated picture."""
+"""Prefixes of the titles of plots beside an animated picture."""
 
 
 @dataclass(frozen=True)
@@ -36,13 +36,13 @@ class ViewOptions:
     """Options of a page."""
 
     side_by_side: bool = False
-    """A place for each robot, even if all are the same."""
+    """True to draw robots side by side, even if all are the same."""
     rate: float = RATE_HZ
-    """Poses a second of flight."""
+    """Poses per second of flight."""
     title: str = ""
-    """Empty: the flights' names."""
+    """Title of the page; empty: the flights' names."""
     dark: bool = True
-    """Light on dark."""
+    """True for light on dark."""
 
 
 def flights_page(
@@ -51,12 +51,12 @@ def flights_page(
     options: ViewOptions,
     advance: Callable[[int], Callable[[], None]],
 ) -> str:
-    """Return the page of some flights, complete in itself.
+    """Return the self-contained page of flights.
 
     Args:
         logs: by name, at least one.
         robots: that flew, by the same names.
-        options: what is asked of it.
+        options: of the page.
         advance: called with the number of frames, then after each frame.
 
     Raises:
@@ -91,15 +91,15 @@ def picture_of(
     """Return the animated picture of a flight.
 
     Args:
-        logs: by name, one.
+        logs: exactly one, by name.
         robots: that flew, by the same names.
         title: caption; empty: law, robot and case.
-        file: whose ending tells the format, one of `animation.FORMATS`.
+        file: with a suffix of `animation.FORMATS`.
         advance: called with the number of frames, then after each frame.
 
     Raises:
         InputError: there are several flights, there is no browser, or the flight has no state.
-        FlightError: the browser did not come up.
+        FlightError: the browser did not start.
     """
     if len(logs) > 1:
         raise InputError(f"{file}: an animated picture shows one flight, got {len(logs)} bags")
@@ -110,7 +110,7 @@ def picture_of(
 
 
 def shown_robot(log: FlightLog, name: str = "") -> Robot:
-    """Return the robot of a flight: the one given, or the one that the bag tells.
+    """Return the robot of a flight: by ``name``, or from the bag if it is empty.
 
     Raises:
         InputError: the robot does not exist, is unknown, or has other joints than the bag.
@@ -128,12 +128,12 @@ def remarks_on(logs: Mapping[str, FlightLog], robots: Mapping[str, Robot]) -> li
     lines += [line for robot in robots.values() for line in shown_shapes(robot).remarks]
     for name, log in logs.items():
         if (urdf := _urdf_of(log)) and not robots[name].visuals:
-            lines.append(f"a bag has no robot's shapes: --robot {urdf} draws those of that file")
+            lines.append(f"bags do not contain the robot's shapes: --robot {urdf} draws them")
     return list(dict.fromkeys(lines))
 
 
 def _urdf_of(log: FlightLog) -> str:
-    """Return the URDF that a flight's robot was read from; empty: it was none."""
+    """Return the URDF that a flight's robot was read from; empty for another format."""
     parameters = log.flight.get("parameters")
     plant = parameters.get("plant") if isinstance(parameters, dict) else None
     name = split_choice(str(plant.get("robot", ""))).name if isinstance(plant, dict) else ""

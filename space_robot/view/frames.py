@@ -1,4 +1,4 @@
-"""The motion of a robot as its page shows it: the poses of all bodies, so many times a second."""
+"""The motion of a robot, sampled for a page: poses of all bodies."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ from ..analysis.plot_series import tick_times
 Array = NDArray[np.float64]
 
 RATE_HZ = 30.0
-"""Of a page nobody asked another one of."""
+"""Default frame rate of a page."""
 MOST_FRAMES = 3000
-"""Of a page, shared by its flights, so that it stays below 3 MB."""
+"""Maximum number of frames of all flights of a page, to keep it below 3 MB."""
 STEP = 2.0**-30
-"""What poses are rounded to, m: a billionth, far below what can be seen, and half the page."""
+"""Resolution of poses, m: invisible, and halves the size of the page."""
 
 
 @dataclass(frozen=True)
@@ -32,38 +32,38 @@ class Frames:
     """The motion of a robot at K times."""
 
     time: Array
-    """(K,) s."""
+    """(K,) time, s."""
     base_position: Array
     """(K, 3) m, inertial frame."""
     base_quaternion: Array
     """(K, 4) ``[w, x, y, z]``."""
     joint_positions: Array
-    """(K, N) of all joints, rad, or m of prismatic ones."""
+    """(K, N) positions of all joints, rad, or m for prismatic ones."""
     joints: list[Transform]
-    """Of every joint, a parent's before its children's."""
+    """Transforms of all joints, parents before children."""
     tools: dict[str, Array]
-    """(K, 3) m, place of each tool, inertial frame."""
+    """(K, 3) position of each tool, m, inertial frame."""
     desired: Array | None
-    """(K, 3) m, where the first tool was wanted, the base at its true place; None: not known."""
+    """(K, 3) desired position of the first tool, for the true base position, m; or None."""
 
     @classmethod
     def of(cls, log: FlightLog, robot: Robot, times: Array) -> Frames:
-        """Take them from a flight; between ticks the last one holds, as after the flight's end.
+        """Sample a flight; between ticks, and after its end, the last state is held.
 
         Args:
-            log: the flight, as it truly was.
+            log: the flight, with true states.
             robot: that flew.
             times: (K,) s.
 
         Raises:
-            InputError: no tick of the flight has a whole state.
+            InputError: no tick of the flight has a complete state.
         """
         known = np.flatnonzero(
             log.finite(("base_position", "quaternion", "joint_positions", "passive_positions"))
         )
         if not len(known):
-            raise InputError("no tick of the bag has the whole state of the robot: nothing to show")
-        # a time is a tick's to half a tick: times are counted from ticks with rounding
+            raise InputError("no tick of the bag has the complete state of the robot")
+        # times are rounded: the nearest tick is meant
         due = times + 0.5 * log.timebase.period
         at = np.searchsorted(tick_times(log)[known], due, side="right") - 1
         rows = known[np.maximum(at, 0)]
@@ -88,16 +88,16 @@ class Frames:
         )
 
     def move_to(self, k: int) -> tuple[Array, Array, list[Transform], int]:
-        """Return what `RobotScene.move` takes at the k-th time."""
+        """Return the arguments of `RobotScene.move` for the k-th time."""
         return self.base_position[k], self.base_quaternion[k], self.joints, k
 
 
 def shown_times(logs: Sequence[FlightLog], rate: float) -> Array:
-    """Return the times, s, that are shown of some flights: at ticks of the first one.
+    """Return the times, s, of the frames of some flights: ticks of the first one.
 
     Args:
         logs: of the flights, none of them empty.
-        rate: so many a second, or fewer where that were too many.
+        rate: frames per second; reduced for long flights.
     """
     start = min(float(tick_times(log)[0]) for log in logs)
     end = max(float(tick_times(log)[-1]) for log in logs)
@@ -110,7 +110,7 @@ def shown_times(logs: Sequence[FlightLog], rate: float) -> Array:
 
 
 def _desired(log: FlightLog, robot: Robot, rows: NDArray[np.intp]) -> Array | None:
-    """Return the first tool's places by the reference; joints without motors rest."""
+    """Return the first tool's desired positions, (K, 3) m, with passive joints at rest."""
     if not controls_base(log):
         return None
     reference, joints = log.reference_base[rows, :4], log.reference_joints[rows, 0]

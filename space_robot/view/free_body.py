@@ -20,37 +20,37 @@ from space_robot_sim.environment.grasp import Grasp
 Array = NDArray[np.float64]
 
 ACCURACY = 1e-9
-"""Of the attitude, relative."""
+"""Relative tolerance of the attitude's integration."""
 
 
 class FreeBody(NamedTuple):
-    """A rigid body in free motion, at one moment."""
+    """State of a rigid body in free motion at one time."""
 
     position: Array
-    """(3,) m of its centre of mass, inertial frame."""
+    """(3,) position of the centre of mass, m, inertial frame."""
     rotation: Array
-    """(3, 3) of its axes, as columns, on inertial axes."""
+    """(3, 3) rotation matrix from body axes to inertial axes."""
     velocity: Array
-    """(3,) m/s, inertial frame."""
+    """(3,) velocity, m/s, inertial frame."""
     angular_velocity: Array
-    """(3,) rad/s, inertial axes."""
+    """(3,) angular velocity, rad/s, inertial axes."""
     inertia: Array
-    """(3, 3) kg m2 about its centre of mass, on its own axes."""
+    """(3, 3) inertia about the centre of mass, kg m2, body axes."""
 
     def poses(self, times: Array) -> tuple[Array, Array]:
-        """Return where it is at some times.
+        """Return the poses at some times.
 
         Args:
-            times: (K,) s from the moment, negative ones before it; monotonic.
+            times: (K,) relative to the time of the state, s; monotonic, may be negative.
 
         Returns:
-            (K, 3) m of its centre of mass; (K, 4) ``[w, x, y, z]`` of its axes.
+            (K, 3) centre of mass, m, inertial frame; (K, 4) attitude ``[w, x, y, z]``.
         """
         positions = self.position + times[:, np.newaxis] * self.velocity
         return positions, self._attitudes(times)
 
     def _attitudes(self, times: Array) -> Array:
-        """Integrate Euler's equations without a torque."""
+        """Integrate Euler's equations without torque."""
         start = Rotation.from_matrix(self.rotation)
         momentum = self.rotation @ self.inertia @ self.rotation.T @ self.angular_velocity
         inverse = np.linalg.inv(self.inertia)
@@ -58,7 +58,7 @@ class FreeBody(NamedTuple):
         def rate(_: float, quaternion: Array) -> Array:
             axes = Rotation.from_quat(quaternion).as_matrix()
             x, y, z, w = quaternion
-            turn = inverse @ (axes.T @ momentum)  # on its own axes
+            turn = inverse @ (axes.T @ momentum)  # in body axes
             on_left = np.array([[w, -z, y], [z, w, -x], [-y, x, w], [-x, -y, -z]])
             return np.asarray(0.5 * on_left @ turn)
 
@@ -74,17 +74,17 @@ class FreeBody(NamedTuple):
                 rtol=ACCURACY,
                 atol=ACCURACY,
             )
-            assert solved.sol is not None  # it is dense
+            assert solved.sol is not None  # dense output
             quaternions = solved.sol(times).T
         quaternions /= np.linalg.norm(quaternions, axis=1, keepdims=True)
         return quaternions[:, [3, 0, 1, 2]]
 
 
 def before_capture(capture: Capture, log: FlightLog, robot: Robot) -> FreeBody | None:
-    """Return a target just before it is captured, its axes those of the body that grasps it.
+    """Return the state of a target just before its capture, with the axes of the grasping body.
 
-    Its place is the tool's at the tick of the capture. Its motion is the event's; what is relative
-    to the tool is added to the tool's own motion over the tick before.
+    Its position is the tool's at the tick of the capture. Its velocities are those of the event;
+    relative ones are added to the tool's velocity over the previous tick.
 
     Args:
         capture: the event.
@@ -92,7 +92,7 @@ def before_capture(capture: Capture, log: FlightLog, robot: Robot) -> FreeBody |
         robot: that flew.
 
     Returns:
-        None where ``log`` does not have both ticks.
+        None if ``log`` does not have both ticks.
     """
     grasp = Grasp.of(robot, capture.target)
     row = tick_from(capture.time_s, log.timebase.period) - log.first_tick
@@ -113,11 +113,10 @@ def before_capture(capture: Capture, log: FlightLog, robot: Robot) -> FreeBody |
 
 
 def held_poses(grasp: Grasp, log: FlightLog, robot: Robot) -> tuple[Array, Array]:
-    """Return where a target would be if it were held in each row of a log.
+    """Return the poses of a grasped target in each row of a log.
 
     Returns:
-        (N, 3) m of its centre of mass, inertial frame; (N, 3, 3) axes of the body that holds it,
-        as columns.
+        (N, 3) centre of mass, m, inertial frame; (N, 3, 3) rotation matrices of the grasping body.
     """
     axes = base_axes(log.quaternion.T)
     frames = body_frames(robot, tuple(axes), log.all_positions.T)

@@ -1,8 +1,8 @@
-"""A server of viser for the browsers of this machine: it answers no other page, and stops at once.
+"""A server of viser for browsers on this machine only; it stops without waiting for them.
 
-Whatever page a browser shows may open a websocket to this machine, and one whose name is made to
-lead here may read what it is sent. So a request must name this machine, and come from a page that
-this server has sent. viser has no option for that; it is added where viser calls websockets.
+Any page in a browser may open a websocket to this machine, and by DNS rebinding also read the
+answers. Therefore the host of a request must be this machine, and its origin must be this server.
+viser has no option for that; the check is added where viser calls websockets.
 """
 
 from __future__ import annotations
@@ -24,16 +24,16 @@ if TYPE_CHECKING:
     from websockets.http11 import Request, Response
 
 LOCAL = re.compile(r"(127\.0\.0\.1|localhost|\[::1\])(:\d+)?")
-"""Host of a request; the port may be another one, forwarded by ssh."""
+"""Allowed hosts of a request; the port may differ, if forwarded by ssh."""
 MOST_CONNECTIONS = 64
 OPENING_S = 5.0
-"""Time for a connection to become a websocket."""
+"""Timeout of a websocket's opening handshake."""
 
 
 def is_own(headers: Headers) -> bool:
-    """Return True if a request names this machine, and its page is of the same address.
+    """Return True if the host of a request is this machine, and its origin the same address.
 
-    Programs that are no browsers send no origin.
+    Programs other than browsers send no origin.
     """
     hosts, origins = headers.get_all("Host"), headers.get_all("Origin")
     if len(hosts) != 1 or not LOCAL.fullmatch(hosts[0]):
@@ -43,18 +43,18 @@ def is_own(headers: Headers) -> bool:
 
 @contextmanager
 def local_server(port: int = 0) -> Iterator[ViserServer]:
-    """Serve scenes to this machine alone, and print nothing.
+    """Serve scenes to this machine only, without output.
 
     Args:
-        port: to listen to; the next free one if it is taken. 0: any.
+        port: to listen on; the next free one if it is in use. 0: any.
 
     Raises:
-        FlightError: this version of viser cannot be kept from answering other pages.
+        FlightError: requests of other pages cannot be refused with this version of viser.
     """
     from rich import get_console
     from viser import ViserServer
 
-    # a browser that opens a connection and does not use it is no error
+    # an unused connection of a browser is not an error
     logging.getLogger("websockets.server").setLevel(logging.CRITICAL)
     console = get_console()
     was_quiet, console.quiet = console.quiet, True
@@ -64,7 +64,7 @@ def local_server(port: int = 0) -> Iterator[ViserServer]:
             server = ViserServer(host="127.0.0.1", port=port, verbose=False)
         try:
             if not connections.is_serving:
-                raise FlightError("this version of viser answers any page: it is not served")
+                raise FlightError("this version of viser cannot refuse requests of other pages")
             yield server
         finally:
             connections.abort()
@@ -75,7 +75,7 @@ def local_server(port: int = 0) -> Iterator[ViserServer]:
 
 @contextmanager
 def _served_by(connections: _Connections) -> Iterator[None]:
-    """Let websockets that are served meanwhile be served by ``connections``."""
+    """Within the context, serve new websockets by ``connections``."""
     import websockets.asyncio.server as websocket_server
 
     original = connections.original = websocket_server.serve
@@ -87,7 +87,7 @@ def _served_by(connections: _Connections) -> Iterator[None]:
 
 
 class _Connections:
-    """The connections of a server."""
+    """Open connections of a server."""
 
     original: Any
     """`websockets.asyncio.server.serve`."""
@@ -98,7 +98,7 @@ class _Connections:
         self._open: dict[asyncio.Transport, asyncio.AbstractEventLoop] = {}
 
     def serve(self, *arguments: Any, process_request: Any, **options: Any) -> Any:
-        """Return what `original` does, for requests that `is_own`."""
+        """Call `original`, and refuse requests that are not `is_own`."""
         from websockets.asyncio.server import ServerConnection
 
         opened, closed = self._opened, self._open.pop
@@ -128,7 +128,7 @@ class _Connections:
             self._open[transport] = loop
 
     def abort(self) -> None:
-        """Close all at once: a browser that does not answer would be waited for."""
+        """Close all connections without waiting for the browsers."""
         self._has_ended = True
         for transport, loop in list(self._open.items()):
             loop.call_soon_threadsafe(transport.abort)

@@ -1,4 +1,4 @@
-"""Marks of a flight: events, faults, changes of law."""
+"""Marks on the time axis of a flight: events, faults, changes of law."""
 
 from __future__ import annotations
 
@@ -17,19 +17,19 @@ from ..scenario.faults import KINDS
 
 
 class Mark(NamedTuple):
-    """A mark beside the flight's curves."""
+    """A mark on the plots of a flight."""
 
     start: float
-    """s."""
+    """Start, s."""
     stop: float
-    """s; that of ``start`` for what takes no time, infinite for what lasts."""
+    """End, s: equal to ``start`` for an instant, infinite for a permanent change."""
     text: str
     kind: str
     """``event``, ``fault`` or ``law``."""
 
 
 def marks_of(log: FlightLog) -> list[Mark]:
-    """Return what is marked of a flight, by time; what the bag tells wrongly is left out."""
+    """Return the marks of a flight, by time; invalid entries of the bag are ignored."""
     period = log.timebase.period
     start = log.first_tick * period
     end = start + log.ticks * period
@@ -43,7 +43,7 @@ def marks_of(log: FlightLog) -> list[Mark]:
 
 
 def shared_marks(flights: Mapping[str, FlightLog]) -> list[Mark]:
-    """Return the marks of some flights, by time; one that not all have names those that do."""
+    """Return the marks of some flights, by time, with flight names unless all have the mark."""
     of_each = {name: marks_of(log) for name, log in flights.items()}
     every = sorted({mark for marks in of_each.values() for mark in marks})
     shared = []

@@ -1,4 +1,4 @@
-"""Triangles, and how many of them are made fewer."""
+"""Triangle meshes and their simplification."""
 
 from __future__ import annotations
 
@@ -10,21 +10,21 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 FINEST, COARSER = 400.0, 0.8
-"""Cells along a mesh's longest edge to which its vertices are merged, and the factor of the next
-attempt."""
+"""Initial number of grid cells along a mesh's longest edge for merging vertices, and its factor
+in the next attempt."""
 
 
 class Mesh(NamedTuple):
-    """Triangles."""
+    """A triangle mesh."""
 
     vertices: Array
-    """(V, 3) in the file's unit."""
+    """(V, 3) vertices in the file's unit."""
     faces: NDArray[np.int64]
-    """(F, 3) numbers of vertices."""
+    """(F, 3) indices of vertices."""
 
 
 def simplify(mesh: Mesh, most: int) -> Mesh:
-    """Return a mesh of at most ``most`` faces: vertices that share a cell of a grid are merged."""
+    """Return a mesh of at most ``most`` faces, by merging the vertices in each cell of a grid."""
     low, size = mesh.vertices.min(axis=0), float(np.ptp(mesh.vertices, axis=0).max()) or 1.0
     cells, simplified = FINEST, mesh
     while len(simplified.faces) > most and cells > 1.0:

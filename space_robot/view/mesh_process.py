@@ -1,10 +1,10 @@
-"""Reads mesh files in a process of its own: memory and time of that process are limited.
+"""Process that reads mesh files, with limits of memory and time.
 
     python -m space_robot.view.mesh_process MOST_FACES FOLDER < FILES
 
-A file of a few megabytes may unpack to gigabytes, and the libraries that read the many formats
-check little. FILES is a JSON list of paths. For file ``k`` the process writes ``FOLDER/k.npz``, or
-``FOLDER/k.txt`` with the reason why it cannot be drawn. It may end before it has written all.
+A file of a few megabytes may unpack to gigabytes, and the libraries for the formats check little.
+FILES is a JSON list of paths. For file ``k`` the process writes ``FOLDER/k.npz``, or
+``FOLDER/k.txt`` with the reason why it cannot be drawn. It may end before all files are written.
 """
 
 from __future__ import annotations
@@ -21,13 +21,13 @@ import numpy as np
 from .mesh import Mesh, simplify
 
 MOST_BYTES = 2_000_000_000
-"""Memory of the process."""
+"""Limit of the memory of the process."""
 MOST_SECONDS = 60
-"""Processor time for each file."""
+"""Limit of the processor time per file."""
 MOST_WAIT_S = 180
-"""Time for each file by the wall clock: one that refers to a pipe is never read to its end."""
+"""Limit of the wall-clock time per file; a file that refers to a pipe would never end."""
 MOST_READ = 2_000_000
-"""Vertices, and faces, of a file."""
+"""Limit of vertices, and of faces, of a file."""
 
 
 TOO_MUCH = (
@@ -37,14 +37,14 @@ TOO_MUCH = (
 
 
 class UnreadableMeshError(Exception):
-    """A file cannot be drawn; the message says why."""
+    """A file cannot be drawn; the message has the reason."""
 
 
 def read_mesh(file: str) -> Mesh:
-    """Read a mesh file of any format that trimesh reads.
+    """Read a mesh file of any format supported by trimesh.
 
     Raises:
-        UnreadableMeshError: it cannot be drawn.
+        UnreadableMeshError: the file cannot be drawn.
     """
     import trimesh
 
@@ -56,7 +56,7 @@ def read_mesh(file: str) -> Mesh:
         vertices, faces = np.asarray(read.vertices, dtype=np.float64), np.asarray(read.faces)
     except MemoryError:
         raise UnreadableMeshError(TOO_MUCH) from None
-    except Exception as error:  # as many types as there are formats
+    except Exception as error:  # every format has its own types
         reason = str(error).strip().split("\n")[0] or type(error).__name__
         raise UnreadableMeshError(reason) from None
     for count, name in ((len(vertices), "vertices"), (len(faces), "faces")):
@@ -68,7 +68,7 @@ def read_mesh(file: str) -> Mesh:
 
 
 def check_drawable(mesh: Mesh) -> None:
-    """Check that there is something to draw.
+    """Check that a mesh can be drawn.
 
     Raises:
         UnreadableMeshError: there are no faces, or vertices that are not finite.
@@ -78,10 +78,10 @@ def check_drawable(mesh: Mesh) -> None:
 
 
 def _check_archive(file: str) -> None:
-    """Check the size that an archive states before anything is unpacked.
+    """Check the unpacked size stated by an archive before unpacking.
 
     Raises:
-        UnreadableMeshError: it is too large.
+        UnreadableMeshError: the size is too large.
     """
     if not zipfile.is_zipfile(file):
         return
@@ -94,7 +94,7 @@ def _check_archive(file: str) -> None:
 
 
 def limit_time() -> None:
-    """Let this process end if it takes longer than allowed from now on."""
+    """Limit the processor and wall-clock time of this process from now on."""
     signal.alarm(MOST_WAIT_S)
     used = resource.getrusage(resource.RUSAGE_SELF)
     seconds = int(used.ru_utime + used.ru_stime) + 1 + MOST_SECONDS
@@ -102,7 +102,7 @@ def limit_time() -> None:
 
 
 def main(most: int, folder: Path, files: list[str]) -> None:
-    """Write one file for each mesh into ``folder``."""
+    """Read mesh files and write one result per file into ``folder``."""
     resource.setrlimit(resource.RLIMIT_DATA, (MOST_BYTES, MOST_BYTES))
     for number, file in enumerate(files):
         limit_time()

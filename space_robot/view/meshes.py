@@ -20,33 +20,33 @@ from . import mesh_process
 from .mesh import Mesh
 
 MOST_FACES = 60_000
-"""Of all meshes of a robot: some 0.7 MB of a page."""
+"""Maximum number of faces of all meshes of a robot: about 0.7 MB of a page."""
 
 
 class ReadMesh(NamedTuple):
-    """A mesh file as it is drawn, or the reason why it is not."""
+    """A mesh to be drawn, or the reason why the file cannot be drawn."""
 
     mesh: Mesh | None
     whole: int = 0
-    """Faces that the file has."""
+    """Number of faces in the file."""
     reason: str = ""
 
 
 class Shapes(NamedTuple):
-    """What is drawn of a robot."""
+    """Drawn shapes of a robot."""
 
     shapes: tuple[Visual, ...]
     meshes: dict[str, Mesh]
-    """By file, of those shapes that are meshes."""
+    """Meshes by file."""
     remarks: tuple[str, ...]
-    """What is drawn otherwise than the robot's file has it, a line each."""
+    """Differences from the robot's file, a line each."""
 
 
 def shown_shapes(robot: Robot) -> Shapes:
     """Return the shapes of a robot with their meshes.
 
-    A mesh that cannot be read is left out; a body that has nothing else is drawn from kinematics
-    and mass. One of too many faces is drawn with fewer.
+    An unreadable mesh is omitted; a body without other shapes is drawn from kinematics and mass. A
+    mesh with too many faces is simplified.
     """
     shapes = shapes_of(robot)
     files = tuple(dict.fromkeys(shape.mesh for shape in shapes if shape.shape == "mesh"))
@@ -68,21 +68,21 @@ def shown_shapes(robot: Robot) -> Shapes:
 
 @lru_cache(maxsize=32)
 def read_meshes(files: tuple[str, ...], most: int) -> tuple[ReadMesh, ...]:
-    """Read mesh files, of any format that trimesh reads, in processes with limits.
+    """Read mesh files of any format supported by trimesh, in processes with limits.
 
     Args:
         files: their paths.
-        most: faces of all of them together; those of a file with more than its share are reduced.
+        most: maximum number of faces of all files; a file with more than its share is simplified.
     """
     read: list[ReadMesh] = []
-    while len(read) < len(files):  # a process ends at a file that takes too much
+    while len(read) < len(files):  # a process ends at a file that exceeds the limits
         read += _read_in_process(files[len(read) :], most // len(files))
     return tuple(read)
 
 
 def _read_in_process(files: tuple[str, ...], most: int) -> list[ReadMesh]:
-    """Read files up to the first one at which the process ends, at least one."""
-    # each thread of BLAS would reserve memory, and nothing here is computed by it
+    """Read files until the process ends; return at least one result."""
+    # one BLAS thread: each thread would reserve memory, and BLAS is not used
     environment = {**clean_environment(), "OPENBLAS_NUM_THREADS": "1"}
     read: list[ReadMesh] = []
     with TemporaryDirectory() as folder:

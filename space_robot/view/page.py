@@ -1,4 +1,4 @@
-"""One page with the scene and plots that follow it."""
+"""HTML page with the scene and synchronised plots."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ Array = NDArray[np.float64]
 
 
 class Shown(NamedTuple):
-    """A bag on the page."""
+    """A flight on the page."""
 
     name: str
     colour: str
     what: str
     warnings: Sequence[str] = ()
-    """What is wrong with its recording, a sentence each."""
+    """Defects of its recording, a sentence each."""
 
 
 def render(
@@ -36,15 +36,15 @@ def render(
     start: float,
     dark: bool,
 ) -> str:
-    """Render the page, without references to anything outside itself.
+    """Render the self-contained page.
 
     Args:
         title: of the page.
-        scene: viser's own page of the scene.
+        scene: viser's page of the scene.
         bags: that are shown.
-        plots: in their order.
-        marks: what happened.
-        start: time at which the scene begins, s.
+        plots: in order.
+        marks: on the time axis.
+        start: time of the first frame, s.
         dark: whether the page is light on dark.
     """
     folder = files(__package__).joinpath("templates")

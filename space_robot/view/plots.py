@@ -1,4 +1,4 @@
-"""The plots beside the scene, of one flight or of several together."""
+"""Plots beside the scene, of one or several flights."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ from .quantities import PlottedQuantity, quantities_of
 Array = NDArray[np.float64]
 
 STRETCHES = 600
-"""Of a flight; of each the lowest and the highest value is drawn, so that no chatter is lost."""
+"""Time intervals of a flight; minimum and maximum of each are drawn, so that chatter is visible."""
 MOST_LETTERS = 40
-"""Of a label."""
+"""Maximum length of a label, in characters."""
 
 
 class Series(NamedTuple):
@@ -30,7 +30,7 @@ class Series(NamedTuple):
     label: str
     colour: str
     values: Array
-    """(K,)"""
+    """(K,) values."""
 
 
 class Plot(NamedTuple):
@@ -39,11 +39,11 @@ class Plot(NamedTuple):
     title: str
     unit: str
     time: Array
-    """(K,) s."""
+    """(K,) time, s."""
     series: Sequence[Series]
     is_logarithmic: bool = False
     are_pulses: bool = False
-    """True if each series has a row of its own, for values from 0 to 1."""
+    """True if each series has a separate row, for values from 0 to 1."""
 
 
 def plots_of(
@@ -51,12 +51,12 @@ def plots_of(
 ) -> list[Plot]:
     """Return the plots of some flights.
 
-    Of one flight each axis is drawn, of several the size of each quantity.
+    For one flight each axis is drawn, for several the magnitude of each quantity.
 
     Args:
         flights: by name.
         robots: that flew, by the same names.
-        colours: of the flights; of one flight those of the axes.
+        colours: of the flights; for one flight those of the axes.
     """
     logs = list(flights.values())
     edges = np.linspace(
@@ -107,15 +107,15 @@ def _of_size(
 
 
 def extremes(log: FlightLog, values: Array, edges: Array) -> Array:
-    """Return the lowest and the highest of the values in each stretch of time, in turn.
+    """Return minimum and maximum of the values in each time interval, alternating.
 
     Args:
-        log: whose ticks the values are of.
-        values: (N,), NaN where not known.
-        edges: (K + 1,) s, of the stretches; the last one has all later ticks, too.
+        log: with the ticks of the values.
+        values: (N,), NaN where unknown.
+        edges: (K + 1,) of the intervals, s; the last one includes all later ticks.
 
     Returns:
-        (2 K,), NaN of stretches without a known value.
+        (2 K,), NaN for intervals without a known value.
     """
     starts = np.searchsorted(tick_times(log), edges[:-1])
     lowest_and_highest = np.full((len(starts), 2), np.nan)

@@ -1,4 +1,4 @@
-"""The quantities of a flight that are plotted beside its scene, each where the flight has it."""
+"""Quantities of a flight that are plotted beside its scene."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ AXES = "xyz"
 
 
 class PlottedQuantity(NamedTuple):
-    """Values over the ticks of a flight, all in one unit."""
+    """Values with a common unit over the ticks of a flight."""
 
     title: str
     unit: str
@@ -32,7 +32,7 @@ class PlottedQuantity(NamedTuple):
     """(N, len(labels))."""
     is_error: bool = False
     are_pulses: bool = False
-    """True for shares of a tick, from 0 to 1, during which something is open."""
+    """True for duty cycles per tick, from 0 to 1."""
 
 
 def quantities_of(log: FlightLog, robot: Robot) -> list[PlottedQuantity]:
@@ -40,7 +40,7 @@ def quantities_of(log: FlightLog, robot: Robot) -> list[PlottedQuantity]:
 
     Args:
         log: the flight.
-        robot: that flew, with the joints of ``log``.
+        robot: with the joints of ``log``.
     """
     return [
         *_errors(log),
@@ -71,7 +71,7 @@ def _torques(log: FlightLog) -> Iterator[PlottedQuantity]:
 
 
 def _drift(log: FlightLog) -> Iterator[PlottedQuantity]:
-    """Yield how far the base is from where it was in its first known row."""
+    """Yield the distance of the base from its first known position."""
     known = np.flatnonzero(log.finite(("base_position", "quaternion")))
     if not len(known):
         return
@@ -83,7 +83,7 @@ def _drift(log: FlightLog) -> Iterator[PlottedQuantity]:
 
 
 def _passive_joints(log: FlightLog, robot: Robot) -> Iterator[PlottedQuantity]:
-    """Yield the deflection of the joints without motors from where their springs rest."""
+    """Yield the deflection of the passive joints from the rest positions of their springs."""
     rest = np.array([spring.rest for spring in robot.springs])
     slides = np.array(log.prismatic[len(log.joint_names) :], dtype=bool)
     for chosen, unit in ((~slides, "rad"), (slides, "m")):

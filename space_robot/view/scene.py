@@ -1,4 +1,4 @@
-"""The robot in a viser scene: its shapes below the frames of its bodies, which are then moved."""
+"""The robot in a viser scene: shapes attached to moving frames of the bodies."""
 
 from __future__ import annotations
 
@@ -22,34 +22,34 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 AXES = 0.08
-"""Length of a tool's axes by that of all links."""
+"""Length of a tool's axes relative to that of all links."""
 GREY = (0.7, 0.7, 0.7, 1.0)
-"""Of shapes without a colour."""
+"""Colour of shapes without a colour."""
 
 
 class SceneStyle(NamedTuple):
-    """How the shapes of a robot are drawn."""
+    """Style of a robot's shapes."""
 
     tint: str = ""
-    """Colour of all shapes, as ``#E69F00``; empty: their own."""
+    """Colour of all shapes, such as ``#E69F00``; empty: their own."""
     opacity: float = 1.0
     growth: float = 0.0
-    """m, by which a shape is thicker than it is: so that one drawn over another is not in it."""
+    """Enlargement of shapes, m, so that overlapping robots have no coincident surfaces."""
 
 
 class RobotScene:
-    """A robot below a name of its own, as ``/tde_stc/base_link/link1``: frames as tf has them."""
+    """A robot in the scene with the frames of tf, such as ``/tde_stc/base_link/link1``."""
 
     def __init__(
         self, scene: SceneApi, root: str, robot: Robot, look: SceneStyle | None = None
     ) -> None:
-        """Add the robot; it stands at zero.
+        """Add the robot at the origin.
 
         Args:
             scene: of a server.
             root: name of the robot in the scene, beginning with a slash.
-            robot: its numbers.
-            look: of its shapes.
+            robot: to be drawn.
+            look: style of its shapes.
         """
         self._scene, self._robot, self._look = scene, robot, look or SceneStyle()
         self._names = frame_names(robot).bodies
@@ -69,7 +69,7 @@ class RobotScene:
 
     def _add_frame(self, link: Transform, axes: float = 0.0) -> FrameHandle:
         path = f"{self._paths[link.parent]}/{_part(link.child)}"
-        while path in self._paths.values():  # a tool may be called as a body is
+        while path in self._paths.values():  # a tool may have the name of a body
             path += "_"
         self._paths.setdefault(link.child, path)
         return self._scene.add_frame(
@@ -85,9 +85,9 @@ class RobotScene:
         """Draw a shape on its body.
 
         Args:
-            name: of the shape among those of the body.
-            shape: what it is.
-            mesh: of a shape that is one.
+            name: of the shape, unique on the body.
+            shape: to be drawn.
+            mesh: if the shape is a mesh.
         """
         path = f"{self._paths[self._names[shape.body]]}/{name}"
         return add_shape(self._scene, path, shape, self._look, mesh)
@@ -96,10 +96,10 @@ class RobotScene:
         """Move base and joints.
 
         Args:
-            position: (3,) m of the base, inertial frame.
+            position: (3,) of the base, m, inertial frame.
             quaternion: (4,) of the base.
-            moved: of `joint_transforms`.
-            k: which of their rows.
+            moved: transforms from `joint_transforms`.
+            k: row of the transforms.
         """
         set_pose(self.base, "position", position)
         set_pose(self.base, "wxyz", quaternion)
@@ -112,9 +112,9 @@ class RobotScene:
 
 
 def set_pose(frame: FrameHandle, what: str, value: Array) -> None:
-    """Set a frame's pose to the last bit.
+    """Set a frame's pose exactly.
 
-    viser takes what is close by `numpy.allclose`, 1e-5 of it, for no change and leaves it out.
+    viser ignores changes within the tolerance of `numpy.allclose`, 1e-5.
     """
     held = getattr(frame, what)
     if not np.array_equal(held, value):
@@ -129,10 +129,10 @@ def add_shape(
 
     Args:
         scene: of a server.
-        path: of the shape.
-        shape: what it is; its body does not matter.
-        look: how it is drawn.
-        mesh: of a shape that is one.
+        path: of the shape in the scene.
+        shape: to be drawn; its body is not used.
+        look: style of the shape.
+        mesh: if the shape is a mesh.
     """
     *own, alpha = shape.colour or GREY
     red, green, blue = (round(255 * value) for value in own)
@@ -141,7 +141,7 @@ def add_shape(
     position, turn, more = shape.position, wxyz(shape.rotation), look.growth
     if mesh is not None:
         vertices = mesh.vertices * shape.size
-        flips = np.prod(shape.size) < 0.0  # mirrored: what was outside is inside
+        flips = np.prod(shape.size) < 0.0  # mirrored: faces must be reversed
         return scene.add_mesh_simple(
             path,
             vertices,
@@ -166,11 +166,11 @@ def add_shape(
 
 
 def rgb(colour: str) -> tuple[int, int, int]:
-    """Return red, green and blue, from 0 to 255, of a colour as ``#E69F00``."""
+    """Return red, green and blue, from 0 to 255, of a colour such as ``#E69F00``."""
     red, green, blue = bytes.fromhex(colour.removeprefix("#"))
     return red, green, blue
 
 
 def _part(name: str) -> str:
-    """Return a name as one part of a path in the scene."""
+    """Return a name as a single component of a path in the scene."""
     return name.replace("/", "_") or "_"

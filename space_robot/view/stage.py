@@ -1,4 +1,4 @@
-"""What surrounds the robots in a scene: stars, inertial axes, light, the first camera."""
+"""Environment of the robots in a scene: stars, inertial axes, lights, initial camera."""
 
 from __future__ import annotations
 
@@ -26,15 +26,15 @@ Array = NDArray[np.float64]
 
 FIELD_OF_VIEW = np.radians(35.0)
 DIRECTION = np.array([0.62, -1.0, 0.42])
-"""From what is looked at to the first camera; robots stand side by side along x."""
+"""Direction from the robots to the initial camera; robots are side by side along x."""
 SKY = 1.4
 LAMPS = (((0.2, -0.7, 1.0), 2.3), ((-0.8, -0.6, 0.3), 0.6))
-"""From where light comes, and how strong."""
+"""Directions and intensities of the lights."""
 STARS, STAR_SEED = 500, 1
 STARS_AT, STAR = 40.0, 0.0025
-"""Distance of the stars by the size of what is seen, and their size by that distance."""
+"""Distance of the stars relative to the size of the scene, and their size relative to that."""
 STAR_DARK, STAR_LIGHT = (130, 136, 150), (205, 209, 216)
-"""Their colours on dark and on light pages."""
+"""Colours of the stars on dark and on light pages."""
 CORNERS = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], dtype=float)
 
 
@@ -42,20 +42,20 @@ def check_viser() -> None:
     """Check that viser is installed.
 
     Raises:
-        InputError: it is not; says how to install it.
+        InputError: it is not installed.
     """
     if find_spec("viser") is None:
         raise InputError("view needs viser: pip install 'space_robot[view]'")
 
 
 def set_stage(server: ViserServer, points: Array, dark: bool, shadows: bool = True) -> None:
-    """Put stars, axes, light and camera about some points.
+    """Add stars, axes, lights and the initial camera for some points.
 
     Args:
-        server: whose scene is set.
-        points: (K, 3) m, what must be seen, inertial frame.
-        dark: whether the page is.
-        shadows: whether there are any; without a graphics card they take five times as long.
+        server: of the scene.
+        points: (K, 3) that must be visible, m, inertial frame.
+        dark: whether the page is light on dark.
+        shadows: whether shadows are drawn; without a graphics card this takes five times as long.
     """
     scene, camera = server.scene, server.initial_camera
     scene.set_up_direction("+z")
@@ -71,7 +71,7 @@ def set_stage(server: ViserServer, points: Array, dark: bool, shadows: bool = Tr
 
 
 def _surround(scene: SceneApi, middle: Array, size: float, low: Array, dark: bool) -> None:
-    """Draw what shows that a robot drifts and turns: inertial axes of a round length, and stars."""
+    """Draw inertial axes of a round length, and stars, which make drift and rotation visible."""
     length = 10.0 ** np.floor(np.log10(0.5 * size))
     scene.add_frame(
         "/inertial",
@@ -93,7 +93,7 @@ def _surround(scene: SceneApi, middle: Array, size: float, low: Array, dark: boo
 
 
 def _light(scene: SceneApi, shadows: bool) -> None:
-    """Put lights of our own: viser's map of a city comes late, or not at all."""
+    """Add lights instead of viser's environment map, which may load late or not at all."""
     scene.configure_environment_map(None)
     scene.configure_default_lights(False)
     scene.add_light_hemisphere("/sky", ground_color=(110, 112, 125), intensity=SKY)
@@ -110,7 +110,7 @@ def _light(scene: SceneApi, shadows: bool) -> None:
 
 
 def _distance(points: Array, back: Array) -> float:
-    """Return how far from the origin a camera sees all points, in a picture higher than wide."""
+    """Return the camera's distance from the origin, m, that shows all points in portrait format."""
     right = np.cross([0.0, 0.0, 1.0], back)
     right /= np.linalg.norm(right)
     up = np.cross(back, right)
@@ -120,13 +120,13 @@ def _distance(points: Array, back: Array) -> float:
 
 
 def extent(robot: Robot, position: Array, quaternion: Array, joint_positions: Array) -> Array:
-    """Return where a robot's shapes reach to, (K, 3) m, inertial frame.
+    """Return the corners of a robot's shapes in some poses, (K, 3) m, inertial frame.
 
     Args:
-        robot: its numbers and visuals.
-        position: (T, 3) m of the base.
+        robot: with its visuals.
+        position: (T, 3) of the base, m.
         quaternion: (T, 4) of the base.
-        joint_positions: (T, N) of all joints.
+        joint_positions: (T, N) of all joints, rad or m.
     """
     axes = base_axes(quaternion.T)
     frames = {f.body: f for f in body_frames(robot, tuple(axes), joint_positions.T)}
@@ -141,7 +141,7 @@ def extent(robot: Robot, position: Array, quaternion: Array, joint_positions: Ar
 
 
 def _corners(shape: Visual, mesh: Mesh | None) -> Array:
-    """Return the corners of a box about a shape, (8, 3) m, on the shape's axes."""
+    """Return the corners of a shape's bounding box, (8, 3) m, in the shape's axes."""
     size = np.array(shape.size)
     middle = np.zeros(3)
     if mesh is not None:

@@ -1,4 +1,4 @@
-"""Targets: before they are captured where they drift and turn, then in the hand that holds them."""
+"""Targets in the scene: in free motion before their capture, then fixed to the gripper."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ COLOUR: Colour = (0.85, 0.38, 0.22, 1.0)
 def targets(
     scene: SceneApi, root: str, robot_scene: RobotScene, log: FlightLog, robot: Robot, times: Array
 ) -> list[Move]:
-    """Draw each target of a flight as a box of even density; none where the bag tells none.
+    """Draw each target of a flight as a box of uniform density; nothing without targets.
 
     Args:
         scene: of a server.
@@ -40,7 +40,7 @@ def targets(
         robot_scene: the robot that holds it.
         log: the flight.
         robot: that flew.
-        times: (K,) s, of the frames.
+        times: (K,) of the frames, s.
     """
     try:
         captures = [
@@ -76,7 +76,7 @@ def _holding(scene: RobotScene, name: str, grasp: Grasp, start: int, stop: int) 
 
 
 def _drifting(scene: SceneApi, path: str, grasp: Grasp, free: FreeBody, times: Array) -> Move:
-    """Draw a target up to its capture, at times (K,) s before it."""
+    """Draw a target until its capture, at ``times`` (K,) relative to it, s."""
     frame = scene.add_frame(path, show_axes=False)
     box = even_box(grasp.mass, grasp.inertia, np.zeros(3), 0, COLOUR)
     add_shape(scene, f"{path}/box", box, SceneStyle())
@@ -93,5 +93,5 @@ def _drifting(scene: SceneApi, path: str, grasp: Grasp, free: FreeBody, times: A
 
 
 def _first(times: Array, event: float) -> int:
-    """Return the first frame at which an event has happened; an early one is in none but that."""
+    """Return the first frame at or after an event."""
     return int(np.searchsorted(times, event - 1e-9))

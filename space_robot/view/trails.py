@@ -1,4 +1,4 @@
-"""The ways of the tools through a scene: they grow as they are flown."""
+"""Tool paths in a scene, which grow during the flight."""
 
 from __future__ import annotations
 
@@ -16,25 +16,25 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 Move = Callable[[int], None]
-"""Brings a part of a scene to the k-th frame; called for each k in turn."""
+"""Updates a part of a scene to the k-th frame; called for k = 0, 1, ..."""
 
 PIECES = 60
-"""Of a trail, which appear one after the other."""
+"""Pieces of a trail, which appear one after the other."""
 DESIRED = (128, 128, 128)
-"""Colour of the desired way."""
+"""Colour of the desired path."""
 
 
 def trails(
     scene: SceneApi, root: str, frames: Frames, colour: tuple[int, int, int], width: float
 ) -> list[Move]:
-    """Draw the ways of a robot's tools, and thinner the one that was desired of the first.
+    """Draw the paths of a robot's tools, and, thinner, the desired path of the first tool.
 
     Args:
         scene: of a server.
         root: name of the robot in the scene.
         frames: of its flight.
-        colour: of the flown ways.
-        width: of them, m.
+        colour: of the flown paths.
+        width: of the flown paths, m.
     """
     edges = np.unique(np.linspace(0, len(frames.time) - 1, PIECES + 1).round().astype(int))
     trails: list[Move] = []

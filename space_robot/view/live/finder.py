@@ -1,4 +1,4 @@
-"""Discovery of running plants: domain and namespace."""
+"""Discovery of running plants: ROS domain and namespace."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from ...flight.graph.node_names import PLANT
 from ...flight.graph.temporary_node import TemporaryNode
 
 MOST_NAMES = 5
-"""Of nodes that are named."""
+"""Maximum number of nodes listed in a message."""
 
 
 class FlightPlace(NamedTuple):
-    """A namespace of a ROS domain."""
+    """ROS domain and namespace of a flight."""
 
     domain: int
     namespace: str
@@ -28,21 +28,21 @@ class FlightPlace(NamedTuple):
 
 
 class Finder:
-    """Finder of a plant in a given domain, or on this machine.
+    """Finds a running plant in a ROS domain, or on this machine.
 
-    In a domain the topics tell, wherever their nodes run. Without one the locks of this machine's
-    nodes tell, for `fly` takes a free domain unless it is told one.
+    In a domain it is found by its topics, on any machine. Without a domain it is found by the locks
+    of this machine's nodes, because `fly` chooses a free domain by default.
     """
 
     def __init__(self, domain: int | None = None, namespace: str = "") -> None:
-        """Begin to look.
+        """Start the search.
 
         Args:
             domain: None: that of ROS_DOMAIN_ID, if it is set.
             namespace: of the robot; empty: any.
 
         Raises:
-            InputError: it cannot be a namespace.
+            InputError: invalid namespace.
         """
         self._namespace = full_namespace(namespace) if namespace else ""
         domain = domain_asked_for(domain)
@@ -50,7 +50,7 @@ class Finder:
         self._domain = domain
 
     def find(self) -> FlightPlace | None:
-        """Return where a plant is, of several on this machine the one that began last."""
+        """Return the place of a plant: the last started one on this machine; None if none runs."""
         if self._domain is not None:
             places = sorted(self._publishing())
             return FlightPlace(self._domain, places[0]) if places else None
@@ -58,18 +58,18 @@ class Finder:
         return FlightPlace(*newest) if newest else None
 
     def describe(self) -> str:
-        """Describe where the search runs, and its results."""
+        """Return a description of the search and its results."""
         if self._domain is None:
             return "no plant runs on this machine"
         assert self._node is not None
         own = self._node.node.get_name()
         names = sorted({name for name in self._node.node.get_node_names() if name != own})
         nodes = ", ".join(names[:MOST_NAMES]) + (", ..." if len(names) > MOST_NAMES else "")
-        seen = f"nodes {nodes}, but nobody sends base/state" if names else "no other node"
+        seen = f"nodes {nodes}, but no publisher of base/state" if names else "no other node"
         return f"ROS domain {self._domain} has {seen}"
 
     def is_there(self, place: FlightPlace) -> bool:
-        """Return whether a discovered plant still runs."""
+        """Return True if a discovered plant still runs."""
         if self._domain is not None:
             return place.namespace in self._publishing()
         return any(PLANT in node.name for node in nodes_in(place.domain, place.namespace))

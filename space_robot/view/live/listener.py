@@ -1,4 +1,4 @@
-"""Listener to the state of a running robot."""
+"""Subscriptions to the state of a running robot."""
 
 from __future__ import annotations
 
@@ -38,35 +38,35 @@ TRUE: tuple[type[MessageDescription], ...] = (TruthJoints, TruthBase)
 
 
 KEPT = 4
-"""Messages, so that one of the same tick is there on each topic."""
+"""Number of kept messages per topic, so that all topics have one of the same tick."""
 
 
 class StateTopic:
-    """Takes the messages of a topic; of each the last row is kept for a while."""
+    """Subscription to a topic that keeps the last row of the newest messages."""
 
     def __init__(
         self, node: Node, group: PolledCallbackGroup, kind: type[MessageDescription]
     ) -> None:
-        """Subscribe to the messages of a kind as they come; they are never waited for.
+        """Subscribe to the messages of a kind, with best effort.
 
-        They can be taken once `describe` has been called. Those that come before are kept.
+        They can be read after `describe` was called; earlier messages are kept.
         """
         from space_robot_msgs_py.ros.endpoints import RawSubscription
 
         self._kind = kind
         self._subscription = RawSubscription(node, kind.topic, group, KEPT, best_effort=True)
         self.rows: dict[int, Array] = {}
-        """The last row of each of the newest messages, by its time in ns."""
+        """Last row of each of the newest messages, by its stamp, ns."""
 
     def describe(self, names: RobotNames, timebase: Timebase) -> None:
-        """Set the robot that the messages are of, and the period of its ticks."""
+        """Set the robot of the messages, and the period of its ticks."""
         self._describe = self._kind.of_robot(names, timebase)
         self._codec = Codec(self._describe)
         self._width = sum(column.length for column in self._describe.columns)
         self._period_ns = timebase.period_ns
 
     def take(self) -> None:
-        """Take what has come; messages that are not of this robot are passed over."""
+        """Read received messages; those of other robots are ignored."""
         while (data := self._subscription.take()) is not None:
             try:
                 stamp_ns, numbers = self._codec.decode(data)
@@ -78,7 +78,7 @@ class StateTopic:
             del self.rows[next(iter(self.rows))]
 
     def fill(self, state: RobotState, stamp_ns: int) -> None:
-        """Put the row of a time into the columns of a state that the topic has."""
+        """Write the row with a stamp into the topic's columns of ``state``."""
         row, at = self.rows[stamp_ns], 0
         for column in self._describe.columns:
             target = getattr(state, column.name)
@@ -86,37 +86,37 @@ class StateTopic:
             at += column.length
 
     def close(self) -> None:
-        """Take no more messages."""
+        """End the subscription."""
         self._subscription.close()
 
 
 class Sample(NamedTuple):
-    """Newest known state of the robot."""
+    """Newest received state of the robot."""
 
     time: float
-    """s, simulated."""
+    """Simulated time, s."""
     base_position: Array
-    """(3,) m, inertial frame."""
+    """(3,) position of the base, m, inertial frame."""
     base_quaternion: Array
-    """(4,) ``[w, x, y, z]``."""
+    """(4,) attitude of the base, ``[w, x, y, z]``."""
     angles: Array
-    """(N,) of all joints, the passive ones behind; rad, or m of prismatic ones."""
+    """(N,) positions of all joints, passive ones last; rad, or m for prismatic ones."""
     torque: Array
-    """(n+3,) N m applied over the last tick; base, then joints."""
+    """(n+3,) torque applied over the last tick, N m; base, then joints."""
     error: Array | None
-    """(n+3,) tracking error as the law sees it; None: not received yet."""
+    """(n+3,) tracking error of the law; None: not received yet."""
 
 
 class Listener:
-    """Subscriber of the newest state: the true one if published, else the measured one."""
+    """Receives the newest state: the true one if it is published, else the measured one."""
 
     def __init__(self, place: FlightPlace, robot: str, check: Callable[[], None]) -> None:
-        """Join the graph; ask the plant which robot it is, and for its period.
+        """Join the graph; request robot and period from the plant's parameters.
 
         Args:
-            place: where the plant is.
+            place: domain and namespace of the plant.
             robot: name or path of the robot; empty: the plant's.
-            check: called while waiting for the plant; raises to give up.
+            check: called while waiting for the plant; may raise an error to stop.
 
         Raises:
             InputError: the files of its robot do not exist on this machine.
@@ -128,7 +128,7 @@ class Listener:
         self._group = PolledCallbackGroup()
         self._topics: dict[type[MessageDescription], StateTopic] = {}
         try:
-            # before the plant is asked: a short flight may be over when it has answered
+            # before the request: a short flight may be over when the plant has answered
             for kind in (*MEASURED, *TRUE):
                 self._topics[kind] = StateTopic(self._monitor.node, self._group, kind)
             self._law = RawSubscription(self._monitor.node, topics.LAW, self._group)
@@ -142,13 +142,13 @@ class Listener:
             topic.describe(self._names, self._timebase)
         self._state = RobotState.allocate(self.robot.n)
         self._stamp_ns: int | None = None
-        """The newest sample's time."""
+        """Time of the newest sample."""
         self.law = ""
-        """Name of the law in force; empty: not received yet."""
+        """Name of the active law; empty: not received yet."""
 
     def _ask_plant(self, robot: str, check: Callable[[], None]) -> tuple[Robot, float]:
         name = period = None
-        while not (name and period):  # a plant that is not configured yet has neither
+        while not (name and period):  # an unconfigured plant has neither
             check()
             name, period = get_parameters(self._monitor.node, PLANT, ["robot", "period"], check)
         try:
@@ -156,14 +156,14 @@ class Listener:
         except InputError as error:
             if robot:
                 raise
-            raise InputError(f"the plant's robot: {error}; --robot tells which it is") from None
+            raise InputError(f"the plant's robot: {error}; choose it with --robot") from None
 
     def poll(self, with_states: bool, events: list[Event]) -> Sample | None:
-        """Return the newest sample, if there is a new one.
+        """Return the newest sample; None if there is no new one.
 
         Args:
-            with_states: False: nobody looks, so that no state need be sent here.
-            events: to which is added what has happened.
+            with_states: False: do not subscribe to states, since no browser is open.
+            events: new events are appended to it.
         """
         events += self._monitor.poll()
         while (data := self._law.take()) is not None:
@@ -193,7 +193,7 @@ class Listener:
 
     @property
     def complaints(self) -> dict[str, str]:
-        """The modes of nodes that are not well, by their names, and of a plant with faults."""
+        """Modes of nodes that are not in normal operation, by name, and faults of the plant."""
         values = self._monitor.values.get(PLANT, {})
         faults = {PLANT: f"faults: {values['faults']}"} if "faults" in values else {}
         return {**faults, **self._monitor.complaints}
@@ -214,7 +214,7 @@ class Listener:
                 self._topics[kind] = topic
 
     def _newest_of_all(self) -> int | None:
-        """Return the newest time for which each topic has a row: base and arm of one tick."""
+        """Return the newest stamp, ns, for which each topic has a row: base and arm of one tick."""
         times = [set(topic.rows) for topic in self._topics.values()]
         return max(set.intersection(*times), default=None) if times else None
 

@@ -1,4 +1,4 @@
-"""Server of live scenes, one flight after the other, until the user ends it."""
+"""Server of live scenes, one flight after the other, until it is stopped."""
 
 from __future__ import annotations
 
@@ -20,17 +20,17 @@ if TYPE_CHECKING:
     from viser import ViserServer
 
 RATE_HZ = 30.0
-"""Frames a second at most, by the wall clock."""
+"""Maximum frames per second of wall-clock time."""
 TELL_S = 0.2
-"""How often words and curves are shown anew."""
+"""Period of updates of texts and curves, wall-clock time."""
 FIRST_S = 0.02
-"""How often the first state is looked for."""
+"""Period of checks for the first state."""
 LOOK_S = 0.5
-"""How often a plant is looked for."""
+"""Period of the search for a plant."""
 SAY_S = 20.0
-"""How often it is said that there is still no flight."""
+"""Period of the message that there is no flight."""
 UNWATCHED_S = 60.0
-"""Of a flight that states are listened to without a browser, for one that opens late."""
+"""Time from the start of a flight in which states are received without a browser."""
 WAITING, OVER = "waiting for a flight", "the flight is over"
 MISSED = "the flight was over before it could be shown; view shows its bag"
 
@@ -40,15 +40,15 @@ class LiveOptions:
     """Options of a live scene."""
 
     domain: int | None = None
-    """ROS domain; None: ROS_DOMAIN_ID, or that of the flight on this machine that began last."""
+    """ROS domain; None: ROS_DOMAIN_ID, or that of the last started flight on this machine."""
     namespace: str = ""
-    """Of the robot; empty: any."""
+    """Namespace of the robot; empty: any."""
     robot: str = ""
-    """Name or file of the robot; empty: what its plant says."""
+    """Name or file of the robot; empty: that of the plant."""
     port: int = 8080
-    """Of the page; the next free one if it is taken."""
+    """Port of the page; the next free one if it is in use."""
     dark: bool = True
-    """Light on dark."""
+    """True for light on dark."""
 
 
 class OverError(FlightError):
@@ -56,22 +56,22 @@ class OverError(FlightError):
 
 
 def serve(options: LiveOptions, say: Callable[[str], None], ready: Callable[[str], None]) -> None:
-    """Serve the scene until a signal raises.
+    """Serve the scene until a signal interrupts.
 
     Args:
-        options: what is asked.
+        options: of the scene.
         say: called with a line for each event.
         ready: called with the page's address.
 
     Raises:
         InputError: viser is not installed, or the files of a robot do not exist.
-        Interrupted: the user has ended it.
+        Interrupted: stopped by the user.
     """
     with (
         closing(Finder(options.domain, options.namespace)) as finder,
         local_server(options.port) as server,
     ):
-        # no button to share: that would lead through a server somewhere
+        # no share button: it would use an external server
         server.gui.configure_theme(
             dark_mode=options.dark, show_logo=False, show_share_button=False, control_width="large"
         )
@@ -88,7 +88,7 @@ def serve(options: LiveOptions, say: Callable[[str], None], ready: Callable[[str
 
 
 def _wait(finder: Finder, say: Callable[[str], None]) -> FlightPlace:
-    """Wait for a flight, and say from time to time what is there instead."""
+    """Wait for a flight, and regularly report the state of the search."""
     say(WAITING)
     say_at = time.monotonic() + SAY_S
     while (place := finder.find()) is None:
@@ -100,24 +100,24 @@ def _wait(finder: Finder, say: Callable[[str], None]) -> FlightPlace:
 
 
 class Follower:
-    """Shows one flight after the other; the last one stays to be seen until the next begins."""
+    """Shows one flight after the other; the last one stays visible until the next starts."""
 
     def __init__(self, server: ViserServer, finder: Finder, options: LiveOptions) -> None:
         self._server, self._finder, self._options = server, finder, options
         self._waiting = server.gui.add_markdown("Waiting for a flight.")
         self._view: LiveView | None = None
         self._began = 0.0
-        """When the flight was first shown, by the monotonic clock."""
+        """Time at which the flight was first shown, monotonic clock, s."""
 
     def follow(self, place: FlightPlace, say: Callable[[str], None]) -> None:
-        """Show the flight in a place to its end.
+        """Show a flight until its end.
 
         Args:
-            place: where it is.
-            say: called with a description of the wait.
+            place: domain and namespace of the flight.
+            say: called with a line for each event.
 
         Raises:
-            OverError: it is over.
+            OverError: the flight is over.
             FlightError: its plant does not answer.
             InputError: the files of its robot do not exist on this machine.
         """
@@ -154,7 +154,7 @@ class Follower:
     def _first_sample(
         self, listener: Listener, events: list[Event], check: Callable[[], None]
     ) -> Sample:
-        """Return the first sample; of a flight that is over by then what has come of it."""
+        """Wait for the first sample; if the flight ends before, return the last received one."""
         while True:
             if sample := listener.poll(True, events):
                 return sample
@@ -177,8 +177,8 @@ class Follower:
             events: list[Event] = []
             sample = listener.poll(self._is_wanted, events)
             view.note(events)
-            if listener.time < flown:  # by the clock: faults may send old states
-                raise OverError("the flight has begun anew")
+            if listener.time < flown:  # the clock, because faults may send old states
+                raise OverError("the flight has been restarted")
             flown = listener.time
             if sample:
                 view.show(sample)

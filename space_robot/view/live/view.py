@@ -1,4 +1,4 @@
-"""A flight as it is seen live: the robot, the ways of its tools, its curves, and words on it."""
+"""Live view of a flight: robot, tool paths, curves and text."""
 
 from __future__ import annotations
 
@@ -31,26 +31,33 @@ Array = NDArray[np.float64]
 
 ROOT = "/robot"
 TRAIL = 0.0035
-"""Width of a tool's trail by the size of what is seen."""
+"""Width of a tool's trail relative to the size of the scene."""
 ROOM = 1.3
-"""The first camera sees this much more than the robot in its first pose: it will move."""
+"""Field of the first camera relative to the robot's first pose, since the robot moves."""
 MOST_EVENTS = 8
 
 
 PIECE = 60
-"""Segments that are sent anew with each point; pieces that are full are left alone."""
+"""Maximum segments of a piece of the trail; only the last piece is sent again with new points."""
 MOST_PIECES = 60
 BREAK_S = 0.5
-"""Places further apart in simulated time are not joined: nobody looked meanwhile."""
+"""Largest simulated time between connected points; larger gaps were not received."""
 
 
 class Trail:
-    """Line segments below a name in the scene."""
+    """Path of a tool as line segments of the scene."""
 
     def __init__(
         self, scene: SceneApi, name: str, colour: tuple[int, int, int], width: float
     ) -> None:
-        """``width``: m."""
+        """Create an empty trail.
+
+        Args:
+            scene: of a server.
+            name: of the trail in the scene.
+            colour: red, green and blue, 0 to 255.
+            width: of the lines, m.
+        """
         self._scene, self._name, self._colour, self._width = scene, name, colour, width
         self._pieces: deque[LineSegmentsHandle] = deque()
         self._segments: list[tuple[Array, Array]] = []
@@ -58,11 +65,11 @@ class Trail:
         self._count = 0
 
     def add(self, time: float, place: Array) -> None:
-        """Lead the way on to a place, (3,) m, at a time, s."""
+        """Extend the trail to a position, (3,) m, at a time, s."""
         last, self._last = self._last, (time, place)
         if last is None or not 0.0 < time - last[0] < BREAK_S:
             return
-        if np.linalg.norm(place - last[1]) < 0.2 * self._width:  # drawn when it has gone farther
+        if np.linalg.norm(place - last[1]) < 0.2 * self._width:  # too short
             self._last = time, last[1]
             return
         if not self._segments or len(self._segments) >= PIECE:
@@ -85,21 +92,21 @@ class Trail:
         )
 
     def clear(self) -> None:
-        """Take all of it away."""
+        """Remove it from the scene."""
         while self._pieces:
             self._pieces.pop().remove()
         self._segments, self._last = [], None
 
 
 class LiveView:
-    """What browsers see of one robot."""
+    """Scene and panel of one robot."""
 
     def __init__(self, server: ViserServer, robot: Robot, sample: Sample, dark: bool) -> None:
-        """Put the robot into the empty scene.
+        """Add the robot to the empty scene.
 
         Args:
-            server: that browsers are connected to.
-            robot: that flies.
+            server: of viser.
+            robot: of the flight.
             sample: its pose.
             dark: whether the page is light on dark.
         """
@@ -126,7 +133,7 @@ class LiveView:
     def show(self, sample: Sample) -> None:
         """Move the robot."""
         position, quaternion = sample.base_position, _unit(sample)
-        # of two rows, since the scene takes what has one for what never moves
+        # two rows, because the scene treats a single row as a constant transform
         links = joint_transforms(self._robot, np.tile(sample.angles, (2, 1)))
         with self._server.atomic():
             self._scene.move(position, quaternion[0], links, 0)
@@ -136,12 +143,12 @@ class LiveView:
         self._curves.add(sample)
 
     def tell(self, listener: Listener, speed: float, note: str = "") -> None:
-        """Write what the panel says, and draw the curves.
+        """Update the panel's text and the curves.
 
         Args:
-            listener: that heard it.
-            speed: simulated seconds by those of the wall clock.
-            note: a sentence more.
+            listener: with the received data.
+            speed: simulated time per wall-clock time.
+            note: additional sentence.
         """
         lines = [
             f"<b>{html.escape(listener.law or '...')}</b>, {html.escape(self._robot.name)}",
@@ -159,11 +166,11 @@ class LiveView:
             self._curves.draw()
 
     def note(self, events: Sequence[Event]) -> None:
-        """Store an event to be shown."""
+        """Store events to be shown."""
         self._events.extend(events)
 
     def close(self) -> None:
-        """Take all of it away."""
+        """Remove it from the scene."""
         for trail in self._trails:
             trail.clear()
         self._root.remove()
@@ -172,6 +179,6 @@ class LiveView:
 
 
 def _unit(sample: Sample) -> Array:
-    """Return the base's attitude, (1, 4): sensors tell one that is not quite a unit quaternion."""
+    """Return the base's attitude, (1, 4), normalised: measured quaternions are not exactly unit."""
     unit: Array = sample.base_quaternion[np.newaxis] / np.linalg.norm(sample.base_quaternion)
     return unit

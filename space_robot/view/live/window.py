@@ -1,4 +1,4 @@
-"""The last seconds of some curves, for plots that move with the flight."""
+"""Live plots of the last seconds of some curves."""
 
 from __future__ import annotations
 
@@ -24,24 +24,24 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 LENGTH_S = 10.0
-"""Of simulated time."""
+"""Length of the window in simulated time."""
 POINTS = 400
-"""Of a curve at most."""
+"""Maximum number of points of a curve."""
 HEIGHT = 150
-"""px."""
+"""Height of a plot, px."""
 
 
 class Curves:
-    """Errors and torques over the last seconds, a plot for each column of Table V."""
+    """Errors and torques over the last seconds, one plot per column of Table V."""
 
     def __init__(self, gui: GuiApi, robot: Robot, colours: Sequence[str], ink: str) -> None:
-        """Add the plots, empty.
+        """Add empty plots.
 
         Args:
             gui: of a server.
-            robot: that flies.
+            robot: of the flight.
             colours: of the curves.
-            ink: colour of axes and words.
+            ink: colour of axes and text.
         """
         self._rows: deque[tuple[float, Array]] = deque(maxlen=2 * POINTS)
         labels, prismatic = [*AXES, *robot.joint_names], robot.is_prismatic[: robot.n].tolist()
@@ -53,7 +53,7 @@ class Curves:
                 self._plots.append(_Plot(gui, name, shown, colours, ink))
 
     def add(self, sample: Sample) -> None:
-        """Take a sample, unless it follows the one before too closely."""
+        """Add a sample, unless it is too close to the previous one."""
         rows = self._rows
         if rows and sample.time < rows[-1][0] + LENGTH_S / POINTS:
             return
@@ -63,7 +63,7 @@ class Curves:
             rows.popleft()
 
     def draw(self) -> None:
-        """Show what was taken."""
+        """Update the plots."""
         if len(self._rows) > 1:
             time = np.array([time for time, _ in self._rows])
             values = np.array([row for _, row in self._rows])
@@ -71,7 +71,7 @@ class Curves:
                 plot.draw(time, values)
 
     def remove(self) -> None:
-        """Take the plots away."""
+        """Remove the plots."""
         for plot in self._plots:
             plot.handle.remove()
 
@@ -105,7 +105,7 @@ class _Plot:
     def draw(self, time: Array, values: Array) -> None:
         shown = values[:, self._columns]
         largest = float(np.max(np.abs(shown)))
-        # the plot's own numbers have no exponents: thousandths are written out
+        # the plot's tick labels have no exponents, so small values are scaled
         exponent = 3 * int(np.floor(np.log10(largest) / 3)) if largest > 0.0 else 0
         if exponent != self._exponent:
             self._exponent = exponent

@@ -213,7 +213,7 @@ def test_a_bag_has_no_shapes_of_a_urdf_until_it_is_named(view: Run, tmp_path: Pa
         robot=str(urdf), mission=str(mission), gains=str(gains), controller="ctc", duration=0.1
     )
     simulate(Flight(resolve(plan)), tmp_path / "flown")
-    hint = f"a bag has no robot's shapes: --robot {urdf} draws those of that file\n"
+    hint = f"bags do not contain the robot's shapes: --robot {urdf} draws them\n"
     without = view("flown", "--no-open", "--out", "without.html")
     assert without.code == 0, without.err
     assert hint in without.err
