@@ -1,1 +1,1 @@
-"""Settings: one schema for files, parameters and options; YAML that is read strictly."""
+"""Settings: one schema for files, parameters and options; strict reading of YAML."""

@@ -1,4 +1,4 @@
-"""Arguments of public functions, checked: one line that names the argument and what was given."""
+"""Checks of the arguments of public functions; errors name the argument and its value."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ Array = NDArray[np.float64]
 
 
 def as_path(value: Any, name: str) -> Path:
-    """Return a path.
+    """Return a value as a path.
 
     Raises:
         InputError: ``value`` is neither text nor a path.
@@ -28,7 +28,7 @@ def as_path(value: Any, name: str) -> Path:
 
 
 def path_text(value: Any, name: str) -> str:
-    """Return a path as it is written: `pathlib` makes ``./one`` a plain name.
+    """Return a path as written; `pathlib` would remove the ``./`` of ``./one``.
 
     Raises:
         InputError: ``value`` is neither text nor a path.
@@ -41,7 +41,7 @@ def as_numbers(value: Any, name: str) -> Array:
     """Return real numbers as an array of any shape, float64.
 
     Raises:
-        InputError: ``value`` has anything else, or rows of several lengths.
+        InputError: ``value`` has other elements, or rows of different lengths.
     """
     try:
         numbers = np.asarray(value)
@@ -53,10 +53,10 @@ def as_numbers(value: Any, name: str) -> Array:
 
 
 def as_whole_number(value: Any, name: str, least: int, most: int | None = None) -> int:
-    """Return a whole number in a range.
+    """Return an integer in a range.
 
     Raises:
-        InputError: ``value`` is none, or beyond the range.
+        InputError: ``value`` is not an integer, or out of range.
     """
     allowed = f"{least} or more" if most is None else f"{least} to {most}"
     try:

@@ -1,4 +1,4 @@
-"""Advice for an unknown name: the names that are allowed, and the nearest of them."""
+"""Advice for an unknown name: the allowed names, and the most similar ones."""
 
 from __future__ import annotations
 
@@ -7,25 +7,25 @@ from collections.abc import Iterable, Sequence
 from .text import printable
 
 MOST_LISTED = 20
-"""Names that an error lists; of more it names the nearest ones."""
+"""Maximum number of names listed by an error; of more only the most similar ones."""
 MOST_NEAR = 3
-"""Names suggested in the place of an unknown one."""
+"""Maximum number of suggested names."""
 SHORTEST_PART = 3
-"""Characters of a part of a name that names it."""
+"""Minimum length of a part of a name that is searched in other names."""
 LONGEST_SHOWN = 80
-"""Characters of a name."""
+"""Maximum displayed characters of a name."""
 LONGEST_COMPARED, MOST_COMPARED = 60, 2_000
-"""Characters of a name, and names, that are compared: the time grows with both."""
+"""Maximum length and number of compared names, since the time grows with both."""
 
 
 def choices(name: str, allowed: Iterable[str], also: str = "", listing: str = "") -> str:
-    """Return the end of an error about an unknown name: the names allowed, and the nearest.
+    """Return the end of an error about an unknown name: allowed and most similar names.
 
     Args:
         name: the unknown one.
-        allowed: all names that are known.
-        also: what else is allowed, as ``, or a path to a .yaml file``.
-        listing: the option or command that lists all names, as ``--fault list``.
+        allowed: all allowed names.
+        also: other allowed values, such as ``, or a path to a .yaml file``.
+        listing: the option or command that lists all names, such as ``--fault list``.
     """
     names = list(allowed)
     near = [_shown(other) for other in nearest(name, names)]
@@ -48,8 +48,8 @@ def _shown(name: str) -> str:
 
 
 def nearest(name: str, allowed: Sequence[str]) -> list[str]:
-    """Return the allowed names that are spelt most like ``name``, or else contain it."""
-    from difflib import get_close_matches  # wanted for errors only
+    """Return the allowed names with the most similar spelling, else those containing ``name``."""
+    from difflib import get_close_matches  # needed for errors only
 
     if len(name) > LONGEST_COMPARED:
         return []

@@ -1,4 +1,4 @@
-"""The ``config/`` folder. Imports nothing heavy: the command line names its files in help."""
+"""The ``config/`` folder. Light imports only, since the help of commands lists its files."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ from pathlib import Path
 from ..errors import InputError
 
 GRAPH_FILE = "space_robot.yaml"
-"""The file of the graph's defaults in the config folder."""
+"""File with the defaults of the graph, in the config folder."""
 
 
 @cache
 def config_directory() -> Path:
-    """Return the ``config/`` folder: the source tree's, or the one installed under ``share/``.
+    """Return the ``config/`` folder of the source tree, or the one installed under ``share/``.
 
     Raises:
         InputError: the installation is incomplete.

@@ -13,14 +13,14 @@ from .validation import read_yaml, short
 from .yaml_text import check_file
 
 GIVEN = "given"
-"""In the place of a file's name: there is no file, all numbers are given beside it."""
+"""In place of a file's name: there is no file, all values are set directly."""
 
 
 def named_file(kind: str, name: str) -> Path:
     """Return ``config/<kind>/<name>.yaml``, or ``name`` itself if it is a path to a YAML file.
 
     Raises:
-        InputError: there is no such file; names the ones there are.
+        InputError: there is no such file; lists the existing ones.
     """
     if name.endswith((".yaml", ".yml")):
         path = Path(name)
@@ -37,28 +37,28 @@ def named_file(kind: str, name: str) -> Path:
 
 
 def is_named(kind: str, name: str) -> bool:
-    """Return whether there is ``config/<kind>/<name>.yaml``."""
-    # not Path.is_file, which raises an OSError for a name that is too long
+    """Return True if there is a file ``config/<kind>/<name>.yaml``."""
+    # not Path.is_file, which raises an OSError if a name is too long
     return "/" not in name and os.path.isfile(config_directory() / kind / f"{name}.yaml")
 
 
 def named_layers(kind: str, name: str) -> list[Path]:
-    """Return the `named_file`; none for what is `GIVEN`.
+    """Return the `named_file` in a list; an empty list for `GIVEN`.
 
     Raises:
-        InputError: there is no such file; names the ones there are.
+        InputError: there is no such file; lists the existing ones.
     """
     return [] if name == GIVEN else [named_file(kind, name)]
 
 
 def node_parameters(path: Path, node: str) -> Tree:
-    """Read what a ROS parameter file says to a node, as a tree.
+    """Read the parameters of a node from a ROS parameter file, as a tree.
 
-    Below the keys ``/**`` and its ROS name, which may have ``/**/`` before it: ROS itself takes
-    that for a node of any namespace, and the name alone for one in the root one.
+    They are below the keys ``/**``, the node's ROS name, or ``/**/`` and the name: ROS applies the
+    latter in any namespace, the name alone only in the root namespace.
 
     Raises:
-        InputError: the file cannot be read or is not a ROS parameter file.
+        InputError: the file cannot be read, or is not a ROS parameter file.
     """
     merged: Tree = {}
     for name, content in read_yaml(path).items():

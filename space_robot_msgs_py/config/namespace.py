@@ -1,4 +1,4 @@
-"""Namespaces of ROS: the part of a full name before its last ones, as /sat1 of /sat1/plant_node."""
+"""ROS namespaces: the first part of a full name, such as /sat1 of /sat1/plant_node."""
 
 from __future__ import annotations
 
@@ -10,27 +10,27 @@ from .validation import short
 
 _NAMESPACE = re.compile(r"(/[A-Za-z_][A-Za-z0-9_]*)+")
 _TWO = "__"
-"""Nowhere in a name of ROS."""
+"""A character that ROS names cannot contain."""
 
 
 def full_namespace(text: str) -> str:
-    """``sat1``, ``/sat1`` or ``/sat1/`` as ROS has it, ``/sat1``; empty is the root, ``/``.
+    """Return a namespace in ROS's form: ``/sat1`` for ``sat1`` or ``/sat1/``, ``/`` if empty.
 
     Raises:
-        InputError: it cannot be one.
+        InputError: invalid namespace.
     """
     if not (name := text.strip("/")):
         return ROOT
     namespace = f"/{name}"
     if not _NAMESPACE.fullmatch(namespace) or _TWO in namespace:
         raise InputError(
-            f"{short(text)} is no namespace: letters, digits and _ were expected, no digit first, "
-            "as sat1 or fleet/sat1"
+            f"{short(text)} is not a namespace: letters, digits and _ were expected, not starting "
+            "with a digit, such as sat1 or fleet/sat1"
         )
     return namespace
 
 
 def relative(name: str, namespace: str) -> str:
-    """The name relative to a namespace; empty if it is in another one, or in one further down."""
+    """Return a name relative to a namespace; empty if it is in another or a nested one."""
     prefix, _, last = name.rpartition("/")
     return last if (prefix or ROOT) == namespace else ""

@@ -1,8 +1,8 @@
-"""Settings of the nodes: from files in ``config/``, by name, with overrides on top.
+"""Settings of the nodes: from files in ``config/``, selected by name, and overrides.
 
-``config/`` holds ROS parameter files (and the robots). A node's settings are the defaults of
-its schema, then the files its selectors name (a robot, a case, ...), then what the user gives.
-The nodes and the in-process flight resolve them here, so both fly the same numbers.
+``config/`` contains ROS parameter files and robots. The settings of a node are the defaults of its
+schema, overridden by the files of its selectors (robot, case, ...), then by the user's values.
+Nodes and in-process flights use this module, so both have the same settings.
 """
 
 from __future__ import annotations
@@ -23,18 +23,18 @@ from .trees import Tree, merge, nest
 from .validation import StrictModel, short, validate
 
 Texts = Annotated[list[str], AfterValidator(lambda texts: texts or [""])]
-"""Texts of which empty ones count for nothing: ROS has no empty list of strings."""
+"""List of texts; empty texts are ignored, because ROS has no empty list of strings."""
 
 
 class NodeSettings(StrictModel):
-    """Settings of every node of the graph; each node's schema derives from it."""
+    """Settings common to all nodes of the graph; base class of each node's schema."""
 
     node: ClassVar[str]
-    """The node: plant, controller, mission, recorder."""
+    """Name of the node: plant, controller, mission, recorder."""
     selectors: ClassVar[tuple[str, ...]] = ("robot",)
-    """Fields that choose configuration files."""
+    """Fields that select configuration files."""
     sends: ClassVar[tuple[Topic, ...]] = ()
-    """Topics whose listeners the node can wait for (parameter ``wait_for``)."""
+    """Topics for whose subscribers the node can wait (parameter ``wait_for``)."""
 
     robot: str = Field(
         "paper", description="a robot of config/robots, or a path to its YAML, URDF or folder"
@@ -43,7 +43,7 @@ class NodeSettings(StrictModel):
         0.0005, description="length of a tick, s; the same for all nodes"
     )
     fifo_priority: Annotated[int, Field(ge=0, le=98)] = Field(
-        0, description="SCHED_FIFO priority to ask for (0: the usual scheduling)"
+        0, description="SCHED_FIFO priority to request (0: default scheduling)"
     )
 
     @field_validator("wait_for", check_fields=False)
@@ -58,17 +58,17 @@ class NodeSettings(StrictModel):
 
     @classmethod
     def ros_name(cls) -> str:
-        """Return the name of the node in ROS, of its executable, of its section in files."""
+        """Return the name of the ROS node, of its executable and of its section in files."""
         return f"{cls.node}_node"
 
     @property
     def timebase(self) -> Timebase:
-        """Ticks and stamps at this period."""
+        """Conversion of ticks and stamps at this period."""
         return Timebase(round(self.period * 1e9))
 
     @classmethod
     def layers(cls, selected: Mapping[str, str]) -> list[Path]:
-        """Return the parameter files below the user's overrides, for the selectors' values."""
+        """Return the parameter files for the selectors' values."""
         return [config_directory() / GRAPH_FILE]
 
     @classmethod
@@ -76,7 +76,7 @@ class NodeSettings(StrictModel):
         """Read the settings from the files and the user's (dotted or nested) overrides.
 
         Raises:
-            InputError: naming the file or override at fault.
+            InputError: an invalid value; names the file or override.
         """
         where = f"{cls.node} parameters"
         own, tree = nest(overrides), Tree()

@@ -1,21 +1,21 @@
-"""Text from outside, made fit to be shown."""
+"""Display of external texts."""
 
 from __future__ import annotations
 
 
 def printable(text: str) -> str:
-    """Return a text as one line, whatever a broken bag had for names."""
+    """Return a text as one printable line, for example names from a damaged bag."""
     return "".join(letter if letter.isprintable() else "?" for letter in text)
 
 
 def one_line_of(error: BaseException) -> str:
-    """Return the type of a program's error and its first words, in one line."""
+    """Return type and beginning of the message of an exception, in one line."""
     text = printable(" ".join(str(error).split()))
     return f"{type(error).__name__}: {text}"[:300].removesuffix(": ")
 
 
 def shortened(text: str, most: int) -> str:
-    """Return a text of at most ``most`` letters: a longer one has "..." in place of its middle."""
+    """Shorten a text to at most ``most`` characters, with "..." in its middle."""
     if len(text) <= most:
         return text
     end = (most - 3) // 2

@@ -11,7 +11,7 @@ Tree = dict[str, Any]
 
 
 def merge(below: Tree, above: Mapping[str, Any]) -> Tree:
-    """Return ``below`` with the leaves of ``above`` put over it."""
+    """Return ``below`` with its leaves overridden by those of ``above``."""
     merged = dict(below)
     for key, value in above.items():
         old = merged.get(key)
@@ -21,10 +21,10 @@ def merge(below: Tree, above: Mapping[str, Any]) -> Tree:
 
 
 def nest(flat: Mapping[Any, Any]) -> Tree:
-    """Turn ``{"a.b": 1}`` into ``{"a": {"b": 1}}``.
+    """Convert ``{"a.b": 1}`` to ``{"a": {"b": 1}}``.
 
     Raises:
-        InputError: something is given as a value and as a group of values.
+        InputError: a key has a value and also a group of values.
     """
     tree: Tree = {}
     for key, value in flat.items():
@@ -36,7 +36,7 @@ def nest(flat: Mapping[Any, Any]) -> Tree:
 
 
 def _refuse_both(one: Tree, other: Tree, prefix: str = "") -> None:
-    """Check that nothing is a value in one tree, and a group of values in the other."""
+    """Check that no key is a value in one tree and a group of values in the other."""
     for key in one.keys() & other.keys():
         first, second = one[key], other[key]
         if isinstance(first, dict) is not isinstance(second, dict):
@@ -46,7 +46,7 @@ def _refuse_both(one: Tree, other: Tree, prefix: str = "") -> None:
 
 
 def flatten(tree: Mapping[Any, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
-    """Turn ``{"a": {"b": 1}}`` into ``("a.b", 1)``, leaf by leaf; an empty mapping is one."""
+    """Yield ``("a.b", 1)`` for each leaf of ``{"a": {"b": 1}}``; an empty mapping is a leaf."""
     for key, value in tree.items():
         if isinstance(value, Mapping) and value:
             yield from flatten(value, f"{prefix}{key}.")

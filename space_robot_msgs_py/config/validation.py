@@ -1,4 +1,4 @@
-"""YAML to checked data: every error names file, key, value given and values allowed."""
+"""Validation of YAML data; every error names file, key, value and allowed values."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ from .yaml_text import YamlTextError, parse_yaml, read_file
 
 
 class StrictModel(BaseModel):
-    """Base of what is read from files, parameters and options: no other keys, no other types.
+    """Base class of data from files, parameters and options, without extra keys or conversions.
 
-    A whole number may stand for a decimal one, and a number for a name (``case: 1``).
+    Only an integer may stand for a float, and a number for a name (``case: 1``).
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False, strict=True)
@@ -39,14 +39,14 @@ Schema = TypeVar("Schema", bound=BaseModel)
 
 
 MOST_KEPT = 100_000
-"""Characters of a text whose content is kept."""
+"""Maximum length of a text with cached content, in characters."""
 
 
 def read_yaml(path: Path) -> dict[str, Any]:
-    """Read the mapping in a YAML file; the caller may change it.
+    """Read the mapping in a YAML file; the caller may modify it.
 
     Raises:
-        InputError: the file is missing, unreadable, no file, not YAML, or not a mapping.
+        InputError: the file is missing, unreadable, not a file, not YAML, or not a mapping.
     """
     text = read_file(path)
     try:
@@ -60,7 +60,7 @@ def read_yaml(path: Path) -> dict[str, Any]:
 
 @lru_cache(maxsize=128)
 def _pickled(text: str) -> bytes:
-    """Parse a text once: flight after flight reads the same files, and parsing is slow."""
+    """Return the pickled content of a text; cached, since parsing is slow and files are reused."""
     return pickle.dumps(parse_yaml(text))
 
 
@@ -77,8 +77,8 @@ def validate(schema: type[Schema], content: Any, where: str) -> Schema:
 
 
 def one_line(error: ValidationError, schema: type[BaseModel], where: str) -> str:
-    """Tell the first fault of ``content`` of a ``schema``: key, what was given, what is allowed."""
-    # a misspelt key shows as one missing and one unknown: the unknown one is the cause
+    """Return the first error as a line with key, value and allowed values."""
+    # a misspelt key gives a missing and an unknown key: the unknown one is the cause
     faults = sorted(
         error.errors(include_url=False), key=lambda fault: fault["type"] != "extra_forbidden"
     )
@@ -96,7 +96,7 @@ def one_line(error: ValidationError, schema: type[BaseModel], where: str) -> str
 
 
 def _allowed_keys(schema: Any, location: tuple[int | str, ...]) -> list[str]:
-    """Return the names, in files, of the fields of the model at a location within ``schema``."""
+    """Return the keys, as in files, of the model at a location within ``schema``."""
     for step in location:
         if hasattr(schema, "model_fields"):
             schema = schema.model_fields[step].annotation
@@ -108,10 +108,10 @@ def _allowed_keys(schema: Any, location: tuple[int | str, ...]) -> list[str]:
 
 
 def short(value: Any) -> str:
-    """Show a value as an error does, in one line of at most 80 characters."""
+    """Return a value as text for errors, in one line of at most 80 characters."""
     try:
         text = repr(value)
-    except ValueError:  # a whole number of more digits than Python likes to print
+    except ValueError:  # an integer with too many digits for Python
         text = f"a number of type {type(value).__name__}"
     if "\n" in text:  # an array
         text = " ".join(text.split())
@@ -125,13 +125,13 @@ def one_of(
 
     Args:
         name: as the user wrote it.
-        allowed: all names that are known.
-        what: the kind of thing that is named, for the error.
-        context: follows the name in the error, as `` in my.yaml``.
-        listing: see `choices`.
+        allowed: all allowed names.
+        what: kind of the named object, for the error.
+        context: follows the name in the error, such as `` in my.yaml``.
+        listing: the option or command that lists all names, see `choices`.
 
     Raises:
-        InputError: naming what was given and what is allowed.
+        InputError: unknown name; lists the allowed ones.
     """
     names = list(allowed)
     if not isinstance(name, str) or name not in names:

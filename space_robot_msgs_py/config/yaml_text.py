@@ -1,6 +1,6 @@
-"""YAML, read strictly: what a text can do to its reader is bounded, and each mistake has a line.
+"""Strict reading of YAML: limits of size and nesting, and line numbers in errors.
 
-The types are those of ROS parameter files: ``1e3`` is a number, a date is a word.
+The types are those of ROS parameter files: ``1e3`` is a number, a date is a text.
 """
 
 from __future__ import annotations
@@ -23,15 +23,15 @@ except ImportError:  # PyYAML was built without libyaml
     from yaml import SafeLoader  # type: ignore[assignment]
 
 LARGEST_FILE = 16 * 2**20
-"""Bytes."""
+"""Largest size of a file, bytes."""
 DEEPEST = 64
-"""Lists and mappings within one another."""
+"""Largest depth of nested lists and mappings."""
 LONGEST_NAME = 250
-"""Characters of a file's name that an error shows."""
+"""Maximum displayed characters of a file's name in errors."""
 MOST_VALUES = 200_000
-"""Values in a text; they take a second to build."""
+"""Largest number of values in a text; they take a second to build."""
 MOST_REPEATED = 100_000
-"""Values that aliases may add to those written out."""
+"""Largest number of values added by aliases."""
 
 _FLOAT, _TIMESTAMP, _MERGE = (
     f"tag:yaml.org,2002:{kind}" for kind in ("float", "timestamp", "merge")
@@ -40,14 +40,14 @@ _EXPONENT = re.compile(r"^[-+]?(?:[0-9][0-9_]*(?:\.[0-9_]*)?|\.[0-9][0-9_]*)[eE]
 
 
 class YamlTextError(InputError):
-    """A text is not the YAML that is read here; says in which line."""
+    """A text is not valid YAML; the message has the line number."""
 
 
 def read_file(path: Path) -> str:
-    """Read the text in a file; pipes and devices, which may never end, are none.
+    """Read the text of a regular file; not of pipes and devices, which may be endless.
 
     Raises:
-        InputError: there is no such file, or it cannot be read.
+        InputError: the file does not exist, or cannot be read.
     """
     with _opened(path) as file:
         data = file.read(LARGEST_FILE + 1)
@@ -60,7 +60,7 @@ def check_file(path: Path) -> None:
     """Check that a file can be read.
 
     Raises:
-        InputError: see `read_file`.
+        InputError: the file does not exist, or cannot be read.
     """
     with _opened(path):
         pass
@@ -71,7 +71,7 @@ def _opened(path: Path) -> Iterator[BinaryIO]:
     name = str(path) if str(path).isprintable() else repr(str(path))
     name = name if len(name) <= LONGEST_NAME else f"{name[:40]}...{name[-40:]}"
     try:
-        # not to wait for the other end of a pipe
+        # opening a pipe must not block
         descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
         try:
             if not stat.S_ISREG(os.fstat(descriptor).st_mode):
@@ -86,12 +86,12 @@ def _opened(path: Path) -> Iterator[BinaryIO]:
         raise InputError(f"{name}: no such file") from None
     except OSError as error:
         raise InputError(f"{name}: cannot be read ({error.strerror})") from None
-    except ValueError as error:  # not UTF-8, or no name of a file
+    except ValueError as error:  # not UTF-8, or an invalid file name
         raise InputError(f"{name}: cannot be read ({error})") from None
 
 
 def is_folder(path: Path) -> bool:
-    """Return whether a folder is there; False for what cannot be the name of one, too."""
+    """Return True if a folder exists; False also for an invalid name."""
     try:
         return path.is_dir()
     except (OSError, ValueError):
@@ -99,10 +99,10 @@ def is_folder(path: Path) -> bool:
 
 
 def parse_yaml(text: str) -> Any:
-    """Build the value of a YAML text.
+    """Return the value of a YAML text.
 
     Raises:
-        YamlTextError: it is not YAML, has a key twice, or is nested or repeated without measure.
+        YamlTextError: not YAML, a repeated key, or a limit is exceeded.
     """
     try:
         _measure(text)
@@ -112,12 +112,12 @@ def parse_yaml(text: str) -> Any:
         line = f"line {mark.line + 1}: " if mark else ""
         problem = " ".join(str(getattr(error, "problem", None) or error).split())
         raise YamlTextError(f"{line}not YAML ({problem})") from None
-    except ValueError as error:  # characters that no file could hold
+    except ValueError as error:  # invalid characters
         raise YamlTextError(f"not YAML ({error})") from None
 
 
 def _measure(text: str) -> None:
-    """Check that a text may be built, from its events, which come one by one."""
+    """Check the limits from the stream of YAML events, before values are built."""
     sizes: dict[str, int] = {}
     opened: list[tuple[str | None, int]] = []
     size = repeated = 0
@@ -152,7 +152,7 @@ def _refused(problem: str, event: Any) -> yaml.YAMLError:
 
 
 class _Loader(SafeLoader):
-    """Takes a key that occurs twice, or a value that is not what its tag says, for a mistake."""
+    """Loader that rejects repeated keys, and values that do not match their tag."""
 
     yaml_implicit_resolvers = {  # noqa: RUF012  (a class variable, as in the base)
         first: [(tag, pattern) for tag, pattern in resolvers if tag != _TIMESTAMP]
@@ -169,7 +169,7 @@ class _Loader(SafeLoader):
             kind = node.tag.removeprefix("tag:yaml.org,2002:")
             said = f" {node.value[:40]!r}" if isinstance(node.value, str) else ""
             raise yaml.constructor.ConstructorError(
-                problem=f"the value{said} is no {kind}", problem_mark=node.start_mark
+                problem=f"the value{said} is not of type {kind}", problem_mark=node.start_mark
             ) from None
 
     def construct_mapping(self, node: Any, deep: bool = False) -> dict[Any, Any]:
@@ -184,7 +184,7 @@ class _Loader(SafeLoader):
             key = self.construct_object(key_node, deep=True)
             if not isinstance(key, Hashable):
                 raise yaml.constructor.ConstructorError(
-                    problem="a key must be a word or a number", problem_mark=key_node.start_mark
+                    problem="a key must be a text or a number", problem_mark=key_node.start_mark
                 )
             if key in seen:
                 raise yaml.constructor.ConstructorError(

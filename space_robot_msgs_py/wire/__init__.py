@@ -1,1 +1,1 @@
-"""The messages of the graph: laid out, encoded and decoded."""
+"""Messages of the graph: descriptions, layouts, encoding and decoding."""

@@ -1,4 +1,4 @@
-"""/base/state: pose and velocity of the base, and the torque that was applied to it."""
+"""/base/state: pose and velocity of the base, and the torque applied to it."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from .message import MessageDescription, Run, SampleColumn, name_order
 
 XYZ = (0, 1, 2)
 WXYZ = (3, 0, 1, 2)
-"""A sample's quaternion in ROS's, which is x, y, z, w."""
+"""Indices of a sample's quaternion (w, x, y, z) in ROS's order (x, y, z, w)."""
 
 
 class BaseState(MessageDescription):
-    """A sensor_msgs/MultiDOFJointState of one body; forces are zero: nobody pushes the base."""
+    """A sensor_msgs/MultiDOFJointState of one body; forces are zero."""
 
     topic = topics.BASE_STATE
     columns = (
@@ -28,11 +28,11 @@ class BaseState(MessageDescription):
     )
 
     def __init__(self, names: Sequence[str], timebase: Timebase) -> None:
-        """``names``: those of the joints do not matter here."""
+        """Describe the messages; ``names`` is not used."""
         super().__init__([topics.BASE_JOINT], timebase)
 
     def content(self, rows: int = 1) -> Mapping[str, Any]:
-        """The base, in the inertial frame."""
+        """Return the fields: the base in the inertial frame."""
         return {
             "header": {"frame_id": topics.INERTIAL_FRAME},
             "joint_names": self.names,
@@ -42,7 +42,7 @@ class BaseState(MessageDescription):
         }
 
     def runs(self, message: Any) -> Iterable[Run]:
-        """Linear velocity in the inertial frame, angular velocity and torque in the base's."""
+        """Yield pose and velocity in the inertial frame, angular rate and torque in the base's."""
         name_order(message.joint_names, self.names, self.topic.full_name)
         if not (len(message.transforms) == len(message.twist) == len(message.wrench) == 1):
             raise MessageError(f"{self.topic.full_name}: one transform, twist, wrench expected")

@@ -1,7 +1,7 @@
-"""Messages of a type that is not installed, as the bytes of one that is.
+"""Messages of a type that is not installed, transported in another message.
 
-Who publishes or takes a message needs the compiled support of its type, even for serialized bytes.
-That of tf2_msgs is on no Python index, so the recorder is sent the very bytes of /tf in a
+Publishers and subscribers need the compiled support of a type, even for serialized bytes. That of
+tf2_msgs is not on any Python index, so the recorder receives the bytes of /tf in a
 std_msgs/UInt8MultiArray.
 """
 
@@ -12,7 +12,7 @@ import struct
 from .cdr import ENCAPSULATION
 
 _HEAD = struct.Struct("<4sIII")
-"""Encapsulation, dimensions, offset of the data: none; length of the data."""
+"""Encapsulation header, no dimensions, no offset, length of the data."""
 
 
 def wrap(data: bytes) -> bytes:
@@ -21,5 +21,5 @@ def wrap(data: bytes) -> bytes:
 
 
 def unwrap(data: bytes) -> bytes:
-    """Return the serialized message in a carrier that `wrap` made."""
+    """Return the serialized message in a carrier from `wrap`."""
     return data[_HEAD.size :]

@@ -1,9 +1,9 @@
-"""The bytes of a message, laid out by walking its definition: what stays, where numbers stand.
+"""Byte layout of messages, from their definitions: constant bytes and positions of numbers.
 
-The messages of a flight keep their names and lengths, so the bytes between the numbers never
-change. A `MessageLayout` knows them of one message, and of all that differ in numbers only.
+Names and lengths in the messages of a flight are constant, so the bytes between the numbers never
+change. A `MessageLayout` describes all messages that differ only in numbers.
 
-Plain CDR, little endian: a primitive is aligned to its size counted from the end of the 4-byte
+Plain CDR, little endian: a primitive is aligned to its size, counted from the end of the 4-byte
 encapsulation header; a string is its length (with NUL), bytes, NUL; a sequence is its length,
 then its elements.
 """
@@ -27,7 +27,7 @@ Bytes = NDArray[np.uint8]
 ENCAPSULATION = b"\x00\x01\x00\x00"
 BODY = len(ENCAPSULATION)
 BIG_ENDIAN = b"\x00\x00"
-"""The beginning of a message that a big-endian machine wrote."""
+"""First bytes of a big-endian message."""
 STAMP = struct.Struct("<iI")
 _BIG_STAMP = struct.Struct(">iI")
 TIME = "builtin_interfaces/msg/Time"
@@ -55,59 +55,59 @@ _NUMBER = (Nodetype.BASE, ("float64", 0))
 
 
 class Slot(NamedTuple):
-    """The place of a run of float64 in a message."""
+    """Position of consecutive float64 numbers in a message."""
 
     offset: int
-    """Bytes from the message's beginning."""
+    """Offset from the start of the message, bytes."""
     length: int
 
 
 class MessageLayout:
-    """The bytes of one message, and where in them the numbers stand.
+    """Bytes of a message, and positions of its numbers.
 
-    Numbers are every float64 and Time; all else, as names, lengths and other integers, is the same
-    in all messages of one layout.
+    Numbers are every float64 and Time; everything else, such as names, lengths and other integers,
+    is equal in all messages of a layout.
     """
 
     def __init__(self, type_name: str, content: Any) -> None:
-        """Lay out a message.
+        """Compute the layout of a message.
 
         Args:
-            type_name: as ``sensor_msgs/msg/JointState``.
-            content: the decoded message, or a mapping of its fields; what it lacks is zero or
+            type_name: such as ``sensor_msgs/msg/JointState``.
+            content: the decoded message, or a mapping of its fields; missing fields are zero or
                 empty.
         """
         walk = _Walk()
         walk.message(type_name, content, "")
         self.pattern: Bytes = np.full((2, BODY + len(walk.body)), 0xFF, np.uint8)
-        """The message's bytes, and which of their bits are the same in all of this layout."""
+        """Bytes of the message, and mask of the bits that are constant in the layout."""
         self.pattern[0] = np.frombuffer(ENCAPSULATION + walk.body, np.uint8)
         for start, stop in walk.changing:
             self.pattern[1, BODY + start : BODY + stop] = 0
         self.slots = walk.slots
-        """The runs of float64 by their path, as ``transforms[0].translation``."""
+        """Slots of float64 by path, such as ``transforms[0].translation``."""
         self.stamps = tuple(walk.stamps)
-        """The places of all Times: bytes from the message's beginning."""
+        """Offsets of all Times, bytes from the start of the message."""
 
     @property
     def data(self) -> bytes:
-        """The message as it goes on the wire."""
+        """Return the serialized message."""
         data: bytes = self.pattern[0].tobytes()
         return data
 
 
 class _Walk:
-    """Goes through the fields of a message in the order of its definition and writes each."""
+    """Writes the fields of a message in the order of its definition."""
 
     def __init__(self) -> None:
         self.body = bytearray()
         self.changing: list[tuple[int, int]] = []
-        """Numbers, and padding: a foreign writer pads with what it likes."""
+        """Bytes that may differ: numbers, and padding, which writers may fill arbitrarily."""
         self.slots: dict[str, Slot] = {}
         self.stamps: list[int] = []
 
     def message(self, type_name: str, content: Any, path: str) -> None:
-        """A message, or a message in it."""
+        """Write a message or a nested message."""
         fields = _fields(type_name)
         values = [_value(content, name) for name, _ in fields]
         if type_name == TIME:
@@ -134,7 +134,7 @@ class _Walk:
             self.message(of, value, path)
         else:
             element, count = of
-            items = [None] * count if value is None else value  # of a sequence that lacks: none
+            items = [None] * count if value is None else value  # empty for a missing sequence
             if kind is Nodetype.SEQUENCE:
                 self._primitive(_LENGTH, len(items))
             if element == _NUMBER:
@@ -148,7 +148,7 @@ class _Walk:
         self.body += form.pack(value)
 
     def _numbers(self, values: Any, path: str) -> None:
-        if len(values):  # an empty sequence has no padding after it
+        if len(values):  # no padding after an empty sequence
             self._align(8)
         self.slots[path] = Slot(BODY + len(self.body), len(values))
         self._change(np.asarray(values, "<f8").tobytes())
@@ -174,14 +174,14 @@ def _value(content: Any, name: str) -> Any:
 
 
 def header_stamp_ns(data: bytes, at: int = 0) -> int:
-    """Stamp of a serialized message that starts with a Header or is a Time, of either order, ns.
+    """Return the stamp, ns, of a serialized message that starts with a Header or a Time.
 
     Args:
-        data: the message.
-        at: so many bytes stand before the stamp.
+        data: the message, little or big endian.
+        at: number of bytes before the stamp.
 
     Raises:
-        MessageError: the message ends before that.
+        MessageError: the message is too short.
     """
     try:
         form = _BIG_STAMP if data.startswith(BIG_ENDIAN) else STAMP

@@ -14,26 +14,26 @@ from .message import MessageDescription, Run
 
 
 class Clock(MessageDescription):
-    """A rosgraph_msgs/Clock: nothing but a stamp."""
+    """A rosgraph_msgs/Clock, which has only a stamp."""
 
     topic = topics.CLOCK
 
     def content(self, rows: int = 1) -> Mapping[str, Any]:
-        """Its stamp is no field of ours."""
+        """Return no fields: the stamp is written separately."""
         return {}
 
     def runs(self, message: Any) -> Iterable[Run]:
-        """There are none."""
+        """Return no numbers."""
         return ()
 
 
 class ClockCodec:
-    """/clock."""
+    """Encodes /clock."""
 
     def __init__(self) -> None:
         self._codec = Codec(Clock((), Timebase(1)))
         self._nothing = np.empty(0)
 
     def encode(self, stamp_ns: int) -> bytes:
-        """The bytes of /clock."""
+        """Return the bytes of /clock."""
         return self._codec.encode(stamp_ns, self._nothing)

@@ -1,4 +1,4 @@
-"""Messages to flat numbers and back by NumPy: a node without compiled code starts sooner."""
+"""Conversion of messages to flat arrays and back by NumPy, for nodes without compiled code."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ Array = NDArray[np.float64]
 
 
 class Codec:
-    """Writes our own messages of a topic, and reads all that say what ours say.
+    """Writes and reads the messages of a topic.
 
-    A message laid out as the one written or read last is read by copying its numbers; any other is
-    decoded the general way once.
+    A message with the layout of the last one is read by copying its numbers; a new layout is
+    decoded in general form once.
     """
 
     def __init__(self, description: MessageDescription) -> None:
@@ -25,7 +25,7 @@ class Codec:
 
     def _write_like(self, own: Numbers) -> None:
         room = np.zeros(BODY + own.layout.pattern.shape[1], np.uint8)
-        self._wire = room[BODY:]  # the float64 inside are then aligned in memory
+        self._wire = room[BODY:]  # aligns the float64 in memory
         self._wire[:] = own.layout.pattern[0]
         self._body = body(self._wire)
         self._to = own.words
@@ -36,11 +36,11 @@ class Codec:
         self._from = known.words
 
     def encode(self, stamp_ns: int | None, values: Array) -> bytes:
-        """Our own message of these numbers, row behind row.
+        """Return the serialized message of some numbers.
 
         Args:
-            stamp_ns: its stamp (None: it has none).
-            values: as many rows as there are.
+            stamp_ns: its stamp (None: without stamp).
+            values: all rows, flattened.
         """
         if values.size != self._to.size:
             self._write_like(self._description.own(values.size // self._width))
@@ -50,13 +50,13 @@ class Codec:
         return self._wire.tobytes()
 
     def decode(self, data: bytes) -> tuple[int, Array]:
-        """Stamp, ns, and numbers, row behind row, of any message of the topic.
+        """Return the stamp, ns, and the numbers of all rows, flattened, of a message of the topic.
 
         Raises:
-            MessageError: it does not fit, or is none.
+            MessageError: the bytes are not a message of this topic and robot.
         """
         layout, constant = self._pattern
-        if len(data) >= len(layout):  # foreign writers may leave bytes behind the message
+        if len(data) >= len(layout):  # other writers may append bytes
             message = np.frombuffer(data, np.uint8, len(layout))
             if not np.any((message ^ layout) & constant):
                 return header_stamp_ns(data), body(message)[self._from]

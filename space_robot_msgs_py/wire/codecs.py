@@ -1,4 +1,4 @@
-"""States and commands to messages and back, in the time of a tick."""
+"""Fast conversion of states and commands to messages and back."""
 
 from __future__ import annotations
 
@@ -15,16 +15,16 @@ from .thrusters_state import ThrustersState
 from .wheels_state import WheelsState
 
 PARTS: tuple[type[MessageDescription], ...] = (JointStates, WheelsState, BaseState, ThrustersState)
-"""The messages of a state in the order in which they are sent."""
+"""Messages of a state in the order of sending."""
 
 FOR_THE_RECORD = (ThrustersState.topic,)
 
 
 class StateCodec:
-    """`RobotState` as its messages: a part for the joints, the base, its wheels, its thrusters."""
+    """Converts `RobotState` to messages for joints, base, wheels and thrusters, and back."""
 
     def __init__(self, names: RobotNames, timebase: Timebase) -> None:
-        """Wheels and thrusters have a part where ``names`` has any."""
+        """Create the codecs; wheels and thrusters only if ``names`` has any."""
         self._timebase, record = timebase, State.dtype(len(names.joints))
         parts = [part.of_robot(names, timebase) for part in PARTS]
         self.parts = {
@@ -33,17 +33,17 @@ class StateCodec:
             if part.names or not part.topic.is_optional
         }
         self.topics = tuple(self.parts)
-        """Those of the parts, in the order in which they are sent."""
+        """Topics of all messages, in the order of sending."""
         self.control_topics = tuple(t for t in self.topics if t not in FOR_THE_RECORD)
-        """Those of the parts that a controller needs."""
+        """Topics of the messages that a controller needs."""
 
     def encode(self, state: RobotState) -> tuple[bytes, ...]:
-        """The bytes of every part."""
+        """Return the bytes of all messages."""
         stamp_ns, numbers = self._timebase.stamp_ns(state.tick), state.numbers
         return tuple([codec.encode(stamp_ns, numbers) for codec in self.parts.values()])
 
     def decode(self, topic: Topic, data: bytes, state: RobotState) -> int:
-        """Fill one part of ``state``; returns the tick.
+        """Write one message into ``state``; return its tick.
 
         Raises:
             MessageError: the message does not fit.
@@ -52,19 +52,19 @@ class StateCodec:
 
 
 class CommandCodec:
-    """`Command` as /command."""
+    """Converts `Command` to /command and back."""
 
     def __init__(self, names: Sequence[str], timebase: Timebase) -> None:
-        """``names``: see `RobotNames.commanded`."""
+        """Create the codec; ``names`` are those of `RobotNames.commanded`."""
         self._timebase = timebase
         self._codec = CompiledCodec(Commands(names, timebase))
 
     def encode(self, command: Command) -> bytes:
-        """The bytes of /command, stamped with the state it answers."""
+        """Return the bytes of /command, with the stamp of the state that it answers."""
         return self._codec.encode(self._timebase.stamp_ns(command.tick), command.torque)
 
     def decode(self, data: bytes, command: Command) -> None:
-        """Fill ``command``.
+        """Write a message into ``command``.
 
         Raises:
             MessageError: the message does not fit.

@@ -1,4 +1,4 @@
-"""/command: what is asked of every axis and actuator, as a sensor_msgs/JointState's efforts."""
+"""/command: commands of all axes and actuators, as efforts of a sensor_msgs/JointState."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ class Commands(JointStates):
     frame_id = topics.BASE_FRAME
 
     def __init__(self, names: Sequence[str], timebase: Timebase, actuators: int = 0) -> None:
-        """``actuators``: so many of the names, the last ones, are of the base's actuators."""
+        """Describe the messages; the last ``actuators`` names are the base's actuators."""
         super().__init__(names, timebase)
         self.columns = (SampleColumn("commanded_torque", 0, len(self.names) - actuators),)
         if actuators:
@@ -26,5 +26,5 @@ class Commands(JointStates):
 
     @classmethod
     def of_robot(cls, names: RobotNames, timebase: Timebase) -> Commands:
-        """The base's axes come before the joints, its actuators after them."""
+        """Describe the messages of a robot: base axes, joints, base actuators."""
         return cls(names.commanded, timebase, len(names.actuators))

@@ -1,4 +1,4 @@
-"""Messages to flat numbers and back in compiled code, the same for every layout and robot."""
+"""Conversion of messages to flat arrays and back in compiled code for all layouts and robots."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ Array = NDArray[np.float64]
 Bytes = NDArray[np.uint8]
 
 FOREIGN = -1 << 62
-"""In place of a stamp: the message is laid out otherwise."""
+"""Returned instead of a stamp if the message has another layout."""
 _BILLION = 1_000_000_000
 
 
 @subroutine
 def little_endian(data: Any, at: Any, size: int) -> int:
-    """An unsigned integer of ``size`` bytes."""
+    """Return an unsigned little-endian integer of ``size`` bytes."""
     value: Any = np.uint64(0)
     for i in range(size):
         value |= np.uint64(data[at + np.uint64(i)]) << np.uint64(8 * i)
@@ -29,7 +29,7 @@ def little_endian(data: Any, at: Any, size: int) -> int:
 
 @subroutine
 def is_laid_out(data: Any, pattern: Bytes) -> bool:
-    """Whether a message has the bytes that are the same in all of a layout; it is long enough."""
+    """Return True if a message, which must be long enough, has a layout's constant bytes."""
     differing = np.uint8(0)
     for i in range(pattern.shape[1]):
         differing |= (data[i] ^ pattern[0, i]) & pattern[1, i]
@@ -38,7 +38,7 @@ def is_laid_out(data: Any, pattern: Bytes) -> bool:
 
 @subroutine
 def stamp_of(data: Any) -> int:
-    """The time a message begins with, ns."""
+    """Return the time at the start of a message, ns."""
     seconds: Any = np.int64(np.int32(little_endian(data, np.uint64(4), 4)))
     nanoseconds: Any = np.int64(little_endian(data, np.uint64(8), 4))
     return seconds * _BILLION + nanoseconds  # type: ignore[no-any-return]
@@ -46,18 +46,18 @@ def stamp_of(data: Any) -> int:
 
 @subroutine
 def _store(data: Bytes, at: Any, value: Any, size: int) -> None:
-    """An integer of ``size`` bytes, little endian."""
+    """Store an integer of ``size`` bytes, little endian."""
     for i in range(size):
         data[at + np.uint64(i)] = np.uint8(value >> np.uint64(8 * i) & np.uint64(0xFF))
 
 
 @kernel
 def write(wire: Bytes, places: Offsets, values: Array, stamp_ns: int) -> None:
-    """Put a stamp and numbers into a message.
+    """Write a stamp and numbers into a message.
 
     Args:
-        wire: its bytes.
-        places: (2, K) byte of the message, index into ``values``.
+        wire: bytes of the message.
+        places: (2, K) byte offset in the message, index into ``values``.
         values: numbers of a sample.
         stamp_ns: its stamp.
     """
@@ -72,12 +72,12 @@ def write(wire: Bytes, places: Offsets, values: Array, stamp_ns: int) -> None:
 
 @kernel
 def read(data: bytes, pattern: Bytes, places: Offsets, values: Array) -> int:
-    """Take the numbers of a message; its stamp, ns, or `FOREIGN` if it is laid out otherwise.
+    """Read the numbers of a message; return its stamp, ns, or `FOREIGN` for another layout.
 
     Args:
-        data: the message; what lies behind the layout is ignored: foreign writers leave some there.
+        data: the message; bytes after the layout, from other writers, are ignored.
         pattern: `MessageLayout.pattern`.
-        places: (2, K) byte of the message, index into ``values``.
+        places: (2, K) byte offset in the message, index into ``values``.
         values: numbers of a sample.
     """
     if len(data) < pattern.shape[1] or not is_laid_out(data, pattern):
@@ -91,16 +91,21 @@ def read(data: bytes, pattern: Bytes, places: Offsets, values: Array) -> int:
 
 
 class CompiledCodec:
-    """Writes our own messages of a topic, and reads all that say what ours say.
+    """Writes and reads the messages of a topic.
 
-    A message laid out as ours, or as the one read last, is read by copying its numbers; any other
-    is decoded the general way once.
+    A message with our layout, or that of the last one, is read by copying its numbers; a new layout
+    is decoded in general form once.
     """
 
     def __init__(
         self, description: MessageDescription, record: np.dtype[Any] | None = None
     ) -> None:
-        """``record``: of the sample, whose fields the columns name (None: they are all of it)."""
+        """Create the codec.
+
+        Args:
+            description: of the messages.
+            record: dtype of the sample, with the columns as fields (None: only the columns).
+        """
         self._description = description
         own = description.own()
         self._into = _indices(description, record)
@@ -115,15 +120,15 @@ class CompiledCodec:
         self._pattern, self._known = known.layout.pattern, self._places(known)
 
     def encode(self, stamp_ns: int, values: Array) -> bytes:
-        """Our own message with the numbers of a sample."""
+        """Return the serialized message of a sample."""
         write(self._wire, self._own, values, stamp_ns)
         return self._wire.tobytes()
 
     def decode(self, data: bytes, values: Array) -> int:
-        """Fill a sample's numbers; the stamp, ns.
+        """Read a message into a sample's numbers; return its stamp, ns.
 
         Raises:
-            MessageError: the message does not fit, or is none.
+            MessageError: the bytes are not a message of this topic and robot.
         """
         stamp_ns = self.read(data, values)
         if stamp_ns == FOREIGN:
@@ -133,12 +138,12 @@ class CompiledCodec:
         return stamp_ns
 
     def read(self, data: bytes, values: Array) -> int:
-        """`decode`, but only of what is laid out as the message before; else `FOREIGN`."""
+        """Decode a message with the layout of the last one; return `FOREIGN` for another layout."""
         return read(data, self._pattern, self._known, values)
 
 
 def _indices(description: MessageDescription, record: np.dtype[Any] | None) -> Offsets:
-    """Places of the columns' numbers among all of a sample."""
+    """Return the indices of the columns' numbers in a sample."""
     fields = record.fields if record is not None else None
     if fields is None:
         return np.arange(sum(column.length for column in description.columns), dtype=np.uint64)

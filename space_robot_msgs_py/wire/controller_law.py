@@ -1,4 +1,4 @@
-"""/controller/law: a message whenever the law or its gains change."""
+"""/controller/law: a message for each change of the law or its gains."""
 
 from __future__ import annotations
 
@@ -13,24 +13,24 @@ from .definitions import decode
 NODE = topics.LAW.full_name.rpartition("/")[0] + "_node"
 """Full name of the node in the root namespace."""
 CONTROLLER = "controller"
-"""The parameter that names the law."""
+"""Parameter with the name of the law."""
 STRING, DOUBLE_ARRAY = 4, 8
-"""Members of rcl_interfaces/ParameterType."""
+"""Constants of rcl_interfaces/ParameterType."""
 
 
 class LawCodec:
-    """`LawInForce` as the parameters ``controller`` and ``<law>.<gain>``.
+    """Converts `LawInForce` to the parameters ``controller`` and ``<law>.<gain>``, and back.
 
-    They are ``new_parameters`` of the law a controller begins with, ``changed_parameters`` of
-    every other. A change is rare, so each message is laid out anew.
+    They are ``new_parameters`` for the initial law of a controller, ``changed_parameters`` for
+    every other. Changes are rare, so the layout of each message is computed again.
     """
 
     def __init__(self, timebase: Timebase, node: str = NODE) -> None:
-        """``node``: full name of the one whose law it is."""
+        """Create the codec; ``node`` is the full name of the controller node."""
         self._timebase, self._node = timebase, node
 
     def encode(self, law: LawInForce) -> bytes:
-        """The bytes of /controller/law."""
+        """Return the bytes of /controller/law."""
         sec, nanosec = divmod(self._timebase.stamp_ns(law.tick), 1_000_000_000)
         values: dict[str, dict[str, Any]] = {
             CONTROLLER: {"type": STRING, "string_value": law.name}
@@ -48,10 +48,10 @@ class LawCodec:
 
     @staticmethod
     def decode(data: bytes, tick: int) -> LawInForce:
-        """The law of a message stamped with ``tick``.
+        """Return the law of a message with the stamp of ``tick``.
 
         Raises:
-            MessageError: the message names no law, or a gain of it is no list of numbers.
+            MessageError: the message has no law, or a gain that is not a list of numbers.
         """
         message = decode(data, topics.LAW.type)
         parameters = {
@@ -64,7 +64,7 @@ class LawCodec:
         for key, value in parameters.items():
             if key.startswith(f"{name}."):
                 if value.type != DOUBLE_ARRAY:
-                    raise MessageError(f"{topics.LAW.full_name}: {key} is no list of numbers")
+                    raise MessageError(f"{topics.LAW.full_name}: {key} is not a list of numbers")
                 gains[key.removeprefix(f"{name}.")] = tuple(value.double_array_value.tolist())
         is_first = any(p.name == CONTROLLER for p in message.new_parameters)
         return LawInForce(tick, name, gains, is_first)

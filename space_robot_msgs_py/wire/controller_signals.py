@@ -1,4 +1,4 @@
-"""/controller/signals: the telemetry by the names of the axes, for plots; nobody here reads it."""
+"""/controller/signals: telemetry with names of the axes, for external plotting tools."""
 
 from __future__ import annotations
 
@@ -16,19 +16,19 @@ Array = NDArray[np.float64]
 
 
 class ControllerSignals(JointStates):
-    """A sensor_msgs/JointState, whose fields have the units of e, s and the estimate N_hat."""
+    """A sensor_msgs/JointState; its fields are e, s and the estimate N_hat in their units."""
 
     topic = topics.SIGNALS
     frame_id = topics.BASE_FRAME
 
     @classmethod
     def of_robot(cls, names: RobotNames, timebase: Timebase) -> ControllerSignals:
-        """The controlled axes."""
+        """Describe the messages for the controlled axes."""
         return cls(names.axes, timebase)
 
 
 class SignalsCodec:
-    """e, s and N_hat of a tick to their message."""
+    """Encodes e, s and N_hat of a tick."""
 
     def __init__(self, axis_names: Sequence[str], timebase: Timebase) -> None:
         self._codec = Codec(ControllerSignals(axis_names, timebase))

@@ -1,4 +1,4 @@
-"""/controller/telemetry: the signals inside the control law, now and then."""
+"""/controller/telemetry: internal signals of the control law."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ SIGNALS = ("s", "u", "n_hat", "e")
 
 
 class Telemetry(MessageDescription):
-    """A labelled std_msgs/Float64MultiArray, a row a signal; the padding before holds the tick."""
+    """A std_msgs/Float64MultiArray with one labelled row per signal, and the tick as padding."""
 
     topic = topics.TELEMETRY
 
     def content(self, rows: int = 1) -> Mapping[str, Any]:
-        """Its rows are those of one tick."""
+        """Return the fields; the rows belong to one tick."""
         axes = self.names
         size = len(SIGNALS) * len(axes)
         dimensions = (
@@ -45,14 +45,14 @@ class Telemetry(MessageDescription):
         }
 
     def runs(self, message: Any) -> Iterable[Run]:
-        """The tick, then all else."""
+        """Yield the tick, then the signals."""
         if not len(message.data):
             raise MessageError(f"{self.topic.full_name}: no tick")
         return (Run("data", range(len(message.data))),)
 
 
 class TelemetryCodec:
-    """s, u, N_hat and e of a tick to their message and back."""
+    """Converts s, u, N_hat and e of a tick to a message and back."""
 
     def __init__(self, axis_names: Sequence[str]) -> None:
         self._codec = Codec(Telemetry(axis_names, Timebase(1)))
@@ -60,7 +60,7 @@ class TelemetryCodec:
         self._rows = self._numbers[1:].reshape(len(SIGNALS), -1)
 
     def encode(self, tick: int, rows: Sequence[Array]) -> bytes:
-        """The bytes of /controller/telemetry for the rows named by `SIGNALS`."""
+        """Return the bytes of /controller/telemetry for the rows of `SIGNALS`."""
         self._numbers[0] = tick
         for target, row in zip(self._rows, rows, strict=True):
             target[:] = row
@@ -68,7 +68,7 @@ class TelemetryCodec:
 
     @staticmethod
     def decode(data: bytes) -> tuple[int, Array]:
-        """Tick and (4, n+3) rows.
+        """Return tick and rows (4, n+3).
 
         Raises:
             MessageError: the message does not fit.

@@ -21,17 +21,17 @@ _FIELD = re.compile(r"^([A-Za-z]\w*(?:/[A-Z]\w*)?)(?:\[.*?\])?\s+[a-z]\w*", re.M
 
 @cache
 def jazzy() -> Typestore:
-    """The message types of ROS 2 Jazzy, from rosbags."""
+    """Return the message types of ROS 2 Jazzy, from rosbags."""
     return get_typestore(Stores.ROS2_JAZZY)
 
 
 def decode(data: bytes, type_name: str) -> Any:
-    """Any message of Jazzy from its CDR bytes (slow; the codecs are the fast way).
+    """Decode any message of Jazzy from its CDR bytes (slow; the codecs are faster).
 
-    Bytes behind the message are let pass: rclpy's own serializer leaves some.
+    Bytes after the message are ignored: rclpy's serializer appends some.
 
     Raises:
-        MessageError: the bytes are no message of this type.
+        MessageError: the bytes are not a message of this type.
     """
     definition = jazzy().get_msgdef(type_name)
     parse = {b"\0\1": definition.deserialize_cdr_le, b"\0\0": definition.deserialize_cdr_be}
@@ -44,9 +44,9 @@ def decode(data: bytes, type_name: str) -> Any:
 
 @cache
 def definition(type_name: str) -> str:
-    """The ``ros2msg`` text of a type and all it contains, as rosbag2 stores it.
+    """Return the ``ros2msg`` text of a type with all nested types, as stored by rosbag2.
 
-    Taken from the ``.msg`` files of the ROS 2 at hand, comments and all; without ROS from
+    It is read from the ``.msg`` files of the installed ROS 2, with comments, or without ROS from
     rosbags, which has the same fields.
     """
     root = type_name.replace("/msg/", "/")
@@ -69,7 +69,7 @@ def definition(type_name: str) -> str:
 
 
 def _installed(name: str) -> str | None:
-    """The ``.msg`` file of ``package/Type`` in the sourced ROS, or in this Python's wheels."""
+    """Return the ``.msg`` text of ``package/Type`` from the installed ROS; None if not found."""
     package, _, type_name = name.partition("/")
     prefixes = [p for p in os.environ.get("AMENT_PREFIX_PATH", "").split(os.pathsep) if p]
     for prefix in [*prefixes, sys.prefix]:

@@ -14,7 +14,7 @@ from .message import MessageDescription, Run, SampleColumn, name_order
 class JointStates(MessageDescription):
     """A sensor_msgs/JointState; its efforts are the torques and forces applied to the joints.
 
-    Joints without motors stand behind those that have one; nothing is applied to them.
+    Passive joints come after the actuated ones and have no efforts.
     """
 
     topic = topics.JOINT_STATES
@@ -22,7 +22,7 @@ class JointStates(MessageDescription):
     frame_id: str = ""
 
     def __init__(self, names: Sequence[str], timebase: Timebase, passive: int = 0) -> None:
-        """``passive``: so many of the names, the last ones, are of joints without motors."""
+        """Describe the messages; the last ``passive`` names are passive joints."""
         super().__init__(names, timebase)
         self._passive = passive
         n = len(self.names) - passive
@@ -36,11 +36,11 @@ class JointStates(MessageDescription):
 
     @classmethod
     def of_robot(cls, names: RobotNames, timebase: Timebase) -> JointStates:
-        """All joints."""
+        """Describe the messages for all joints."""
         return cls(names.all_joints, timebase, len(names.passive))
 
     def content(self, rows: int = 1) -> Mapping[str, Any]:
-        """Our names, and the numbers of our fields."""
+        """Return names, and the fields with zeros."""
         numbers = [0.0] * len(self.names)
         return {
             "header": {"frame_id": self.frame_id},
@@ -49,7 +49,7 @@ class JointStates(MessageDescription):
         }
 
     def runs(self, message: Any) -> Iterable[Run]:
-        """Field by field in the order of our names, whatever theirs."""
+        """Yield the fields in the order of our names, for any order in the message."""
         order = name_order(message.name, self.names, self.topic.full_name)
         for field in self.fields:
             count = len(getattr(message, field))

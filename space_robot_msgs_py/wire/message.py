@@ -1,9 +1,9 @@
-"""The description of a topic's messages: one, for all who write and read them.
+"""Descriptions of a topic's messages, used by all writers and readers.
 
-A topic's description stands in the module that is named after it (`description`). It says what
-our own message is made of, and where in a decoded one, ours or another's, the numbers of a sample
-stand. All else follows from the message's definition: the codecs and the bag reader read every
-message that is laid out like one they have seen by copying its numbers.
+The description of a topic is in the module with its name (`description`). It defines the content of
+our messages, and where the numbers of a sample are in any decoded message. The rest follows from
+the message's definition: codecs and bag reader read messages with a known layout by copying their
+numbers.
 """
 
 from __future__ import annotations
@@ -27,87 +27,87 @@ Offsets = NDArray[np.uint64]
 
 
 class SampleColumn(NamedTuple):
-    """The place of some of a sample's numbers: in a `State`, and in the rows of a flight log."""
+    """Position of some of a sample's numbers in a `State` and in the rows of a flight log."""
 
     name: str
     first: int
-    """The first of them among the numbers of that field."""
+    """Index of the first one in the field."""
     length: int
 
 
 class Run(NamedTuple):
-    """Some of a sample's numbers, in its order, by their places in a slot of the message."""
+    """Some of a sample's numbers, in order, by their indices in a slot of the message."""
 
     path: str
     order: Sequence[int]
 
 
 def body(message: Bytes) -> Array:
-    """All that may be float64 in a message's bytes; a view."""
+    """Return a message's bytes after its header as an array of float64; a view."""
     behind = message[BODY:]
     return behind[: len(behind) // 8 * 8].view(np.float64)
 
 
 class Numbers(NamedTuple):
-    """The places of a sample's numbers in all messages of a layout."""
+    """Positions of a sample's numbers in all messages of a layout."""
 
     layout: MessageLayout
     offsets: Offsets
-    """(K,) bytes from the message's beginning."""
+    """(K,) offsets from the start of the message, bytes."""
 
     @property
     def words(self) -> NDArray[np.intp]:
-        """(K,) places in `body`."""
+        """(K,) indices into `body`."""
         return ((self.offsets - np.uint64(BODY)) // np.uint64(8)).astype(np.intp)
 
     @property
     def values(self) -> Array:
-        """(K,) numbers of the message that was laid out."""
+        """(K,) numbers of the message that defined the layout."""
         return body(self.layout.pattern[0])[self.words]
 
 
 class MessageDescription(ABC):
-    """The messages of one topic, and what their numbers mean."""
+    """Description of the messages of a topic, and of their numbers."""
 
     topic: ClassVar[Topic]
     columns: tuple[SampleColumn, ...] = ()
-    """The columns of one row, in the order of its numbers; of several rows each is a tick."""
+    """Columns of a row, in the order of its numbers; each row of a message is a tick."""
 
     def __init__(self, names: Sequence[str], timebase: Timebase) -> None:
         """Describe the messages of a robot.
 
         Args:
             names: of the joints or axes, in the order of the sample's numbers.
-            timebase: of the stamps.
+            timebase: conversion between ticks and stamps.
         """
         self.names, self.timebase = tuple(names), timebase
 
     @classmethod
     def of_robot(cls, names: RobotNames, timebase: Timebase) -> MessageDescription:
-        """The messages of a robot with these names, of which most need those of the joints."""
+        """Describe the messages of a robot; by default with the names of its joints."""
         return cls(names.joints, timebase)
 
     @abstractmethod
     def content(self, rows: int) -> Mapping[str, Any]:
-        """The fields of our own message of so many rows; its numbers, all zero, may be left out."""
+        """Return the fields of our message with ``rows`` rows; its numbers may be omitted."""
 
     @abstractmethod
     def runs(self, message: Any) -> Iterable[Run]:
-        """The numbers of a decoded message, row by row, in the order of the columns.
+        """Yield the numbers of a decoded message, row by row, in the order of the columns.
 
         Raises:
-            MessageError: it does not fit.
+            MessageError: the message does not fit this robot.
         """
 
     def own(self, rows: int = 1) -> Numbers:
-        """The layout of our own message."""
+        """Return the layout of our message."""
         return self.learn(MessageLayout(self.topic.type, self.content(rows)).data)
 
     def learn(self, data: bytes) -> Numbers:
-        """The layout of any message of the topic.
+        """Return the layout of any message of the topic.
 
         Raises:
-            MessageError: it does not fit, or is none.
+            MessageError: the bytes are not a message of this topic and robot.
         """
         message = decode(data, self.topic.type)
         runs = list(self.runs(message))
@@ -117,10 +117,10 @@ class MessageDescription(ABC):
 
 
 def name_order(names: Sequence[str], expected: Sequence[str], topic: str) -> list[int]:
-    """Find where each expected name stands among the given ones.
+    """Return the index of each expected name in ``names``.
 
     Raises:
-        MessageError: other names than expected.
+        MessageError: the names are not the expected ones.
     """
     if sorted(names) != sorted(expected):
         raise MessageError(f"{topic}: names {list(names)}, expected {list(expected)}", "names")
@@ -128,9 +128,9 @@ def name_order(names: Sequence[str], expected: Sequence[str], topic: str) -> lis
 
 
 def description(topic: Topic) -> type[MessageDescription] | None:
-    """Find the description of a topic's messages in the module of this folder with its name.
+    """Return the description of a topic's messages, from the module with its name.
 
-    None of one whose messages are no columns of numbers.
+    None for a topic without columns of numbers.
     """
     module = import_module(f"{__package__}.{topic.name.replace('/', '_')}")
     for known in vars(module).values():

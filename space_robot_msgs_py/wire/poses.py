@@ -1,4 +1,4 @@
-"""Messages that hold poses of always the same frames or shapes, all with one stamp."""
+"""Messages with poses of a constant set of frames or shapes, all with one stamp."""
 
 from __future__ import annotations
 
@@ -15,22 +15,22 @@ from .message import body
 Array = NDArray[np.float64]
 
 POSE = 7
-"""Numbers of a pose: translation, m, and rotation x, y, z, w to the axes of the outer frame."""
+"""Numbers of a pose: translation, m, and quaternion x, y, z, w, relative to the parent frame."""
 
 
 class PosesCodec:
-    """Writes poses and stamps into a message of which all else stays as it is."""
+    """Writes poses and stamps into a message that is otherwise constant."""
 
     def __init__(
         self, type_name: str, content: Mapping[str, Any], paths: Sequence[str], timebase: Timebase
     ) -> None:
-        """Lay the message out.
+        """Compute the layout of the message.
 
         Args:
-            type_name: its type.
-            content: its fields but for poses and stamps.
-            paths: where each pose begins, as ``transforms[0].transform.translation``.
-            timebase: of the stamps.
+            type_name: type of the message.
+            content: its fields without poses and stamps.
+            paths: start of each pose, such as ``transforms[0].transform.translation``.
+            timebase: conversion between ticks and stamps.
         """
         self._timebase = timebase
         layout = MessageLayout(type_name, content)

@@ -21,15 +21,15 @@ class ReferenceBase(Trajectory):
     frame_id = topics.INERTIAL_FRAME
 
     def __init__(self, names: Sequence[str], timebase: Timebase) -> None:
-        """``names``: those of the joints do not matter here."""
+        """Describe the messages; ``names`` is not used."""
         super().__init__([topics.BASE_JOINT], timebase)
 
     def point(self) -> Mapping[str, Any]:
-        """One body."""
+        """Return the fields of a point with one body."""
         return {"transforms": [{}], "velocities": [{}], "accelerations": [{}]}
 
     def point_runs(self, point: Any, order: Sequence[int]) -> Iterable[Run]:
-        """Quaternion w x y z, angular velocity and acceleration in the base's frame."""
+        """Yield quaternion w, x, y, z, angular velocity and acceleration in the base's frame."""
         if not len(point.transforms) == len(point.velocities) == len(point.accelerations) == 1:
             raise MessageError(
                 f"{self.topic.full_name}: a point lacks pose, velocity or acceleration", "size"

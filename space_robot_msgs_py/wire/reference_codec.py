@@ -1,4 +1,4 @@
-"""The desired motion as /reference/joints and /reference/base, and back."""
+"""Conversion of the desired motion to /reference/joints and /reference/base, and back."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ Array = NDArray[np.float64]
 
 
 class ReferenceCodec:
-    """`ReferenceChunk` to and from its two messages.
+    """Converts `ReferenceChunk` to its two messages and back.
 
-    Lengths may differ from message to message; those of one length are fast.
+    The length of messages may vary; a constant length is fastest.
     """
 
     def __init__(self, joint_names: Sequence[str], timebase: Timebase) -> None:
@@ -27,13 +27,13 @@ class ReferenceCodec:
         self._base = Codec(ReferenceBase(joint_names, timebase))
 
     def encode(self, chunk: ReferenceChunk) -> tuple[bytes, bytes]:
-        """The bytes of /reference/joints and /reference/base."""
+        """Return the bytes of /reference/joints and /reference/base."""
         stamp_ns = self._timebase.stamp_ns(chunk.start)
         joints, base = chunk.joints.reshape(-1), chunk.base.reshape(-1)
         return self._joints.encode(stamp_ns, joints), self._base.encode(stamp_ns, base)
 
     def decode_joints(self, data: bytes) -> tuple[int, Array]:
-        """First tick and (k, 3, n) rows of a /reference/joints.
+        """Return first tick and rows (k, 3, n) of a /reference/joints.
 
         Raises:
             MessageError: other joints than expected, or points not one tick apart.
@@ -42,7 +42,7 @@ class ReferenceCodec:
         return self._timebase.tick(stamp_ns), values.reshape(-1, 3, self._n)
 
     def decode_base(self, data: bytes) -> tuple[int, Array]:
-        """First tick and (k, 10) rows of a /reference/base.
+        """Return first tick and rows (k, 10) of a /reference/base.
 
         Raises:
             MessageError: points not one tick apart.

@@ -24,11 +24,11 @@ class ReferenceJoints(Trajectory):
         self.columns = (SampleColumn("reference_joints", 0, len(FIELDS) * len(self.names)),)
 
     def point(self) -> Mapping[str, Any]:
-        """A number a joint of each field."""
+        """Return the fields of a point with one number per joint."""
         return dict.fromkeys(FIELDS, [0.0] * len(self.names))
 
     def point_runs(self, point: Any, order: Sequence[int]) -> Iterable[Run]:
-        """Positions, velocities, accelerations, each in the order of our names."""
+        """Yield positions, velocities and accelerations, each in the order of our names."""
         for field in FIELDS:
             if len(getattr(point, field)) != len(order):
                 raise MessageError(

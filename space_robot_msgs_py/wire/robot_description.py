@@ -1,4 +1,4 @@
-"""/robot_description: the robot as the text of a URDF, for whoever draws or plans with it."""
+"""/robot_description: the robot as URDF text, for viewers and planners."""
 
 from __future__ import annotations
 
@@ -7,9 +7,9 @@ from .cdr import MessageLayout
 
 
 def robot_description(text: str) -> bytes:
-    """Return the std_msgs/String of a URDF, with ends of lines behind it up to a whole word.
+    """Return the std_msgs/String of a URDF, padded with newlines to a multiple of the word size.
 
-    The middleware would fill that up with zeros: so it is sent as it is written here.
+    Otherwise the middleware would append zeros, and received bytes would differ.
     """
     missing = -(len(text.encode()) + 1) % 4
     return MessageLayout(topics.ROBOT_DESCRIPTION.type, {"data": text + missing * "\n"}).data

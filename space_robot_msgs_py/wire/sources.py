@@ -1,9 +1,9 @@
-"""The publishers of a topic: the graph's own, and foreign ones.
+"""Identification of a topic's publishers: the graph's own, and foreign ones.
 
-A topic of the graph has one publisher. Its node has claimed the topic and noted its publisher's
-identity there, so it is told from others without asking anybody's name, from its first message on;
-one that was started again has claimed the topic anew. Each publisher counts what it sends, so
-what it sent and did not come here is known whatever the stamps say.
+A topic of the graph has one publisher. Its node has claimed the topic with the publisher's identity
+(GID), so its messages are recognised from the first one on, without discovery; a restarted node
+claims the topic again. Each publisher counts its messages, so lost messages are detected
+independently of the stamps.
 """
 
 from __future__ import annotations
@@ -13,53 +13,53 @@ from dataclasses import dataclass
 from typing import NamedTuple, Protocol
 
 PARTICIPANT_BYTES = 12
-"""The first bytes of a publisher's GID, which name the participant, so the process."""
+"""Number of first bytes of a GID that identify the participant, hence the process."""
 
 
 class Claimed(NamedTuple):
-    """The claim on a topic."""
+    """Claim on a topic."""
 
     publishers: tuple[bytes, ...] = ()
-    """The GIDs noted last, the newest last, of nodes that may have ended since."""
+    """GIDs of the last claims, the newest last; their nodes may have ended."""
     is_held: bool = False
-    """True if that node still lives."""
+    """True if the node of the newest claim is alive."""
 
 
 class Publishers(Protocol):
-    """Finds out about the publishers of a topic, without their messages."""
+    """Information on the publishers of a topic, independent of their messages."""
 
     def claimed(self, topic: str) -> Claimed:
-        """Return who has claimed it."""
+        """Return the claim on a topic."""
 
     def names(self, topic: str) -> Mapping[bytes, str]:
-        """Full node name by GID of all that are listed now; empty of one without a name."""
+        """Return the full node name of each discovered publisher by GID; empty if unknown."""
 
 
 class Unknown:
-    """Sources that cannot be identified: every publisher is accepted as the flight's own."""
+    """Publishers that cannot be identified: all are accepted as the graph's own."""
 
     def claimed(self, topic: str) -> Claimed:
-        """Nobody has."""
+        """Return an empty claim."""
         return Claimed()
 
     def names(self, topic: str) -> Mapping[bytes, str]:
-        """None is listed."""
+        """Return no names."""
         return {}
 
 
 @dataclass(slots=True)
 class Source:
-    """One publisher's messages, counted."""
+    """Counts the messages of one publisher."""
 
     is_ours: bool
     is_claimed: bool
     received: int = 0
     last: int = 0
-    """The highest sequence number."""
+    """Highest sequence number."""
     passed_over: int = 0
-    """Messages sent while nothing was to be recorded."""
+    """Number of messages sent while recording was paused."""
     reported: int = 0
-    """Messages that were sent, by their sender's own account."""
+    """Number of sent messages, as reported by the sender."""
     is_resuming: bool = False
     name: str = ""
 
@@ -73,33 +73,33 @@ class Source:
 
     @property
     def holes(self) -> int:
-        """Messages that were sent before the last one here and are not here."""
+        """Number of messages that were sent before the last received one and are missing."""
         return max(0, self.last - self.received - self.passed_over)
 
     @property
     def tail(self) -> int:
-        """Messages that were sent after the last one here."""
+        """Number of messages that were sent after the last received one."""
         return 0 if self.is_resuming else max(0, self.reported - self.last)
 
 
 class Sources:
-    """The publishers of one topic. Independent of ROS."""
+    """Identifies and counts the publishers of one topic; independent of ROS."""
 
     def __init__(self, topic: str, publishers: Publishers) -> None:
         self._topic, self._publishers = topic, publishers
         self._sources: dict[bytes, Source] = {}
         self._was_claimed = self._has_paused = False
         self.is_counted = False
-        """True if our publisher tells how many messages it sent."""
+        """True if our publisher reports its number of sent messages."""
         self.begins_anew = False
-        """True if what was recorded so far turned out to be a foreign publisher's."""
+        """True if already recorded messages are those of a foreign publisher."""
 
     def take(self, publisher: bytes, sequence: int) -> bool:
-        """Count a message; whether it is ours.
+        """Count a message; return True if it is ours.
 
         Args:
-            publisher: GID; empty where messages tell none: then all are taken for ours.
-            sequence: number of the message of its publisher, from 1 on; 0: unknown.
+            publisher: GID; empty if unknown: then all messages count as ours.
+            sequence: the publisher's number of the message, from 1; 0: unknown.
         """
         if not publisher:
             return True
@@ -110,9 +110,11 @@ class Sources:
         return source.is_ours
 
     def note_sent(self, participant: bytes, count: int) -> None:
-        """Our publisher of this participant says that it has sent ``count`` messages.
+        """Store the number of sent messages reported by our publisher.
 
-        Of no use where messages tell no publisher (empty).
+        Args:
+            participant: of the publisher; empty if unknown: then the report is ignored.
+            count: number of sent messages.
         """
         if not participant:
             return
@@ -121,19 +123,19 @@ class Sources:
         if not same and count:
             claimed = self._publishers.claimed(self._topic).publishers
             same = [p for p in claimed if p[:PARTICIPANT_BYTES] == participant]
-        if same:  # of several the newest: a node that was configured again counts anew
+        if same:  # the newest of several: a reconfigured node restarts its count
             source = self._sources.get(same[-1]) or self._meet(same[-1])
             source.reported = max(source.reported, count)
             self.is_counted = True
 
     def pause(self) -> None:
-        """Pass over what each publisher sends until its next message here."""
+        """Ignore the messages of each publisher until its next received one."""
         self._has_paused = True
         for source in self._sources.values():
             source.is_resuming = True
 
     def find_names(self) -> None:
-        """Look for names of foreign publishers that have none yet."""
+        """Look up the names of foreign publishers that are still unknown."""
         nameless = {p: s for p, s in self._sources.items() if not (s.is_ours or s.name)}
         names = self._publishers.names(self._topic) if nameless else {}
         for publisher, source in nameless.items():
@@ -141,32 +143,32 @@ class Sources:
 
     @property
     def holes(self) -> int:
-        """Messages that our publishers sent before the last one here and that are not here."""
+        """Number of missing messages of our publishers before the last received ones."""
         return sum(source.holes for source in self._sources.values() if source.is_ours)
 
     @property
     def tail(self) -> int:
-        """Messages that our publishers sent after the last one here."""
+        """Number of messages that our publishers sent after the last received ones."""
         return sum(source.tail for source in self._sources.values() if source.is_ours)
 
     @property
     def is_behind(self) -> bool:
-        """True if our publishers say that they have sent more than has come."""
+        """True if our publishers report more messages than were received."""
         return self.tail > 0
 
     @property
     def passed_over(self) -> int:
-        """Messages of our publishers that were sent while nothing was to be recorded."""
+        """Number of messages of our publishers sent while recording was paused."""
         return sum(source.passed_over for source in self._sources.values() if source.is_ours)
 
     @property
     def foreign(self) -> int:
-        """Messages of foreign publishers."""
+        """Number of messages of foreign publishers."""
         return sum(source.received for source in self._sources.values() if not source.is_ours)
 
     @property
     def foreign_names(self) -> list[str]:
-        """Their nodes, or how many have no name."""
+        """Node names of foreign publishers, and the number of those without name."""
         foreign = [source.name for source in self._sources.values() if not source.is_ours]
         names = sorted({name for name in foreign if name})
         if nameless := foreign.count(""):
@@ -178,7 +180,7 @@ class Sources:
         self._was_claimed = self._was_claimed or claim.is_held or publisher in claim.publishers
         if is_claimed := publisher in claim.publishers:
             for other in self._sources.values():
-                if other.is_ours and not other.is_claimed:  # it was there first, but is foreign
+                if other.is_ours and not other.is_claimed:  # it was first, but is foreign
                     other.is_ours, self.begins_anew = False, True
         is_ours = is_claimed or (not self._was_claimed and self._follows(publisher))
         source = Source(is_ours, is_claimed, is_resuming=self._has_paused)
@@ -186,7 +188,7 @@ class Sources:
         return source
 
     def _follows(self, publisher: bytes) -> bool:
-        """Return True for the first publisher of an unclaimed topic, or its restart."""
+        """Return True for the first publisher of an unclaimed topic, or its restarted node."""
         ours = [p for p, source in self._sources.items() if source.is_ours]
         if not ours:
             return True

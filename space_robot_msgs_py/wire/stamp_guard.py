@@ -1,30 +1,30 @@
-"""Stamps of states, believed or not."""
+"""Plausibility check of the stamps of states."""
 
 from __future__ import annotations
 
 AGREEING = 5
-"""So many other stamps in a row that fit one another are a new time, not a fault."""
+"""Number of consecutive consistent stamps after which a new time is accepted."""
 
 
 class StampGuard:
-    """Lets stamps pass that rise by no more than a jump. Independent of ROS.
+    """Accepts stamps that increase by at most a limit; independent of ROS.
 
-    A single stamp that goes back or jumps is wrong. Several that agree mean a new time: the plant
-    has started anew, or this node has slept.
+    A single stamp that goes back or jumps is rejected. Several consistent ones mean a new time: the
+    plant was restarted, or this node was suspended.
     """
 
     def __init__(self, longest_jump: int) -> None:
-        """``longest_jump``: ticks from one state to the next that are still believed."""
+        """Create the guard; ``longest_jump`` is the largest accepted step in ticks."""
         self._longest_jump = longest_jump
         self.last = -1
-        """The last tick believed; -1 before the first."""
+        """Last accepted tick; -1 before the first."""
         self.is_new_time = False
-        """True if the last tick believed did not follow the one before."""
+        """True if the last accepted tick started a new time."""
         self._other = -1
         self._agreeing = 0
 
     def passes(self, tick: int) -> bool:
-        """Return True if a state of ``tick`` is to be believed, which is then the last one."""
+        """Return True if ``tick`` is accepted; it is then the last one."""
         follows = 0 < tick - self.last <= self._longest_jump
         if not follows and self.last >= 0:
             agrees = self._agreeing and 0 <= tick - self._other <= self._longest_jump

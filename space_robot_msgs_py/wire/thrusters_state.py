@@ -11,18 +11,18 @@ from .message import SampleColumn
 
 
 class ThrustersState(JointStates):
-    """A sensor_msgs/JointState whose efforts are forces, N: the means over the last interval."""
+    """A sensor_msgs/JointState; its efforts are the mean forces over the last tick, N."""
 
     topic = topics.THRUSTERS_STATE
     fields = ("effort",)
     frame_id = topics.BASE_FRAME
 
     def __init__(self, names: Sequence[str], timebase: Timebase) -> None:
-        """``names``: of the thrusters."""
+        """Describe the messages; ``names`` are those of the thrusters."""
         super().__init__(names, timebase)
         self.columns = (SampleColumn("thrusts", 0, len(self.names)),)
 
     @classmethod
     def of_robot(cls, names: RobotNames, timebase: Timebase) -> ThrustersState:
-        """The thrusters alone."""
+        """Describe the messages for the thrusters."""
         return cls(names.thrusters, timebase)

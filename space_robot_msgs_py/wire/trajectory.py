@@ -1,4 +1,4 @@
-"""The common part of both halves of the reference: points one tick apart."""
+"""Common base of trajectory messages: points with a spacing of one tick."""
 
 from __future__ import annotations
 
@@ -11,27 +11,27 @@ from .message import MessageDescription, Run, name_order
 
 
 class Trajectory(MessageDescription):
-    """A trajectory message: a row a point, the first at the message's stamp.
+    """A trajectory message: one row per point, the first at the message's stamp.
 
-    The times of the points are no numbers but part of the layout: all messages have the same.
+    The times of the points are a constant part of the layout.
     """
 
     frame_id = ""
 
     @abstractmethod
     def point(self) -> Mapping[str, Any]:
-        """The fields of one of our points."""
+        """Return the fields of one of our points."""
 
     @abstractmethod
     def point_runs(self, point: Any, order: Sequence[int]) -> Iterable[Run]:
-        """The numbers of a decoded point; ``order``: where our names stand among the message's.
+        """Yield the numbers of a decoded point; ``order``: index of our names in the message.
 
         Raises:
-            MessageError: it lacks some.
+            MessageError: numbers are missing.
         """
 
     def content(self, rows: int) -> Mapping[str, Any]:
-        """Names, and so many points."""
+        """Return names and ``rows`` points."""
         after = [divmod(self.timebase.stamp_ns(i), 1_000_000_000) for i in range(rows)]
         return {
             "header": {"frame_id": self.frame_id},
@@ -43,7 +43,7 @@ class Trajectory(MessageDescription):
         }
 
     def runs(self, message: Any) -> Iterable[Run]:
-        """Point by point."""
+        """Yield the numbers point by point."""
         order = name_order(message.joint_names, self.names, self.topic.full_name)
         if not message.points:
             raise MessageError(f"{self.topic.full_name}: a trajectory without points")

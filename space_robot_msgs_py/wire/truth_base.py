@@ -1,4 +1,4 @@
-"""/truth/base: the base as it truly moves."""
+"""/truth/base: the true motion of the base."""
 
 from __future__ import annotations
 
@@ -26,15 +26,15 @@ class TruthBase(Trajectory):
     frame_id = topics.INERTIAL_FRAME
 
     def __init__(self, names: Sequence[str], timebase: Timebase) -> None:
-        """``names``: those of the joints do not matter here."""
+        """Describe the messages; ``names`` is not used."""
         super().__init__([topics.BASE_JOINT], timebase)
 
     def point(self) -> Mapping[str, Any]:
-        """One body."""
+        """Return the fields of a point with one body."""
         return {"transforms": [{}], "velocities": [{}]}
 
     def point_runs(self, point: Any, order: Sequence[int]) -> Iterable[Run]:
-        """Pose; velocity on inertial axes, angular velocity on base axes."""
+        """Yield pose, velocity in the inertial frame, angular velocity in the base's frame."""
         if not len(point.transforms) == len(point.velocities) == 1:
             raise MessageError(f"{self.topic.full_name}: a point lacks pose or velocity", "size")
         return (

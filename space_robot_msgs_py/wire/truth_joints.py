@@ -1,4 +1,4 @@
-"""/truth/joints: the controlled axes as they truly move, and the torques truly given to them."""
+"""/truth/joints: true motion of the controlled axes, and the torques actually applied."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ FIELDS = ("positions", "velocities", "effort")
 class TruthJoints(Trajectory):
     """A trajectory_msgs/JointTrajectory of base x, y, z and the joints, as in /command.
 
-    The base's positions are the vector part of its quaternion, its velocities are on base axes.
-    Joints without motors stand behind the others; nothing is given to them.
+    The base's positions are the vector part of its quaternion, its velocities are in base axes.
+    Passive joints come last and have no efforts.
     """
 
     topic = topics.TRUTH_JOINTS
 
     def __init__(self, names: Sequence[str], timebase: Timebase, passive: int = 0) -> None:
-        """``names``: of the joints; so many of them, the last ones, are ``passive``."""
+        """Describe the messages; the last ``passive`` names of joints are passive."""
         n = len(names) - passive
         super().__init__((*topics.BASE_AXES, *names), timebase)
         self._passive = passive
@@ -40,15 +40,15 @@ class TruthJoints(Trajectory):
 
     @classmethod
     def of_robot(cls, names: RobotNames, timebase: Timebase) -> TruthJoints:
-        """All joints."""
+        """Describe the messages for all joints."""
         return cls(names.all_joints, timebase, len(names.passive))
 
     def point(self) -> Mapping[str, Any]:
-        """A number an axis of each field."""
+        """Return the fields of a point with one number per axis."""
         return dict.fromkeys(FIELDS, [0.0] * len(self.names))
 
     def point_runs(self, point: Any, order: Sequence[int]) -> Iterable[Run]:
-        """Positions, velocities, effort, each in the order of our names."""
+        """Yield positions, velocities and efforts, each in the order of our names."""
         for field in FIELDS:
             if len(getattr(point, field)) != len(order):
                 raise MessageError(

@@ -1,4 +1,4 @@
-"""True states as messages, many ticks in one: as rare as the reference's, they cost as little."""
+"""Messages of true states, many ticks in one, to reduce their cost."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ from .truth_base import TruthBase
 from .truth_joints import TruthJoints
 
 CHUNK_TICKS = 20
-"""Ticks in a message: so many at most are lost with a plant that is killed."""
+"""Ticks per message, hence the maximum number of ticks lost with a killed plant."""
 
 Messages = Iterable[tuple[topics.Topic, bytes]]
 
 
 class TruthWriter:
-    """Collects the true state of every tick; gives /truth/joints and /truth/base now and then."""
+    """Collects the true state of every tick for /truth/joints and /truth/base."""
 
     def __init__(self, names: RobotNames, timebase: Timebase) -> None:
         descriptions: tuple[MessageDescription, ...] = (
@@ -34,7 +34,7 @@ class TruthWriter:
         self._start = self._count = 0
 
     def add(self, truth: RobotState) -> Messages:
-        """Take the state of a tick, one after the other; return messages that are complete."""
+        """Add the state of the next tick; return complete messages."""
         if not self._count:
             self._start = truth.tick
         self._numbers[self._count] = truth.numbers
@@ -42,7 +42,7 @@ class TruthWriter:
         return self.flush() if self._count == CHUNK_TICKS else ()
 
     def flush(self) -> Messages:
-        """Return the messages of what has been taken and not given out."""
+        """Return messages of the remaining states."""
         rows, self._count = self._rows[: self._count], 0
         if not len(rows):
             return ()

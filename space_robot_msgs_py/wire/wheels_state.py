@@ -11,14 +11,14 @@ from .message import SampleColumn
 
 
 class WheelsState(JointStates):
-    """A sensor_msgs/JointState: speeds relative to the base, and the torques the motors gave."""
+    """A sensor_msgs/JointState: speeds relative to the base, rad/s, and motor torques, N m."""
 
     topic = topics.WHEELS_STATE
     fields = ("velocity", "effort")
     frame_id = topics.BASE_FRAME
 
     def __init__(self, names: Sequence[str], timebase: Timebase) -> None:
-        """``names``: of the wheels."""
+        """Describe the messages; ``names`` are those of the wheels."""
         super().__init__(names, timebase)
         count = len(self.names)
         self.columns = (
@@ -28,5 +28,5 @@ class WheelsState(JointStates):
 
     @classmethod
     def of_robot(cls, names: RobotNames, timebase: Timebase) -> WheelsState:
-        """The wheels alone."""
+        """Describe the messages for the wheels."""
         return cls(names.wheels, timebase)

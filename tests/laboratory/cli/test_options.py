@@ -80,7 +80,7 @@ def test_parameters_of_a_scenario_and_those_given(
         ("parameters: ['plant.case=[']", "parameters 'plant.case': line 2: not YAML"),
         ("5: 6", "unknown key 5"),
         ("[1]", "a mapping was expected, got list"),
-        ("[1]: 2", "a key must be a word or a number"),
+        ("[1]: 2", "a key must be a text or a number"),
     ],
 )
 def test_a_wrong_scenario_is_refused(tmp_path: Path, content: str, said: str) -> None:
@@ -93,7 +93,7 @@ def test_a_wrong_scenario_is_refused(tmp_path: Path, content: str, said: str) ->
     ("text", "said"),
     [
         ("plant.case=[", "--set 'plant.case': line 2: not YAML"),
-        ("plant.case=!!int x", "the value 'x' is no int"),
+        ("plant.case=!!int x", "the value 'x' is not of type int"),
         ("plant.case=" + "[" * 20_000, "nested deeper"),
         ("plant.case", "NODE.PARAM=VALUE expected"),
         ("plnt.case=1", "unknown node 'plnt'"),

@@ -55,7 +55,7 @@ def test_a_namespace_begins_with_a_slash_and_ends_without(text: str, namespace: 
 
 @pytest.mark.parametrize("text", ["1a", "a/1", "a//b", "a__b", "a b", "ä", "a-b", "~a", "a\n"])
 def test_what_ros_does_not_take_is_no_namespace(text: str) -> None:
-    with pytest.raises(InputError, match="is no namespace: letters, digits and _") as caught:
+    with pytest.raises(InputError, match="is not a namespace: letters, digits and _") as caught:
         full_namespace(text)
     assert str(caught.value).startswith(repr(text))
 

@@ -159,7 +159,7 @@ def test_a_parameter_event_that_names_no_law_is_an_error() -> None:
     with pytest.raises(MessageError, match="no parameter 'controller'"):
         LawCodec.decode(data.replace(b"controller\0", b"kontroller\0"), 0)
     at = data.index(b"ctc.k_p\0") + 8
-    with pytest.raises(MessageError, match=r"ctc\.k_p is no list of numbers"):
+    with pytest.raises(MessageError, match=r"ctc\.k_p is not a list of numbers"):
         LawCodec.decode(data[:at] + b"\x03" + data[at + 1 :], 0)
 
 

@@ -205,7 +205,7 @@ def test_a_step_that_the_end_of_the_flight_cuts_short_is_told(
     [
         (("step", "--ticks", "0"), "--ticks 0: 1 to 10000000000 were expected"),
         (("step", "--ticks", "-3"), "--ticks -3: 1 to 10000000000 were expected"),
-        (("pause", "--namespace", "9"), "is no namespace"),
+        (("pause", "--namespace", "9"), "is not a namespace"),
         (("pause",), "no service /plant_node/pause in ROS domain"),
     ],
 )
