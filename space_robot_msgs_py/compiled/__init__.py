@@ -1,1 +1,1 @@
-"""Compiled functions, their cache on disk, and the records that they share with Python."""
+"""Compiled functions, their cache on disk, and records shared by compiled code and Python."""

@@ -1,7 +1,7 @@
-"""Blocks in compiled code: arrays (k,) of records, one type for all numbers of joints n.
+"""Blocks in compiled code: arrays (k,) of records, one type for any number of joints n.
 
 ``block[i]`` is a record, ``block[i:j]`` a block, ``block.size`` is k, and ``block[i] = record``
-copies it. A block from Python tells n by the size of its items.
+copies it. For a block from Python, n follows from the size of its items.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ _typeof_array = typeof_impl.dispatch(np.ndarray)
 
 
 class BlockType(types.Type):
-    """A block of records of a layout."""
+    """Numba type of a block of records with a layout."""
 
     def __init__(self, layout: Layout) -> None:
         self.record = RecordType(layout)
@@ -40,7 +40,7 @@ class BlockType(types.Type):
 
     @property
     def key(self) -> Any:
-        """What tells it from another type, for Numba."""
+        """Identity of the type, for Numba."""
         return self.record.layout
 
 
@@ -68,7 +68,7 @@ def _unbox_block(kind: BlockType, array: Any, c: Any) -> Any:
     block.n = joints(c.builder, kind.record.layout.size, native.itemsize)
     (block.size,) = cgutils.unpack_tuple(c.builder, native.shape)
     (block.step,) = cgutils.unpack_tuple(c.builder, native.strides)
-    # the caller keeps the array
+    # the caller holds the reference to the array
     c.context.nrt.decref(c.builder, plain, native._getvalue())
     return NativeValue(block._getvalue(), is_error=error)
 

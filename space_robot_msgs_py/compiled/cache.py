@@ -1,4 +1,4 @@
-"""Where compiled code is kept on disk; the folder's name is a digest of the source."""
+"""Folder of the compiled code on disk; its name is a digest of the sources."""
 
 from __future__ import annotations
 
@@ -12,18 +12,18 @@ from functools import cache
 from pathlib import Path
 
 ROOM_BYTES = 16 << 20
-"""Size that a whole cache needs, with room to spare."""
+"""Required free space for a complete cache, with reserve."""
 
 
 @cache
 def cache_directory() -> Path:
-    """Folder of the compiled kernels: ``NUMBA_CACHE_DIR`` or the user's cache, by source digest.
+    """Return the folder of compiled kernels: ``NUMBA_CACHE_DIR`` or the user's cache, by digest.
 
-    Where that cannot be written, a folder of the user's own among the temporary files.
+    If it cannot be written, a private folder among the temporary files is used.
     """
     here = Path(__file__).resolve()
     root = here.parents[2]
-    digest = hashlib.sha256(str(root).encode())  # Numba keeps installations apart, so do we
+    digest = hashlib.sha256(str(root).encode())  # one cache per installation, as in Numba
     for source in sorted(root.glob("space_robot*/**/*.py")):
         text = source.read_bytes()
         if b"@kernel" in text or b"@subroutine" in text or source.parent == here.parent:
@@ -35,14 +35,14 @@ def cache_directory() -> Path:
         return wanted / name
     other = _temporary_cache()
     sys.stderr.write(
-        f"space_robot: compiled code is kept in {other}: {wanted} cannot be used ({why})\n"
+        f"space_robot: compiled code is stored in {other}: {wanted} cannot be used ({why})\n"
     )
-    os.environ["NUMBA_CACHE_DIR"] = str(other)  # the processes that this one starts share it
+    os.environ["NUMBA_CACHE_DIR"] = str(other)  # for child processes
     return other / name
 
 
 def _unusable(folder: Path) -> str:
-    """Why no cache can be kept there; empty if it can, or if there is one already."""
+    """Return why a folder cannot hold the cache; empty if it can, or already does."""
     try:
         is_new = not folder.is_dir()
         folder.mkdir(parents=True, exist_ok=True)
@@ -57,7 +57,7 @@ def _unusable(folder: Path) -> str:
 
 
 def _temporary_cache() -> Path:
-    """A folder that is nobody else's: what is in it is run."""
+    """Return a folder owned by this user only, since code in it is executed."""
     folder = Path(tempfile.gettempdir()) / f"space_robot_{os.getuid()}"
     try:
         folder.mkdir(mode=0o700, exist_ok=True)

@@ -1,4 +1,4 @@
-"""The kernels that a kernel needs, and how many of them are compiled: for a progress bar."""
+"""Kernels needed by a kernel, and the number of compiled ones, for a progress bar."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ from typing import Any
 
 
 def index_files(functions: Iterable[Any]) -> set[str]:
-    """Return the file of each kernel that some kernels need, themselves included.
+    """Return the index file of each of some kernels and of the kernels that they call.
 
-    Numba writes the file once the kernel is compiled. Subroutines have none: they are compiled
-    into the kernels that call them.
+    Numba writes the file when the kernel is compiled. Subroutines have no file: they are compiled
+    into their callers.
     """
     files: set[str] = set()
     seen: set[int] = set()
@@ -29,12 +29,12 @@ def index_files(functions: Iterable[Any]) -> set[str]:
 
 
 def count_compiled(files: Iterable[str]) -> int:
-    """Return how many of the `index_files` are there."""
+    """Return the number of existing `index_files`."""
     return sum(map(os.path.exists, files))
 
 
 def _called(function: Any) -> Iterator[Any]:
-    """Yield the kernels and subroutines that a function names."""
+    """Yield the kernels and subroutines that a function refers to."""
     for name in _names(function.__code__):
         value = function.__globals__.get(name)
         if hasattr(value, "py_func"):

@@ -1,9 +1,9 @@
-"""One decorator for every compiled function, with a disk cache that cannot go stale.
+"""Decorators of compiled functions, with a disk cache that is never outdated.
 
-Numba's own cache watches only the file a function stands in, so a change in a function it
-calls from another file goes unseen. Here the cache folder's name is a digest of the files of all
-three packages that have kernels: an edit of one of them starts a fresh cache, an edit of another
-file does not, and all processes share what one compiled.
+Numba's cache checks only the file of a function, and does not detect changes of called functions in
+other files. Here the name of the cache folder is a digest of all files with kernels in the three
+packages: an edit of one of them starts a new cache, other edits do not. All processes share the
+cache.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ import numba
 from numba.core.errors import NumbaError
 
 from ..errors import InputError
-from . import block_type  # noqa: F401  (what Numba makes of a block)
+from . import block_type  # noqa: F401  (registers the type of blocks)
 from .cache import cache_directory
 from .record_type import RecordType
 from .records import Record
@@ -29,15 +29,15 @@ config: Any = numba.config
 _FunctionType: Any = numba.types.WrapperAddressProtocol
 _Function = TypeVar("_Function", bound=Callable[..., Any])
 _COLOURS = re.compile(r"\x1b\[\d*m")
-"""Of a terminal, which Numba puts into its errors."""
+"""Escape sequences of terminals, which Numba's errors contain."""
 
 
 def kernel(function: _Function) -> _Function:
     """Compile ``function`` on first call, without the GIL, cached on disk.
 
-    IEEE arithmetic is kept as written (no fast-math, nothing fused): the same inputs give the same
-    bits in every process and on every processor, if they call no function of the C library (sine,
-    exponential, ...) but the square root.
+    IEEE arithmetic is kept as written (no fast-math, no fused operations): the same inputs give the
+    same bits in every process and on every processor, except in kernels that call functions of the
+    C library other than the square root (sine, exponential, ...).
     """
     with _our_cache():
         compiled = _njit(cache=True, **_OPTIONS)(function)
@@ -52,16 +52,16 @@ def kernel(function: _Function) -> _Function:
 
 
 def subroutine(function: _Function) -> _Function:
-    """A small part of kernels, callable from them only: it compiles in half the time."""
+    """Compile a small function that only kernels call, in half the time of a kernel."""
     return cast(_Function, _njit(no_cpython_wrapper=True, **_OPTIONS)(function))
 
 
 class RecordFunction(_FunctionType):  # type: ignore[misc]
-    """A kernel of records, and a float at last, as a value that a compiled loop can be given.
+    """A kernel of records, and a float as last argument, as a function value for compiled loops.
 
-    A loop sees it as a function of the records that all such kernels share the beginning of, and is
-    compiled once for all of them: a record is passed by its address and its number of joints, and
-    what lies there is the kernel's affair alone.
+    A loop sees it as a function of the common base records of all such kernels, so it is compiled
+    only once: a record is passed by its address and number of joints, and only the kernel knows its
+    complete layout.
     """
 
     def __init__(
@@ -74,18 +74,18 @@ class RecordFunction(_FunctionType):  # type: ignore[misc]
 
         Args:
             function: the kernel.
-            records: of its arguments.
-            seen_as: those that a loop passes in their place.
+            records: types of its arguments.
+            seen_as: types of the arguments as seen by a loop.
 
         Raises:
-            InputError: it cannot be compiled; with the reason and the line in one line.
+            InputError: the kernel cannot be compiled; has reason and line number.
         """
         compiled: Any = function
         own, self._signature = _signature(records), _signature(seen_as)
         with _our_cache():
             try:
                 self._code = numba.cfunc(own, cache=True, error_model="numpy")(compiled.py_func)
-            except OSError:  # no room in the cache
+            except OSError:  # no space in the cache
                 self._code = numba.cfunc(own, error_model="numpy")(compiled.py_func)
             except NumbaError as error:
                 name = function.__qualname__
@@ -93,19 +93,19 @@ class RecordFunction(_FunctionType):  # type: ignore[misc]
         self._address = int(self._code.address or 0)
         arguments = [ctypes.c_void_p, ctypes.c_ssize_t] * (len(own.args) - 1)
         self.call = ctypes.CFUNCTYPE(None, *arguments, ctypes.c_double)(self._address)
-        """Run it from Python, on the records at these addresses, each followed by its n."""
+        """Call the kernel from Python with the addresses of records, each followed by n."""
 
     def __wrapper_address__(self) -> int:
-        """Address of the machine code, for Numba."""
+        """Return the address of the machine code, for Numba."""
         return self._address
 
     def signature(self) -> Any:
-        """The type that a loop sees, for Numba."""
+        """Return the function type as seen by a loop, for Numba."""
         return self._signature
 
 
 def _reason(error: NumbaError) -> str:
-    """Return the line of Numba's many that says what is wrong, and where that is."""
+    """Return the relevant line of an error of Numba, with the position in the source."""
     lines = [line.strip() for line in _COLOURS.sub("", str(error)).splitlines()]
     reasons = [line for line in lines if line and not line.startswith(("Failed in", "File "))]
     place = re.search(r'File "(.+?)", (line \d+)', "\n".join(lines))
@@ -119,7 +119,7 @@ def _signature(records: Iterable[type[Record]]) -> Any:
 
 @contextmanager
 def _our_cache() -> Iterator[None]:
-    """Numba reads the folder when it decorates."""
+    """Set the cache folder while Numba decorates, when it reads the setting."""
     previous = config.CACHE_DIR
     config.CACHE_DIR = str(cache_directory())
     try:

@@ -1,8 +1,8 @@
-"""Where the fields of a record stand, as a formula of the number of joints n.
+"""Memory layout of a record as a function of the number of joints n.
 
-The layout of one n is NumPy's to keep (`Record.dtype`). Compiled code is given the formula, and n
-at run time, so that a robot of another size needs no other code. Each dimension of an array is
-``a + b n``; so sizes and offsets are polynomials of n.
+For a particular n the layout is a NumPy dtype (`Record.dtype`). Compiled code uses the formula with
+n at run time, so that it works for robots of any size. Each dimension of an array is ``a + b n``,
+so sizes and offsets are polynomials of n.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 DEGREE = 2
-"""Highest power of n in the size of a field: that of a matrix."""
+"""Highest power of n in the size of a field, as in a matrix."""
 
 
 class Dimension(NamedTuple):
@@ -23,7 +23,7 @@ class Dimension(NamedTuple):
 
 
 class Polynomial(NamedTuple):
-    """``a + b n + c n^2``, float64 numbers that stand one behind the other."""
+    """``a + b n + c n^2``, a number of consecutive float64."""
 
     a: int = 0
     b: int = 0
@@ -37,7 +37,7 @@ class Polynomial(NamedTuple):
         """Return the product.
 
         Raises:
-            TypeError: n stands in it to a power beyond `DEGREE`.
+            TypeError: the power of n exceeds `DEGREE`.
         """
         constant, slope = dimension
         if self.c * slope:
@@ -48,21 +48,21 @@ class Polynomial(NamedTuple):
 
 @dataclass(frozen=True)
 class Layout:
-    """The fields of a record by name, in their order in memory.
+    """Fields of a record by name, in memory order.
 
-    Records with equal fields have equal layouts: a compiled function takes all of them.
+    Records with equal fields have equal layouts, so a compiled function accepts all of them.
     """
 
     fields: tuple[tuple[str, tuple[Dimension, ...] | Layout], ...]
-    """The dimensions of an array, () of a number; or the layout of a record within the record."""
+    """Dimensions of an array, () for a number, or the layout of a nested record."""
 
     @property
     def size(self) -> Polynomial:
-        """Numbers in the whole record."""
+        """Number of float64 in the record."""
         return _end_of(self.fields)
 
     def find(self, name: str) -> tuple[Polynomial, tuple[Dimension, ...] | Layout] | None:
-        """Return where a field stands, in numbers from the beginning, and what it is."""
+        """Return offset, in numbers, and shape or layout of a field; None if it does not exist."""
         for k, (known, kind) in enumerate(self.fields):
             if known == name:
                 return _end_of(self.fields[:k]), kind
@@ -85,7 +85,7 @@ def count(dimensions: tuple[Dimension, ...]) -> Polynomial:
 
 
 def dimensions_of(name: str, shape: Callable[[int], tuple[int, ...]]) -> tuple[Dimension, ...]:
-    """Read the formula of a shape off its values.
+    """Derive the formula of a shape from its values.
 
     Raises:
         TypeError: a dimension is not ``a + b n``.

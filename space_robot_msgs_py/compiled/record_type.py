@@ -1,9 +1,9 @@
 """Records in compiled code: a pointer and the number of joints n, one type for all n.
 
-Numba's own type of a record has the place of every field as a constant, so that whatever takes the
-record is compiled anew for every n. Here places and shapes are computed from the formulas of
-`Layout` where a field is read. What a kernel sees is the same: numbers and arrays by attribute, and
-records within records. A record from Python tells n by its size.
+Numba's type of a record has constant field offsets, so that functions of the record are compiled
+again for every n. Here offsets and shapes are computed from the formulas of `Layout` when a field
+is read. Kernels see the same: numbers, arrays and nested records as attributes. For a record from
+Python, n follows from its size.
 """
 
 from __future__ import annotations
@@ -24,14 +24,14 @@ from .layouts import Dimension, Layout, Polynomial
 from .records import layout_of
 
 BYTES = 8
-"""Of a float64, of which all records consist."""
+"""Size of a float64, of which all records consist, bytes."""
 _INT = cgutils.intp_t
 _FLOAT = cpu_target.target_context.get_value_type(types.float64)
 _typeof_scalar = typeof_impl.dispatch(np.generic)
 
 
 class RecordType(types.Type):
-    """A record of a layout."""
+    """Numba type of a record with a layout."""
 
     def __init__(self, layout: Layout) -> None:
         self.layout = layout
@@ -39,12 +39,12 @@ class RecordType(types.Type):
 
     @property
     def key(self) -> Any:
-        """What tells it from another type, for Numba."""
+        """Identity of the type, for Numba."""
         return self.layout
 
 
 def digest(layout: Layout) -> str:
-    """Return a short name, by which Numba finds in its cache what takes the layout."""
+    """Return a short name of a layout, for the keys of Numba's cache."""
     return hashlib.sha256(repr(layout).encode()).hexdigest()[:16]
 
 
@@ -77,12 +77,12 @@ def _unbox_record(kind: RecordType, scalar: Any, c: Any) -> Any:
 
 
 def joints(builder: Any, size: Polynomial, itemsize: Any) -> Any:
-    """Emit the n for which a record of ``size`` numbers has so many bytes; 0 if all have."""
+    """Emit n from a record's size in bytes and its polynomial; 0 if the size is constant."""
     a, b, c = size
     numbers = builder.sub(builder.sdiv(itemsize, _INT(BYTES)), _INT(a))
     if c == 0:
         return builder.sdiv(numbers, _INT(b)) if b else _INT(0)
-    # b n + c n^2 = numbers, and the root is a whole number
+    # b n + c n^2 = numbers, with an integer root
     square = builder.add(builder.mul(numbers, _INT(4 * c)), _INT(b * b))
     sqrt = builder.module.declare_intrinsic("llvm.sqrt", [_FLOAT])
     root = builder.call(sqrt, [builder.sitofp(square, _FLOAT)])

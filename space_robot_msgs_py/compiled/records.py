@@ -1,8 +1,8 @@
-"""Named arrays in one block of memory, for Python and for compiled code.
+"""Named arrays in one block of memory, for Python and compiled code.
 
-A kernel that takes a `Record` gets one pointer, and the number of joints, instead of a dozen arrays
-to check and unpack. NumPy and Numba both read the fields by attribute, so the same declaration
-serves both: NumPy is given the layout for one n, Numba the formula for every n.
+A kernel receives a `Record` as a pointer and the number of joints, instead of a dozen arrays to
+check and unpack. NumPy and Numba both read the fields as attributes, from the same declaration:
+NumPy uses the layout for one n, Numba the formula for all n.
 """
 
 from __future__ import annotations
@@ -21,18 +21,18 @@ from typing_extensions import Self
 from .layouts import Layout, dimensions_of
 
 Block = NDArray[Any]
-"""An array (1,) of one record; Numba takes it ten times faster than the record."""
+"""An array (1,) of one record; Numba unboxes it ten times faster than the record."""
 Shape = Callable[[int], tuple[int, ...]]
 
 
 @dataclass(frozen=True)
 class Field:
-    """A field of float64."""
+    """Declaration of a float64 field."""
 
     shape: Shape
-    """Its shape for a robot of n joints."""
+    """Shape for a robot with n joints."""
     description: str
-    """Meaning and unit, where somebody outside the code is to read them."""
+    """Meaning and unit, for users."""
 
 
 def shaped(shape: Shape, description: str = "") -> Any:
@@ -46,18 +46,18 @@ def nested(record: type[Record]) -> Any:
 
 
 class Record:
-    """Base of all declarations; the class itself is never instantiated.
+    """Base class of all declarations; never instantiated.
 
-    A subclass has the fields of its base first, so code that knows the base alone can read
-    those of any subclass's block (`prefix`).
+    The fields of the base class come first, so code for the base class can read the block of any
+    subclass (`prefix`).
     """
 
     address: int
-    """The place in memory of a `view`'s block."""
+    """Memory address of a `view`'s block."""
 
     @classmethod
     def fields(cls) -> dict[str, Field | type[Record]]:
-        """The fields by name, in their order in memory."""
+        """Return the fields by name, in memory order."""
         fields: dict[str, Field | type[Record]] = {}
         for base in reversed(cls.__mro__):
             for name, value in vars(base).items():
@@ -69,31 +69,31 @@ class Record:
 
     @classmethod
     def layout(cls) -> Layout:
-        """Memory layout for any number of joints."""
+        """Return the memory layout for any number of joints."""
         record: Any = cls
         return _layout(record)
 
     @classmethod
     def dtype(cls, n: int) -> np.dtype[Any]:
-        """Memory layout for a robot of ``n`` joints."""
+        """Return the memory layout for a robot with ``n`` joints."""
         record: Any = cls
         return _dtype(record, n)
 
     @classmethod
     def block(cls, n: int) -> Block:
-        """A block of zeros; ``block[0]`` is the record."""
+        """Return a block of zeros; ``block[0]`` is the record."""
         return np.zeros(1, cls.dtype(n))
 
     @classmethod
     def allocate(cls, n: int) -> Self:
-        """A record of zeros for a robot of ``n`` joints."""
+        """Return a record of zeros for a robot with ``n`` joints."""
         return cast(Self, cls.block(n)[0])
 
     @classmethod
     def view(cls, block: Block) -> Self:
-        """The arrays of a block as attributes, which Python reads ten times faster than a record's.
+        """Return the arrays of a block as attributes, ten times faster in Python than a record.
 
-        They are written in place (``view.name[:] = ...``); fields without a shape are left out.
+        They are written in place (``view.name[:] = ...``); scalar fields are omitted.
         """
         record = RecordView(address=block.ctypes.data)
         for name, field in cls.fields().items():
@@ -105,28 +105,28 @@ class Record:
 
 
 class RecordView(SimpleNamespace):
-    """What `Record.view` returns. It has an address in memory, so it is neither copied nor pickled.
+    """Result of `Record.view`. It has a memory address, so it cannot be copied or pickled.
 
-    Copy the object that owns the block instead: a `RecordOwner` makes its views anew.
+    Copy the object that owns the block instead: a `RecordOwner` creates its views again.
     """
 
     def __reduce__(self) -> Any:
-        """Refuse.
+        """Refuse copying and pickling.
 
         Raises:
             TypeError: always.
         """
         raise TypeError(
             "a view of a record cannot be copied or pickled: copy the object that owns its block "
-            "(a law, a controller, a plant, a bench), and leave views out of its __getstate__"
+            "(a law, a controller, a plant, a bench), and omit views in its __getstate__"
         )
 
 
 class RecordOwner:
-    """Base of classes that own blocks of records and have attributes that are views of them.
+    """Base class of owners of record blocks with views of them as attributes.
 
-    A copy, made by `copy` or `pickle`, has blocks of its own, and its attributes are views of
-    those; NumPy alone would copy block and views apart, and nothing would connect them.
+    A copy by `copy` or `pickle` has its own blocks, and views of these; NumPy alone would copy
+    blocks and views separately, without connection.
     """
 
     _views: ClassVar[tuple[str, ...]]
@@ -137,10 +137,10 @@ class RecordOwner:
         raise NotImplementedError
 
     def __getstate__(self) -> dict[str, Any]:
-        """Return all attributes but the views.
+        """Return all attributes except the views.
 
         Raises:
-            TypeError: another attribute is a view of a block, too.
+            TypeError: an undeclared attribute is a view of a block.
         """
         state = {name: value for name, value in vars(self).items() if name not in self._views}
         arrays = {name: value for name, value in state.items() if isinstance(value, np.ndarray)}
@@ -154,17 +154,17 @@ class RecordOwner:
         return state
 
     def __setstate__(self, state: dict[str, Any]) -> None:
-        """Take over attributes, and look into the blocks among them."""
+        """Set the attributes, and create the views of the blocks."""
         vars(self).update(state)
         self._look_into_blocks()
 
     def __copy__(self) -> Self:
-        """Return a whole copy, as `copy.deepcopy` does: a block has one owner."""
+        """Return a deep copy: a block has one owner."""
         return copy.deepcopy(self)
 
 
 def prefix(block: Block, base: np.dtype[Any]) -> Block:
-    """A block's first bytes as a block of another layout: that of its record's base."""
+    """Return a view of a block as a block of its record's base class."""
     return np.ndarray((1,), base, buffer=block)
 
 
@@ -202,5 +202,5 @@ _LAYOUTS: dict[np.dtype[Any], Layout] = {}
 
 
 def layout_of(dtype: np.dtype[Any]) -> Layout | None:
-    """Return the layout that a record's dtype is one of; None: it is of no record."""
+    """Return the layout of a record's dtype; None if it is not that of a record."""
     return _LAYOUTS.get(dtype)

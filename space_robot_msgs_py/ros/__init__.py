@@ -1,1 +1,1 @@
-"""The nodes' common host: process, parameters, publishers and subscriptions of the loop."""
+"""Common part of all nodes: process, parameters, publishers and subscriptions."""

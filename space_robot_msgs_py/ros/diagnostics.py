@@ -1,6 +1,6 @@
-"""/diagnostics: each node's `Health`, once a second and on every change of mode.
+"""/diagnostics: each node's `Health`, once per second and at every change of mode.
 
-Its stamps are simulated times, as those of all other topics.
+Stamps are simulated times, as on all other topics.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ FLUSH_S = 0.5
 
 
 class Diagnostics:
-    """Publishes what a node reports of itself."""
+    """Publishes the health of a node."""
 
     def __init__(self, node: Node) -> None:
         self._node = node
@@ -30,12 +30,12 @@ class Diagnostics:
         self._last_tick: tuple[float, float] | None = None
 
     def report(self, health: Health, timebase: Timebase, now_or_never: bool = False) -> None:
-        """Publish if a second has passed or the mode has changed; or in any case, and wait.
+        """Publish if a second has passed or the mode has changed.
 
         Args:
-            health: its values may have the node's ``tick``, the message's stamp; 0 without it.
-            timebase: of the tick.
-            now_or_never: whether this is the last report.
+            health: its value ``tick``, by default 0, gives the message's stamp.
+            timebase: conversion between ticks and stamps.
+            now_or_never: True for the last report: publish always, and wait for delivery.
         """
         now = time.monotonic()
         changed = self._last is None or (health.mode, health.level) != (
@@ -45,7 +45,7 @@ class Diagnostics:
         if not (changed or now_or_never) and now - self._last_s < PERIOD_S:
             return
         if changed:
-            if health.level is Level.OK:  # two lines: a call of the log has one severity for good
+            if health.level is Level.OK:  # two lines: rclpy allows one severity per calling line
                 self._node.get_logger().info(health.mode)
             else:
                 self._node.get_logger().warning(health.mode)
@@ -67,7 +67,7 @@ class Diagnostics:
             self._publisher.wait_for_all_acked(Duration(seconds=FLUSH_S))
 
     def _rate(self, health: Health, now: float) -> dict[str, float]:
-        """Ticks by the wall clock's second since the last report."""
+        """Return the ticks per second of wall-clock time since the last report."""
         tick = health.values.get("tick")
         if not isinstance(tick, int):
             return {}

@@ -1,7 +1,8 @@
-"""Publishers and subscriptions for a loop that takes messages itself.
+"""Publishers and subscriptions of a loop that takes messages without executor.
 
-The executor costs more than the loop's whole work, so the loop's subscriptions are kept out of
-it (`PolledCallbackGroup`) and taken by hand as raw bytes; the executor only serves parameters.
+The executor would take more time than the loop itself, so the loop's subscriptions are excluded
+from it (`PolledCallbackGroup`), and messages are taken as raw bytes; the executor only serves
+parameters.
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ from .serialized_take import Received, serialized_take
 
 
 class PolledCallbackGroup(CallbackGroup):
-    """Keeps its subscriptions out of every executor."""
+    """Excludes its subscriptions from every executor."""
 
     def can_execute(self, entity: Any) -> bool:
         """Allow none."""
@@ -33,22 +34,22 @@ class PolledCallbackGroup(CallbackGroup):
         return False
 
     def ending_execution(self, entity: Any) -> None:
-        """Do nothing: there is nothing to end."""
+        """Do nothing."""
 
 
 def full_name_of(info: TopicEndpointInfo) -> str:
-    """The full name of an endpoint's node."""
+    """Return the full name of an endpoint's node."""
     return f"{info.node_namespace.rstrip('/')}/{info.node_name}"
 
 
 def message_type(name: str) -> Any:
-    """The Python class of a ``package/msg/Type``."""
+    """Return the Python class of a ``package/msg/Type``."""
     package, _, type_name = name.partition("/msg/")
     return getattr(importlib.import_module(f"{package}.msg"), type_name)
 
 
 def qos(topic: Topic) -> QoSProfile:
-    """Reliable, with the topic's depth and durability."""
+    """Return the quality of service: reliable, with the topic's depth and durability."""
     durable = DurabilityPolicy.TRANSIENT_LOCAL if topic.transient_local else None
     return QoSProfile(
         history=HistoryPolicy.KEEP_LAST,
@@ -67,9 +68,9 @@ class RawPublisher:
         self._publisher = node.create_publisher(message_type(topic.type), topic.name, qos(topic))
         self._publish = raw_publish(self._publisher)
         self.full_name = str(self._publisher.topic_name)
-        """In the node's namespace, remapped as the user wants."""
+        """Full topic name: in the node's namespace, with remappings."""
         self.sent = 0
-        """Messages sent."""
+        """Number of sent messages."""
 
     def publish(self, data: bytes) -> None:
         """Send serialized bytes."""
@@ -78,16 +79,15 @@ class RawPublisher:
 
     @property
     def listener_count(self) -> int:
-        """Number of subscriptions that are connected."""
+        """Number of connected subscriptions."""
         return int(self._publisher.get_subscription_count())
 
     def missing_listeners(self, names: Sequence[str]) -> list[str]:
-        """Return the awaited nodes that do not listen to this topic yet.
+        """Return the nodes that should subscribe to this topic but do not yet.
 
         Args:
-            names: ``NODE:TOPIC``, a node that must listen to that topic, or ``NODE``, one that must
-                listen to this one whatever it is. Nodes are of this one's namespace, unless they
-                are given with another.
+            names: ``NODE:TOPIC``, a node that must subscribe to that topic, or ``NODE``, for
+                every topic. Nodes without namespace are in that of this node.
         """
         awaited = [entry.partition(":") for entry in names if entry]
         nodes = [node for node, _, topic in awaited if topic.strip("/") in ("", self.topic.name)]
@@ -103,21 +103,21 @@ class RawPublisher:
         return name if name.startswith("/") else f"{namespace}/{name}"
 
     def flush(self, timeout_s: float) -> None:
-        """Wait until all listeners have acknowledged everything sent."""
+        """Wait until all subscribers have acknowledged all sent messages."""
         from rclpy.duration import Duration
 
         self._publisher.wait_for_all_acked(Duration(seconds=timeout_s))
 
 
 def flush(outputs: Sequence[RawPublisher], timeout_s: float) -> None:
-    """`RawPublisher.flush` of all, in ``timeout_s`` together."""
+    """Call `RawPublisher.flush` of all publishers, with a common ``timeout_s``."""
     until = time.monotonic() + timeout_s
     for output in outputs:
         output.flush(max(0.0, until - time.monotonic()))
 
 
 class RawSubscription:
-    """A subscription whose messages the loop takes itself, serialized."""
+    """A subscription to serialized messages, which are taken without executor."""
 
     def __init__(
         self,
@@ -130,11 +130,11 @@ class RawSubscription:
         """Subscribe.
 
         Args:
-            node: that listens.
-            topic: its name, type and quality of service.
-            group: of subscriptions that no executor takes.
-            depth: messages kept (0: as many as the topic says).
-            best_effort: take what comes, so that the publisher never waits or sends again.
+            node: that subscribes.
+            topic: name, type and quality of service.
+            group: callback group that excludes it from executors.
+            depth: of the queue (0: that of the topic).
+            best_effort: True for best effort, so that the publisher never waits or resends.
         """
         self.topic, self._node = topic, node
         profile = qos(topic)
@@ -150,20 +150,20 @@ class RawSubscription:
             callback_group=group,
         )
         self.full_name = str(self._subscription.topic_name)
-        """In the node's namespace, remapped as the user wants."""
+        """Full topic name: in the node's namespace, with remappings."""
         self.handle = self._subscription.handle
         self._type = self._subscription.msg_type
         self._take_serialized = serialized_take()
 
     def close(self) -> None:
-        """Take no more messages."""
+        """End the subscription."""
         self._node.destroy_subscription(self._subscription)
 
     def take(self) -> bytes | None:
-        """Take the next message, if there is one."""
+        """Take the next message; None if there is none."""
         taken = take_serialized(self.handle, self._type)
         return None if taken is None else taken[0]
 
     def take_with_source(self) -> Received | None:
-        """Take the next message, with when and by whom it was sent."""
+        """Take the next message with its time and publisher; None if there is none."""
         return self._take_serialized(self.handle, self._type)

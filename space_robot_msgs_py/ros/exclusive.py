@@ -1,7 +1,7 @@
 """Exclusive node names and exclusive publishers of topics in a ROS domain.
 
 Two plants or two controllers in one domain would answer each other's ticks. Nodes of this project
-keep each other out with `locks`. Other nodes take none; discovery finds those.
+exclude each other by `locks`. Other nodes have no locks and are found by discovery.
 """
 
 from __future__ import annotations
@@ -18,17 +18,17 @@ from .endpoints import full_name_of
 from .locks import FileLock, HeldError, look, node_lock, topic_lock
 
 UNNAMED = "_NODE_NAME_UNKNOWN_"
-"""Name that discovery gives to a node until its participant has announced its own."""
+"""Node name shown by discovery until the participant has announced its name."""
 
 
 class TopicClaim:
-    """This process' right to publish some topics of its domain, until it ends or lets go."""
+    """Exclusive right of this process to publish some topics, until `release` or its end."""
 
     def __init__(self, node: Node, topic_names: Sequence[str]) -> None:
-        """``topic_names``: what only this node may publish; resolved with its remappings.
+        """Claim ``topic_names``, resolved with the node's remappings.
 
         Raises:
-            InputError: another node has one of them, or no lock can be had.
+            InputError: another node has claimed one of them, or a lock file cannot be created.
         """
         self._held = ExitStack()
         domain = node.context.get_domain_id()
@@ -52,15 +52,15 @@ class TopicClaim:
         self._held.callback(lock.release)
 
     def release(self) -> None:
-        """Let others have the topics."""
+        """Release the topics."""
         self._held.close()
 
 
 def claim_name(node: Node) -> FileLock:
-    """This process' right to its node's name: who calls a service by name means one node.
+    """Claim the node's name, so that service calls by name reach one node only.
 
     Raises:
-        InputError: another node of this project has it, or no lock can be had.
+        InputError: another node of this project has it, or the lock file cannot be created.
     """
     domain, name = node.context.get_domain_id(), node.get_fully_qualified_name()
     try:
@@ -68,24 +68,24 @@ def claim_name(node: Node) -> FileLock:
     except HeldError as error:
         raise InputError(
             f"ROS domain {domain} has a {name} already: {error.holder.name}; end that one, "
-            "or take another domain (ROS_DOMAIN_ID) or name (--ros-args -r __node:=...)"
+            "or use another domain (ROS_DOMAIN_ID) or name (--ros-args -r __node:=...)"
         ) from None
 
 
 class GraphPublishers:
-    """Who publishes the topics of a node's domain: by the claims on them, and by discovery."""
+    """Publishers of the topics of a node's domain, from claims and discovery."""
 
     def __init__(self, node: Node) -> None:
         self._node = node
 
     def claimed(self, topic: str) -> Claimed:
-        """Return the owner of the claim of a topic on this machine."""
+        """Return the claim on a topic on this machine."""
         domain = self._node.context.get_domain_id()
         is_held, notes = look(topic_lock(domain, self._node.resolve_topic_name(topic)))
         return Claimed(tuple(gid for text in notes if (gid := _gid(text))), is_held)
 
     def names(self, topic: str) -> dict[bytes, str]:
-        """Full node name by GID of all that are listed now; empty of one without a name."""
+        """Return the full node name of each discovered publisher by GID; empty if unknown."""
         infos = self._node.get_publishers_info_by_topic(topic)
         return {
             gid_of(info): "" if info.node_name == UNNAMED else _full_name(info) for info in infos
@@ -93,7 +93,7 @@ class GraphPublishers:
 
 
 def gid_of(info: TopicEndpointInfo) -> bytes:
-    """The identity that a publisher's messages carry."""
+    """Return the GID of a publisher, which its messages contain."""
     return bytes(info.endpoint_gid)
 
 
@@ -107,10 +107,15 @@ def _gid(text: str) -> bytes:
 def foreign_publishers(
     node: Node, topic_names: Sequence[str], own: Sequence[str] = ()
 ) -> dict[str, list[str]]:
-    """Full names of nodes other than this one by full topic name; of a topic without: no entry.
+    """Return full names of other nodes that publish some topics, by full topic name.
 
-    By name, as discovery sees it now: a killed node of this one's name is not foreign. ``own``:
-    full names of further nodes that are none.
+    They are compared by name, as discovered now: a killed node with this node's name is not
+    foreign. Topics without foreign publishers are omitted.
+
+    Args:
+        node: this node.
+        topic_names: to look for.
+        own: full names of further nodes that are not foreign.
     """
     known = {node.get_fully_qualified_name(), *own}
     foreign = {}

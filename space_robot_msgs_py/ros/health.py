@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from enum import IntEnum
 
 SENT = "sent "
-"""Before a topic's name: the key of how many messages the node's publisher has sent on it."""
+"""Prefix of a topic's name in the key of its number of sent messages."""
 
 
 class Level(IntEnum):
@@ -20,10 +20,10 @@ class Level(IntEnum):
 
 @dataclass(frozen=True, slots=True)
 class Health:
-    """Health of a node at one moment."""
+    """Health of a node at one time."""
 
     mode: str
-    """The mode in a word or two, then why: ``nominal``, ``safe: no state for 0.5 s``."""
+    """Mode and reason: ``nominal``, ``safe: no state for 0.5 s``."""
     level: Level = Level.OK
     values: Mapping[str, float | int | str] = field(default_factory=dict)
-    """Readings, by name with unit; ``tick`` is the last one dealt with."""
+    """Values by name with unit; ``tick`` is the last processed one."""

@@ -1,8 +1,8 @@
-"""A process that ends with the one that started it, however that one ends.
+"""Lifelines: a child process ends when its parent ends, for any reason.
 
-The starter holds the only write end of a pipe, which the kernel closes with it, be it by SIGKILL;
-the started process has a thread that waits for that. The pipe of a node is its standard input: it
-goes through ``ros2 run``, which neither passes signals on nor other descriptors.
+The parent holds the only write end of a pipe, which the kernel closes at its end, also after
+SIGKILL; a thread of the child waits for that. The pipe of a node is its standard input, since
+``ros2 run`` passes on neither signals nor other descriptors.
 """
 
 from __future__ import annotations
@@ -13,30 +13,30 @@ import threading
 import time
 
 VARIABLE = "SPACE_ROBOT_LIFELINE"
-"""In a process' environment: its standard input is a lifeline, held by the process of this pid."""
+"""Environment variable: the standard input is a lifeline held by the process with this pid."""
 TIMEOUT_S = 15.0
-"""For ending well after SIGTERM; then SIGKILL."""
+"""Time from SIGTERM to SIGKILL."""
 
 
 def held() -> dict[str, str]:
-    """Return what the environment of a process says whose standard input this process holds."""
+    """Return the environment variable for a process whose standard input this process holds."""
     return {VARIABLE: str(os.getpid())}
 
 
 def starter() -> int:
-    """Pid of the process that holds the other end of this one's standard input; 0: none does."""
+    """Return the pid of the process that holds this one's lifeline; 0 if there is none."""
     value = os.environ.get(VARIABLE, "")
     return int(value) if value.isdecimal() else 0
 
 
 def hold_to_standard_input() -> None:
-    """End with the starter of this process, if it has said that it holds the other end."""
+    """End this process with its parent, if standard input is a lifeline."""
     if starter():
         hold_to(0)
 
 
 def hold_to(descriptor: int) -> None:
-    """Get SIGTERM when the pipe's other end is closed, and SIGKILL if that does not help."""
+    """Send this process SIGTERM when the pipe's other end is closed, and later SIGKILL."""
     threading.Thread(target=_wait, args=(descriptor,), name="lifeline", daemon=True).start()
 
 

@@ -1,7 +1,7 @@
 """Locks of ROS domains, nodes and topics, released by the kernel when their holder ends.
 
-Discovery would not do: it takes its time, and lists a killed node for another 20 s. Each lock is a
-file in the temporary folder that names its holder; it stays when the lock goes.
+Discovery is too slow, and lists a killed node for another 20 s. Each lock is a file in the
+temporary folder with the name of its holder; the file remains after the release.
 """
 
 from __future__ import annotations
@@ -19,18 +19,18 @@ from ..topics import ROOT
 from .lifeline import starter
 
 TRIES, PAUSE_S = 5, 0.01
-"""A lock that is just being looked at is free a moment later."""
+"""Time to retry: a lock that is only being inspected is free again at once."""
 MOST_NOTES = 16
-"""So many are kept, of earlier holders too: who looks late still finds a short-lived one."""
+"""Number of stored notes, including earlier holders', for readers that come late."""
 
 
 class Holder(NamedTuple):
     """Holder of a lock."""
 
     name: str
-    """With the pid."""
+    """Name with pid."""
     starter: int
-    """Pid of the process it ends with; 0: none."""
+    """Pid of the process that holds its lifeline; 0: none."""
 
 
 class HeldError(InputError):
@@ -42,18 +42,18 @@ class HeldError(InputError):
 
 
 def topic_lock(domain: int, topic: str) -> Path:
-    """The file that is locked by the publisher of a topic, given by its full name."""
-    # a ROS name has no dots and no @, so no two topics, and no topic and node, share a file
+    """Return the lock file of the publisher of a topic, given by full name."""
+    # ROS names contain neither dots nor @, so all topics and nodes have different files
     return _path(f"{domain}{topic.replace('/', '.')}")
 
 
 def node_lock(domain: int, node: str) -> Path:
-    """The file that is locked by the node of a full name."""
+    """Return the lock file of a node, given by full name."""
     return _path(f"{domain}@{node.replace('/', '.')}")
 
 
 def domain_lock(domain: int, namespace: str = ROOT) -> Path:
-    """The file that is locked by the command that has started a graph in a namespace there."""
+    """Return the lock file of the command that started a graph in a domain and namespace."""
     return _path(f"{domain}" if namespace == ROOT else f"{domain}+{namespace.replace('/', '.')}")
 
 
@@ -62,14 +62,14 @@ def _path(name: str) -> Path:
 
 
 class FileLock:
-    """A lock, until its process ends or lets go."""
+    """A lock, held until `release` or the end of the process."""
 
     def __init__(self, path: Path, name: str, notes: Sequence[str] = ()) -> None:
-        """Take it as ``name``, and add ``notes`` there, a word each, for those who `look`.
+        """Acquire the lock as ``name``, and add ``notes``, a word each, for `look`.
 
         Raises:
-            HeldError: somebody else has it.
-            InputError: no lock can be taken there.
+            HeldError: another process holds it.
+            InputError: the file cannot be locked.
         """
         self._descriptor = _open(path)
         for _ in range(TRIES):
@@ -86,29 +86,29 @@ class FileLock:
         os.pwrite(self._descriptor, "\n".join(lines).encode(), 0)
 
     def release(self) -> None:
-        """Let others have it."""
+        """Release the lock."""
         os.close(self._descriptor)
 
 
 def commands_in(domain: int) -> list[Holder]:
-    """The commands that have started a graph in a domain, in whatever namespace."""
+    """Return the commands that started graphs in a domain, in any namespace."""
     lone, others = domain_lock(domain), domain_lock(domain, "/*")
     return _holders([lone, *lone.parent.glob(others.name)])
 
 
 def nodes_in(domain: int, namespace: str = ROOT) -> list[Holder]:
-    """The nodes of this project in a namespace of a domain, those further down left out."""
+    """Return the nodes of this project in a namespace of a domain, without nested namespaces."""
     wanted = node_lock(domain, f"{namespace.rstrip('/')}/*")
     files = wanted.parent.glob(wanted.name)
     return _holders([path for path in files if path.name.count(".") == wanted.name.count(".")])
 
 
 def living_nodes(name: str, namespace: str = "") -> Iterator[tuple[int, str]]:
-    """Yield domain and namespace of this machine's nodes of a name, those that began last first.
+    """Yield domain and namespace of this machine's nodes with a name, the newest first.
 
     Args:
-        name: its last part.
-        namespace: its first part; empty: any.
+        name: of the node, without namespace.
+        namespace: of the node; empty: any.
     """
     start, end = _path("").stem, f".{name}.lock"
     files = _path("").parent.glob(f"{start}*@*{end}")
@@ -138,7 +138,7 @@ def _holders(paths: Iterable[Path]) -> list[Holder]:
 
 
 def look(path: Path) -> tuple[bool, list[str]]:
-    """Return True if somebody holds a lock, and the notes of those who took it, the newest last."""
+    """Return True if a lock is held, and the notes of its holders, the newest last."""
     try:
         descriptor = _open(path)
     except InputError:
@@ -164,19 +164,19 @@ def _holder(descriptor: int) -> Holder:
 
 
 def _lines(descriptor: int) -> list[str]:
-    """Holder, starter, notes; empty where nobody has written any."""
+    """Return holder, starter and notes; empty texts if missing."""
     lines = os.pread(descriptor, 1000, 0).decode(errors="replace").split("\n")
     return [*lines, "", "", ""][:3]
 
 
 def _open(path: Path) -> int:
-    """Open a lock file, for all users: a domain is the whole machine's."""
+    """Open a lock file for all users, since a domain is shared by the whole machine."""
     flags = os.O_RDWR | os.O_NOFOLLOW
     try:
-        if path.exists():  # Linux refuses O_CREAT for others' files in /tmp
+        if path.exists():  # Linux refuses O_CREAT for other users' files in /tmp
             return os.open(path, flags)
         descriptor = os.open(path, flags | os.O_CREAT, 0o666)
-        os.fchmod(descriptor, 0o666)  # past the umask
+        os.fchmod(descriptor, 0o666)  # independent of the umask
         return descriptor
     except OSError as error:
-        raise InputError(f"{path}: no lock can be taken there ({error.strerror})") from None
+        raise InputError(f"{path}: cannot be locked ({error.strerror})") from None

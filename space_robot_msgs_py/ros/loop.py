@@ -1,6 +1,6 @@
-"""Interface of a node's loop, which its host steps and which never waits itself.
+"""Interface of a node's loop, which is stepped by its host and never waits.
 
-So one host can run one node in a process, or step several in turn.
+So a host can step one or several nodes in a process.
 """
 
 from __future__ import annotations
@@ -13,35 +13,35 @@ from .health import Health
 
 
 class Wait(NamedTuple):
-    """The time and the messages that a loop waits for when it has nothing to do."""
+    """Time and messages that an idle loop waits for."""
 
     seconds: float
-    """After this long it is to be stepped in any case."""
+    """Timeout after which the loop is stepped in any case."""
     inputs: tuple[RawSubscription, ...] = ()
-    """It is to be stepped as soon as one of these has a message."""
+    """Subscriptions; the loop is stepped as soon as one of them has a message."""
     is_brief: bool = False
-    """True if a message is expected at once, so that sleeping would cost more than looking."""
+    """True if a message is expected soon, so that polling is faster than sleeping."""
     is_for_others: bool = False
-    """True if it only gives way to the other nodes: it is over once those of its own process, if
-    there are any, have had their turns."""
+    """True if the loop only yields: the wait ends when the other nodes of the process were
+    stepped."""
     patience_s: float = 0.0
-    """It may last so much longer while other nodes of the process have something to do."""
+    """Allowed extension while other nodes of the process are busy."""
 
 
 class Loop(Protocol):
-    """A node's work; made with its settings in configure, stepped while the node is active."""
+    """Work of a node; created by configure, stepped while the node is active."""
 
     @property
     def outputs(self) -> Sequence[RawPublisher]:
-        """Topics that nobody else may publish."""
+        """Publishers of topics that no other node may publish."""
 
     @property
     def wait_for(self) -> Sequence[str]:
-        """Who must listen before the first step: ``NODE:TOPIC``, or ``NODE`` to all ``outputs``."""
+        """Subscribers required before the first step: ``NODE:TOPIC``, ``NODE`` for all topics."""
 
     @property
     def is_complete(self) -> bool:
-        """True if the loop has come to its end, and with it the flight."""
+        """True if the loop, and thereby the flight, has ended."""
 
     def begin(self) -> None:
         """Prepare for stepping; called on activate."""
@@ -50,18 +50,18 @@ class Loop(Protocol):
         """Run one step without waiting.
 
         Returns:
-            What to wait for; None if something was done and there may be more.
+            What to wait for; None if work was done and there may be more.
         """
 
     def deactivate(self) -> None:
-        """Leave the graph safe: called on deactivate, and before the end of an active node."""
+        """Put the graph into a safe state; called on deactivate and before an active node ends."""
 
     def close(self) -> None:
         """Release all resources; called on cleanup and at the end.
 
         Raises:
-            FlightError: something that was promised has not been kept.
+            FlightError: the results are incomplete.
         """
 
     def health(self) -> Health:
-        """Return the health of the node; called some times a second."""
+        """Return the health of the node; called several times per second."""

@@ -1,7 +1,7 @@
 """A node of this project as a ROS 2 lifecycle node.
 
-Files and parameters are checked in configure, which fails with the reason; topics are there once
-it has succeeded. Nothing is sent before activate.
+Files and parameters are checked by configure, which fails with the reason; topics exist after it
+has succeeded. Nothing is sent before activate.
 """
 
 from __future__ import annotations
@@ -30,10 +30,10 @@ AUTOSTART = "autostart"
 DISCOVERY_S = 0.3
 LOOK_AGAIN_S = 0.3
 LOOK_PERIOD_S = 1.0
-"""To look for foreign publishers takes as long as the rest of a report."""
+"""Period of checks for foreign publishers, which take as long as the rest of a report."""
 PAUSE_S = 1e-3
 NO_TIME = Timebase(1)
-"""Of a node that has never been configured: it is at tick 0."""
+"""Timebase of a node that has never been configured: it is at tick 0."""
 
 
 class ManagedNode(LifecycleNode, Generic[Schema]):
@@ -53,18 +53,18 @@ class ManagedNode(LifecycleNode, Generic[Schema]):
         self.is_active = False
         self.is_shut_down = False
         self.times_configured = 0
-        """So many times it has been configured with success."""
+        """Number of successful configurations."""
         self.let_others_work: Callable[[], None] = lambda: time.sleep(PAUSE_S)
-        """To be called by a loop that stands down while it waits for what another node does."""
+        """Called by a loop while it waits for another node during deactivation."""
         self._topics: list[str] = []
         self._foreign, self._look_at = "", 0.0
-        """Foreign publishers when they were looked for last, and when to look again."""
+        """Last found foreign publishers, and time of the next check."""
         self._claim: TopicClaim | None = None
         self._name: FileLock | None = None
         self.error: SpaceRobotError | None = None
         """Reason why the last transition failed."""
         description = ParameterDescriptor(
-            description="configure and activate without being told (false: wait for transitions)",
+            description="configure and activate at startup (false: wait for transitions)",
             read_only=True,
         )
         self.autostart = bool(self.declare_parameter(AUTOSTART, True, description).value)
@@ -75,11 +75,11 @@ class ManagedNode(LifecycleNode, Generic[Schema]):
         guard_change_state(self, self._refuse_transition)
 
     def log(self, text: str) -> None:
-        """Say something on the node's log."""
+        """Write to the node's log."""
         self.get_logger().info(text)
 
     def report(self) -> None:
-        """Report the health, if it is time again or the mode has changed."""
+        """Report the health if it is due, or if the mode has changed."""
         self._diagnostics.report(self._health(), self._timebase)
 
     @property
@@ -87,7 +87,7 @@ class ManagedNode(LifecycleNode, Generic[Schema]):
         return self.settings.timebase if self.settings else NO_TIME
 
     def _health(self) -> Health:
-        """Ask the loop, and add the messages it has sent: the recorder looks if all have come."""
+        """Return the loop's health with the numbers of sent messages, for the recorder's check."""
         if self.loop is None:
             return Health("unconfigured")
         health = self.loop.health()
@@ -105,7 +105,7 @@ class ManagedNode(LifecycleNode, Generic[Schema]):
         return Health(health.mode, health.level, values)
 
     def claim_name(self) -> None:
-        """Be the only node of this name in the domain; before anything is served.
+        """Claim the node's name in the domain, before any service is offered.
 
         Raises:
             InputError: another node of this project has the name.
@@ -113,7 +113,7 @@ class ManagedNode(LifecycleNode, Generic[Schema]):
         self._name = claim_name(self)
 
     def destroy_node(self) -> None:
-        """Let go of everything, what serves the node before the node."""
+        """Release all resources, the executor before the node."""
         self.calls.shutdown()
         super().destroy_node()
         if self._name:
@@ -123,17 +123,17 @@ class ManagedNode(LifecycleNode, Generic[Schema]):
         """Configure and activate.
 
         Raises:
-            SpaceRobotError: it cannot be.
+            SpaceRobotError: the transition failed.
         """
         self._insist(self.trigger_configure())
-        time.sleep(DISCOVERY_S)  # to see who else is there
+        time.sleep(DISCOVERY_S)  # to discover other nodes
         self._insist(self.trigger_activate())
 
     def stop(self) -> None:
-        """Deactivate and clean up; the opposite of `start`.
+        """Deactivate and clean up, the reverse of `start`.
 
         Raises:
-            SpaceRobotError: it cannot be.
+            SpaceRobotError: the transition failed.
         """
         self._insist(self.trigger_deactivate())
         self._insist(self.trigger_cleanup())
@@ -143,10 +143,10 @@ class ManagedNode(LifecycleNode, Generic[Schema]):
             raise self.error or SpaceRobotError(f"{self.get_name()} cannot be started")
 
     def end(self) -> None:
-        """Shut down, unless that has been done, and let go of everything.
+        """Shut down, unless already done, and release all resources.
 
         Raises:
-            SpaceRobotError: the loop could not be closed as it should.
+            SpaceRobotError: the loop could not be closed properly.
         """
         if self.is_shut_down:
             self._try(self._release)
@@ -159,25 +159,23 @@ class ManagedNode(LifecycleNode, Generic[Schema]):
             raise self.error
 
     def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Check parameters and files, make the loop and its topics."""
+        """Check parameters and files, create the loop and its topics."""
 
         def configure() -> None:
             self.settings = declare_settings(self, self._schema, self._changeable)
-            if not self._changeable:  # else the loop declares more
+            if not self._changeable:  # otherwise the loop declares more parameters
                 refuse_unknown(self)
             self.loop = self._make_loop(self, self.settings)
             refuse_unknown(self)
             self._topics = [output.topic.name for output in self.loop.outputs]
             own = {*self._topics, *(topic.name for topic in self._schema.sends)}
-            self._claim = TopicClaim(
-                self, sorted(own)
-            )  # what it never sends is nobody else's either
+            self._claim = TopicClaim(self, sorted(own))  # claimed even if never published
             self.times_configured += 1
 
         return self._try(configure, undo=self._release)
 
     def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Start stepping the loop, unless another node publishes this one's topics."""
+        """Start the loop, unless another node publishes this one's topics."""
 
         def activate() -> None:
             if foreign := self._lasting_foreign_publishers():
@@ -191,7 +189,7 @@ class ManagedNode(LifecycleNode, Generic[Schema]):
         return self._try(self._stand_down)
 
     def on_cleanup(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Remove topics and parameters; a new configure reads the files again."""
+        """Remove topics and parameters; the next configure reads the files again."""
         return self._try(self._release)
 
     def on_shutdown(self, state: LifecycleState) -> TransitionCallbackReturn:
@@ -205,7 +203,7 @@ class ManagedNode(LifecycleNode, Generic[Schema]):
         return self._try(shut_down)
 
     def on_error(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Give the node up: something unforeseen was raised in a transition."""
+        """Finalize the node after an unexpected error in a transition."""
         return TransitionCallbackReturn.FAILURE
 
     def _foreign_publishers(self) -> str:
@@ -219,7 +217,7 @@ class ManagedNode(LifecycleNode, Generic[Schema]):
         return "; ".join(f"{t} is also published by {', '.join(n)}" for t, n in foreign.items())
 
     def _lasting_foreign_publishers(self) -> str:
-        """Look twice for foreign publishers: one that is just being discovered has no name yet."""
+        """Check twice for foreign publishers: discovery first shows them without node name."""
         if self._foreign_publishers():
             time.sleep(LOOK_AGAIN_S)
         return self._foreign_publishers()
@@ -234,11 +232,11 @@ class ManagedNode(LifecycleNode, Generic[Schema]):
             self.error = error
             if undo:
                 undo()
-            if not self.autostart:  # else the process ends with these words
+            if not self.autostart:  # otherwise the process ends with this message
                 self.get_logger().error(str(error))
             return TransitionCallbackReturn.FAILURE
-        except Exception as error:  # rclpy would swallow it without a word
-            self.error = SpaceRobotError(f"unforeseen {type(error).__name__}: {error}")
+        except Exception as error:  # rclpy would ignore it silently
+            self.error = SpaceRobotError(f"unexpected {type(error).__name__}: {error}")
             self.get_logger().error(str(self.error))
             return TransitionCallbackReturn.ERROR
         return TransitionCallbackReturn.SUCCESS
@@ -249,7 +247,7 @@ class ManagedNode(LifecycleNode, Generic[Schema]):
             self.loop.deactivate()
 
     def _release(self) -> None:
-        """Close the loop, take back what configure made."""
+        """Close the loop, and destroy everything created by configure."""
         loop, self.loop = self.loop, None
         try:
             if loop is not None:

@@ -1,6 +1,6 @@
 """Host of the nodes of a process: startup, lifecycle, stepping of loops, shutdown.
 
-As a rule a process hosts one node; a composed graph is several nodes in one process.
+Usually a process hosts one node; a composed graph has several nodes in one process.
 """
 
 from __future__ import annotations
@@ -39,23 +39,23 @@ class NodeKind(Generic[Schema]):
     """Definition of a kind of node."""
 
     schema: type[Schema]
-    """Its parameters; it tells the node's name, too."""
+    """Schema of its parameters, with the node's name."""
     make_loop: Callable[[ManagedNode[Schema], Schema], Loop]
     changeable: tuple[str, ...] = ()
-    """Names of the parameters that may be changed in flight."""
+    """Names of the parameters that can be changed in flight."""
     offer_services: Callable[[ManagedNode[Schema]], None] = lambda node: None
-    """Makes services, and their parameters, that the node has in all states of its lifecycle."""
+    """Creates services and parameters that exist in all lifecycle states."""
 
     def make_node(self) -> ManagedNode[Schema]:
-        """Join the graph, unconfigured."""
+        """Create the node in the state unconfigured."""
         return ManagedNode(self.schema, self.make_loop, self.changeable, self.offer_services)
 
 
 class NodeHost:
-    """Starts, serves, steps and ends the nodes of this process."""
+    """Starts, steps and ends the nodes of this process, and serves their calls."""
 
     def __init__(self, nodes: Sequence[ManagedNode[Any]]) -> None:
-        """Take the nodes, in the order in which they are started."""
+        """Store the nodes in the order of their start."""
         self._nodes = nodes
         self._turns = NodeScheduler(nodes)
         self._is_signalled = False
@@ -67,12 +67,12 @@ class NodeHost:
         self._is_signalled = True
 
     def run(self) -> None:
-        """Start the nodes that start by themselves; then serve and step until the end.
+        """Start the nodes with autostart, then serve and step all nodes.
 
-        That is a signal, a loop that is complete, or the shutdown of all nodes.
+        It ends at a signal, when a loop is complete, or when all nodes are shut down.
 
         Raises:
-            SpaceRobotError: a node cannot be started, or its loop cannot go on.
+            SpaceRobotError: a node cannot be started, or its loop failed.
         """
         for node in self._nodes:
             node.claim_name()
@@ -84,7 +84,7 @@ class NodeHost:
             pass
 
     def end(self) -> list[tuple[str, SpaceRobotError]]:
-        """End all nodes, the last one first; which ones could not end as they should, and why."""
+        """End all nodes, the last one first; return names and errors of nodes that failed."""
         failures = []
         for node in reversed(self._nodes):
             try:
@@ -97,14 +97,14 @@ class NodeHost:
 def run_nodes(*kinds: NodeKind[Any], arguments: list[str] | None = None) -> NoReturn:
     """Run nodes in this process until a loop is complete, or until all are shut down.
 
-    Exit code 0 at the end or on one of `ENDING_SIGNALS`, 2 on bad input, 1 on a failed flight,
-    each failure with one line on standard error.
+    The exit code is 0 at the end or at one of `ENDING_SIGNALS`, 2 for invalid input, 1 for a failed
+    flight; each failure gives one line on standard error.
 
     Args:
-        kinds: the nodes in the order in which they are started; they end in the reverse order.
-        arguments: the command line (None: this process').
+        kinds: the nodes in the order of their start; they end in reverse order.
+        arguments: the command line (None: that of this process).
     """
-    faulthandler.enable()  # a crash of the middleware leaves a word on where it was
+    faulthandler.enable()  # a traceback for crashes of the middleware
     schemas = [kind.schema for kind in kinds]
     who = schemas[0].ros_name() if len(kinds) == 1 else "composed nodes"
     try:
@@ -114,7 +114,7 @@ def run_nodes(*kinds: NodeKind[Any], arguments: list[str] | None = None) -> NoRe
         rclpy.init(args=arguments, signal_handler_options=SignalHandlerOptions.NO)
     except InputError as error:
         sys.exit(_say(who, error))
-    except Exception as error:  # RCLError is private; whatever it is, the arguments are at fault
+    except Exception as error:  # RCLError is private; it means invalid arguments
         sys.exit(_say(who, InputError(str(error).splitlines()[0])))
     nodes = [kind.make_node() for kind in kinds]
     host = NodeHost(nodes)
@@ -132,21 +132,21 @@ def run_nodes(*kinds: NodeKind[Any], arguments: list[str] | None = None) -> NoRe
         rclpy.utilities.try_shutdown()
     sys.stdout.flush()
     sys.stderr.flush()
-    # all is closed; what is left are threads of the middleware, which may crash (once in thousands
-    # of times) when they meet the ruins of an interpreter that ends in the usual way
+    # all is closed except threads of the middleware, which may crash (once in thousands of times)
+    # during the normal shutdown of the interpreter
     os._exit(code)
 
 
 def _answer(schemas: Sequence[type[NodeSettings]], others: Sequence[str]) -> None:
-    """Print the usage and end, if that is what the arguments that are not for ROS ask for.
+    """Print the usage and exit, if this is requested by the arguments that are not ROS's.
 
     Raises:
-        InputError: they ask for something else.
+        InputError: other arguments.
     """
     if not {"-h", "--help"} & set(others):
         raise InputError(
-            f"unknown argument {short(others[0])}: a node takes only those of ROS, after "
-            "--ros-args (--help tells more)"
+            f"unknown argument {short(others[0])}: a node accepts only those of ROS, after "
+            "--ros-args (see --help)"
         )
     for schema in schemas:
         name = schema.ros_name()

@@ -1,4 +1,4 @@
-"""The nodes of a process in turn: served, stepped, and waited for when none has anything to do."""
+"""Scheduler of the nodes of a process: steps them in turn, and waits when all are idle."""
 
 from __future__ import annotations
 
@@ -18,24 +18,24 @@ from .waiting import SPIN_S, Waiter
 LISTENER_PERIOD_S = 0.02
 REMIND_S = 5.0
 UPKEEP_GAP_S = 2e-3
-"""Between one node's upkeep and another's, so that all of them together delay no tick."""
+"""Minimum time between the upkeep of two nodes, so that they do not delay a tick together."""
 UPKEEP_PATIENCE_S = 0.02
-"""Upkeep that is due waits so long for a moment in which no node has anything to do."""
+"""Maximum time that due upkeep waits for an idle moment of all nodes."""
 GLANCE_S = 1e-3
-"""A node among several looks so often whether a message has come that is not expected at once."""
+"""Period of polling for messages that are not expected soon, in a process with several nodes."""
 NO_WAIT = Wait(0.0)
 
 
 class NodeScheduler:
-    """Gives each node its turn, and lets the process sleep between two rounds if it can."""
+    """Steps all nodes in turn, and lets the process sleep between two rounds if possible."""
 
     def __init__(self, nodes: Sequence[ManagedNode[Any]]) -> None:
-        """Take the nodes in the order of their turns."""
+        """Store the nodes in the order of their turns."""
         self._nodes = nodes
         self._seats = [ScheduledNode(node, is_alone=len(nodes) == 1) for node in nodes]
         self._upkeeps = [Upkeep(node) for node in nodes]
         self._due = [0.0] * len(nodes)
-        """When each node's upkeep is due, by the monotonic clock."""
+        """Time at which each node's upkeep is due, monotonic clock."""
         self._upkeep_at = 0.0
         self._waiter = Waiter(nodes[0])
         self._is_alone = len(nodes) == 1
@@ -43,7 +43,7 @@ class NodeScheduler:
             seat.node.let_others_work = partial(self._step_others, seat)
 
     def take(self) -> bool:
-        """Give all nodes a turn each; False when the process has come to its end."""
+        """Step all nodes once; return False when the process is to end."""
         now = time.monotonic()
         if now >= self._upkeep_at:
             if not any(node.is_active for node in self._nodes):
@@ -59,7 +59,7 @@ class NodeScheduler:
         return self._rest(now) if is_idle else True
 
     def _serve_inactive(self) -> bool:
-        """Wait for service calls, as there is nothing else to do; False when all are shut down."""
+        """Wait for service calls while no node is active; return False when all are shut down."""
         timeout_s = PERIOD_S / len(self._nodes)
         for upkeep in self._upkeeps:
             upkeep.run(timeout_s)
@@ -72,10 +72,10 @@ class NodeScheduler:
         self._upkeep_at = max(min(self._due), time.monotonic() + UPKEEP_GAP_S)
 
     def _rest(self, now: float) -> bool:
-        """Do what can wait for others, or wait until a node has something to do.
+        """Run due upkeep, or wait until a node has work.
 
         Returns:
-            False when the process has come to its end.
+            False when the process is to end.
         """
         if now >= self._upkeep_at:
             self._serve_one()
@@ -104,31 +104,31 @@ class NodeScheduler:
 
 
 class ScheduledNode:
-    """A node among those that take turns, and how far its loop is."""
+    """A scheduled node with the state of its loop."""
 
     def __init__(self, node: ManagedNode[Any], is_alone: bool) -> None:
-        """Take a node in any state."""
+        """Store a node, in any lifecycle state."""
         self.node, self._is_alone = node, is_alone
         self.wait = NO_WAIT
-        """The wait that its loop asked for last."""
+        """Last wait requested by the loop."""
         self.wake_at = 0.0
-        """When it is to be stepped though no message has come, by the monotonic clock."""
+        """Time at which the loop is stepped without message, monotonic clock."""
         self.glance_at = 0.0
-        """When it may be stepped at the earliest."""
+        """Earliest time of the next step."""
         self.spins = False
-        """True if it is better to look for its next message than to sleep."""
+        """True to poll for the next message instead of sleeping."""
         self._may_spin = True
         self._loop: Loop | None = None
-        """The loop while it is stepped."""
+        """The loop while the node is active."""
         self._remind_at = 0.0
 
     @property
     def is_complete(self) -> bool:
-        """True if its loop has come to its end."""
+        """True if its loop has ended."""
         return self._loop is not None and self._loop.is_complete
 
     def step(self, now: float) -> bool:
-        """Step the node's loop, if it is active and need not wait; whether it did something."""
+        """Step the loop if it is active and need not wait; return True if it did work."""
         if not self.node.is_active:
             self._loop, self.wait, self.glance_at, self.spins = None, NO_WAIT, 0.0, False
             return False
@@ -144,7 +144,7 @@ class ScheduledNode:
         return False
 
     def spin(self, until: float) -> bool:
-        """Step the loop again and again, giving way between; whether it did something in time."""
+        """Step the loop repeatedly, yielding between; return True if it did work in time."""
         assert self._loop is not None
         step = self._loop.step
         while True:
@@ -166,7 +166,7 @@ class ScheduledNode:
             self.glance_at = 0.0 if wait.is_brief else min(now + GLANCE_S, self.wake_at)
 
     def _begin(self, now: float) -> bool:
-        """Begin the loop of a node that has become active, once its listeners are there."""
+        """Start the loop of a newly active node once its subscribers exist; return True then."""
         node, loop = self.node, self.node.loop
         assert loop is not None
         self._remind_at = self._remind_at or now + REMIND_S
@@ -180,7 +180,7 @@ class ScheduledNode:
             return False
         self._remind_at = 0.0
         gc.collect()
-        gc.freeze()  # what lives until the end need not be looked through in the loop
+        gc.freeze()  # exclude permanent objects from garbage collection
         self._may_spin = not (node.settings and node.settings.fifo_priority)
         if node.settings and node.settings.fifo_priority:
             node.log(ask_for_fifo(node.settings.fifo_priority))
@@ -190,10 +190,10 @@ class ScheduledNode:
 
 
 def ask_for_fifo(priority: int) -> str:
-    """Put all threads of this process under SCHED_FIFO; return a message on the result.
+    """Request SCHED_FIFO for all threads of this process; return a message on the result.
 
-    The middleware's threads go one above the loop: a loop that waits for a message must not keep
-    the thread away that brings it. Linux wakes such threads at once, others when it suits.
+    The middleware's threads get a priority one above the loop's, since a loop that waits for a
+    message must not block the thread that delivers it. Linux wakes such threads without delay.
     """
     loop = os.getpid()
     try:
@@ -202,5 +202,5 @@ def ask_for_fifo(priority: int) -> str:
             level = priority if thread == loop else priority + 1
             os.sched_setscheduler(thread, os.SCHED_FIFO, os.sched_param(level))
     except (OSError, AttributeError) as error:  # no permission; not Linux
-        return f"SCHED_FIFO {priority} was not granted ({error}): the usual scheduling"
+        return f"SCHED_FIFO {priority} was not granted ({error}): default scheduling"
     return f"SCHED_FIFO {priority}"

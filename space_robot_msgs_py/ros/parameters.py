@@ -26,7 +26,7 @@ def _bounds(field: Any) -> tuple[float | None, float | None]:
 
 
 def descriptor(field: Any, read_only: bool) -> ParameterDescriptor:
-    """Description and range of a schema's field."""
+    """Return the ROS descriptor of a schema's field: description and range."""
     low, high = _bounds(field)
     result = ParameterDescriptor(description=field.description or "", read_only=read_only)
     if low is not None and high is not None:
@@ -40,20 +40,20 @@ def descriptor(field: Any, read_only: bool) -> ParameterDescriptor:
 
 
 def declare_settings(node: Node, schema: type[Schema], changeable: tuple[str, ...] = ()) -> Schema:
-    """Resolve a schema with the user's parameters over its files, and declare every setting.
+    """Resolve a schema from files and the user's parameters, and declare every setting.
 
-    All are read-only but the ``changeable`` ones. The schema has checked types and ranges
-    before, with clearer words than ROS has.
+    All are read-only except the ``changeable`` ones. The schema checks types and ranges first, with
+    clearer messages than ROS.
 
     Raises:
-        InputError: a file or a parameter is wrong.
+        InputError: an invalid file or parameter.
     """
     fields = dict(leaves(schema))
     settings = schema.resolve(overrides(node, fields))
     usual = schema.model_fields["period"].default
     if settings.period != usual:
         node.get_logger().info(
-            f"a tick lasts {settings.period:g} s; the gains shipped are for {usual:g} s"
+            f"a tick lasts {settings.period:g} s; the shipped gains are for {usual:g} s"
         )
     for name, value in flatten(settings.model_dump()):
         node.declare_parameter(
@@ -63,16 +63,16 @@ def declare_settings(node: Node, schema: type[Schema], changeable: tuple[str, ..
 
 
 def overrides(node: Node, names: Iterable[str]) -> dict[str, Any]:
-    """Return what the user gave for these parameters, on the command line or in a file."""
+    """Return the user's values of these parameters, from the command line or a file."""
     values = parameter_overrides(node)
     return {name: _plain(values[name].value) for name in names if name in values}
 
 
 def refuse_unknown(node: Node) -> None:
-    """Stop on a parameter nobody declared, which ROS would ignore in silence.
+    """Refuse undeclared parameters, which ROS would ignore silently.
 
     Raises:
-        InputError: naming the parameter and those there are.
+        InputError: an unknown parameter; lists the existing ones.
     """
     allowed = sorted(declared_parameters(node))
     for name in parameter_overrides(node):

@@ -1,4 +1,4 @@
-"""/simulation/paused: publishes a pause to all nodes, so that watchdogs ignore it."""
+"""/simulation/paused: tells all nodes of a pause, so that watchdogs ignore it."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from .endpoints import PolledCallbackGroup, RawPublisher, RawSubscription
 
 
 class PausedOutput:
-    """Publisher of the pause, also for late subscribers."""
+    """Publisher of the pause, latched for late subscribers."""
 
     def __init__(self, node: Node) -> None:
         self._publisher = RawPublisher(node, topics.SIMULATION_PAUSED)
         self._told: bool | None = None
 
     def tell(self, is_paused: bool) -> None:
-        """Return whether the simulation is paused, if that is news."""
+        """Publish whether the simulation is paused, if this has changed."""
         if is_paused is not self._told:
             self._told = is_paused
             self._publisher.publish(serialize_message(Bool(data=is_paused)))
@@ -38,9 +38,9 @@ class PausedInput:
 
     @property
     def running_since(self) -> float:
-        """Time since when the simulation has been known not to be paused, by the monotonic clock.
+        """Time since which the simulation is known to be running, monotonic clock.
 
-        It is now while the simulation is paused.
+        During a pause it is the present time.
         """
         while (data := self._input.take()) is not None:
             try:

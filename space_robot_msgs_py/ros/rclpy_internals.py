@@ -1,8 +1,8 @@
 """Access to private parts of rclpy, of the `VERSIONS` 7.1 of ROS 2 Jazzy.
 
-What is used, and for want of which public way: wait sets (the executor's own costs more than a
-loop's whole work), messages taken by hand, the parameters that the user gave for a node,
-undeclaring read-only parameters, and a lifecycle node that survives an impossible transition.
+These have no public interface: wait sets (the executor's takes more time than a loop's work),
+taking messages without executor, the user's parameters of a node, undeclaring read-only
+parameters, and a lifecycle node that survives an impossible transition.
 """
 
 from __future__ import annotations
@@ -18,11 +18,11 @@ from rclpy.node import Node
 from rclpy.publisher import Publisher
 
 VERSIONS = ("7.",)
-"""Beginnings of rclpy's versions that this was written for: Jazzy's."""
+"""Prefixes of supported versions of rclpy: those of Jazzy."""
 
 
 def is_known_version() -> bool:
-    """Return whether rclpy is one of `VERSIONS`, with its rcl and rmw."""
+    """Return True if rclpy has one of the `VERSIONS`, with its rcl and rmw."""
     try:
         return metadata.version("rclpy").startswith(VERSIONS)
     except metadata.PackageNotFoundError:
@@ -30,26 +30,26 @@ def is_known_version() -> bool:
 
 
 def tells_pointers() -> bool:
-    """Return whether `pointer` works here."""
+    """Return True if `pointer` is available."""
     return hasattr(_rclpy.Subscription, "pointer")
 
 
 def pointer(handle: Any) -> int:
-    """Address of the ``rcl_subscription_t`` behind a subscription's handle."""
+    """Return the address of the ``rcl_subscription_t`` of a subscription's handle."""
     return handle.pointer  # type: ignore[no-any-return]
 
 
 def take_serialized(handle: Any, message_type: Any) -> tuple[bytes, dict[str, int]] | None:
-    """Take a subscription's next message, by its handle, with its info: rclpy's own take.
+    """Take a subscription's next message with its info by rclpy, from the handle.
 
-    Without rclpy's guard against another thread that destroys the subscription meanwhile.
+    There is no protection against another thread that destroys the subscription meanwhile.
     """
     taken: tuple[bytes, dict[str, int]] | None = handle.take_message(message_type, True)
     return taken
 
 
 def raw_publish(publisher: Publisher) -> Callable[[bytes], None]:
-    """The publisher's function for serialized messages; see `take_serialized` for its guard."""
+    """Return the publisher's function for serialized messages, without protection as above."""
     publish: Callable[[bytes], None] = publisher.handle.publish_raw
     return publish
 
@@ -63,7 +63,7 @@ class SubscriptionWaitSet:
             self._set = _rclpy.WaitSet(size, 0, 0, 0, 0, 0, handle)
 
     def wait(self, handles: Sequence[Any], timeout_s: float) -> None:
-        """Sleep until one of the subscriptions has a message or the time is over."""
+        """Sleep until one of the subscriptions has a message, or until the timeout."""
         self._set.clear_entities()
         for handle in handles:
             self._set.add_subscription(handle)
@@ -79,7 +79,7 @@ class ServiceWaitSet:
         self._set: Any = None
 
     def is_called(self) -> bool:
-        """Tell at once whether a request waits: in 20 us, where an executor's look takes 1 ms."""
+        """Return True if a request waits; takes 20 us, where an executor takes 1 ms."""
         if (services := list(self._node.services)) != self._services:
             self._services = services
             handle: Any = self._node.context.handle
@@ -93,12 +93,12 @@ class ServiceWaitSet:
 
 
 def parameter_overrides(node: Node) -> Mapping[str, Any]:
-    """Return what the user gave for a node, on the command line or in a parameter file."""
+    """Return the user's parameters of a node, from the command line or a parameter file."""
     return node._parameter_overrides
 
 
 def declared_parameters(node: Node) -> set[str]:
-    """Names of all declared parameters."""
+    """Return the names of all declared parameters."""
     return set(node._parameters)
 
 
@@ -110,10 +110,10 @@ def forget_parameters(node: Node, names: Iterable[str]) -> None:
 
 
 def guard_change_state(node: LifecycleNode, refused: Callable[[], None]) -> None:
-    """Answer a transition that does not exist in the present state: rclpy would die of it.
+    """Refuse transitions that do not exist in the present state, on which rclpy would crash.
 
     Args:
-        node: not served yet.
+        node: not in an executor yet.
         refused: called for each such transition.
     """
     service = node._service_change_state

@@ -1,4 +1,4 @@
-"""A graph of lifecycle nodes taken back to its start, from within one of its nodes."""
+"""Restart of a graph of lifecycle nodes, from within one of its nodes."""
 
 from __future__ import annotations
 
@@ -16,27 +16,27 @@ from .managed_node import ManagedNode
 
 FIND_S = 5.0
 ANSWER_S = 180.0
-"""A node that is configured anew may have code to compile."""
+"""Timeout of a transition, in which a node may compile code."""
 
 
 @types.coroutine
 def until(condition: Callable[[], bool]) -> Generator[None, None, None]:
-    """Let the node do other things until a condition holds; for callbacks of services."""
+    """Yield to the node until a condition holds; for service callbacks."""
     while not condition():
         yield
 
 
 async def restart(node: ManagedNode[Any], others: Sequence[str]) -> None:
-    """Deactivate and clean up a node and others, then configure and activate them anew.
+    """Deactivate and clean up a node and others, then configure and activate them again.
 
-    All that they made is made again from their parameters and files, as at their first start.
+    They read their parameters and files again, as at their first start.
 
     Args:
-        node: the one that leads: it stops first and starts last.
-        others: names of the others in its namespace, in the order of their activation.
+        node: the leading node, which stops first and starts last.
+        others: names of the others in its namespace, in the order of activation.
 
     Raises:
-        FlightError: a node refuses or does not answer; the graph does not fly on then.
+        FlightError: a node refuses or does not answer; the flight then stops.
         SpaceRobotError: ``node`` itself cannot be started.
     """
     node.stop()
@@ -54,7 +54,7 @@ async def _change(node: ManagedNode[Any], name: str, transition: str) -> None:
         ChangeState, f"{name}/change_state", callback_group=ReentrantCallbackGroup()
     )
     try:
-        await _in_time(client.service_is_ready, FIND_S, f"{name} is not there to {transition}")
+        await _in_time(client.service_is_ready, FIND_S, f"{name} is not available to {transition}")
         number = getattr(Transition, f"TRANSITION_{transition.upper()}")
         answer = client.call_async(ChangeState.Request(transition=Transition(id=number)))
         await _in_time(answer.done, ANSWER_S, f"{name} does not answer to {transition}")

@@ -1,8 +1,8 @@
 """``python .../run_module.py MODULE ARGUMENT...``: ``python -m`` without the current folder.
 
-``python -m`` looks for every import in the current folder first, so a ``queue.py`` of the user's
-there would run in our processes. Here only PYTHONPATH and what is installed are searched. (From
-Python 3.11 on, ``-P`` does the same.) As a module: the command line that does so.
+``python -m`` searches every import in the current folder first, so a user's ``queue.py`` there
+would run in our processes. Here only PYTHONPATH and installed packages are searched. (From Python
+3.11 on, ``-P`` does the same.) Imported as a module, it builds the command line.
 """
 
 from __future__ import annotations
@@ -14,12 +14,12 @@ HERE = os.path.dirname(os.path.abspath(__file__))
 
 
 def module_command(module: str, *arguments: str) -> list[str]:
-    """The command line that runs ``module`` as a program under this Python."""
+    """Return the command line that runs ``module`` as a program with this Python."""
     return [sys.executable, os.path.join(HERE, "run_module.py"), module, *arguments]
 
 
 def clean_environment() -> dict[str, str]:
-    """This process' environment; an empty entry of PYTHONPATH would be the current folder."""
+    """Return this process' environment without the current folder (empty entries) in PYTHONPATH."""
     environment = dict(os.environ)
     if "PYTHONPATH" in environment:
         entries = environment["PYTHONPATH"].split(os.pathsep)
@@ -29,9 +29,9 @@ def clean_environment() -> dict[str, str]:
 
 def _main() -> None:
     root = os.path.dirname(os.path.dirname(HERE))
-    # a script's own folder is put first, and ours holds modules that are no top-level ones
+    # Python adds the script's folder, whose modules are not top-level ones
     sys.path[:] = [path for path in sys.path if os.path.abspath(path) != HERE]
-    if root not in sys.path:  # an uninstalled tree in the parent's current folder
+    if root not in sys.path:  # a source tree in the parent's current folder
         sys.path.insert(0, root)
     import runpy
 

@@ -1,10 +1,9 @@
-"""Serialized messages with their publisher, whom rclpy's own take does not tell.
+"""Takes serialized messages with their publisher's identity, which rclpy does not return.
 
-This goes past rclpy, to the C interface of rcl as ROS 2 Jazzy has it
-(`rcl_take_serialized_message`, `rmw_message_info_t`), through ``pointer`` of a subscription's
-handle. It takes less time than rclpy's take, too. With another rclpy than those of
-`rclpy_internals.VERSIONS`, or where the libraries are not as expected, messages are taken by rclpy
-and do not tell their publisher.
+It calls the C interface of rcl in ROS 2 Jazzy directly (`rcl_take_serialized_message`,
+`rmw_message_info_t`), through ``pointer`` of a subscription's handle. This is also faster than
+rclpy. With other versions than `rclpy_internals.VERSIONS`, or with unexpected libraries, messages
+are taken by rclpy, without their publisher's identity.
 """
 
 from __future__ import annotations
@@ -17,23 +16,23 @@ from typing import Any, NamedTuple
 from .rclpy_internals import is_known_version, pointer, take_serialized, tells_pointers
 
 ROOM = 4096
-"""Bytes of a message that need no more memory than there is; rcl makes more where it must."""
+"""Initial size of the message buffer, bytes; rcl enlarges it if necessary."""
 OK, NOTHING_THERE = 0, 401
 GID_BYTES = 16
 NOT_COUNTED = (1 << 64) - 1
-"""rmw's sequence number of a middleware that gives none."""
+"""Sequence number in rmw of a middleware without sequence numbers."""
 
 
 class Received(NamedTuple):
-    """A serialized message and where it is from."""
+    """A serialized message with its origin."""
 
     data: bytes
     sent_ns: int
-    """When it was sent by its sender's clock, ns since 1970."""
+    """Time of sending by the sender's clock, ns since 1970."""
     publisher: bytes
     """GID of the publisher; in RTPS its first 12 bytes identify the participant. Empty: unknown."""
     sequence: int
-    """Sequence number of the message of this publisher, from 1 on; 0: unknown."""
+    """The publisher's sequence number of the message, from 1; 0: unknown."""
 
 
 class _Allocator(ctypes.Structure):
@@ -68,18 +67,18 @@ class _Info(ctypes.Structure):
 
 
 Take = Callable[[Any, Any], Received | None]
-"""The next message of a subscription, by its handle and type of rclpy's, if there is one."""
+"""Takes the next message of a subscription, given rclpy's handle and type; None if none waits."""
 
 
 class SerializedTake:
-    """Takes from any subscription into one block of memory; not for several threads."""
+    """Takes messages of any subscription with one buffer; not thread-safe."""
 
     def __init__(self) -> None:
-        """Find what is needed of rcl.
+        """Load the functions of rcl.
 
         Raises:
-            OSError: a library is not there.
-            AttributeError: a library lacks a function.
+            OSError: a library is missing.
+            AttributeError: a function is missing.
         """
         self._take = ctypes.CDLL("librcl.so").rcl_take_serialized_message  # rclpy has loaded it
         self._take.argtypes = [ctypes.c_void_p] * 4
@@ -97,7 +96,7 @@ class SerializedTake:
         self._gid = (ctypes.c_char * GID_BYTES).from_buffer(self._info, gid_at)
 
     def __call__(self, handle: Any, message_type: Any) -> Received | None:
-        """The next message, with its publisher."""
+        """Take the next message with its publisher; None if none waits."""
         with handle:
             code = self._take(pointer(handle), *self._addresses, None)
         if code == NOTHING_THERE:
@@ -115,7 +114,7 @@ class SerializedTake:
 
 
 def take_by_rclpy(handle: Any, message_type: Any) -> Received | None:
-    """The next message, without its publisher: all that rclpy itself tells."""
+    """Take the next message by rclpy, without its publisher; None if none waits."""
     taken = take_serialized(handle, message_type)
     if taken is None:
         return None
@@ -126,7 +125,7 @@ def take_by_rclpy(handle: Any, message_type: Any) -> Received | None:
 
 @cache
 def serialized_take() -> Take:
-    """The one of this process: `SerializedTake`, or `take_by_rclpy` where that cannot be."""
+    """Return the function of this process: `SerializedTake`, or else `take_by_rclpy`."""
     try:
         if is_known_version() and tells_pointers():
             return SerializedTake()

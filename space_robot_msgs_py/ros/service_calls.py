@@ -1,4 +1,4 @@
-"""A node's service calls, run one by one between the ticks of its loop."""
+"""Service calls of a node, executed one by one between the ticks of its loop."""
 
 from __future__ import annotations
 
@@ -11,37 +11,37 @@ from rclpy.node import Node
 from .rclpy_internals import ServiceWaitSet
 
 OVERLOADED_S = 1.0
-"""Calls that have been waiting without a break for this long are a storm."""
+"""Time of uninterrupted waiting calls after which a node is overloaded."""
 COUNTED_S = 0.1
-"""Of the time from one call to the next: a few slow ones, as transitions, are no storm."""
+"""Maximum counted time per call, so that a few slow ones, such as transitions, are no overload."""
 FULL_LOOK_S = 5.0
 
 
 class ServiceCalls(SingleThreadedExecutor):
-    """Runs the callbacks of one node; counts them, and knows when they are too many."""
+    """Executes the callbacks of one node, counts them, and detects overload."""
 
     def __init__(self, node: Node) -> None:
         super().__init__()
         self.add_node(node)
         self._requests = ServiceWaitSet(node)
         self._full_look_at = 0.0
-        """When to look for what is no service call, too: the middleware's warnings."""
+        """Time of the next check of all entities, including the middleware's events."""
         self.count = 0
-        """Calls run so far."""
+        """Number of executed calls."""
         self.is_overloaded = False
-        """True if calls come faster than they are run; beyond 1000 of a kind they are lost."""
+        """True if calls arrive faster than they are executed; more than 1000 of a kind are lost."""
         self._unfinished: list[Any] = []
-        """Calls whose callback waits for something that the node's loop does."""
+        """Calls whose callback waits for the node's loop."""
         self._began_at: float | None = None
-        """When the last call began; None if none waited after it."""
+        """Start time of the last call; None if no further call waited."""
         self._busy_s = 0.0
-        """How long there has been no break."""
+        """Time without idle moment, s."""
 
     def run_one(self, timeout_s: float = 0.0) -> bool:
-        """Run a call that waits, or comes within ``timeout_s``; tell whether there was one."""
+        """Execute a call that waits or arrives in time; return True if there was one."""
         if not timeout_s and not self._is_worth_a_look():
             return self._take_a_break()
-        # the end of a call wakes the executor, whose next look then ends at once and finds nothing
+        # the end of a call wakes the executor, so its next wait returns at once without result
         callback = self._next(timeout_s) or (self._next(0.0) if self._began_at else None)
         if callback is None:
             return self._take_a_break()
@@ -60,12 +60,12 @@ class ServiceCalls(SingleThreadedExecutor):
         return True
 
     def _take_a_break(self) -> bool:
-        """Note that no call waits: there is no storm."""
+        """Reset the measure of overload, since no call waits."""
         self._began_at, self._busy_s, self.is_overloaded = None, 0.0, False
         return False
 
     def _go_on(self, callback: Any) -> bool:
-        """Run a call again that waits for something; several looks for one call are no storm."""
+        """Resume a waiting call; this does not count as overload."""
         self._began_at, self._busy_s = None, 0.0
         callback()
         if callback.done():
@@ -75,12 +75,12 @@ class ServiceCalls(SingleThreadedExecutor):
         return True
 
     def finish(self) -> None:
-        """Run the callbacks that still wait, now that what they wait for has ended."""
+        """Resume all waiting callbacks after the end of the loop."""
         for callback in self._unfinished:
             callback()
 
     def _is_worth_a_look(self) -> bool:
-        """Return whether a request waits, or whether it is time for a full look, which is slow."""
+        """Return True if a request waits, or if the slow check of all entities is due."""
         if self._unfinished:
             return True
         if (now := time.monotonic()) < self._full_look_at:

@@ -10,13 +10,13 @@ from .endpoints import PolledCallbackGroup, RawSubscription
 from .exclusive import GraphPublishers
 
 MOST_REFUSED = 1_000
-"""So many messages of others are passed over before the loop may look after other things."""
+"""Maximum number of foreign messages ignored per call of `take`."""
 
 
 class TrustedSubscription(RawSubscription):
-    """Tells publishers apart by the identity (GID) that each message carries, see `Sources`.
+    """Distinguishes publishers by the identity (GID) in each message, see `Sources`.
 
-    Where messages carry none (`serialized_take`), all are taken for the topic's own publisher's.
+    Messages without identity (`serialized_take`) are accepted as the topic's own publisher's.
     """
 
     def __init__(
@@ -26,7 +26,7 @@ class TrustedSubscription(RawSubscription):
         self._sources = Sources(topic.name, GraphPublishers(node))
 
     def take(self) -> bytes | None:
-        """Take the next message of the topic's own publisher, if there is one."""
+        """Take the next message of the topic's own publisher; None if there is none."""
         is_ours = self._sources.take
         for _ in range(MOST_REFUSED):
             taken = self.take_with_source()
@@ -37,6 +37,6 @@ class TrustedSubscription(RawSubscription):
         return None
 
     def counts(self, word: str) -> dict[str, int]:
-        """Count, for a node's health, the messages of others that were ``word``, if any."""
+        """Return the number of foreign messages, which were ``word``, for a node's health."""
         count = self._sources.foreign
         return {f"{word}: another publisher's on {self.full_name}": count} if count else {}

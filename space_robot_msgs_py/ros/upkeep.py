@@ -1,4 +1,4 @@
-"""A node's work between the steps of its loop: service calls, and reports of its health."""
+"""Upkeep of a node between the steps of its loop: service calls and health reports."""
 
 from __future__ import annotations
 
@@ -8,25 +8,25 @@ from typing import Protocol
 from .service_calls import ServiceCalls
 
 PERIOD_S = 0.1
-"""A look for service calls takes time that a loop needs: not too often."""
+"""Period of checks for service calls, which take time of the loop."""
 SERVICE_SHARE = 0.1
-"""Service calls that wait one behind another take no more than this share of a loop's time."""
+"""Maximum share of a loop's time for queued service calls."""
 LONGEST_PAUSE_S = 1.0
 
 
 class Served(Protocol):
-    """The part of a node that `Upkeep` needs."""
+    """Interface of a node for `Upkeep`."""
 
     calls: ServiceCalls
 
     def report(self) -> None:
-        """Report the health if it is time again."""
+        """Report the health if it is due."""
 
 
 class Upkeep:
-    """Runs a node's service calls and reports its health, each when it is due.
+    """Executes a node's service calls and reports its health, each when due.
 
-    In flight one of the two at a time: both take longer than a tick leaves free.
+    In flight only one of the two at a time, since both together take longer than a tick allows.
     """
 
     def __init__(self, node: Served) -> None:
@@ -34,21 +34,21 @@ class Upkeep:
         self._next_call = self._next_report = 0.0
 
     def run(self, timeout_s: float = 0.0) -> float:
-        """Run a service call that waits or report the health, if it is time.
+        """Execute a waiting service call or report the health, if due.
 
         Args:
-            timeout_s: how long a call is waited for, where there is no flight that waits for this.
+            timeout_s: time to wait for a call; only without flight.
 
         Returns:
-            When to be called again, by the monotonic clock.
+            Time of the next call of this method, monotonic clock.
         """
         now = time.monotonic()
         looks = timeout_s > 0.0 or self._next_call <= min(now, self._next_report)
         if looks:
             has_run = self.node.calls.run_one(timeout_s)
             begin, now = now, time.monotonic()
-            # after one call look for another soon, but let them take no more than their share;
-            # the answer to a client that has gone takes the middleware 0.1 s
+            # after a call check again soon, within the allowed share of time; the answer to a
+            # client that has ended takes the middleware 0.1 s
             pause = min((now - begin) / SERVICE_SHARE, LONGEST_PAUSE_S)
             self._next_call = now + (pause if has_run else PERIOD_S)
         if now >= self._next_report and (timeout_s or not looks):

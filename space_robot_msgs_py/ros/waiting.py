@@ -1,4 +1,4 @@
-"""Waiting for messages of subscriptions that no executor knows."""
+"""Waiting for messages of subscriptions without executor."""
 
 from __future__ import annotations
 
@@ -12,20 +12,20 @@ from .endpoints import RawSubscription
 from .rclpy_internals import SubscriptionWaitSet
 
 SPIN_S = 300e-6
-"""How long a wait takes and yields before it sleeps in the wait set. Not under SCHED_FIFO, where
-yielding gives way to nobody and sleeping threads wake at once."""
+"""Time of polling and yielding before sleeping in the wait set. Not under SCHED_FIFO, where
+yielding has no effect and sleeping threads wake without delay."""
 
 
 class Waiter:
-    """Waits until one of some subscriptions has something to take."""
+    """Waits until one of some subscriptions has a message."""
 
     def __init__(self, node: Node) -> None:
-        """``node``: any of the process' nodes."""
+        """Create the waiter; ``node`` is any node of the process."""
         self._context = node.context
         self._sets: dict[int, SubscriptionWaitSet] = {}
 
     def wait(self, inputs: Sequence[RawSubscription], timeout_s: float) -> None:
-        """Sleep until a message is there or the time is over."""
+        """Sleep until there is a message, or until the timeout."""
         size = len(inputs)
         if size not in self._sets:
             self._sets[size] = SubscriptionWaitSet(self._context, size)
@@ -33,7 +33,7 @@ class Waiter:
 
 
 def take_or_wait(entry: RawSubscription, waiter: Waiter, timeout_s: float) -> bytes | None:
-    """The next message of ``entry``: look and yield for a moment, then sleep, then look again."""
+    """Return the next message of ``entry``: poll and yield for a moment, then sleep, poll again."""
     data = entry.take()
     if data is not None:
         return data
