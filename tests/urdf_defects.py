@@ -37,11 +37,11 @@ DEFECTS = {
     "another root": Defect(GOOD, "<sdf><robot/></sdf>", "<sdf>", 1, "the root must be <robot>"),
     "xacro element": Defect("</robot>", "<xacro:x/></robot>", "<xacro:x>", 57, "xacro must be"),
     "robot without name": Defect(
-        '<robot name="arm">', "<robot>", "robot", 2, "needs a printable name", "named 'given'"
+        '<robot name="arm">', "<robot>", "robot", 2, "a printable name is required", "named 'given'"
     ),
     "no link": Defect(GOOD, '<robot name="a"/>', "robot", 1, "there is no <link>"),
     "no joint": Defect(
-        GOOD, f'<robot name="a"><link name="b">{HULL}</link></robot>', "", 0, "no joint moves"
+        GOOD, f'<robot name="a"><link name="b">{HULL}</link></robot>', "", 0, "no moving joint"
     ),
     # names, and what hangs on what
     "link without name": Defect('<link name="upper">', "<link>", "link", 16, "a printable name"),
@@ -59,13 +59,13 @@ DEFECTS = {
     "no parent": Defect('<parent link="upper"/>', "", "joint 'slide'", 45, "<parent link="),
     "no child": Defect('<child link="fore"/>', "<child/>", "joint 'slide'", 45, "<child link="),
     "unknown parent": Defect(
-        '<parent link="upper"/>', '<parent link="x"/>', "joint 'slide'", 47, "is no link"
+        '<parent link="upper"/>', '<parent link="x"/>', "joint 'slide'", 47, "is not a known link"
     ),
     "unknown child": Defect(
-        '<child link="fore"/>', '<child link="x"/>', "joint 'slide'", 48, "is no link"
+        '<child link="fore"/>', '<child link="x"/>', "joint 'slide'", 48, "is not a known link"
     ),
     "parent is child": Defect(
-        '<child link="fore"/>', '<child link="upper"/>', "joint 'slide'", 45, "must be two links"
+        '<child link="fore"/>', '<child link="upper"/>', "joint 'slide'", 45, "must be different links"
     ),
     "two parents": Defect(
         '<child link="hand"/>',
@@ -75,19 +75,19 @@ DEFECTS = {
         "already: loops cannot be closed",
     ),
     "two roots": Defect(
-        "</robot>", STRAY, "link 'stray'", 57, "only the root may be no joint's child"
+        "</robot>", STRAY, "link 'stray'", 57, "only the root may have no parent"
     ),
     "circle": Defect(
-        '<parent link="hull"/>', '<parent link="hand"/>', "joint 'shoulder'", 37, "in a circle"
+        '<parent link="hull"/>', '<parent link="hand"/>', "joint 'shoulder'", 37, "form a loop"
     ),
     # joints
     "no type": Defect(' type="prismatic"', "", "joint 'slide'", 45, "type must be one of"),
     "unknown type": Defect('"prismatic"', '"screw"', "joint 'slide'", 45, "type must be one of"),
     "planar joint": Defect(
-        '"prismatic"', '"planar"', "joint 'slide'", 45, "it moves in more than one way"
+        '"prismatic"', '"planar"', "joint 'slide'", 45, "more than one degree of freedom"
     ),
     "floating joint": Defect(
-        '"prismatic"', '"floating"', "joint 'slide'", 45, "it moves in more than one way"
+        '"prismatic"', '"floating"', "joint 'slide'", 45, "more than one degree of freedom"
     ),
     "mimic": Defect(
         LIMIT,
@@ -95,20 +95,20 @@ DEFECTS = {
         "joint 'shoulder'",
         42,
         "cannot be coupled",
-        "freed",
+        "made independent",
     ),
     "zero axis": Defect('"0 1 0"', '"0 0 0"', "joint 'shoulder'", 41, "the axis has no direction"),
-    "axis of NaN": Defect('"0 1 0"', '"0 nan 0"', "joint 'shoulder'", 41, "is no number"),
+    "axis of NaN": Defect('"0 1 0"', '"0 nan 0"', "joint 'shoulder'", 41, "is not a number"),
     "axis of two numbers": Defect('"0 1 0"', '"0 1"', "joint 'shoulder'", 41, "must be 3 numbers"),
     "long axis": Defect(
         '"0 1 0"', '"0 1 1"', "joint 'shoulder'", 41, "must have length 1", "normalised"
     ),
     "no limit": Defect(LIMIT, "", "joint 'shoulder'", 37, "needs a <limit>", "no limits"),
     "limits upside down": Defect(
-        '"-1" upper="2"', '"2" upper="-1"', "joint 'shoulder'", 42, "upside down", "exchanged"
+        '"-1" upper="2"', '"2" upper="-1"', "joint 'shoulder'", 42, "above upper", "exchanged"
     ),
     "limits without room": Defect(
-        'lower="-1" upper="2" ', "", "joint 'shoulder'", 42, "no room", "no limits of position"
+        'lower="-1" upper="2" ', "", "joint 'shoulder'", 42, "are equal", "no limits of position"
     ),
     "no effort": Defect(
         ' effort="50"', "", "joint 'shoulder'", 42, "limit.effort must be", "no limit of effort"
@@ -124,7 +124,7 @@ DEFECTS = {
     ),
     # numbers and what is misspelt
     "text for a number": Defect(
-        '"0 0 0.8"', '"0 0 0,8"', "joint 'slide'", 46, "origin.xyz is no number, got '0,8'"
+        '"0 0 0.8"', '"0 0 0,8"', "joint 'slide'", 46, "origin.xyz is not a number, got '0,8'"
     ),
     "too large": Defect('"300"', '"1e13"', "link 'hull'", 7, "must be at most 1e+12"),
     "infinite": Defect('"300"', '"1e400"', "link 'hull'", 7, "must be at most 1e+12"),
@@ -148,7 +148,7 @@ DEFECTS = {
         "left out",
     ),
     "given twice": Defect(
-        LIMIT, LIMIT * 2, "joint 'shoulder'", 42, "<limit> stands there twice", "the first one"
+        LIMIT, LIMIT * 2, "joint 'shoulder'", 42, "<limit> occurs twice", "the first one"
     ),
     # masses and inertias
     "negative mass": Defect('"300"', '"-300"', "link 'hull'", 7, "mass must be at least 0"),
@@ -165,11 +165,11 @@ DEFECTS = {
         '<mass value="0"/>',
         "link 'fore'",
         26,
-        "a link that moves must have a mass",
+        "a moving link must have a mass",
         "joint 'slide' locked at 0, merged into link 'upper'",
     ),
     "massless between": Defect(
-        UPPER, "<inertial>", "link 'upper'", 16, "a link that moves and carries others must"
+        UPPER, "<inertial>", "link 'upper'", 16, "a moving link that carries others must"
     ),
     "inertia without mass": Defect(
         "</link>\n  <joint",
@@ -177,7 +177,7 @@ DEFECTS = {
         "link 'hand'",
         36,
         "inertia without mass",
-        "the inertia is left out",
+        "the inertia is ignored",
     ),
     "zero inertia": Defect(
         FLAT, "", "link 'fore'", 26, "the inertia is zero", "that of a solid sphere of 0.134 m"
@@ -188,7 +188,7 @@ DEFECTS = {
         "link 'upper'",
         19,
         "the inertia is zero",
-        "that of the solid cylinder that it looks like",
+        "that of the solid cylinder of its visual",
     ),
     "not positive definite": Defect(
         'iyy="50"', 'iyy="-5"', "link 'hull'", 7, "not positive definite", "raised to the nearest"
@@ -208,10 +208,10 @@ DEFECTS = {
         "link 'hand'",
         32,
         "needs the attribute 'radius'",
-        "the shape is left out",
+        "the shape is ignored",
     ),
     "negative shape": Defect(
-        '"1 1 2"', '"1 1 -2"', "link 'hull'", 10, "must have sizes above 0", "the shape is left out"
+        '"1 1 2"', '"1 1 -2"', "link 'hull'", 10, "must have sizes above 0", "the shape is ignored"
     ),
     "unknown shape": Defect(
         '<box size="1 1 2"/>', "<cone/>", "link 'hull'", 10, "must be box, cylinder", "the shape"
@@ -225,7 +225,7 @@ DEFECTS = {
         "link 'fore'",
         29,
         "a mesh needs a filename",
-        "the shape is left out",
+        "the shape is ignored",
     ),
     "colour": Defect(
         '"0.2 0.2 0.2 1"', '"grey"', "material 'grey'", 3, "must be 4 numbers", "the colour"

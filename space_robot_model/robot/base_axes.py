@@ -1,4 +1,4 @@
-"""Vectors of many ticks at once, turned between the base's axes and the inertial ones."""
+"""Rotation of vectors between base and inertial frame, for many ticks at once."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ Array = NDArray[np.float64]
 
 
 def base_axes(quaternion: Array) -> Array:
-    """Return the base's axes x, y, z on inertial axes, (3, 3, N), of (4, N) ``[w, x, y, z]``."""
+    """Return the base's axes x, y, z in inertial axes, (3, 3, N), of (4, N) ``[w, x, y, z]``."""
     w, x, y, z = quaternion
     return np.array(
         [
@@ -21,19 +21,19 @@ def base_axes(quaternion: Array) -> Array:
 
 
 def to_inertial(axes: Array, vectors: Array) -> Array:
-    """Turn vectors (3, N) on the base's ``axes``, see `base_axes`, to inertial axes, (3, N)."""
+    """Rotate vectors (3, N) from base to inertial axes, (3, N); ``axes`` of `base_axes`."""
     turned: Array = axes[0] * vectors[0] + axes[1] * vectors[1] + axes[2] * vectors[2]
     return turned
 
 
 def to_base(axes: Array, vectors: Array) -> Array:
-    """Turn vectors (3, N) on inertial axes to the base's ``axes``, see `base_axes`, (3, N)."""
+    """Rotate vectors (3, N) from inertial to base axes, (3, N); ``axes`` of `base_axes`."""
     turned: Array = axes[:, 0] * vectors[0] + axes[:, 1] * vectors[1] + axes[:, 2] * vectors[2]
     return turned
 
 
 def cross(a: Array, b: Array) -> Array:
-    """Return ``a x b`` of vectors (3, N), faster than NumPy's over short rows."""
+    """Return ``a x b`` of vectors (3, N), faster than NumPy for short rows."""
     return np.array(
         [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
     )

@@ -1,7 +1,7 @@
-"""What is chosen of a URDF, as a part of its name: ``my.urdf?base=LINK&repair``.
+"""Options of a URDF as a part of its name: ``my.urdf?base=LINK&repair``.
 
-One text names a robot to commands, nodes and bags; a YAML that refers to a URDF says the same with
-``base`` and ``repair``.
+So one text defines a robot in commands, nodes and bags; a YAML that refers to a URDF has the same
+options as keys ``base`` and ``repair``.
 """
 
 from __future__ import annotations
@@ -14,25 +14,25 @@ _CHOICE = re.compile(r"\?(?=base=|repair$)(?:base=([^&?./]+))?(?:&?(repair))?$")
 
 
 class RobotChoice(NamedTuple):
-    """A robot's name, taken apart."""
+    """A robot's name, split into its parts."""
 
     name: str
-    """Without what is chosen."""
+    """Name without options."""
     base: str | None
-    """The link that is the satellite; None: the root."""
+    """Name of the link that is the satellite; None: the root."""
     repair: bool
-    """Whether defects are repaired."""
+    """True to repair defects."""
 
 
 def with_choice(robot: str, base: str | None, repair: bool) -> str:
-    """Return the name of a robot of which this is chosen; `split_choice` takes it apart."""
+    """Return the name of a robot with options; `split_choice` is the inverse."""
     chosen = [f"base={quote(base, safe='').replace('.', '%2E')}"] if base else []
     chosen += ["repair"] if repair else []
     return f"{robot}?{'&'.join(chosen)}" if chosen else robot
 
 
 def split_choice(robot: str) -> RobotChoice:
-    """Take a robot's name apart; any text is one."""
+    """Split a robot's name; any text is accepted."""
     match = _CHOICE.search(robot)
     if not match:
         return RobotChoice(robot, None, False)

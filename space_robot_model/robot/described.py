@@ -14,9 +14,9 @@ Array = NDArray[np.float64]
 
 
 def describe(robot: Robot) -> dict[str, Any]:
-    """Return what a robot consists of, SI units; angles in rad, numbers unknown are infinite.
+    """Return the parts of a robot in SI units; angles in rad, unknown numbers are infinite.
 
-    Vectors are on the axes of the body's own frame, whose z is the axis of its joint.
+    Vectors are in the axes of the body's frame, whose z axis is that of its joint.
     """
     return {
         "name": robot.name,

@@ -1,4 +1,4 @@
-"""A robot as the mapping of a YAML file that has all of its numbers, whatever it was read from."""
+"""A robot as the mapping of a self-contained YAML file, for any source of the robot."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ Array = NDArray[np.float64]
 
 
 def document_of(robot: Robot) -> dict[str, Any]:
-    """Return what `Robot.from_dict` builds the same robot of, but for its visuals.
+    """Return the mapping from which `Robot.from_dict` builds the same robot, without visuals.
 
-    Joints keep their numbers. Frames are written in degrees, so a number may differ in its last
-    digits from the robot's.
+    Frames are written in degrees, so numbers may differ from the robot's in their last digits. The
+    order of joints is kept.
     """
     links = [_link(robot, joint) for joint in range(robot.joint_count)]
     carriers = (BASE, *robot.all_joint_names)

@@ -1,4 +1,4 @@
-"""The inertia matrix, bias force, accelerations and torques of a `Robot`, in new arrays."""
+"""Inertia matrix, bias force, accelerations and torques of a `Robot`, as new arrays."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ def _checked(robot: Robot) -> Robot:
 
 
 def generalised_rows(robot: Robot) -> list[int]:
-    """Return where each of ``[v0, w0, joints]`` stands for the algorithms, see `Model.row`."""
+    """Return the index in the algorithms of each of ``[v0, w0, joints]``, see `Model.row`."""
     row = robot.model.row
     return [*range(6), *(6 + int(row[joint]) for joint in range(robot.joint_count))]
 
@@ -62,16 +62,16 @@ def mass_matrix(robot: Robot, quaternion_wxyz: ArrayLike, joint_positions: Array
     """Return the inertia matrix H of (7)-(10).
 
     Args:
-        robot: the robot's numbers.
+        robot: with N joints.
         quaternion_wxyz: (4,) base attitude, unit.
-        joint_positions: (N,) of all joints, rad, or m of prismatic ones.
+        joint_positions: (N,) of all joints, rad, or m for prismatic ones.
 
     Returns:
         (N+6, N+6), symmetric positive definite; generalised velocity ``[v0, w0, thetadot]``,
         base part on inertial axes.
 
     Raises:
-        InputError: an argument has another type or shape, or the quaternion is not unit.
+        InputError: an argument has a wrong type or shape, or the quaternion is not unit.
     """
     n, order, rows = _checked(robot).joint_count, list(robot.order), generalised_rows(robot)
     out, data = np.empty((n + 6, n + 6)), Data.allocate(n)
@@ -91,17 +91,17 @@ def bias_force(
     """Return the velocity-dependent force c of (20): ``H qdd + c = F``.
 
     Args:
-        robot: the robot's numbers.
+        robot: with N joints.
         quaternion_wxyz: (4,) base attitude, unit.
-        joint_positions: (N,) of all joints, rad, or m of prismatic ones.
-        w0_inertial: (3,) base angular velocity on inertial axes, rad/s.
+        joint_positions: (N,) of all joints, rad, or m for prismatic ones.
+        w0_inertial: (3,) base angular velocity in inertial axes, rad/s.
         joint_velocities: (N,) of all joints, rad/s or m/s.
 
     Returns:
         (N+6,) force (N), moment about the base CoM (N m) on inertial axes, joint torques (N m).
 
     Raises:
-        InputError: an argument has another type or shape, or the quaternion is not unit.
+        InputError: an argument has a wrong type or shape, or the quaternion is not unit.
     """
     n, order, rows = _checked(robot).joint_count, list(robot.order), generalised_rows(robot)
     out, data = np.empty(n + 6), Data.allocate(n)
@@ -124,10 +124,10 @@ def forward_dynamics(
     """Return the acceleration ``qdd = H^-1 (F - c)`` of (7).
 
     Args:
-        robot: the robot's numbers.
+        robot: with N joints.
         quaternion_wxyz: (4,) base attitude, unit.
-        joint_positions: (N,) of all joints, rad, or m of prismatic ones.
-        w0_inertial: (3,) base angular velocity on inertial axes, rad/s.
+        joint_positions: (N,) of all joints, rad, or m for prismatic ones.
+        w0_inertial: (3,) base angular velocity in inertial axes, rad/s.
         joint_velocities: (N,) of all joints, rad/s or m/s.
         force: (N+6,) F: force (N), moment about the base CoM (N m) on inertial axes, joint
             torques (N m).
@@ -136,7 +136,7 @@ def forward_dynamics(
         (N+6,) m/s2 and rad/s2, base part on inertial axes.
 
     Raises:
-        InputError: an argument has another type or shape, or the quaternion is not unit.
+        InputError: an argument has a wrong type or shape, or the quaternion is not unit.
     """
     n, order, rows = _checked(robot).joint_count, list(robot.order), generalised_rows(robot)
     out, data = np.empty(n + 6), Data.allocate(n)
@@ -151,15 +151,14 @@ def forward_dynamics(
 
 
 def inverse_dynamics(robot: Robot, references: Block) -> Array:
-    """Return the torque that each desired motion asks of a robot whose base floats freely.
+    """Return the torque for each desired motion of a robot without force on its base.
 
     Args:
-        robot: the robot's numbers.
-        references: (N,) array of a `space_robot_msgs_py.samples.Reference` each, of unit
-            quaternions.
+        robot: with n actuated joints.
+        references: (N,) block of `space_robot_msgs_py.samples.Reference`, with unit quaternions.
 
     Returns:
-        (N, n+3) N m, on the base's axes, which turn with it, then on the joints.
+        (N, n+3) N m, in base axes, then of the joints.
     """
     n = robot.n
     out = np.empty((len(references), n + 3))
@@ -168,15 +167,14 @@ def inverse_dynamics(robot: Robot, references: Block) -> Array:
 
 
 def free_inverse_dynamics(robot: Robot, references: Block) -> Array:
-    """Return the torque that each desired motion of the joints asks for if nothing turns the base.
+    """Return the torque for each desired motion of the joints with an unactuated base.
 
     Args:
-        robot: the robot's numbers; it has no momentum.
-        references: (N,) array of a `space_robot_msgs_py.samples.Reference` each, of unit
-            quaternions.
+        robot: with n actuated joints and zero momentum.
+        references: (N,) block of `space_robot_msgs_py.samples.Reference`, with unit quaternions.
 
     Returns:
-        (N, n+3) N m, zero on the base's axes, then on the joints.
+        (N, n+3) N m, zero in the base's axes, then of the joints.
     """
     out = np.empty((len(references), robot.n + 3))
     free_inverse_dynamics_along(robot.model, references, RhoSpaceModel.allocate(robot.n), out)

@@ -1,4 +1,4 @@
-"""The schema of a robot's YAML file, checked for physical sense."""
+"""Schema of a robot's YAML file, with checks of physical consistency."""
 
 from __future__ import annotations
 
@@ -26,9 +26,9 @@ Vector = Annotated[list[float], Field(min_length=3, max_length=3)]
 Coefficient = Annotated[float, Field(ge=0.0)]
 
 BASE = "base"
-"""The name of the base in a robot's file."""
+"""Name of the base in a robot's file."""
 MOST_LINKS = 4000
-"""Of a robot's file, those on fixed joints included."""
+"""Maximum number of links in a robot's file, including fixed ones."""
 
 
 class BaseFile(StrictModel):
@@ -39,14 +39,14 @@ class BaseFile(StrictModel):
 
 
 class OriginFile(StrictModel):
-    """A frame on its parent's axes: place in m, then turned about x, y, z of the parent."""
+    """A frame relative to its parent: position, m, and rotations about the parent's x, y, z."""
 
     xyz: Vector = Field([0.0, 0.0, 0.0])
     rpy_deg: Vector = Field([0.0, 0.0, 0.0])
 
 
 class FrameFile(StrictModel):
-    """A frame by modified Denavit-Hartenberg numbers, lengths in m, or by its ``origin``."""
+    """A frame by modified Denavit-Hartenberg parameters, lengths in m, or by its ``origin``."""
 
     alpha_deg: float = 0.0
     a: float = 0.0
@@ -56,12 +56,12 @@ class FrameFile(StrictModel):
     @model_validator(mode="after")
     def _one_way(self) -> Self:
         if self.origin and self.model_fields_set & {"alpha_deg", "a", "d"}:
-            raise ValueError("either origin, or alpha_deg, a and d, place a frame; not both")
+            raise ValueError("a frame has either origin, or alpha_deg, a and d, not both")
         return self
 
     @property
     def rotation(self) -> Array:
-        """(3, 3) its axes, as columns, on its parent's axes; exact at right angles."""
+        """(3, 3) axes of the frame, as columns, in parent axes; exact at right angles."""
         if self.origin:
             return rotation_of_rpy(np.radians(self.origin.rpy_deg))
         s, c = exact_sines_cosines(np.radians(self.alpha_deg))
@@ -69,14 +69,14 @@ class FrameFile(StrictModel):
 
     @property
     def offset(self) -> Array:
-        """(3,) m, from the parent's frame to this one, on the axes of this one."""
+        """(3,) position relative to the parent's frame, in the axes of this frame, m."""
         if self.origin:
             return product(self.rotation.T, self.origin.xyz)
         return np.array([self.a, 0.0, self.d])
 
 
 class LimitsFile(StrictModel):
-    """The range of a joint; a prismatic one has m in the place of degrees, and N."""
+    """Limits of a joint in degrees, deg/s and N m; m, m/s and N for a prismatic joint."""
 
     position_deg: Annotated[list[float], Field(min_length=2, max_length=2)] | None = None
     velocity_deg: Annotated[float, Field(gt=0.0)] | None = None
@@ -85,19 +85,19 @@ class LimitsFile(StrictModel):
     @model_validator(mode="after")
     def _in_order(self) -> Self:
         if self.position_deg and not self.position_deg[0] < self.position_deg[1]:
-            raise ValueError("position_deg must be a lower limit, then a higher one")
+            raise ValueError("position_deg must be a lower and a higher limit, in this order")
         return self
 
 
 class FrictionFile(StrictModel):
-    """The friction of a joint, in place of the settings': N m and N m s/rad, or N and N s/m."""
+    """Friction of a joint, instead of that of the settings: N m and N m s/rad, or N and N s/m."""
 
     coulomb: Coefficient
     viscous: Coefficient
 
 
 class PassiveFile(StrictModel):
-    """What holds a joint without a motor: N m/rad and N m s/rad, or N/m and N s/m."""
+    """Spring and damper of a passive joint: N m/rad and N m s/rad, or N/m and N s/m."""
 
     stiffness: Coefficient
     damping: Coefficient
@@ -105,10 +105,10 @@ class PassiveFile(StrictModel):
 
 
 class LinkFile(FrameFile):
-    """One entry of ``robot.links``: a joint, its place on its parent, and the body it moves.
+    """One entry of ``robot.links``: a joint, its frame on the parent, and the body it moves.
 
-    Lengths in m, mass in kg, inertia about the CoM in kg m2 on the link's axes. Without a
-    ``parent`` it is joined to the link above it in the file, the first one to the base.
+    Lengths in m, mass in kg, inertia about the CoM in kg m2 in the link's axes. Without
+    ``parent`` the parent is the previous link in the file, or the base for the first link.
     """
 
     name: Annotated[str, Field(min_length=1)]
@@ -133,7 +133,7 @@ class LinkFile(FrameFile):
     @classmethod
     def _moves_mass(cls, mass: float, info: ValidationInfo) -> float:
         if mass == 0.0 and info.data.get("joint") != "fixed":
-            raise ValueError("a link that moves must have a mass greater than 0")
+            raise ValueError("a moving link must have a mass greater than 0")
         return mass
 
     @field_validator("inertia", mode="after")
@@ -145,7 +145,7 @@ class LinkFile(FrameFile):
     @classmethod
     def _moves(cls, joint: StrictModel | None, info: ValidationInfo) -> StrictModel | None:
         if joint and info.data.get("joint") == "fixed":
-            raise ValueError("a fixed link has no friction and no spring")
+            raise ValueError("a fixed link cannot have friction or a spring")
         return joint
 
 
@@ -154,7 +154,7 @@ class ToolFile(FrameFile):
 
     name: Annotated[str, Field(min_length=1)] = "tool"
     link: str = ""
-    """The last one in the file where none is named."""
+    """Name of the link; the last one in the file if empty."""
 
 
 def _distinct_names(links: list[LinkFile]) -> list[LinkFile]:
@@ -170,7 +170,7 @@ def _distinct_names(links: list[LinkFile]) -> list[LinkFile]:
 
 
 class RobotFile(StrictModel):
-    """``robot``, the whole of a robot's YAML."""
+    """Key ``robot`` of a robot's YAML."""
 
     name: Annotated[str, Field(min_length=1)]
     base: BaseFile
@@ -181,7 +181,7 @@ class RobotFile(StrictModel):
     tools: list[ToolFile] = Field([])
 
     def bodies(self) -> list[Body]:
-        """Return the tree that the file tells."""
+        """Return the bodies of the tree defined by the file."""
         tools = [*([self.tool] if self.tool else []), *self.tools] or [ToolFile()]
         last = self.links[-1].name
         base = Body(BASE, self.base.mass, inertia_tensor(self.base.inertia), np.zeros(3))

@@ -1,15 +1,15 @@
-"""A robot by its name or its files, and where its mission and its gains are.
+"""Search of a robot by name or path, and of its mission and gains.
 
-A robot is named by a name of ``config/robots``, by a path to a ``.yaml``, ``.urdf`` or ``.xacro``
-(with what is chosen of it: see `space_robot_model.robot.choice`), or by a folder of its own:
+A robot is given by a name of ``config/robots``, by a path to a ``.yaml``, ``.urdf`` or ``.xacro``
+(with options, see `space_robot_model.robot.choice`), or by its own folder:
 
     robot.yaml (or robot.urdf, robot.xacro)
     mission.yaml
     gains/<set>/<law>.yaml, gains/default_sets.yaml
 
-The mission and the gains of a robot that has no such folder are those of ``config/`` that are
-called as its file is. A name without a slash is never a folder's (see `robot_as_path`), so that
-names out of bags open nothing but what is shipped.
+Mission and gains of a robot without such a folder are those of ``config/`` with the name of its
+file. A name without a slash is never that of a folder (see `robot_as_path`), so that names from
+bags open shipped files only.
 """
 
 from __future__ import annotations
@@ -32,23 +32,23 @@ from .robot import Robot
 from .source import URDF, YAML, RobotSource, read_robot_file
 
 ROBOTS = "robots"
-"""The folder of the shipped robots in the config folder."""
+"""Folder of the shipped robots in the config folder."""
 OWN = "robot"
-"""Name, less its ending, of the robot's file in a folder of its own."""
+"""Name, without suffix, of the robot's file in its own folder."""
 OWN_MISSION, OWN_GAINS = "mission.yaml", "gains"
 
 
 @dataclass(frozen=True)
 class RobotFiles:
-    """Where a robot and what belongs to it are."""
+    """Paths of a robot's file, mission and gains."""
 
     name: str
-    """That its mission and gains go by: a name of ``config/``, of a file, or of a folder."""
+    """Name for mission and gains: of ``config/``, of the file, or of the folder."""
     file: Path
     mission: Path | None
-    """None: it has none of its own."""
+    """Its own mission; None: it has none."""
     gains: Path | None
-    """The folder of its gain sets; None: it has none."""
+    """Folder of its gain sets; None: it has none."""
 
 
 def robot_names() -> list[str]:
@@ -60,7 +60,7 @@ def robot_files(robot: str) -> RobotFiles:
     """Find the files of a robot, by name or path.
 
     Raises:
-        InputError: there is no such robot; names those there are.
+        InputError: there is no such robot; lists the shipped ones.
     """
     if robot == GIVEN:
         return RobotFiles(GIVEN, Path(GIVEN), None, None)
@@ -83,12 +83,12 @@ def find_robot(robot: str, base: str | None = None, repair: bool = False) -> Rob
     """Read a robot by name or path.
 
     Args:
-        robot: see above.
-        base: the link that is the satellite, of a URDF (None: what the name says, else its root).
-        repair: whether a URDF's defects are repaired, or the name says so.
+        robot: name or path, see above.
+        base: the link that is the satellite, of a URDF (None: as in the name, else its root).
+        repair: True to repair a URDF's defects, also if the name does not request it.
 
     Raises:
-        InputError: there is no such robot, or its file is wrong.
+        InputError: there is no such robot, or its file is invalid.
     """
     return robot_source(path_text(robot, "robot"), base, repair).robot
 
@@ -100,30 +100,30 @@ def robot_source(robot: str, base: str | None = None, repair: bool = False) -> R
 
 
 def mission_file(robot: str, mission: str = "") -> Path:
-    """Return the file of a mission, of the robot's own if the name is empty.
+    """Return the file of a mission; that of the robot's own mission if the name is empty.
 
     Raises:
-        InputError: there is none, or no such robot; says what to do.
+        InputError: there is no such mission or robot; with advice.
     """
     if mission:
         return named_file("missions", mission)
     files = robot_files(robot)
     if robot == GIVEN:
-        raise InputError("a robot that no file tells has no mission of its own: give one")
+        raise InputError("a robot without file has no mission of its own: choose one")
     if files.mission is None:
-        find_robot(robot)  # what is wrong with that comes first
+        find_robot(robot)  # an invalid robot is reported first
         raise InputError(
             f"robot {short(robot)} has no mission of its own: `{new_command(robot)}` "
-            "makes it one, with gains; or name a mission"
+            "makes one, with gains; or choose a mission"
         )
     return files.mission
 
 
 def mission_layers(robot: str, mission: str) -> list[Path]:
-    """Return the `mission_file`; none of a mission that is `GIVEN`.
+    """Return the `mission_file` in a list; an empty list for `GIVEN`.
 
     Raises:
-        InputError: see `mission_file`.
+        InputError: there is no such mission or robot.
     """
     return [] if mission == GIVEN else [mission_file(robot, mission)]
 
@@ -137,10 +137,10 @@ def new_command(robot: str) -> str:
 
 
 def robot_as_path(robot: str) -> str:
-    """Return what a user means by a robot's name: ``r``, if no robot is called so, is a path.
+    """Interpret a user's robot name: ``r`` is a path if no shipped robot has this name.
 
-    It is then the folder ``r/`` or the file ``./r``. Not for names out of bags: these open no
-    folder of the user's.
+    It is then the folder ``r/`` or the file ``./r``. Not for names from bags, which must not open
+    the user's folders.
     """
     name = split_choice(robot).name
     if not name or "/" in name or name.endswith((*YAML, *URDF)) or is_named(ROBOTS, robot):
@@ -170,11 +170,11 @@ def _own_folder(file: Path) -> RobotFiles:
 
 
 def _file_of(folder: Path) -> Path:
-    """Return the robot's file in a folder of its own."""
+    """Return the robot's file in its own folder."""
     endings = (*YAML, *URDF)
     if os.path.lexists(folder) and not is_folder(folder):
         raise InputError(
-            f"robot {short(str(folder))}: not a robot's file, whose name ends in one of "
+            f"robot {short(str(folder))}: not a robot's file, its suffix must be one of "
             f"{', '.join(endings)}"
         )
     if not is_folder(folder):

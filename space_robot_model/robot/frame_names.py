@@ -1,4 +1,4 @@
-"""Names of a robot's frames, as tf, URDF and viewers know them: each is there once."""
+"""Unique names of a robot's frames, for tf, URDF and viewers."""
 
 from __future__ import annotations
 
@@ -11,28 +11,27 @@ from .robot import Robot
 
 
 class FrameNames(NamedTuple):
-    """Of each body, the base first, and of each tool."""
+    """Names of the frames of all bodies, the base first, and of all tools."""
 
     bodies: tuple[str, ...]
     tools: tuple[str, ...]
 
 
 def frame_names(robot: Robot) -> FrameNames:
-    """Return the names of bodies and tools, changed only where ROS has another convention.
+    """Return the frame names of bodies and tools, following the conventions of ROS.
 
-    The base of a YAML file is ``base_link`` (REP 105); a URDF's keeps its name. A body that is
-    called as a joint is, as all of a YAML file are, becomes a link: ``link1`` of ``joint1``,
-    ``elbow_link`` of ``elbow``. Bodies and tools share the names of frames, so a tool that is
-    called as a body is, such as the frame of a URDF's last link, is ``<name>_tool``. No frame is
-    called as the inertial one or a joint, begins with a slash, or has characters that XML cannot
-    hold.
+    The base of a YAML file is ``base_link`` (REP 105); that of a URDF keeps its name. A body with
+    the name of a joint, as in YAML files, becomes a link: ``link1`` for ``joint1``, ``elbow_link``
+    for ``elbow``. A tool with the name of a body, such as a URDF's last link, becomes
+    ``<name>_tool``. No frame has the name of the inertial frame or of a joint, starts with a slash,
+    or contains characters that are invalid in XML.
     """
     joints = set(urdf_joint_names(robot))
     taken = {INERTIAL_FRAME, *joints}
     base, *links = robot.body_names
     names = {0: distinct(BASE_FRAME if base == BASE else base, "_body", taken)}
     clashes = [printable(link) in joints for link in links]
-    for is_changed in (False, True):  # names that stay as they are come first
+    for is_changed in (False, True):  # unchanged names have priority
         for number, link in enumerate(links, 1):
             if clashes[number - 1] is is_changed:
                 names[number] = distinct(_link_name(link) if is_changed else link, "_body", taken)
@@ -41,7 +40,7 @@ def frame_names(robot: Robot) -> FrameNames:
 
 
 def urdf_joint_names(robot: Robot) -> list[str]:
-    """Return the names of the joints, changed only where two are equal in XML."""
+    """Return the names of the joints, changed only if two are equal in XML."""
     taken: set[str] = set()
     return [distinct(joint, "_", taken) for joint in robot.all_joint_names]
 
@@ -54,7 +53,7 @@ def _link_name(name: str) -> str:
 
 
 def distinct(name: str, ending: str, taken: set[str]) -> str:
-    """Return a name that is not taken, with an ending if need be, and take it."""
+    """Return an unused name, with a suffix if necessary, and add it to ``taken``."""
     candidate = printable(name)
     number = 1
     while candidate in taken:
@@ -65,6 +64,6 @@ def distinct(name: str, ending: str, taken: set[str]) -> str:
 
 
 def printable(name: str) -> str:
-    """Return a name as one line without a slash or blanks at its ends."""
+    """Return a name as one line, without slashes or spaces at its ends."""
     shown = "".join(letter if letter.isprintable() else "_" for letter in name)
     return shown.strip().lstrip("/") or "_"

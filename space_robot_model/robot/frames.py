@@ -1,4 +1,4 @@
-"""Frames of a robot's bodies, for every tick of a flight at once."""
+"""Frames of a robot's bodies, for all ticks of a flight at once."""
 
 from __future__ import annotations
 
@@ -15,18 +15,18 @@ Array = NDArray[np.float64]
 
 
 class BodyFrame(NamedTuple):
-    """A body's frame, tick by tick; vectors (3, T) on the axes of an outer frame."""
+    """Frame of a body at T ticks; vectors (3, T) in the axes of an outer frame."""
 
     body: int
     x: Array
     y: Array
     z: Array
-    """The axis of the joint that moves the body."""
+    """Axis of the joint that moves the body."""
     origin: Array
-    """m, from the base's CoM."""
+    """Position relative to the base's CoM, m."""
 
     def on_outer_axes(self, vector: Array) -> Array:
-        """Turn a vector (3,) on the body's axes to the outer frame's, (3, T)."""
+        """Rotate a vector (3,) from the body's axes to the outer frame's, (3, T)."""
         turned: Array = self.x * vector[0] + self.y * vector[1] + self.z * vector[2]
         return turned
 
@@ -34,12 +34,12 @@ class BodyFrame(NamedTuple):
 def body_frames(
     robot: Robot, base_axes: tuple[Array, Array, Array], joint_positions: Array
 ) -> Iterator[BodyFrame]:
-    """Hand out the frame of the base, then of every body, a parent's before its children's.
+    """Yield the frame of the base, then of every body, parents before children.
 
     Args:
-        robot: whose masses do not matter.
-        base_axes: x, y and z of the base, (3, T) each.
-        joint_positions: (N, T) of all joints, rad, or m of prismatic ones.
+        robot: its masses are not used.
+        base_axes: x, y and z axis of the base, (3, T) each.
+        joint_positions: (N, T) of all joints, rad, or m for prismatic ones.
     """
     frames = {0: BodyFrame(0, *base_axes, np.zeros_like(base_axes[0]))}
     yield frames[0]
@@ -58,7 +58,7 @@ def body_frames(
 
 
 def _combined(vectors: tuple[Array, Array, Array], factors: Array) -> Array:
-    """Return the sum of the vectors times the factors; most factors of most robots are zero."""
+    """Return the linear combination of the vectors, skipping the factors that are zero."""
     terms = [
         factor * vector for factor, vector in zip(factors, vectors, strict=True) if factor != 0.0
     ]

@@ -1,4 +1,4 @@
-"""Masses and inertias as files tell them, checked for physical sense."""
+"""Inertias in files: conversion, and checks of physical consistency."""
 
 from __future__ import annotations
 
@@ -18,17 +18,17 @@ def inertia_tensor(values: list[float]) -> Array:
 
 
 def inertia_elements(tensors: Array) -> Array:
-    """Invert `inertia_tensor`, for (..., 3, 3) tensors."""
+    """Return the six elements (..., 6) of tensors (..., 3, 3), the inverse of `inertia_tensor`."""
     t = tensors
     moments = [t[..., 0, 0], t[..., 1, 1], t[..., 2, 2]]
     return np.stack([*moments, t[..., 0, 1], t[..., 0, 2], t[..., 1, 2]], axis=-1)
 
 
 def check_inertia(values: list[float]) -> list[float]:
-    """Return the six numbers of an inertia that a body can have.
+    """Return the six elements of an inertia if it is physically consistent.
 
     Raises:
-        ValueError: it is not positive definite, or breaks the triangle inequality.
+        ValueError: it is not positive definite, or violates the triangle inequality.
     """
     moments = np.linalg.eigvalsh(inertia_tensor(values))
     if moments[0] <= 0.0:

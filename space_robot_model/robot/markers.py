@@ -1,4 +1,4 @@
-"""The robot's shapes as markers: where each of them is in the inertial frame, tick by tick."""
+"""The robot's shapes as markers, with poses in the inertial frame at each tick."""
 
 from __future__ import annotations
 
@@ -17,18 +17,24 @@ from .urdf_text import mesh_address
 
 Array = NDArray[np.float64]
 Pose = tuple[float, float, float, float, float, float, float]
-"""Position x, y, z, m, and orientation x, y, z, w."""
+"""Position x, y, z, m, and quaternion x, y, z, w."""
 
 WHITE = (1.0, 1.0, 1.0, 1.0)
-"""With this a mesh shows its own colours as they are."""
+"""Colour that leaves a mesh's own colours unchanged."""
 KINDS = {"box": CUBE, "cylinder": CYLINDER, "sphere": SPHERE, "mesh": MESH}
 
 
 class RobotMarkers:
-    """A marker for each shape of `shapes_of`, named after its body's frame and numbered on it."""
+    """A marker for each shape of `shapes_of`, identified by its body's frame and a number."""
 
     def __init__(self, robot: Robot, timebase: Timebase, prefix: str = "") -> None:
-        """``prefix``: before the names, as ``sat1/``."""
+        """Create the markers.
+
+        Args:
+            robot: with its shapes.
+            timebase: conversion between ticks and stamps.
+            prefix: of the frame names, such as ``sat1/``.
+        """
         shapes, names = shapes_of(robot), frame_names(robot).bodies
         bodies = [shape.body for shape in shapes]
         self._codec = MarkersCodec(
@@ -43,14 +49,14 @@ class RobotMarkers:
         self._shapes = [(row[shape.body], _pose(shape)) for shape in shapes]
 
     def encode(self, tick: int, poses: Array) -> bytes:
-        """Return the message of a tick, from the poses of `space_robot_model.robot.poses`."""
+        """Return the message of a tick for poses of `space_robot_model.robot.poses`."""
         return self._codec.encode(tick, self.poses(poses))
 
     def poses(self, poses: Array) -> Array:
-        """Return (K, 7) position, m, and orientation x, y, z, w of all in the inertial frame.
+        """Return positions, m, and quaternions x, y, z, w, (K, 7), in the inertial frame.
 
         Args:
-            poses: (M, 7) of the base, then of each body on the one that carries it.
+            poses: (M, 7) of the base, then of each body relative to its parent.
         """
         base, *bodies = poses.tolist()
         placed = [base]
@@ -60,7 +66,7 @@ class RobotMarkers:
 
 
 def _on(outer: Pose, inner: Pose) -> Pose:
-    """Return a pose, given on the axes of a frame, where that frame's own is given."""
+    """Return the composition of two poses: ``inner`` is relative to ``outer``."""
     x, y, z, a, b, c, w = outer
     u, v, s, d, e, f, g = inner
     # p + 2 w (q x r) + 2 q x (q x r)

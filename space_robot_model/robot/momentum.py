@@ -1,4 +1,4 @@
-"""Centre of mass and angular momentum of the whole robot, for every tick of a flight at once."""
+"""Centre of mass and angular momentum of the robot, for all ticks of a flight at once."""
 
 from __future__ import annotations
 
@@ -17,50 +17,50 @@ from .robot import Robot
 Array = NDArray[np.float64]
 
 _BATCH = 8192
-"""Rows at a time, so that all vectors of a batch stay in the processor's cache."""
+"""Rows per batch, so that all vectors of a batch fit into the processor's cache."""
 
 
 class Motion(NamedTuple):
-    """Attitude of the base and motion of a robot's bodies, tick by tick."""
+    """Attitude of the base and motion of a robot's bodies, at N ticks."""
 
     quaternion: Array
-    """(N, 4) ``[w, x, y, z]`` of the base, unit."""
+    """(N, 4) unit quaternion ``[w, x, y, z]`` of the base."""
     omega_base: Array
-    """(N, 3) rad/s, base frame."""
+    """(N, 3) angular velocity of the base, rad/s, base frame."""
     joint_positions: Array
-    """(T, N) of all joints, the passive ones behind; rad, or m of prismatic joints."""
+    """(T, N) positions of all joints, passive ones last; rad, or m for prismatic joints."""
     joint_velocities: Array
-    """(T, N) rad/s or m/s."""
+    """(T, N) velocities of the joints, rad/s or m/s."""
 
 
 class RobotMomentum(NamedTuple):
-    """What a robot's bodies have together, tick by tick."""
+    """Total momentum of a robot's bodies, at each tick."""
 
     centre_of_mass: Array
-    """(N, 3) m, of all bodies from the base's CoM, inertial axes."""
+    """(N, 3) common centre of mass relative to the base's CoM, m, inertial axes."""
     angular: Array
-    """(N, 3) N m s, angular momentum about the common centre of mass, inertial axes."""
+    """(N, 3) angular momentum about the common centre of mass, N m s, inertial axes."""
     base: Array
-    """(N, 3) N m s, the share of it that the base has; the arm has the rest."""
+    """(N, 3) contribution of the base, N m s; the rest is that of the arm."""
 
 
 class _Body(NamedTuple):
-    """A body of the chain, seen from the base's CoM; vectors (3, N) on inertial axes."""
+    """A body of the chain, relative to the base's CoM; vectors (3, N) in inertial axes."""
 
     mass: float
     com: Array
-    """m."""
+    """Position of its centre of mass, m."""
     velocity: Array
-    """m/s, of its centre of mass."""
+    """Velocity of its centre of mass, m/s."""
     spin: Array
-    """N m s, angular momentum about its own centre of mass."""
+    """Angular momentum about its centre of mass, N m s."""
 
 
 def robot_momentum(robot: Robot, motion: Motion) -> RobotMomentum:
-    """Sum up ``I_i w_i + m_i (r_i - r) x (v_i - v)`` over all bodies.
+    """Return the sum of ``I_i w_i + m_i (r_i - r) x (v_i - v)`` over all bodies.
 
-    ``r`` and ``v`` are their common CoM's, so the velocity of the base does not matter. Wheels
-    count as locked to the base; what their spin adds is not the robot's.
+    ``r`` and ``v`` are those of the common CoM, so the velocity of the base is not needed. Wheels
+    count as locked to the base; their spin momentum is not included.
 
     Raises:
         ValueError: an array has the wrong shape.
@@ -91,7 +91,7 @@ def _sum(vectors: Iterable[Array]) -> Array:
 
 
 def _bodies(robot: Robot, motion: Motion) -> Iterator[_Body]:
-    """Walk from the base outwards; arrays are (., T)."""
+    """Yield the bodies from the base outwards; arrays are (., T)."""
     axes = base_axes(motion.quaternion)
     omega = {0: to_inertial(axes, motion.omega_base)}
     frames: dict[int, BodyFrame] = {}

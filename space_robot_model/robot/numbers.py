@@ -1,7 +1,7 @@
-"""A robot's own numbers as a mapping, of which the same robot is built to the bit.
+"""Exact numbers of a robot as a mapping, from which the same robot is built bit for bit.
 
-So bags keep a robot that no file tells. Who writes a robot by hand has a file's form, see
-`space_robot_model.robot.file`. Numbers that are infinite or NaN are null; visuals are left out.
+Bags store robots without file in this form. Robots written by hand have the form of
+`space_robot_model.robot.file`. Infinite numbers and NaN are null; visuals are omitted.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ Matrix = Annotated[list[Vector], Field(min_length=3, max_length=3)]
 
 
 class ToolNumbers(StrictModel):
-    """See `Tool`."""
+    """Frame of an end effector: name, rotation, position and rank of a `Tool`."""
 
     name: str
     rotation: Matrix
@@ -34,7 +34,7 @@ class ToolNumbers(StrictModel):
 
 
 class JointNumbers(StrictModel):
-    """See `Joint`; its axis is z."""
+    """A `Joint` about, or along, the z axis of its body."""
 
     name: str
     kind: Literal["revolute", "prismatic"]
@@ -46,7 +46,7 @@ class JointNumbers(StrictModel):
 
 
 class BodyNumbers(StrictModel):
-    """See `Body`."""
+    """A rigid body with its joint and tools, as a `Body`."""
 
     name: str
     mass: float
@@ -58,7 +58,7 @@ class BodyNumbers(StrictModel):
 
     @property
     def body(self) -> Body:
-        """The body that they are of."""
+        """Return the body with these numbers."""
         joint, own = None, self.joint
         if own:
             joint = Joint(
@@ -86,31 +86,31 @@ class BodyNumbers(StrictModel):
 
 
 class RobotNumbers(StrictModel):
-    """A robot's bodies, as a walk down each branch meets them."""
+    """A robot's bodies, branch by branch from the base."""
 
     name: Annotated[str, Field(min_length=1)]
     bodies: Annotated[list[BodyNumbers], Field(min_length=2, max_length=MOST_JOINTS + 1)]
 
 
 class Document(StrictModel):
-    """The whole mapping."""
+    """The complete mapping."""
 
     robot: RobotNumbers
 
 
 def are_numbers(content: dict[str, Any]) -> bool:
-    """Return whether a robot's mapping holds its own numbers; else it has a file's form."""
+    """Return True if a robot's mapping has this form, and not that of a file."""
     robot = content.get("robot")
     return isinstance(robot, dict) and "bodies" in robot
 
 
 def numbers_of(name: str, bodies: Sequence[Body]) -> dict[str, Any]:
-    """Return the mapping of a robot's own numbers, as `Document` has it."""
+    """Return the mapping of a robot's exact numbers, in the form of `Document`."""
     return {"robot": {"name": name, "bodies": [_body_numbers(body) for body in bodies]}}
 
 
 def _body_numbers(body: Body) -> dict[str, Any]:
-    """Return those of a body, without a check: that costs more than a short flight's set-up."""
+    """Return the numbers of a body, without validation, which would take too long."""
     joint = body.joint and {
         "name": body.joint.name,
         "kind": body.joint.kind,

@@ -1,7 +1,7 @@
-"""The poses of all frames of a robot at one state, each on its parent: what /tf tells.
+"""Poses of all frames of a robot in one state, relative to their parents, for /tf.
 
-As `space_robot_model.robot.transforms`, for one tick of a running flight: all that does not change
-is computed once.
+The same as `space_robot_model.robot.transforms` for one tick of a running flight; constant parts
+are computed once.
 """
 
 from __future__ import annotations
@@ -22,17 +22,17 @@ from .transforms import Transform, joint_transforms, tool_transforms
 Array = NDArray[np.float64]
 
 XYZW = [1, 2, 3, 0]
-"""ROS's order of a quaternion ``[w, x, y, z]``."""
+"""Indices that bring a quaternion ``[w, x, y, z]`` into ROS's order."""
 
 
 class RobotPoses:
-    """Poses of the base on the inertial frame, then of each body on the one that carries it."""
+    """Poses of the base in the inertial frame, then of each body relative to its parent."""
 
     def __init__(self, robot: Robot) -> None:
-        """Compute the poses at zero."""
+        """Compute the poses at joint positions zero."""
         joints = joint_transforms(robot, np.zeros((1, robot.joint_count)))
         self.frames = (Frame(INERTIAL_FRAME, frame_names(robot).bodies[0]), *map(_frame, joints))
-        """In the order of the poses."""
+        """Frames in the order of the poses."""
         self._poses = np.empty((1 + len(joints), POSE))
         self._poses[1:] = [_pose(transform) for transform in joints]
         order = np.array(robot.order, np.intp)
@@ -42,11 +42,11 @@ class RobotPoses:
         self._origins = self._poses[self._slid, :3]
         self._axes = np.array([robot.rotation[j][:, 2] for j in self._sliding]).reshape(-1, 3)
         x, y, z, w = self._poses[self._turned, 3:].T
-        # of q0 (cos theta/2, 0, 0, sin theta/2) what goes with the cosine, and with the sine
+        # factors of the cosine and of the sine in q0 (cos theta/2, 0, 0, sin theta/2)
         self._even, self._odd = np.column_stack((x, y, z, w)), np.column_stack((y, -x, w, -z))
 
     def at(self, state: RobotState) -> Array:
-        """Return (M, 7) translation, m, and rotation x, y, z, w of each; overwritten next time."""
+        """Return translations, m, and quaternions x, y, z, w, (M, 7); reused by the next call."""
         poses, joints = self._poses, np.append(state.joint_positions, state.passive_positions)
         poses[0, :3], poses[0, 3:] = state.base_position, state.quaternion[XYZW]
         s, c = sines_cosines(0.5 * joints[self._turning])
@@ -57,7 +57,7 @@ class RobotPoses:
 
 
 def tool_poses(robot: Robot) -> tuple[tuple[Frame, ...], Array]:
-    """Return the tools' frames and their poses (M, 7), which never change."""
+    """Return the tools' frames and their constant poses (M, 7)."""
     tools = tool_transforms(robot)
     return tuple(map(_frame, tools)), np.array([_pose(tool) for tool in tools]).reshape(-1, POSE)
 

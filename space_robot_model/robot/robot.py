@@ -1,4 +1,4 @@
-"""The robot is data: its numbers from YAML or URDF, checked for physical sense."""
+"""The robot as data from YAML or URDF, checked for physical consistency."""
 
 from __future__ import annotations
 
@@ -32,10 +32,10 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class Robot(TreeArrays):
-    """A satellite base with arms, panels and booms: a tree of bodies, from a file or built."""
+    """A satellite base with arms, panels and booms: a tree of bodies, from a file or a program."""
 
     repairs: tuple[str, ...] = ()
-    """What was repaired in the file that it was read from, a line each."""
+    """Repairs of defects in its file, a line each."""
 
     @property
     def axis_names(self) -> tuple[str, ...]:
@@ -47,7 +47,7 @@ class Robot(TreeArrays):
         """Read and check a robot file.
 
         Raises:
-            InputError: naming file, key, value given and values allowed.
+            InputError: invalid file; names file, key, value and allowed values.
         """
         file = as_path(path, "path")
         return cls.from_dict(read_yaml(file), str(file), file.parent)
@@ -56,12 +56,15 @@ class Robot(TreeArrays):
     def from_dict(
         cls, content: dict[str, Any], where: str = "robot", folder: Path | None = None
     ) -> Robot:
-        """Build from the mapping a robot file holds (key ``robot`` at its top), or `content`.
+        """Build a robot from the mapping of a file (with the key ``robot``), or from `content`.
 
-        A URDF that it refers to is looked for in ``folder``, the working one if None.
+        Args:
+            content: the mapping.
+            where: name of the source, for errors.
+            folder: of a URDF that it refers to; None: the working folder.
 
         Raises:
-            InputError: naming ``where``, key, value given and values allowed.
+            InputError: invalid content; names ``where``, key, value and allowed values.
         """
         from .urdf_file import is_urdf, read_urdf_content
 
@@ -77,15 +80,15 @@ class Robot(TreeArrays):
 
     @classmethod
     def from_urdf(cls, path: str | Path, base: str | None = None, repair: bool = False) -> Robot:
-        """Read and check a URDF, or a xacro file where that package is installed.
+        """Read and check a URDF, or a xacro file if that package is installed.
 
         Args:
-            path: the file.
+            path: of the file.
             base: the link that is the satellite; the root if None.
-            repair: mend the defects that can be mended, and tell them in `repairs`.
+            repair: repair defects where possible, and list them in `repairs`.
 
         Raises:
-            InputError: in one line that names link or joint, line, value and the repair, if any.
+            InputError: invalid file; names link or joint, line, value and the repair, if any.
         """
         from .urdf import read_urdf
 
@@ -99,12 +102,12 @@ class Robot(TreeArrays):
 
     @property
     def content(self) -> dict[str, Any]:
-        """All numbers but the visuals, as lists and texts; `from_dict` builds the same of them."""
+        """All numbers without visuals, as lists and texts; `from_dict` builds the same robot."""
         return numbers_of(self.name, self.bodies())
 
     @cached_property
     def nominal(self) -> Robot:
-        """The robot that the flight software knows: its passive joints are locked at rest."""
+        """The robot assumed by the flight software: passive joints locked at rest."""
         if not self.springs:
             return self
         bodies = self.bodies()
@@ -114,18 +117,19 @@ class Robot(TreeArrays):
         return Robot.of_tree(self.name, bodies)  # the same order of the actuated joints
 
     def from_degrees(self, values: ArrayLike) -> Array:
-        """Return positions of the n actuated joints in rad, and m of prismatic ones, as given.
+        """Convert positions of the n actuated joints to rad; m of prismatic joints are kept.
 
-        ``values`` (..., n) are in degrees, and in m of prismatic joints.
+        Args:
+            values: (..., n) in degrees, or m for prismatic joints.
 
         Raises:
-            InputError: they are no numbers, or not n.
+            InputError: not numbers, or not n.
         """
         numbers, n = self._of_joints(values), self.n
         return np.where(self.is_prismatic[:n], numbers, np.radians(numbers))
 
     def to_degrees(self, values: ArrayLike) -> Array:
-        """Invert `from_degrees`."""
+        """Convert positions (..., n) in rad to degrees; m of prismatic joints are kept."""
         numbers, n = self._of_joints(values), self.n
         return np.where(self.is_prismatic[:n], numbers, np.degrees(numbers))
 
@@ -133,20 +137,20 @@ class Robot(TreeArrays):
         numbers = as_numbers(values, "values")
         if numbers.shape[-1:] != (self.n,):
             raise InputError(
-                f"values: {self.n} numbers were expected, a joint each, "
+                f"values: {self.n} numbers were expected, one per joint, "
                 f"got an array of shape {numbers.shape}"
             )
         return numbers
 
     def with_last_link(self, mass: float, inertia: list[float]) -> Robot:
-        """Return the robot with a payload on the body that carries the tool, CoM kept.
+        """Return the robot with mass and inertia of the body with the tool replaced, CoM kept.
 
         Args:
-            mass: mass of that body, kg.
-            inertia: ``[Ixx, Iyy, Izz, Ixy, Ixz, Iyz]`` about its CoM on its axes, kg m2.
+            mass: of that body, kg.
+            inertia: ``[Ixx, Iyy, Izz, Ixy, Ixz, Iyz]`` about its CoM in its axes, kg m2.
 
         Raises:
-            InputError: they are not one number and six.
+            InputError: ``mass`` is not one number, or ``inertia`` not six.
         """
         for value, name, shape in ((mass, "mass", ()), (inertia, "inertia", (6,))):
             if (got := as_numbers(value, name).shape) != shape:
@@ -157,12 +161,12 @@ class Robot(TreeArrays):
 
     @cached_property
     def model(self) -> Model:
-        """The numbers in the form the compiled algorithms read."""
+        """The constants of the compiled algorithms."""
         return model_of(self)
 
 
 def _locked(joint: Joint, position: float) -> Joint:
-    """Return the fixed joint that this one is at ``position``, rad or m."""
+    """Return a fixed joint with the pose of a joint at ``position``, rad or m."""
     offset, rotation = joint.offset, joint.rotation
     if joint.kind == "prismatic":
         offset = offset + np.array([0.0, 0.0, position])
@@ -174,7 +178,7 @@ def _locked(joint: Joint, position: float) -> Joint:
 
 
 def model_of(robot: TreeArrays) -> Model:
-    """Fill a `Model`, whose joints are in the order of visits."""
+    """Return the `Model` of a robot, with joints in the order of visits."""
     model, count, order = Model.allocate(robot.n), robot.joint_count, list(robot.order)
     bodies = [0, *(joint + 1 for joint in order)]
     row_of_body = {body: row for row, body in enumerate(bodies)}

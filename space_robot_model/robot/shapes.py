@@ -1,4 +1,4 @@
-"""The shapes that show a robot: those of its file, or drawn from its kinematics and masses."""
+"""Shapes of a robot: those of its file, or derived from kinematics and masses."""
 
 from __future__ import annotations
 
@@ -18,23 +18,23 @@ LINK_COLOUR: Colour = (0.82, 0.83, 0.86, 1.0)
 JOINT_COLOUR: Colour = (0.25, 0.28, 0.33, 1.0)
 PANEL_COLOUR: Colour = (0.13, 0.23, 0.48, 1.0)
 THINNEST = 0.02
-"""m; of a box's edge and of a tube's radius."""
+"""Smallest edge of a box and smallest radius of a tube, m."""
 SLENDER = 0.018
-"""Radius of a tube by the length of all links."""
+"""Radius of a tube relative to the length of all links."""
 
 
 def shapes_of(robot: Robot) -> tuple[Visual, ...]:
-    """Return the visuals of a robot's file; if it has none, some that show where its bodies are.
+    """Return the visuals of a robot's file, or derived ones if it has none.
 
-    The base and what has springs for a motor are boxes of even density with the body's mass and
+    The base and bodies on passive joints are boxes of uniform density with the body's mass and
     inertia; other bodies are tubes from their joint to the next ones and to the tools, with a hub
-    about each joint's axis.
+    at each joint's axis.
     """
     return robot.visuals or tuple(drawn_shapes(robot))
 
 
 def drawn_shapes(robot: Robot) -> Iterator[Visual]:
-    """Yield the shapes that `shapes_of` draws, whatever visuals the robot has."""
+    """Yield the derived shapes of `shapes_of`, also for a robot with visuals."""
     ends = _ends(robot)
     lengths = sum(float(np.linalg.norm(end)) for body in ends[1:] for end in body)
     radius = max(THINNEST, SLENDER * lengths)
@@ -56,20 +56,20 @@ def drawn_shapes(robot: Robot) -> Iterator[Visual]:
             if reach := _reach(robot, body - 1):
                 yield from _tube(np.array([0.0, 0.0, -reach]), start, 0.7 * radius, body)
         for end in own if not is_panel else ():
-            if is_base:  # from where it leaves the box
+            if is_base:  # from the surface of the box
                 half = 0.5 * np.array(box.size)
                 start = box.rotation @ np.clip(box.rotation.T @ end, -half, half)
             yield from _tube(start, end, radius, body)
 
 
 def even_box(mass: float, inertia: Array, com: Array, body: int, colour: Colour) -> Visual:
-    """Return the box of even density that has this mass, centre and inertia.
+    """Return the box of uniform density with this mass, centre of mass and inertia.
 
     Args:
         mass: kg.
-        inertia: (3, 3) kg m2 about the centre of mass, on the axes of a body.
-        com: (3,) m, centre of mass, on these axes.
-        body: number of that body.
+        inertia: (3, 3) about the centre of mass, kg m2, in body axes.
+        com: (3,) centre of mass, m, in body axes.
+        body: number of the body.
         colour: of the box.
     """
     second = 0.5 * np.trace(inertia) * np.eye(3) - inertia
@@ -82,7 +82,7 @@ def even_box(mass: float, inertia: Array, com: Array, body: int, colour: Colour)
 
 
 def _reach(robot: Robot, joint: int) -> float:
-    """Return how far a body slides out, m: so much of it stays within its parent; else 0."""
+    """Return the travel of a prismatic joint, m, by which the body stays in its parent; else 0."""
     if not robot.is_prismatic[joint] or joint >= robot.n:
         return 0.0
     upper = robot.limits[joint].upper
@@ -90,7 +90,7 @@ def _reach(robot: Robot, joint: int) -> float:
 
 
 def _ends(robot: Robot) -> list[list[Array]]:
-    """Return for each body the places, on its axes, of the joints and tools that it carries."""
+    """Return for each body the positions, m, of its joints and tools, in body axes."""
     ends: list[list[Array]] = [[] for _ in robot.body_names]
     for joint in robot.order:
         turn = robot.rotation[joint]

@@ -1,4 +1,4 @@
-"""A robot's file, YAML or URDF, as the numbers that are flown and written down."""
+"""Reading of a robot's file, YAML or URDF."""
 
 from __future__ import annotations
 
@@ -23,22 +23,22 @@ YAML, URDF = (".yaml", ".yml"), (".urdf", ".xacro")
 
 @dataclass(frozen=True)
 class RobotSource:
-    """What a robot's file says."""
+    """Content of a robot's file."""
 
     where: str
-    """The file, for errors."""
+    """Name of the file, for errors."""
     content: dict[str, Any]
-    """Complete in itself, for `Robot.from_dict`."""
+    """Self-contained mapping for `Robot.from_dict`."""
     text: str
-    """The same as the text of a YAML file; that of a YAML file is that file's."""
+    """The same as the text of a YAML file; for a YAML file its own text."""
     visuals: tuple[Visual, ...] = ()
-    """Of a URDF; YAML has none."""
+    """Visuals of a URDF; a YAML file has none."""
     findings: tuple[str, ...] = ()
     """Defects of a URDF that were repaired."""
 
     @cached_property
     def robot(self) -> Robot:
-        """The robot, built of `content` whatever the file: a bag that tells that tells this one."""
+        """The robot, built from `content`, hence equal to that of a bag with this content."""
         robot = Robot.from_dict(self.content, where=self.where)
         return replace(robot, visuals=self.visuals, repairs=self.findings)
 
@@ -52,22 +52,22 @@ def read_robot_file(file: Path, base: str | None = None, repair: bool = False) -
         repair: whether a URDF's defects are repaired.
 
     Raises:
-        InputError: the file is wrong, or what was asked is for a URDF.
+        InputError: the file is invalid, or ``base`` or ``repair`` is set for a YAML.
     """
     if file.suffix in URDF:
         return _of_urdf(file, base, repair)
     if base or repair:
-        raise InputError(f"{file}: no URDF, so there is no base to choose and nothing to repair")
+        raise InputError(f"{file}: not a URDF, so base and repair cannot be chosen")
     content = read_yaml(file)
     if not is_urdf(content):
         return _of_yaml(str(file), read_file(file))
     robot = Robot.from_yaml(file)
-    return _of_robot(robot, file, f"From {file.name} and the URDF that it names.")
+    return _of_robot(robot, file, f"From {file.name} and the URDF that it refers to.")
 
 
 @lru_cache(maxsize=16)
 def _of_yaml(where: str, text: str) -> RobotSource:
-    """Flight after flight flies the same robots: each is built once."""
+    """Return the source of a YAML text; cached, since many flights use the same robot."""
     return RobotSource(where, parse_yaml(text), text)
 
 

@@ -1,4 +1,4 @@
-"""The pose of the end effector, for every tick of a flight at once."""
+"""Pose of the end effector, for all ticks of a flight at once."""
 
 from __future__ import annotations
 
@@ -12,23 +12,23 @@ from .robot import Robot
 Array = NDArray[np.float64]
 
 _BATCH = 8192
-"""Rows at a time, so that all vectors of a batch stay in the processor's cache."""
+"""Rows per batch, so that all vectors of a batch fit into the processor's cache."""
 
 
 def tool_pose(robot: Robot, quaternion: Array, joint_positions: Array) -> tuple[Array, Array]:
-    """Return axes and position of the end effector's frame, the base's CoM as origin.
+    """Return rotation and position of the end effector's frame, relative to the base's CoM.
 
     Args:
-        robot: the robot's numbers; masses do not matter.
-        quaternion: (N, 4) ``[w, x, y, z]`` of the base, unit.
-        joint_positions: (N, J) of all joints, the passive ones behind; rad, or m of prismatic ones.
+        robot: its masses are not used.
+        quaternion: (N, 4) unit quaternion ``[w, x, y, z]`` of the base.
+        joint_positions: (N, J) of all joints, passive ones last; rad, or m for prismatic ones.
 
     Returns:
-        (N, 3, 3) rotation from the tool's frame to the inertial one, its columns the tool's
-        axes; (N, 3) m, on inertial axes.
+        (N, 3, 3) rotation from the tool's frame to the inertial one; (N, 3) position, m, inertial
+        axes.
 
     Raises:
-        ValueError: an argument has the wrong shape.
+        ValueError: an argument has a wrong shape.
     """
     rows = len(quaternion)
     if quaternion.shape != (rows, 4) or joint_positions.shape != (rows, robot.joint_count):
@@ -45,7 +45,7 @@ def tool_pose(robot: Robot, quaternion: Array, joint_positions: Array) -> tuple[
 
 
 def _tool(robot: Robot, quaternion: Array, positions: Array) -> tuple[Array, Array]:
-    """Return the tool's axes (3, 3, T), as rows, and place (3, T), m; from (4, T) and (N, T)."""
+    """Return the tool's axes (3, 3, T), as rows, and position (3, T), m, from (4, T), (N, T)."""
     tool = robot.tool
     x, y, z = base_axes(quaternion)
     frames = body_frames(robot, (x, y, z), positions)

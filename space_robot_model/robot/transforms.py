@@ -1,4 +1,4 @@
-"""The robot as a tree of transforms: each body against its parent, tick by tick, as tf has them."""
+"""The robot as a tree of transforms as in tf: each body relative to its parent, at each tick."""
 
 from __future__ import annotations
 
@@ -15,22 +15,22 @@ Array = NDArray[np.float64]
 
 
 class Transform(NamedTuple):
-    """The pose of a body's frame on that of its parent, at T ticks."""
+    """Pose of a body's frame relative to its parent's, at T ticks."""
 
     parent: str
     child: str
     position: Array
-    """(T, 3) m, or (1, 3) if it never changes."""
+    """(T, 3) position, m, or (1, 3) if constant."""
     quaternion: Array
-    """(T, 4) ``[w, x, y, z]`` from the child's axes to the parent's, or (1, 4)."""
+    """(T, 4) ``[w, x, y, z]`` from child to parent axes, or (1, 4) if constant."""
 
 
 def joint_transforms(robot: Robot, joint_positions: Array) -> list[Transform]:
-    """Return the transform of every joint, a parent's before its children's.
+    """Return the transform of every joint, parents before children.
 
     Args:
-        robot: whose frames have the names of `frame_names`.
-        joint_positions: (T, N) of all joints, the passive ones behind; rad, or m of prismatic ones.
+        robot: with frames named by `frame_names`.
+        joint_positions: (T, N) of all joints, passive ones last; rad, or m for prismatic ones.
     """
     transforms, names = [], frame_names(robot).bodies
     for joint in robot.order:
@@ -70,10 +70,10 @@ def tool_transforms(robot: Robot) -> list[Transform]:
 def wxyz(rotation: Array) -> Array:
     """Return the unit quaternion ``[w, x, y, z]`` of a rotation matrix (3, 3).
 
-    By hand: SciPy's takes the plant a quarter of a second to import.
+    Importing SciPy's function would delay the plant by 0.25 s.
     """
     (a, b, c), (d, e, f), (g, h, i) = rotation
-    products = np.array(  # 4 q q^T, of which the row with the largest square is the surest
+    products = np.array(  # 4 q q^T; the row with the largest square is the most accurate
         [
             [1.0 + a + e + i, h - f, c - g, d - b],
             [h - f, 1.0 + a - e - i, b + d, c + g],

@@ -1,4 +1,4 @@
-"""A robot's YAML that refers to a URDF, and adds what URDF cannot say."""
+"""YAML files of robots that refer to a URDF, with additional data."""
 
 from __future__ import annotations
 
@@ -17,35 +17,35 @@ from .tree import Spring
 from .urdf.read import UrdfRobot, parse_urdf, read_urdf, with_springs
 
 KEYS = ("urdf", "urdf_text")
-"""Either of them in ``robot`` says that the robot is a URDF's."""
+"""Keys in ``robot`` that refer to a URDF."""
 
 
 class UrdfFile(StrictModel):
-    """``robot`` of a YAML that refers to a URDF."""
+    """Key ``robot`` of a YAML that refers to a URDF."""
 
     name: str = ""
-    """The robot's; that in the URDF if empty."""
+    """Name of the robot; that of the URDF if empty."""
     urdf: str = ""
-    """Path of the URDF or xacro file, from the folder of the YAML."""
+    """Path of the URDF or xacro file, relative to the folder of the YAML."""
     urdf_text: str = ""
-    """The URDF itself, in the place of a path."""
+    """Text of the URDF, instead of a path."""
     base: Annotated[str, Field(min_length=1)] | None = None
-    """The link that is the satellite; the root if it is left out."""
+    """Name of the link that is the satellite; default: the root."""
     repair: bool = False
-    """Whether defects are repaired."""
+    """True to repair defects."""
     passive: Annotated[dict[str, PassiveFile], Field(default_factory=dict)]
-    """Joints without a motor and the springs that hold them, by the joints' names."""
+    """Springs of the passive joints, by joint name."""
     tools: list[str] | None = None
-    """Links whose frames are tools, the first one first; the ends of the branches if left out."""
+    """Links whose frames are tools, in order of rank; default: the ends of the branches."""
 
     @model_validator(mode="after")
     def _one_source(self) -> Self:
         if bool(self.urdf) == bool(self.urdf_text):
-            raise ValueError("either urdf or urdf_text must tell the robot")
+            raise ValueError("either urdf or urdf_text is needed, and not both")
         return self
 
     def read(self, folder: Path, where: str) -> UrdfRobot:
-        """Read the URDF, which is in ``folder`` or below, and add springs and name."""
+        """Read the URDF, with a path relative to ``folder``, and add springs and name."""
         if self.urdf:
             urdf = read_urdf(folder / self.urdf, self.base, self.repair, self.tools)
         else:
@@ -73,7 +73,7 @@ class _UrdfDocument(StrictModel):
 
 
 def is_urdf(content: dict[str, Any]) -> bool:
-    """Return whether what a robot's YAML holds refers to a URDF."""
+    """Return True if the content of a robot's YAML refers to a URDF."""
     robot = content.get("robot")
     return isinstance(robot, dict) and any(key in robot for key in KEYS)
 
@@ -82,18 +82,18 @@ def read_urdf_content(content: dict[str, Any], folder: Path, where: str) -> Urdf
     """Read the URDF that a robot's YAML refers to.
 
     Args:
-        content: what the YAML holds; see `is_urdf`.
-        folder: the YAML's.
-        where: the YAML's name, for errors.
+        content: of the YAML; see `is_urdf`.
+        folder: of the YAML.
+        where: name of the YAML, for errors.
 
     Raises:
-        InputError: the YAML or the URDF is wrong.
+        InputError: the YAML or the URDF is invalid.
     """
     return validate(_UrdfDocument, content, where).robot.read(folder, where)
 
 
 def complete_content(content: dict[str, Any], folder: Path, where: str) -> dict[str, Any]:
-    """Return the content of a YAML with the URDF's text in the place of its path."""
+    """Return the content of a YAML with the URDF's text instead of its path."""
     file = validate(_UrdfDocument, content, where).robot
     urdf = file.read(folder, where)
     robot = {key: value for key, value in content["robot"].items() if key != "urdf"}

@@ -1,11 +1,11 @@
-"""A robot, whatever it was read from, as the text of a URDF: for RViz, Pinocchio, MuJoCo.
+"""Text of a URDF for any robot, for RViz, Pinocchio and MuJoCo.
 
-Frames of links are those of `space_robot_model.robot.transforms`: the root is the base's, at its
-centre of mass, and the z axis of every other one is the axis of its joint. A tool is a link without
-mass on a fixed joint.
+Frames of links are those of `space_robot_model.robot.transforms`: the root is the base, at its
+centre of mass, and the z axis of every other frame is the axis of its joint. A tool is a massless
+link on a fixed joint.
 
-URDF has no element for springs (their damping is the joint's), for wheels, thrusters and
-sensors, nor for which of the tools is *the* tool.
+URDF has no elements for springs (their damping becomes the joint's), wheels, thrusters and sensors,
+nor for the rank of tools.
 """
 
 from __future__ import annotations
@@ -35,13 +35,13 @@ Materials = dict[Colour, str]
 
 
 def urdf_text(robot: Robot, name: str = "") -> str:
-    """Return the text of a URDF of a robot, the same for the same robot.
+    """Return the URDF text of a robot, the same for equal robots.
 
-    Joints have their names, links those of `frame_names`. Shapes are those of `shapes_of`.
+    Joints keep their names, links have those of `frame_names`. Shapes are those of `shapes_of`.
 
     Args:
         robot: with any tree of joints.
-        name: what it is called; its own name if empty.
+        name: in the URDF; the robot's name if empty.
     """
     frames = frame_names(robot)
     shapes = shapes_of(robot)
@@ -70,7 +70,7 @@ def urdf_text(robot: Robot, name: str = "") -> str:
 
 
 class _Ends(NamedTuple):
-    """A joint's name, and the links that it joins."""
+    """Name of a joint, and of the links that it connects."""
 
     joint: str
     parent: str
@@ -136,7 +136,7 @@ def _add_visual(link: Element, shape: Visual, materials: Materials) -> None:
 
 
 def mesh_address(mesh: str) -> str:
-    """Return the address of a mesh file; viewers do not know from which folder a path would be."""
+    """Return the URL of a mesh file, since viewers do not know the folder of a relative path."""
     return mesh if "://" in mesh else f"file://{quote(str(Path(mesh).absolute()))}"
 
 
@@ -145,7 +145,7 @@ def _add_origin(element: Element, rotation: Array, position: Array) -> None:
 
 
 def _bound(limit: float) -> str:
-    """Return a limit; one that is infinite as the number that `urdf.fields` reads so."""
+    """Return a limit as text; infinity as the number that `urdf.fields` reads as infinite."""
     return _word(limit if math.isfinite(limit) else math.copysign(LARGEST, limit))
 
 
@@ -154,5 +154,5 @@ def _words(values: Iterable[float]) -> str:
 
 
 def _word(value: float) -> str:
-    """Return the shortest number that is read as the same float, without a negative zero."""
+    """Return the shortest text that is read as the same float, without a negative zero."""
     return repr(float(value) + 0.0).removesuffix(".0")

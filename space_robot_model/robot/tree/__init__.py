@@ -1,4 +1,4 @@
-"""A robot as a tree of bodies: as its file tells it, and flattened for the algorithms."""
+"""A robot as a tree of bodies: as in its file, and flattened for the algorithms."""
 
 from .arrays import TreeArrays
 from .bodies import Body, Joint, JointFriction, JointKind, JointLimits, Spring, Tool, Visual

@@ -1,4 +1,4 @@
-"""A tree of bodies as the arrays that the algorithms are filled from."""
+"""A tree of bodies as arrays, the input of the algorithms."""
 
 from __future__ import annotations
 
@@ -21,43 +21,43 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class TreeArrays:
-    """A base with bodies in a tree, each moved by one joint: N joints, n with a motor.
+    """A base with a tree of bodies, each moved by one joint: N joints, n of them actuated.
 
-    Arrays over joints list the n actuated ones first, then the passive ones, which have springs
-    for motors; each group as a walk down each branch meets them. Body 0 is the base, body j + 1 the
-    one that joint j moves; its frame has the joint's axis as z. The base's frame sits at its CoM.
+    Arrays over joints have the n actuated ones first, then the passive ones with springs; each
+    group branch by branch from the base. Body 0 is the base, body j + 1 is moved by joint j; the z
+    axis of its frame is the joint's axis. The base's frame is at its CoM.
     """
 
     name: str
     joint_names: tuple[str, ...]
-    """Those of the n actuated joints: the order of all arrays that the flight software has."""
+    """Names of the n actuated joints, in the order of all arrays of the flight software."""
     passive_names: tuple[str, ...]
     body_names: tuple[str, ...]
     mass: Array
-    """(N+1,) kg, base first."""
+    """(N+1,) masses, kg, base first."""
     inertia: Array
-    """(N+1, 3, 3) kg m2 about each body's CoM, in its frame."""
+    """(N+1, 3, 3) inertia about each body's CoM, kg m2, in its frame."""
     com: Array
-    """(N+1, 3) m, in the body's frame."""
+    """(N+1, 3) centre of mass, m, in the body's frame."""
     parent: NDArray[np.int64]
-    """(N,) the body that each joint moves against, by number."""
+    """(N,) number of the parent body of each joint."""
     rotation: Array
-    """(N, 3, 3) axes of each joint's frame at zero, as columns, on the axes of the parent."""
+    """(N, 3, 3) axes of each joint's frame at zero, as columns, in parent axes."""
     offset: Array
-    """(N, 3) m, from the parent's frame to the joint's, on the joint's axes at zero."""
+    """(N, 3) from the parent's frame to the joint's, m, in the joint's axes at zero."""
     is_prismatic: NDArray[np.bool_]
-    """(N,) True for a joint that slides along its axis, False for one that turns about it."""
+    """(N,) True for prismatic joints, False for revolute ones."""
     limits: tuple[JointLimits, ...]
-    """Of the n actuated joints."""
+    """Limits of the n actuated joints."""
     friction: tuple[JointFriction, ...]
-    """Of all N joints."""
+    """Friction of all N joints."""
     springs: tuple[Spring, ...]
-    """Of the passive joints."""
+    """Springs of the passive joints."""
     tools: tuple[Tool, ...]
     """Frames of the end effectors; the first one is *the* tool."""
     visuals: tuple[Visual, ...] = ()
     order: tuple[int, ...] = ()
-    """All joints as a walk down each branch meets them: a parent's before its children's."""
+    """Order of all joints branch by branch: parents before children."""
 
     @property
     def n(self) -> int:
@@ -71,7 +71,7 @@ class TreeArrays:
 
     @property
     def branches(self) -> tuple[int, ...]:
-        """Number of actuated joints in each branch on the base that has any, in their order."""
+        """Number of actuated joints in each branch with actuated joints, in order."""
         counts: dict[int, int] = {}
         for joint in range(self.n):
             body = joint + 1
@@ -92,10 +92,10 @@ class TreeArrays:
 
     @classmethod
     def of_tree(cls, name: str, bodies: Sequence[Body], where: str = "robot") -> Self:
-        """Build from bodies in any order: see `space_robot_model.robot.tree.flatten`.
+        """Build the arrays from bodies in any order, see `space_robot_model.robot.tree.flatten`.
 
         Raises:
-            InputError: they make no tree, or none that can be flown; ``where`` names the file.
+            InputError: not a tree, or one that cannot be flown; ``where`` names the file.
         """
         walked = flatten(bodies, where)
         moved = sorted(walked[1:], key=lambda m: _joint(m).spring is not None)
@@ -107,9 +107,9 @@ class TreeArrays:
             (len(springs), MOST_PASSIVE, "passive joints"),
         ):
             if number > most:
-                raise InputError(f"{where}: at most {most} {what} can be flown, here are {number}")
+                raise InputError(f"{where}: at most {most} {what} can be flown, got {number}")
         if not actuated:
-            raise InputError(f"{where}: a robot needs one actuated joint at least")
+            raise InputError(f"{where}: a robot needs at least one actuated joint")
         all_moved = [walked[0], *moved]
         number_of = {id(m): number for number, m in enumerate(all_moved)}
         members = [m.body for m in all_moved]
@@ -138,7 +138,7 @@ class TreeArrays:
         )
 
     def bodies(self) -> list[Body]:
-        """Return the tree that `of_tree` makes this robot of, as a walk down each branch."""
+        """Return the bodies from which `of_tree` builds this robot, branch by branch."""
         bodies = []
         for number in (0, *(joint + 1 for joint in self.order)):
             name = self.body_names[number]
@@ -173,7 +173,7 @@ def _joint(moved: Moved) -> Joint:
 
 
 def _numbered_tools(members: Sequence[Body]) -> tuple[Tool, ...]:
-    """Return the tools of all bodies; a robot without any has one on its last body."""
+    """Return the tools of all bodies; without any, one on the last body."""
     numbered = [
         replace(tool, body=number) for number, body in enumerate(members) for tool in body.tools
     ]

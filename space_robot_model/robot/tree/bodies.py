@@ -1,4 +1,4 @@
-"""A robot as files tell it: bodies in any order, joints about any axis, some of them fixed."""
+"""A robot as in files: bodies in any order, joints with any axis, fixed joints."""
 
 from __future__ import annotations
 
@@ -13,32 +13,32 @@ JointKind = Literal["revolute", "prismatic", "fixed"]
 
 
 class JointLimits(NamedTuple):
-    """The range of an actuated joint; infinite where none is known."""
+    """Limits of an actuated joint; infinite if unknown."""
 
     lower: float = -np.inf
-    """rad, or m of a prismatic joint."""
+    """Lower limit of position, rad, or m for a prismatic joint."""
     upper: float = np.inf
-    """rad or m."""
+    """Upper limit of position, rad or m."""
     velocity: float = np.inf
-    """rad/s or m/s."""
+    """Limit of velocity, rad/s or m/s."""
     effort: float = np.inf
-    """N m or N."""
+    """Limit of torque or force, N m or N."""
 
 
 class JointFriction(NamedTuple):
-    """The friction of a joint; NaN where the robot does not tell and the settings' holds."""
+    """Friction of a joint; NaN if not part of the robot: then that of the settings is used."""
 
     coulomb: float = np.nan
-    """N m, or N of a prismatic joint."""
+    """Coulomb friction, N m, or N for a prismatic joint."""
     viscous: float = np.nan
     """N m s/rad or N s/m."""
 
 
 class Spring(NamedTuple):
-    """What holds a passive joint, which has no motor: ``-stiffness (theta - rest) - damping v``."""
+    """Spring and damper of a passive joint: torque ``-stiffness (theta - rest) - damping v``."""
 
     stiffness: float
-    """N m/rad, or N/m of a prismatic joint."""
+    """Stiffness, N m/rad, or N/m for a prismatic joint."""
     damping: float
     """N m s/rad or N s/m."""
     rest: float = 0.0
@@ -50,71 +50,71 @@ NO_LIMITS, USUAL_FRICTION = JointLimits(), JointFriction()
 
 @dataclass(frozen=True)
 class Joint:
-    """How a body is joined to its parent."""
+    """Joint between a body and its parent."""
 
     name: str
     kind: JointKind = "revolute"
-    """A continuous joint is a revolute one without limits of position."""
+    """Kind of joint; a continuous joint is a revolute one without limits of position."""
     rotation: Array = field(default_factory=lambda: np.eye(3))
-    """(3, 3) axes of the body's frame at joint position zero, as columns, on its parent's axes."""
+    """(3, 3) axes of the body's frame at joint position zero, as columns, in parent axes."""
     offset: Array = field(default_factory=lambda: np.zeros(3))
-    """(3,) m, from the parent's frame to the body's at zero, on the *body's* axes at zero."""
+    """(3,) from the parent's frame to the body's at zero, m, in the *body's* axes at zero."""
     axis: Array = field(default_factory=lambda: np.array([0.0, 0.0, 1.0]))
-    """(3,) unit vector on the body's axes: turned about, or moved along."""
+    """(3,) unit vector of the axis, in body axes."""
     limits: JointLimits = NO_LIMITS
     friction: JointFriction = USUAL_FRICTION
     spring: Spring | None = None
-    """Of a passive joint; None: the joint is actuated, or fixed."""
+    """Spring of a passive joint; None for actuated and fixed joints."""
 
 
 @dataclass(frozen=True)
 class Tool:
-    """A frame that a robot works with: an end effector's."""
+    """Frame of an end effector."""
 
     name: str
     rotation: Array
-    """(3, 3) its axes, as columns, on the axes of its body."""
+    """(3, 3) its axes, as columns, in body axes."""
     position: Array
-    """(3,) m, on the axes of its body."""
+    """(3,) position, m, in body axes."""
     body: int = 0
-    """Number of the body that carries it; of no meaning before `flatten`."""
+    """Number of its body; set by `flatten`."""
     rank: int = 0
-    """Its place among the tools of the robot: that of the lowest is *the* tool."""
+    """Rank among the tools of the robot: the lowest is *the* tool."""
 
 
 @dataclass(frozen=True)
 class Visual:
-    """A shape that shows where a body is."""
+    """A shape to display a body."""
 
     shape: Literal["box", "cylinder", "sphere", "mesh"]
     size: tuple[float, ...]
-    """m: edges x, y, z; radius and length along z; radius; scale x, y, z of a mesh."""
+    """Edges x, y, z; radius and length along z; radius, m; or scale x, y, z of a mesh."""
     rotation: Array
-    """(3, 3) its axes, as columns, on the axes of its body."""
+    """(3, 3) its axes, as columns, in body axes."""
     position: Array
-    """(3,) m, on the axes of its body."""
+    """(3,) position, m, in body axes."""
     mesh: str = ""
-    """File of the mesh; its name unchanged if the file does not exist."""
+    """File of the mesh; the original name if the file does not exist."""
     colour: tuple[float, float, float, float] | None = None
     """Red, green, blue, alpha, from 0 to 1."""
     body: int = 0
-    """Number of the body that it shows; of no meaning before `flatten`."""
+    """Number of its body; set by `flatten`."""
 
 
 @dataclass(frozen=True)
 class Body:
-    """A rigid body, with all vectors on the axes of its own frame."""
+    """A rigid body; all vectors are in the axes of its frame."""
 
     name: str
     mass: float
-    """kg; 0 only where a fixed joint adds the body to another one."""
+    """Mass, kg; 0 only for bodies on fixed joints."""
     inertia: Array
-    """(3, 3) kg m2 about its centre of mass."""
+    """(3, 3) inertia about its centre of mass, kg m2."""
     com: Array
-    """(3,) m, its centre of mass."""
+    """(3,) centre of mass, m."""
     parent: str = ""
-    """Name of the body that it is joined to; empty for the base."""
+    """Name of its parent; empty for the base."""
     joint: Joint | None = None
-    """How; None for the base."""
+    """Joint to the parent; None for the base."""
     tools: tuple[Tool, ...] = ()
     visuals: tuple[Visual, ...] = ()

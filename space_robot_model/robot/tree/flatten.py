@@ -1,7 +1,7 @@
-"""The tree of a file in the form of the algorithms.
+"""Conversion of a file's tree to the form of the algorithms.
 
-Fixed joints are merged into the bodies that carry them, every joint is about (or along) the z axis
-of its body's frame, the base's frame is at its centre of mass.
+Bodies on fixed joints are merged into their parents, every joint axis is the z axis of its body's
+frame, and the base's frame is at its centre of mass.
 """
 
 from __future__ import annotations
@@ -24,32 +24,32 @@ Array = NDArray[np.float64]
 
 @dataclass
 class Moved:
-    """A body of the flattened tree and the joint that moves it; the base has none.
+    """A body of the flattened tree and the joint that moves it; None for the base.
 
-    Its frame has the joint's axis as z axis; `body.com`, tools and visuals are on that frame.
+    The z axis of its frame is the joint's axis; `body.com`, tools and visuals are in that frame.
     """
 
     body: Body
     parent: int
-    """The `Moved` that its joint moves against, by number; the base is 0."""
+    """Number of the parent `Moved`; the base is 0."""
 
 
 def flatten(bodies: Sequence[Body], where: str = "robot") -> list[Moved]:
-    """Merge fixed bodies, turn every joint's axis to z, put the base's frame at its CoM.
+    """Merge fixed bodies, rotate every joint axis to z, put the base's frame at its CoM.
 
     Returns:
-        The base, then the bodies with a moving joint, a parent always before its children and
-        else as a walk down each branch in the order of ``bodies`` meets them.
+        The base, then the bodies with a moving joint, branch by branch in the order of ``bodies``,
+        parents before children.
 
     Raises:
-        InputError: names occur twice, a parent is unknown, there is not one base, or a body has no
-            mass or inertia once what is fixed to it is counted.
+        InputError: repeated names, an unknown parent, not exactly one base, or a moving body
+            without mass or inertia, including the bodies fixed to it.
     """
     by_name = _check_names(bodies, where)
     flat: list[Moved] = []
     parts: list[list[Body]] = []
     place: dict[str, tuple[int, Array, Array]] = {}
-    """Of each body: its carrier, and its own frame in the carrier's."""
+    """The carrier of each body, and the body's frame in that of the carrier."""
     for body in _outwards(bodies, by_name, where):
         joint = body.joint
         if joint is None:
@@ -77,7 +77,7 @@ def flatten(bodies: Sequence[Body], where: str = "robot") -> list[Moved]:
 
 
 def axes_with_z(axis: Array) -> Array:
-    """Return a rotation whose third column is the unit vector ``axis``; exact for z, -x, ..."""
+    """Return a rotation with the unit vector ``axis`` as third column; exact for z, -x, ..."""
     helper = np.zeros(3)
     helper[np.argmin(np.abs(axis))] = 1.0
     x = helper - product(helper, axis) * axis
@@ -86,13 +86,13 @@ def axes_with_z(axis: Array) -> Array:
 
 
 def parallel_axes(mass: float, arm: Array) -> Array:
-    """Return what a mass (kg) at ``arm`` (3,), m, adds to the inertia about a point, kg m2."""
+    """Return the inertia, kg m2, of a point mass (kg) at ``arm`` (3,), m (parallel axes)."""
     parallel_axes: Array = mass * (product(arm, arm) * np.eye(3) - np.outer(arm, arm))
     return parallel_axes
 
 
 def first_repeated(names: Iterable[str]) -> str | None:
-    """Return the first name that occurs for a second time, None if all differ."""
+    """Return the first repeated name; None if all differ."""
     seen: set[str] = set()
     for name in names:
         if name in seen:
@@ -110,18 +110,18 @@ def _check_names(bodies: Sequence[Body], where: str) -> dict[str, Body]:
             raise InputError(f"{where}: {kind} names must differ, {short(name)} occurs twice")
     bases = [body.name for body in bodies if body.joint is None]
     if len(bases) != 1:
-        raise InputError(f"{where}: a robot has one base, here are {len(bases)}: {bases}")
+        raise InputError(f"{where}: a robot has one base, got {len(bases)}: {bases}")
     for body in bodies:
         if body.joint and body.parent not in by_name:
             raise InputError(
-                f"{where}: parent {short(body.parent)} of {short(body.name)} is no body: "
+                f"{where}: parent {short(body.parent)} of {short(body.name)} is not a body: "
                 f"{choices(body.parent, names)}"
             )
     return by_name
 
 
 def _outwards(bodies: Sequence[Body], by_name: dict[str, Body], where: str) -> Iterator[Body]:
-    """Walk down each branch from the base, in the order of ``bodies``."""
+    """Yield the bodies branch by branch from the base, in the order of ``bodies``."""
     children: dict[str, list[Body]] = {name: [] for name in by_name}
     for body in reversed(bodies):
         if body.joint:
@@ -133,11 +133,11 @@ def _outwards(bodies: Sequence[Body], by_name: dict[str, Body], where: str) -> I
         seen += 1
         yield body
     if seen < len(bodies):
-        raise InputError(f"{where}: some bodies are not joined to the base, but in a circle")
+        raise InputError(f"{where}: some bodies form a loop that is not connected to the base")
 
 
 def _moved_to(body: Body, rotation: Array, position: Array) -> Body:
-    """Return the body on the axes of another frame, in which its own is so turned and placed."""
+    """Return the body in another frame, given its pose in that frame."""
 
     def at(vector: Array) -> Array:
         return position + product(rotation, vector)
@@ -158,10 +158,10 @@ def _moved_to(body: Body, rotation: Array, position: Array) -> Body:
 
 
 def _merged(first: Body, members: list[Body], where: str) -> Body:
-    """Return one rigid body that is all ``members``, which are on its axes."""
+    """Return the rigid union of all ``members``, which are in its axes."""
     mass = sum(body.mass for body in members)
     if not mass > 0.0:
-        raise InputError(f"{where}: body {first.name!r} moves and has no mass ({mass:g} kg)")
+        raise InputError(f"{where}: moving body {first.name!r} has no mass ({mass:g} kg)")
     heavy = [body for body in members if body.mass > 0.0]
     com, inertia = heavy[0].com, heavy[0].inertia
     if len(heavy) > 1:

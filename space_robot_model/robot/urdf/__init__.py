@@ -1,4 +1,4 @@
-"""Robots from URDF files: read strictly, every defect named."""
+"""Strict reading of robots from URDF files, with reports of all defects."""
 
 from .findings import Finding
 from .read import UrdfRobot, read_urdf

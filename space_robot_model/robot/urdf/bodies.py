@@ -1,4 +1,4 @@
-"""From links and joints to the bodies of a robot, the physically impossible ones mended."""
+"""Conversion of links and joints to bodies, with repair of physically inconsistent ones."""
 
 from __future__ import annotations
 
@@ -23,10 +23,10 @@ Array = NDArray[np.float64]
 
 
 def mend_massless(links: Mapping[str, UrdfLink], tree: Tree, report: Report) -> None:
-    """Lock the joints of bodies without mass that may be locked: those of tips, and the root's.
+    """Lock the joints of massless bodies where possible: at tips and at the root.
 
     Raises:
-        InputError: a body without mass carries others; how they move is not defined.
+        InputError: a massless body carries others, so its motion is undefined.
     """
     while True:
         carriers = tree.carriers()
@@ -47,7 +47,7 @@ def mend_massless(links: Mapping[str, UrdfLink], tree: Tree, report: Report) -> 
             _lock_root(links[tree.base], carried[tree.base][0], tree, report)
         else:
             link = links[massless[0]]
-            what = "a base that" if link.name == tree.base else "a link that moves and"
+            what = "a base that" if link.name == tree.base else "a moving link that"
             raise report.error(
                 link.mass_line,
                 link.part,
@@ -61,7 +61,7 @@ def _lock_tip(link: UrdfLink, tree: Tree, carriers: Mapping[str, str], report: R
     report.repaired(
         link.mass_line,
         link.part,
-        "a link that moves must have a mass",
+        "a moving link must have a mass",
         f"{link.mass:g}",
         f"{edge.joint.part} locked at 0, merged into link {short(carriers[edge.parent])}",
     )
@@ -69,7 +69,7 @@ def _lock_tip(link: UrdfLink, tree: Tree, carriers: Mapping[str, str], report: R
 
 
 def _lock_root(root: UrdfLink, child: str, tree: Tree, report: Report) -> None:
-    """Lock the one joint of a root without mass: what it carries floats freely anyway."""
+    """Lock the only joint of a massless root: its child floats freely anyway."""
     edge = tree.edges[child]
     report.repaired(
         root.mass_line,
@@ -82,26 +82,26 @@ def _lock_root(root: UrdfLink, child: str, tree: Tree, report: Report) -> None:
 
 
 def check_kinds(tree: Tree, report: Report) -> None:
-    """Refuse the joints of more than one degree of freedom.
+    """Check that no joint has more than one degree of freedom.
 
     Raises:
-        InputError: there is one.
+        InputError: a joint has more than one.
     """
     for edge in tree.edges.values():
         if edge.joint.kind in ("floating", "planar"):
             raise report.error(
                 edge.joint.line,
                 edge.joint.part,
-                "it moves in more than one way: use revolute, "
-                "continuous and prismatic joints, with links between them that have a mass",
+                "it has more than one degree of freedom: use revolute, "
+                "continuous and prismatic joints, with links with mass between them",
                 edge.joint.kind,
             )
 
 
 def mend_inertias(links: Mapping[str, UrdfLink], tree: Tree, report: Report) -> None:
-    """Check that every link that has a mass can be made of matter.
+    """Check the physical consistency of every link with mass, and repair inertias.
 
-    A point's inertia, zero, will do for a link that is fixed to one with an inertia.
+    Zero inertia is allowed for a link that is fixed to one with inertia.
     """
     carriers = tree.carriers()
     solid = set()
@@ -130,12 +130,12 @@ def make_bodies(links: Mapping[str, UrdfLink], tree: Tree, tools: Sequence[str])
     """Return a body for each link, the base first, the others in the order of their joints.
 
     Args:
-        links: by their names.
-        tree: how they hang together.
-        tools: the links whose frames are the tools', the first one first.
+        links: by name.
+        tree: of links and joints.
+        tools: links whose frames are tools, in order of rank.
     """
-    # the axis of a reversed joint runs through the frame of what is now its parent: what is now its
-    # child gets its frame there; all other links keep theirs
+    # the axis of a reversed joint passes through the frame of its new parent, so its new child gets
+    # its frame there; all other links keep theirs
     frames = {
         edge.joint.parent: edge.joint.frame for edge in tree.edges.values() if edge.is_reversed
     }
@@ -149,10 +149,10 @@ def make_bodies(links: Mapping[str, UrdfLink], tree: Tree, tools: Sequence[str])
 
 
 def end_frames(links: Mapping[str, UrdfLink], tree: Tree) -> list[str]:
-    """Return the links whose frames are the tools', those behind the most joints first.
+    """Return the links whose frames are tools, those with the most joints to the base first.
 
-    They are fixed links without mass that carry nothing, and the last moving link of a branch that
-    has none of them.
+    They are fixed massless links without children, and the last moving link of a branch without
+    such links.
     """
     carriers, leaves = tree.carriers(), tree.leaves()
     depth = {tree.base: 0}
@@ -169,7 +169,7 @@ def end_frames(links: Mapping[str, UrdfLink], tree: Tree) -> list[str]:
 
 
 def _joint(edge: Edge, parent: UrdfFrame) -> Joint:
-    """Return the joint between two bodies; ``parent``: the frame of the one nearer to the base."""
+    """Return the joint between two bodies; ``parent`` is the frame of the inner one."""
     joint = edge.joint
     rotation = parent.rotation.T
     if edge.is_reversed:
@@ -192,7 +192,7 @@ def _joint(edge: Edge, parent: UrdfFrame) -> Joint:
 def _body(
     link: UrdfLink, frame: UrdfFrame, joint: Joint | None, parent: str, rank: int | None
 ) -> Body:
-    """Return a link as a body whose frame is ``frame``, seen from the link's; a tool if ranked."""
+    """Return a link as a body with ``frame`` relative to the link's; with a tool if ranked."""
     turn, at = frame.rotation.T, frame.position
     visuals = tuple(
         replace(

@@ -1,4 +1,4 @@
-"""XML as a tree of elements that know their line; what could harm a reader is refused."""
+"""XML as a tree of elements with line numbers; dangerous content is refused."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ from xml.parsers import expat
 from space_robot_msgs_py.errors import InputError
 
 DEEPEST = 100
-"""Elements within one another."""
+"""Maximum depth of nested elements."""
 
 
 @dataclass
 class Element:
-    """An XML element; text between elements means nothing in URDF and is not kept."""
+    """An XML element; text between elements has no meaning in URDF and is ignored."""
 
     tag: str
     line: int
@@ -22,19 +22,18 @@ class Element:
     children: list[Element] = field(default_factory=list)
 
     def all(self, tag: str) -> Iterator[Element]:
-        """Yield the children that have a tag."""
+        """Yield the children with a tag."""
         return (child for child in self.children if child.tag == tag)
 
 
 def parse_xml(text: str, where: str) -> Element:
     """Return the root element of an XML text.
 
-    Entities are not expanded but refused with the document type that would declare them: a few of
-    them within one another can fill any memory.
+    Document types are refused, because nested entities declared in them can fill the memory.
 
     Raises:
-        InputError: the text is empty, not XML, has a document type, or is nested too deep; in one
-            line that names ``where`` and the line.
+        InputError: the text is empty, not XML, has a document type, or is nested too deep; names
+            ``where`` and the line.
     """
     if not text.strip():
         raise InputError(f"{where}: the file is empty, a URDF <robot> was expected")
@@ -46,13 +45,13 @@ def parse_xml(text: str, where: str) -> Element:
         raise InputError(f"{where}: line {error.lineno}: not XML ({said})") from None
     except InputError:
         raise
-    except ValueError as error:  # characters that no file could hold
+    except ValueError as error:  # invalid characters
         raise InputError(f"{where}: not XML ({error})") from None
     return builder.top.children[0]
 
 
 class _Builder:
-    """Puts together what the parser reports."""
+    """Builds the tree from the events of the parser."""
 
     def __init__(self, where: str) -> None:
         self.top = Element("", 0, {})

@@ -1,4 +1,4 @@
-"""Numbers in the attributes of URDF elements, read strictly, and the frames they make."""
+"""Strict reading of numbers and frames from attributes of URDF elements."""
 
 from __future__ import annotations
 
@@ -16,20 +16,20 @@ from .findings import Report
 Array = NDArray[np.float64]
 
 LARGEST = 1e12
-"""Of any number in a file, kg, m, rad, ...: all that is computed of them stays finite.
+"""Largest allowed number in a file, kg, m, rad, ..., so that results stay finite.
 
-A limit that is so large is none: other readers of URDF do not know ``inf``."""
+A limit of this size means none: other readers of URDF do not accept ``inf``."""
 _NUMBER = re.compile(r"[-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?")
 _INFINITE = re.compile(r"([-+]?)inf(?:inity)?", re.IGNORECASE)
 
 
 class UrdfFrame(NamedTuple):
-    """A frame, seen from another."""
+    """A frame relative to another."""
 
     rotation: Array
-    """(3, 3) its axes, as columns, on the axes of the other."""
+    """(3, 3) its axes, as columns, in the axes of the other."""
     position: Array
-    """(3,) m, on the axes of the other."""
+    """(3,) position, m, in the axes of the other."""
 
 
 HERE = UrdfFrame(np.eye(3), np.zeros(3))
@@ -39,11 +39,11 @@ class Fields:
     """Reads the attributes of the elements of one link or joint."""
 
     def __init__(self, report: Report, part: str) -> None:
-        """Take where defects go, and which link or joint they are named after."""
+        """Store the report for defects, and the name of the link or joint."""
         self.report, self.part = report, part
 
     def number(self, element: Element, name: str, default: float | None = None) -> float:
-        """Return a number; without a default the attribute must be there."""
+        """Return a number; without default the attribute is required."""
         text = element.attributes.get(name)
         if text is None and default is not None:
             return default
@@ -54,7 +54,7 @@ class Fields:
         return self._number(element, name, text)
 
     def limit(self, element: Element, name: str) -> float | None:
-        """Return a number that may be infinite, as `LARGEST` is here; None if it is not there."""
+        """Return a number, infinite for `LARGEST`; None if the attribute is missing."""
         text = element.attributes.get(name)
         if text is None:
             return None
@@ -67,7 +67,7 @@ class Fields:
     def vector(
         self, element: Element, name: str, default: tuple[float, ...] | None, count: int = 3
     ) -> Array:
-        """Return so many numbers, separated by blanks."""
+        """Return ``count`` numbers, separated by spaces."""
         text = element.attributes.get(name)
         if text is None and default is not None:
             return np.array(default)
@@ -79,7 +79,7 @@ class Fields:
         return np.array([self._number(element, name, word) for word in words])
 
     def frame(self, origin: Element | None) -> UrdfFrame:
-        """Return the frame that an ``<origin>`` describes, on the axes of the one it stands in."""
+        """Return the frame of an ``<origin>``, relative to that of its element."""
         if origin is None:
             return HERE
         self.report.check_content(origin, self.part, (), ("xyz", "rpy"))
@@ -91,5 +91,5 @@ class Fields:
         value = float(text) if _NUMBER.fullmatch(text.strip()) else math.nan
         if abs(value) <= LARGEST:
             return value
-        why = "is no number" if math.isnan(value) else f"must be at most {LARGEST:g}"
+        why = "is not a number" if math.isnan(value) else f"must be at most {LARGEST:g}"
         raise self.report.error(element.line, self.part, f"{element.tag}.{name} {why}", text)

@@ -1,4 +1,4 @@
-"""What is wrong with a robot's file: named with part, line and value, repaired where one may."""
+"""Defects of a robot's file, with part, line and value, and their repairs."""
 
 from __future__ import annotations
 
@@ -19,21 +19,21 @@ class Finding:
     part: str
     """The link or joint that has it, such as ``link 'tip'``."""
     line: int
-    """Where it stands in the file."""
+    """Line in the file."""
     defect: str
-    """In words, and what is allowed."""
+    """Description of the defect, with the allowed values."""
     value: str
-    """As given."""
+    """Value in the file."""
     repair: str
     """The repair, as a participle: ``merged into link 'arm'``."""
 
     def __str__(self) -> str:
-        """Return the finding and its repair in one line."""
+        """Return defect and repair in one line."""
         return f"line {self.line}: {self._named()}: {self.repair}"
 
     @property
     def told(self) -> dict[str, Any]:
-        """The same as a mapping."""
+        """Return the finding as a mapping."""
         return asdict(self)
 
     def _named(self) -> str:
@@ -41,28 +41,28 @@ class Finding:
 
 
 class Report:
-    """Collects the defects of one file; those that nothing repairs end the reading at once."""
+    """Collects the defects of one file; an irreparable one is raised at once."""
 
     def __init__(self, where: str) -> None:
-        """Take the name of the file, for errors."""
+        """Store the name of the file, for errors."""
         self.where = where
         self.findings: list[Finding] = []
 
     def error(self, line: int, part: str, defect: str, value: str | None = None) -> InputError:
-        """Return the error, to be raised, for a defect that has no repair."""
+        """Return the error for an irreparable defect, to be raised."""
         got = "" if value is None else f", got {short(value)}"
         return InputError(f"{self.where}: line {line}: {part}: {defect}{got}")
 
     def repaired(self, line: int, part: str, defect: str, value: str, repair: str) -> None:
-        """Keep a defect that is repaired as ``repair`` says."""
+        """Store a defect with its repair."""
         self.findings.append(Finding(part, line, defect, value and short(value), repair))
 
     def sorted(self) -> list[Finding]:
-        """Return the defects kept, by line."""
+        """Return the stored defects, by line."""
         return sorted(self.findings, key=lambda finding: finding.line)
 
     def refuse_defects(self) -> None:
-        """Raise an InputError that names the first defect in the file, if there is any."""
+        """Raise an InputError for the first defect in the file, if any."""
         if not self.findings:
             return
         first = self.sorted()[0]
@@ -75,9 +75,9 @@ class Report:
     def check_content(
         self, element: Element, part: str, children: Collection[str], attributes: Collection[str]
     ) -> None:
-        """Keep as defects what an element should not hold: most often it is misspelt.
+        """Report unknown children and attributes, which are often misspelt, as defects.
 
-        What has a prefix, such as ``drake:``, is an extension that is none of our business.
+        Names with a prefix, such as ``drake:``, are extensions and are ignored.
         """
         for name, value in element.attributes.items():
             if name not in attributes and ":" not in name and name != "xmlns":
@@ -101,19 +101,19 @@ class Report:
                 )
 
     def only(self, element: Element, tag: str, part: str) -> Element | None:
-        """Return the child with a tag, None if there is none; a second one is a defect."""
+        """Return the child with a tag, or None; a second one is a defect."""
         elements = list(element.all(tag))
         for again in elements[1:]:
             self.repaired(
                 again.line,
                 part,
-                f"<{tag}> stands there twice",
+                f"<{tag}> occurs twice",
                 f"line {elements[0].line} and here",
-                "the first one holds",
+                "the first one is used",
             )
         return elements[0] if elements else None
 
 
 def short_tag(tag: str) -> str:
-    """Show the name of an element in an error, in one short line."""
+    """Return the name of an element for errors, as one short line."""
     return short(tag)[1:-1]

@@ -1,4 +1,4 @@
-"""Links and joints as one tree, seen from the base."""
+"""Links and joints as a tree with the base as root."""
 
 from __future__ import annotations
 
@@ -14,32 +14,32 @@ from .links import UrdfLink
 
 @dataclass
 class Edge:
-    """A joint, and which of its ends is nearer to the base."""
+    """A joint with its direction in the tree."""
 
     joint: UrdfJoint
     parent: str
-    """The link nearer to the base."""
+    """Name of the link nearer to the base."""
     is_reversed: bool
-    """The file has it the other way round: here the joint's child carries its parent."""
+    """True if the file has the opposite direction: the joint's child carries its parent."""
 
     @property
     def moves(self) -> bool:
-        """Whether the joint does anything but hold."""
+        """True if the joint is not fixed."""
         return self.joint.kind != "fixed"
 
 
 @dataclass
 class Tree:
-    """All links, outwards from a base."""
+    """All links, from the base outwards."""
 
     base: str
     order: list[str]
-    """Names of the links, each after the one that carries it."""
+    """Names of the links, parents before children."""
     edges: dict[str, Edge]
-    """Of each link but the base, by its name, what joins it to the rest; as in the file."""
+    """Joint to the parent for each link except the base, by link name, in the file's order."""
 
     def carriers(self) -> dict[str, str]:
-        """Return for each link the one, itself perhaps, whose joint moves it; base if none."""
+        """Return for each link the link (possibly itself) whose joint moves it, or the base."""
         carriers = {self.base: self.base}
         for name in self.order[1:]:
             edge = self.edges[name]
@@ -47,20 +47,20 @@ class Tree:
         return carriers
 
     def leaves(self) -> set[str]:
-        """Return the links that carry no other one."""
+        """Return the links without children."""
         return set(self.order) - {edge.parent for edge in self.edges.values()}
 
 
 def build_tree(
     links: Mapping[str, UrdfLink], joints: Mapping[str, UrdfJoint], base: str | None, report: Report
 ) -> Tree:
-    """Join the links to one tree and look at it from ``base``, or from its root.
+    """Build the tree of links with ``base``, or the URDF's root, as its root.
 
-    A base other than the root turns the joints between them round: what was the child of such a
-    joint becomes its parent.
+    If the base is not the URDF's root, the joints between them are reversed: child and parent are
+    exchanged.
 
     Raises:
-        InputError: the links are not one tree, or there is no such base.
+        InputError: the links do not form one tree, or there is no such base.
     """
     root = _root(links, joints, report)
     if base is not None:
@@ -84,7 +84,7 @@ def build_tree(
 
 
 def _root(links: Mapping[str, UrdfLink], joints: Mapping[str, UrdfJoint], report: Report) -> str:
-    """Return the link that no other carries, having seen that all others hang on it."""
+    """Return the link without parent, after checking that it is connected to all others."""
     above: dict[str, UrdfJoint] = {}
     for joint in joints.values():
         if joint.child in above:
@@ -101,7 +101,7 @@ def _root(links: Mapping[str, UrdfLink], joints: Mapping[str, UrdfJoint], report
         raise report.error(
             roots[1].line,
             roots[1].part,
-            f"only the root may be no joint's child, here are {len(roots)} such links",
+            f"only the root may have no parent, got {len(roots)} such links",
             ", ".join(link.name for link in roots),
         )
     seen = {link.name for link in roots}
@@ -116,5 +116,5 @@ def _root(links: Mapping[str, UrdfLink], joints: Mapping[str, UrdfJoint], report
     for name in links:
         if name not in seen:
             joint = above[name]
-            raise report.error(joint.line, joint.part, "parents and children go round in a circle")
+            raise report.error(joint.line, joint.part, "parents and children form a loop")
     return roots[0].name

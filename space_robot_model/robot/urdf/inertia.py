@@ -1,4 +1,4 @@
-"""Is an inertia one that matter can have? If not: the nearest that it can."""
+"""Check of the physical consistency of inertias, and the nearest consistent inertia."""
 
 from __future__ import annotations
 
@@ -13,25 +13,25 @@ from ..tree import Visual
 Array = NDArray[np.float64]
 
 LEAST_GYRATION = 1e-6
-"""m: a body whose radius of gyration is less counts as a point."""
+"""Radius of gyration below which a body counts as a point, m."""
 ROUNDING = 1e-9
-"""By how much of it a principal moment may exceed the sum of the other two."""
+"""Relative tolerance of the triangle inequality of principal moments."""
 SLENDER = 1e-3
-"""The least of a repaired body's second moments, as a share of the largest: a rod of 1 m is
-then 4 cm thick."""
+"""Smallest second moment of a repaired body relative to the largest: a rod of 1 m is then 4 cm
+thick."""
 SOLID = 1000.0
-"""kg/m3, the density of a body of which nothing but the mass is known."""
+"""Assumed density of a body of unknown shape, kg/m3."""
 
 
 def inertia_defect(mass: float, inertia: Array) -> tuple[str, str]:
-    """Return in words why no body of this mass has this inertia, and its principal moments.
+    """Return the description of an inconsistent inertia, and its principal moments.
 
     Args:
         mass: kg, above 0.
-        inertia: (3, 3) kg m2 about the CoM.
+        inertia: (3, 3) about the CoM, kg m2.
 
     Returns:
-        The defect, empty if there is none, and the moments (kg m2) to be shown.
+        The defect, empty if there is none, and the moments, kg m2, as text.
     """
     moments = np.linalg.eigvalsh(inertia)
     listed = ", ".join(f"{moment:.4g}" for moment in moments)
@@ -45,13 +45,12 @@ def inertia_defect(mass: float, inertia: Array) -> tuple[str, str]:
 
 
 def nearest_inertia(inertia: Array) -> Array | None:
-    """Return the nearest inertia that a body of matter can have; None if there is nothing near.
+    """Return the nearest physically consistent inertia; None if there is nothing near.
 
-    A body's second moments ``S = integral r r^T dm = 1/2 tr(I) 1 - I`` are a matrix without
-    negative eigenvalues, and every such matrix belongs to a body (Wensing, Kim and Slotine 2018,
-    Linear matrix inequalities for physically consistent inertial parameter identification). The
-    nearest to a matrix that has some is the one with those raised to 0 (Higham 1988), here to a
-    little above.
+    A body's second moments ``S = integral r r^T dm = 1/2 tr(I) 1 - I`` are positive semidefinite,
+    and every such matrix belongs to a body (Wensing, Kim and Slotine 2018, Linear matrix
+    inequalities for physically consistent inertial parameter identification). The nearest such
+    matrix has the negative eigenvalues raised to 0 (Higham 1988), here to a little above.
     """
     from ...elementary.symmetric import principal_axes  # numba: slow to import
 
@@ -66,19 +65,19 @@ def nearest_inertia(inertia: Array) -> Array | None:
 
 
 def solid_inertia(mass: float, visuals: tuple[Visual, ...]) -> tuple[Array, str]:
-    """Return the inertia of a homogeneous body that looks like the first shape, and its name.
+    """Return the inertia, kg m2, of a homogeneous body with the first shape, and its description.
 
-    Without a shape it is a sphere as dense as water.
+    Without a shape it is a sphere with the density of water.
 
     Args:
         mass: kg.
-        visuals: what the body looks like; meshes do not count.
+        visuals: shapes of the body; meshes are ignored.
     """
     for visual in visuals:
         if visual.shape != "mesh":
             turn = visual.rotation
             inertia: Array = rotate_tensor(turn, np.diag(_solid(mass, visual.shape, visual.size)))
-            return inertia, f"the solid {visual.shape} that it looks like"
+            return inertia, f"the solid {visual.shape} of its visual"
     from ...elementary.exponential import exp, log  # slow to import
 
     radius = exp(log(3.0 * mass / (4.0 * math.pi * SOLID)) / 3.0)
@@ -87,7 +86,7 @@ def solid_inertia(mass: float, visuals: tuple[Visual, ...]) -> tuple[Array, str]
 
 
 def _solid(mass: float, shape: str, size: tuple[float, ...]) -> list[float]:
-    """Return the principal moments of a homogeneous solid, kg m2, on its axes."""
+    """Return the principal moments of a homogeneous solid, kg m2, in its axes."""
     if shape == "sphere":
         return [0.4 * mass * size[0] * size[0]] * 3
     if shape == "cylinder":

@@ -1,4 +1,4 @@
-"""The joints of a URDF: how they turn or slide, how far, against which friction."""
+"""Joints of a URDF: types, frames, axes, limits and friction."""
 
 from __future__ import annotations
 
@@ -28,17 +28,17 @@ KINDS = {
     "floating": "floating",
     "planar": "planar",
 }
-"""The types of URDF, and which of them become one another's."""
+"""Joint types of URDF, and their types here."""
 ELEMENTS = ("origin", "parent", "child", "axis", "limit", "dynamics", "mimic")
 EXTENSIONS = ("calibration", "safety_controller", "hardwareInterface")
 LIMITS = ("lower", "upper", "effort", "velocity", "acceleration", "deceleration", "jerk")
 NEARLY_ONE = 1e-3
-"""How much the norm of an axis may differ from 1: numbers of four digits do."""
+"""Tolerance of the norm of an axis, sufficient for numbers of four digits."""
 
 
 @dataclass
 class UrdfJoint:
-    """A joint as its file tells it."""
+    """A joint as in the file."""
 
     name: str
     line: int
@@ -47,22 +47,22 @@ class UrdfJoint:
     parent: str
     child: str
     frame: UrdfFrame
-    """The child's frame at joint position zero, on the parent's axes."""
+    """The child's frame at joint position zero, relative to the parent."""
     axis: Array
-    """(3,) unit vector on the child's axes."""
+    """(3,) unit vector in the child's axes."""
     limits: JointLimits
     friction: JointFriction
 
     @property
     def part(self) -> str:
-        """The joint as errors name it."""
+        """Name of the joint in errors."""
         return f"joint {short(self.name)}"
 
 
 def read_joints(
     robot: Element, links: Mapping[str, UrdfLink], report: Report
 ) -> dict[str, UrdfJoint]:
-    """Return all joints by their names, in the order of the file."""
+    """Return all joints by name, in the order of the file."""
     joints: dict[str, UrdfJoint] = {}
     for element in robot.all("joint"):
         name = read_name(element, report)
@@ -83,7 +83,7 @@ def _joint(element: Element, name: str, links: Mapping[str, UrdfLink], fields: F
         raise report.error(element.line, part, f"type must be one of {', '.join(KINDS)}", written)
     parent, child = (_end(element, tag, links, fields) for tag in ("parent", "child"))
     if parent == child:
-        raise report.error(element.line, part, "parent and child must be two links", parent)
+        raise report.error(element.line, part, "parent and child must be different links", parent)
     joint = UrdfJoint(
         name,
         element.line,
@@ -107,7 +107,7 @@ def _joint(element: Element, name: str, links: Mapping[str, UrdfLink], fields: F
                 part,
                 "<mimic>: joints cannot be coupled",
                 mimic.attributes.get("joint", ""),
-                "freed: it moves on its own",
+                "made independent",
             )
     return joint
 
@@ -119,7 +119,7 @@ def _end(element: Element, tag: str, links: Mapping[str, UrdfLink], fields: Fiel
     if end is None or not name:
         raise fields.report.error(element.line, fields.part, f'<{tag} link="..."/> is missing')
     if name not in links:
-        raise fields.report.error(end.line, fields.part, f"the {tag} is no link of the file", name)
+        raise fields.report.error(end.line, fields.part, f"the {tag} is not a known link", name)
     return name
 
 
@@ -156,23 +156,19 @@ def _limits(
 
 
 def _range(element: Element, fields: Fields) -> tuple[float, float]:
-    """Return the least and largest position; one that is not given is 0, as URDF says."""
+    """Return lower and upper limit; a missing one is 0, as defined by URDF."""
     lower, upper = (fields.limit(element, name) or 0.0 for name in ("lower", "upper"))
     interval = f"{lower:g} to {upper:g}"
     if lower > upper:
         fields.report.repaired(
-            element.line,
-            fields.part,
-            "the limits lower and upper are upside down",
-            interval,
-            "exchanged",
+            element.line, fields.part, "lower is above upper", interval, "exchanged"
         )
         return upper, lower
     if lower == upper:
         fields.report.repaired(
             element.line,
             fields.part,
-            "the limits lower and upper leave no room to move",
+            "lower and upper are equal",
             interval,
             "no limits of position",
         )
@@ -181,7 +177,7 @@ def _range(element: Element, fields: Fields) -> tuple[float, float]:
 
 
 def _most(element: Element, name: str, fields: Fields) -> float:
-    """Return the largest velocity or effort."""
+    """Return the limit of velocity or effort."""
     limit = fields.limit(element, name)
     if limit is not None and limit > 0.0:
         return limit
@@ -189,7 +185,7 @@ def _most(element: Element, name: str, fields: Fields) -> float:
     fields.report.repaired(
         element.line,
         fields.part,
-        f"limit.{name} must be given and above 0",
+        f"limit.{name} must be present and above 0",
         element.attributes.get(name, ""),
         repair,
     )
@@ -197,7 +193,7 @@ def _most(element: Element, name: str, fields: Fields) -> float:
 
 
 def _friction(element: Element | None, fields: Fields) -> JointFriction:
-    """Return what the file says of friction; 0 for the part that ``<dynamics>`` does not name."""
+    """Return the friction in the file; 0 for a part that is missing in ``<dynamics>``."""
     if element is None:
         return JointFriction()
     fields.report.check_content(element, fields.part, (), ("damping", "friction"))

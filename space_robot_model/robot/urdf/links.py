@@ -1,4 +1,4 @@
-"""The links of a URDF: masses, inertias, shapes."""
+"""Links of a URDF: masses, inertias, shapes."""
 
 from __future__ import annotations
 
@@ -22,36 +22,36 @@ Array = NDArray[np.float64]
 ELEMENTS = ("inertial", "visual", "collision")
 EXTENSIONS = ("contact", "gravity", "self_collision_checking", "sensor", "verbose")
 NOTHING = 1e-9
-"""kg: lighter bodies count as massless."""
+"""Mass below which a body counts as massless, kg."""
 MOMENTS = ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
 
 
 @dataclass
 class UrdfLink:
-    """A link as its file tells it; vectors on its own axes."""
+    """A link as in the file; vectors are in its axes."""
 
     name: str
     line: int
     mass_line: int
-    """Where its mass stands, or the link if it has none."""
+    """Line of its mass, or of the link if it has none."""
     mass: float
-    """kg, 0 if there is none."""
+    """Mass, kg; 0 if there is none."""
     inertia: Array
-    """(3, 3) kg m2 about the CoM."""
+    """(3, 3) inertia about the CoM, kg m2."""
     com: Array
-    """(3,) m."""
+    """(3,) centre of mass, m."""
     visuals: tuple[Visual, ...]
 
     @property
     def part(self) -> str:
-        """The link as errors name it."""
+        """Name of the link in errors."""
         return f"link {short(self.name)}"
 
 
 def read_links(
     robot: Element, colours: Colours, folder: Path, report: Report
 ) -> dict[str, UrdfLink]:
-    """Return all links by their names, in the order of the file."""
+    """Return all links by name, in the order of the file."""
     links: dict[str, UrdfLink] = {}
     for element in robot.all("link"):
         name = read_name(element, report)
@@ -68,7 +68,7 @@ def read_links(
 
 
 def read_name(element: Element, report: Report) -> str:
-    """Return the name of a link or joint, which must have one that can be shown."""
+    """Return the name of a link or joint, which must be printable."""
     name = element.attributes.get("name", "")
     if not name.strip() or not name.isprintable():
         raise report.error(element.line, element.tag, "a printable name is needed", name)
@@ -107,7 +107,7 @@ def _read_inertial(inertial: Element, link: UrdfLink, fields: Fields) -> None:
     if inertia is None:
         return
     report.check_content(inertia, part, (), MOMENTS)
-    # urdfdom refuses files in which one is missing; a product that is not there may well mean 0
+    # urdfdom refuses files with a missing element; a missing product probably means 0
     for product in MOMENTS[3:]:
         if product not in inertia.attributes:
             report.repaired(inertia.line, part, f"<inertia> needs {product!r}", "", "read as 0")
@@ -122,6 +122,6 @@ def _read_inertial(inertial: Element, link: UrdfLink, fields: Fields) -> None:
             part,
             "inertia without mass",
             f"{np.trace(link.inertia):g} kg m2 (trace)",
-            "the inertia is left out",
+            "the inertia is ignored",
         )
         link.inertia = np.zeros((3, 3))

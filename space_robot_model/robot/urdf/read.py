@@ -1,4 +1,4 @@
-"""A robot from a URDF file."""
+"""Reading of a robot from a URDF file."""
 
 from __future__ import annotations
 
@@ -27,20 +27,20 @@ from .visuals import read_colours
 XACRO = ".xacro"
 MOST_LINKS = 4000
 MOST_MOVING = 4 * MOST_JOINTS
-"""Joints that are not fixed; some of them may be locked for want of mass."""
+"""Maximum number of joints that are not fixed; massless ones are locked later."""
 
 
 @dataclass(frozen=True)
 class UrdfRobot:
-    """What a URDF holds, for `space_robot_model.robot.Robot.of_tree`."""
+    """Content of a URDF, for `space_robot_model.robot.Robot.of_tree`."""
 
     name: str
     bodies: list[Body]
-    """One for each link, the base first, then in the order of their joints."""
+    """One body for each link, the base first, then in the order of their joints."""
     findings: tuple[Finding, ...]
-    """What was repaired."""
+    """Repaired defects."""
     text: str
-    """The URDF itself, expanded if it was xacro."""
+    """Text of the URDF, expanded if it was xacro."""
 
 
 def read_urdf(
@@ -49,19 +49,19 @@ def read_urdf(
     repair: bool = False,
     tools: Sequence[str] | None = None,
 ) -> UrdfRobot:
-    """Read a URDF file, or a xacro file where that package is installed.
+    """Read a URDF file, or a xacro file if that package is installed.
 
     Args:
-        path: the file; one that ends in ``.xacro`` is expanded first, and its lines are counted
-            after that.
+        path: of the file; a ``.xacro`` file is expanded first, and line numbers are those of the
+            expanded text.
         base: the link that is the satellite; the root if None.
-        repair: mend the defects that can be mended, and tell them in ``findings``.
-        tools: links whose frames are the end effectors', the first one *the* tool; None: the
-            frames at the ends of the branches, those behind the most joints first.
+        repair: repair defects where possible, and list them in ``findings``.
+        tools: links whose frames are end effectors, the first one *the* tool; None: the frames at
+            the ends of the branches, those with the most joints to the base first.
 
     Raises:
-        InputError: the file is no URDF, or has a defect; in one line that names link or joint,
-            line, value and what ``repair`` would do.
+        InputError: the file is not a URDF, or has a defect; names link or joint, line, value and
+            the possible repair.
     """
     path = Path(path)
     text = expand_xacro(path) if path.suffix == XACRO else read_file(path)
@@ -75,7 +75,7 @@ def parse_urdf(
     repair: bool = False,
     tools: Sequence[str] | None = None,
 ) -> UrdfRobot:
-    """Read the text of a URDF as `read_urdf` does; ``path``: its name, and where meshes are."""
+    """Read the text of a URDF as `read_urdf`; ``path`` is its name, for errors and meshes."""
     report = Report(str(path))
     root = parse_xml(text, report.where)
     name = _robot_name(root, path, report)
@@ -97,12 +97,12 @@ def parse_urdf(
 
 
 def with_springs(urdf: UrdfRobot, springs: Mapping[str, Spring], where: str) -> UrdfRobot:
-    """Return the robot with some of its joints held by springs in the place of motors.
+    """Return the robot with springs instead of motors in some joints.
 
-    URDF knows no springs. Their damping takes the place of that in ``<dynamics>``.
+    URDF has no springs. Their damping replaces that of ``<dynamics>``.
 
     Raises:
-        InputError: one of the names is no joint that moves.
+        InputError: one of the names is not a moving joint.
     """
     moving = [body.joint.name for body in urdf.bodies if body.joint and body.joint.kind != "fixed"]
     for name in springs:
@@ -122,7 +122,7 @@ def with_springs(urdf: UrdfRobot, springs: Mapping[str, Spring], where: str) -> 
 
 
 def _robot_name(root: Element, path: Path, report: Report) -> str:
-    """Return the robot's name, having seen that the file describes one."""
+    """Return the robot's name, after checking the root element."""
     if root.tag != "robot":
         raise report.error(root.line, f"<{short_tag(root.tag)}>", "the root must be <robot>")
     for element in _all_elements(root):
@@ -130,31 +130,29 @@ def _robot_name(root: Element, path: Path, report: Report) -> str:
             raise report.error(
                 element.line,
                 f"<{short_tag(element.tag)}>",
-                f"xacro must be expanded first: give the file a name that ends in {XACRO}",
+                f"xacro must be expanded first: rename the file to end in {XACRO}",
             )
     name = root.attributes.get("name", "").strip()
     if name and name.isprintable():
         return name
     report.repaired(
-        root.line, "robot", "it needs a printable name", name, f"named {short(path.stem)}"
+        root.line, "robot", "a printable name is required", name, f"named {short(path.stem)}"
     )
     return path.stem
 
 
 def _check_counts(root: Element, report: Report) -> None:
-    """Refuse a file that is far too large before it is read link by link.
+    """Check the number of links and joints before they are read.
 
-    Joints may turn out to be locked, so that more of them than can be flown are read.
+    Some joints may be locked later, so more than can be flown are allowed.
     """
     links = len(list(root.all("link")))
     if links > MOST_LINKS:
-        raise InputError(
-            f"{report.where}: at most {MOST_LINKS} links can be read, here are {links}"
-        )
+        raise InputError(f"{report.where}: at most {MOST_LINKS} links can be read, got {links}")
     moving = sum(joint.attributes.get("type") != "fixed" for joint in root.all("joint"))
     if moving > MOST_MOVING:
         raise InputError(
-            f"{report.where}: at most {MOST_JOINTS} moving joints can be flown, here are {moving}"
+            f"{report.where}: at most {MOST_JOINTS} moving joints can be flown, got {moving}"
         )
 
 
@@ -166,20 +164,20 @@ def _all_elements(root: Element) -> list[Element]:
 
 
 def _check_moving(tree: Tree, report: Report) -> None:
-    """Check that joints move, under names that are free."""
+    """Check that there are moving joints, with allowed names."""
     moving = [edge.joint for edge in tree.edges.values() if edge.moves]
     if not moving:
-        raise InputError(f"{report.where}: no joint moves: a robot needs one at least")
+        raise InputError(f"{report.where}: no moving joint: a robot needs at least one")
     for joint in moving:
         if joint.name in BASE_AXES:
-            raise report.error(joint.line, joint.part, "that is the name of a base axis")
+            raise report.error(joint.line, joint.part, "this is the name of a base axis")
 
 
 def expand_xacro(path: Path) -> str:
-    """Return the URDF text that a xacro file stands for, every argument at its default.
+    """Return the URDF text of a xacro file, with default arguments.
 
     Raises:
-        InputError: the package is not installed, or does not like the file.
+        InputError: the package is not installed, or cannot expand the file.
     """
     check_file(path)
     try:
@@ -189,12 +187,12 @@ def expand_xacro(path: Path) -> str:
             f"{path}: xacro is not installed: `pip install 'space_robot[xacro]'` or `apt install "
             "ros-jazzy-xacro`, or expand the file elsewhere to a .urdf"
         ) from None
-    said = io.StringIO()  # warnings, and where it was when it failed
+    said = io.StringIO()  # warnings, and the position of an error
     try:
         with contextlib.redirect_stderr(said):
             document = xacro.process_file(str(path))
         return str(document.toprettyxml(indent="  "))
-    except (Exception, SystemExit) as error:  # whatever the expressions in a file come to
+    except (Exception, SystemExit) as error:  # expressions in a file may raise anything
         words, more = (" ".join(text.split()) for text in (str(error), said.getvalue()))
         words += "" if more in words else f" {more}"
         raise InputError(f"{path}: xacro cannot expand it ({words[:300]})") from None

@@ -1,4 +1,4 @@
-"""The shapes that show a link."""
+"""Visuals of URDF links."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ Colours = dict[str, Colour]
 
 
 def read_colours(robot: Element, report: Report) -> Colours:
-    """Return the colours of all materials that have a name, wherever in the file they stand."""
+    """Return the colours of all named materials in the file."""
     in_visuals = [
         material
         for link in robot.all("link")
@@ -43,7 +43,7 @@ def read_colours(robot: Element, report: Report) -> Colours:
 def read_visuals(
     link: Element, part: str, colours: Colours, folder: Path, report: Report
 ) -> tuple[Visual, ...]:
-    """Return the shapes of a link; one that makes no sense is a defect and left out."""
+    """Return the shapes of a link; an invalid one is a defect and is omitted."""
     visuals = []
     for element in link.all("visual"):
         fields = Fields(Report(report.where), part)
@@ -102,7 +102,7 @@ def _shape(
 
 
 def _colour(material: Element, colours: Colours, fields: Fields) -> Colour | None:
-    """Return a material's own colour, else that of its name; None if nobody knows one."""
+    """Return a material's own colour, else that of its name; None if unknown."""
     for element in material.all("color"):
         red, green, blue, alpha = fields.vector(element, "rgba", None, count=4)
         return float(red), float(green), float(blue), float(alpha)
@@ -111,20 +111,20 @@ def _colour(material: Element, colours: Colours, fields: Fields) -> Colour | Non
 
 def _left_out(element: Element, part: str, error: InputError, what: str, report: Report) -> None:
     words = str(error).split(f"{part}: ", 1)[-1]
-    report.repaired(element.line, part, f"<{element.tag}>: {words}", "", f"{what} is left out")
+    report.repaired(element.line, part, f"<{element.tag}>: {words}", "", f"{what} is ignored")
 
 
 PACKAGE, FILE = ("package://", "model://"), "file://"
 
 
 def mesh_path(name: str, folder: Path) -> str:
-    """Return the path of a mesh file, or its name as it is if nobody knows where that is.
+    """Return the path of a mesh file, or its unchanged name if the file does not exist.
 
     Args:
-        name: a path from the URDF's folder, or ``file://``, or ``package://NAME/...``: in an
-            installed ROS package, in a folder called NAME that the URDF is in, or in one beside
-            these.
-        folder: the URDF's.
+        name: a path relative to the URDF's folder, ``file://``, or ``package://NAME/...``: in an
+            installed ROS package, in a parent folder NAME of the URDF, or in a folder beside its
+            parents.
+        folder: of the URDF.
     """
     if name.startswith(FILE):
         return unquote(name.removeprefix(FILE))
@@ -136,7 +136,7 @@ def mesh_path(name: str, folder: Path) -> str:
 
 
 def _places(package: str, rest: str, folder: Path) -> Iterator[Path]:
-    """Yield where a file of a package may be, the likeliest place first."""
+    """Yield possible paths of a package's file, the most likely first."""
     for above in (folder, *folder.parents):
         if above.name == package:
             yield above / rest
@@ -154,5 +154,5 @@ def _paths(variable: str) -> list[Path]:
 def _is_file(path: Path) -> bool:
     try:
         return path.is_file()
-    except (OSError, ValueError):  # no name that a file could have
+    except (OSError, ValueError):  # invalid file name
         return False

@@ -81,7 +81,7 @@ def test_what_was_there_is_replaced_if_told_so_and_kept_if_anything_fails(
     assert list(tmp_path.iterdir()) == [mine]
     (mine / "thesis.tex").touch()
     result = new(FILE, "--out", "mine", "--force")
-    assert "holds 'thesis.tex' as well: it is not replaced" in str(result.exception)
+    assert "also contains 'thesis.tex': it is not replaced" in str(result.exception)
 
 
 def test_a_urdf_stays_one_and_has_a_mission_within_its_limits() -> None:
@@ -109,7 +109,7 @@ def test_a_urdf_stays_one_and_has_a_mission_within_its_limits() -> None:
     ("arguments", "said"),
     [
         (["none.urdf"], "none.urdf: no such file"),
-        ([FILE, "--base", "hull"], "no URDF, so there is no base to choose"),
+        ([FILE, "--base", "hull"], "not a URDF, so base and repair"),
         ([str(ARM), "--base", "leg"], "leg"),
         ([FILE, "--out", "/proc/mine"], "/proc/mine: cannot be written"),
     ],

@@ -84,7 +84,7 @@ def test_defects_are_listed_and_end_in_an_error(bad: Path) -> None:
     result = run(bad)
     assert isinstance(result.exception, InputError)
     assert str(result.exception) == f"{bad}: 2 defects to repair: --repair does so"
-    assert "upside down" in result.stdout
+    assert "above upper" in result.stdout
     assert "Bodies" not in result.stdout, "nothing is repaired unasked"
     found = report(bad)
     assert [defect["line"] for defect in found["defects"]] == [7, 42]
@@ -93,7 +93,7 @@ def test_defects_are_listed_and_end_in_an_error(bad: Path) -> None:
         "line": 42,
         "value": "'-1 to -2'",
         "repair": "exchanged",
-        "defect": "the limits lower and upper are upside down",
+        "defect": "lower is above upper",
     }
 
 
@@ -125,7 +125,7 @@ def test_robots_that_are_no_urdf(tmp_path: Path) -> None:
     assert "10, 0.5, 0" in run(yaml).stdout
     result = run(yaml, "--repair")
     assert isinstance(result.exception, InputError)
-    assert "no URDF" in str(result.exception)
+    assert "not a URDF" in str(result.exception)
 
 
 @pytest.mark.parametrize("name", DEFECTS)
@@ -169,4 +169,4 @@ def test_base_and_repair_are_a_part_of_the_name(
         assert _run([*command, "--robot", str(bad), "--base", "fore"]) == 2
         assert "triangle" in capsys.readouterr().err
     assert _run(["simulate", "--base", "fore"]) == 2
-    assert "no URDF" in capsys.readouterr().err
+    assert "not a URDF" in capsys.readouterr().err

@@ -42,7 +42,7 @@ def test_base_and_repairs(tmp_path: Path) -> None:
     bad.write_text(GOOD.replace('upper="2"', 'upper="-2"'))
     result = run(bad)
     assert isinstance(result.exception, InputError)
-    assert "upside down" in str(result.exception)
+    assert "above upper" in str(result.exception)
     result = run(bad, "--repair", "--out", mended)
     assert result.exit_code == 0
     assert "repaired: line" in result.stderr

@@ -81,7 +81,7 @@ def test_what_is_not_there_is_said_in_one_line(
     with pytest.raises(InputError, match=r"no such file or folder"):
         find_robot(f"{tmp_path}/none/")
     (tmp_path / "passwd").write_text("root:x:0:0:")
-    with pytest.raises(InputError, match=r"not a robot's file, whose name ends in one of \.yaml"):
+    with pytest.raises(InputError, match=r"not a robot's file, its suffix must be one of \.yaml"):
         find_robot(f"{tmp_path}/passwd")
     monkeypatch.chdir(tmp_path)
     assert robot_as_path("passwd") == "./passwd", "so that it is not an unknown name"

@@ -35,9 +35,9 @@ def urdf(links: int, kind: str, matter: str = MATTER) -> str:
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        (urdf(MOST_LINKS + 1, "revolute"), "at most 4000 links can be read, here are 4001"),
-        (urdf(MOST_LINKS + 1, "fixed"), "at most 4000 links can be read, here are 4001"),
-        (urdf(MOST_MOVING + 2, "continuous", ""), "at most 64 moving joints .* here are 257"),
+        (urdf(MOST_LINKS + 1, "revolute"), "at most 4000 links can be read, got 4001"),
+        (urdf(MOST_LINKS + 1, "fixed"), "at most 4000 links can be read, got 4001"),
+        (urdf(MOST_MOVING + 2, "continuous", ""), "at most 64 moving joints .* got 257"),
     ],
 )
 def test_a_urdf_is_counted_first(text: str, said: str, monkeypatch: pytest.MonkeyPatch) -> None:

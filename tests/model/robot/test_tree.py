@@ -164,28 +164,28 @@ BAD: dict[str, tuple[Callable[[], list[Body]], str]] = {
         lambda: [HULL, ARM, replace(ARM, name="leg")],
         "joint names must differ, 'j' occurs twice",
     ),
-    "no base": (lambda: [replace(ARM, parent="arm")], "one base, here are 0"),
-    "two bases": (lambda: [HULL, replace(HULL, name="moon"), ARM], "one base, here are 2"),
+    "no base": (lambda: [replace(ARM, parent="arm")], "one base, got 0"),
+    "two bases": (lambda: [HULL, replace(HULL, name="moon"), ARM], "one base, got 2"),
     "unknown parent": (
         lambda: [HULL, replace(ARM, parent="x")],
-        "parent 'x' of 'arm' is no body: choose one of hull, arm",
+        "parent 'x' of 'arm' is not a body: choose one of hull, arm",
     ),
     "circle": (
         lambda: [HULL, ARM, replace(ARM, name="leg", parent="leg", joint=Joint("k"))],
-        "not joined to the base, but in a circle",
+        "not connected to the base",
     ),
-    "no mass": (lambda: [HULL, replace(ARM, mass=0.0)], "'arm' moves and has no mass"),
+    "no mass": (lambda: [HULL, replace(ARM, mass=0.0)], "moving body 'arm' has no mass"),
     "no inertia": (
         lambda: [HULL, replace(ARM, inertia=np.zeros((3, 3)))],
         "the inertia of body 'arm' must be positive definite",
     ),
     "nothing actuated": (
         lambda: [HULL, replace(ARM, joint=Joint("j", spring=Spring(1.0, 0.0)))],
-        "a robot needs one actuated joint at least",
+        "a robot needs at least one actuated joint",
     ),
     "too many joints": (
         lambda: [HULL, *(replace(ARM, name=f"a{k}", joint=Joint(f"j{k}")) for k in range(65))],
-        "at most 64 moving joints can be flown, here are 65",
+        "at most 64 moving joints can be flown, got 65",
     ),
     "too many passive ones": (
         lambda: [
@@ -196,7 +196,7 @@ BAD: dict[str, tuple[Callable[[], list[Body]], str]] = {
                 for k in range(25)
             ),
         ],
-        "at most 24 passive joints can be flown, here are 25",
+        "at most 24 passive joints can be flown, got 25",
     ),
 }
 

@@ -93,7 +93,7 @@ def test_next_to_no_mass_has_no_inertia(given: Path) -> None:
     """Else it would be added, unphysical perhaps, to that of the link it is merged into."""
     given.write_text(GOOD.replace(FORE, '<mass value="1e-12"/>'))
     found = read_urdf(given, repair=True)
-    assert [finding.repair.split()[-1] for finding in found.findings] == ["'upper'", "out"]
+    assert [finding.repair.split()[-1] for finding in found.findings] == ["'upper'", "ignored"]
     robot = Robot.of_tree(found.name, found.bodies)
     np.testing.assert_allclose(np.linalg.eigvalsh(robot.inertia[1]), [0.5, 1.9, 2.1])
 
