@@ -65,7 +65,11 @@ DEFECTS = {
         '<child link="fore"/>', '<child link="x"/>', "joint 'slide'", 48, "is not a known link"
     ),
     "parent is child": Defect(
-        '<child link="fore"/>', '<child link="upper"/>', "joint 'slide'", 45, "must be different links"
+        '<child link="fore"/>',
+        '<child link="upper"/>',
+        "joint 'slide'",
+        45,
+        "must be different links",
     ),
     "two parents": Defect(
         '<child link="hand"/>',
@@ -74,9 +78,7 @@ DEFECTS = {
         52,
         "already: loops cannot be closed",
     ),
-    "two roots": Defect(
-        "</robot>", STRAY, "link 'stray'", 57, "only the root may have no parent"
-    ),
+    "two roots": Defect("</robot>", STRAY, "link 'stray'", 57, "only the root may have no parent"),
     "circle": Defect(
         '<parent link="hull"/>', '<parent link="hand"/>', "joint 'shoulder'", 37, "form a loop"
     ),

@@ -1,5 +1,5 @@
-"""Rigid-body dynamics of a free-floating base with a serial arm.
+"""Rigid-body dynamics of a free-floating base with arms.
 
-Compiled functions of a `Model` that write into given arrays: `crba` (the inertia matrix), `rnea`
-(the bias force), `aba` (accelerations), in the coordinates of the laws `rho_space`.
+Compiled functions of a `Model` that write into preallocated arrays: `crba` (inertia matrix), `rnea`
+(bias force), `aba` (accelerations), `rho_space` (in the coordinates of the laws).
 """

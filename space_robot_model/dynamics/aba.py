@@ -1,11 +1,11 @@
 """Accelerations from forces, ``qdd = H^-1 (F - c)``, by the articulated-body algorithm.
 
-Featherstone's recursion over a tree of bodies, linear in the number of joints. With every quantity
-on inertial axes about one origin the usual changes of frame between links vanish. A spatial inertia
-is held in three blocks: ``[[J, G], [G^T, M]]``, angular part first, J and M symmetric.
+Featherstone's recursion over a tree of bodies, linear in the number of joints. All quantities are
+in inertial axes about one origin, so no frame transformations between links are needed. A spatial
+inertia is stored in three blocks: ``[[J, G], [G^T, M]]``, angular part first, J and M symmetric.
 
-A locked joint passes its link's whole inertia and force on to the parent (hybrid dynamics,
-Featherstone 2008, chapter 9), which costs less than a free one. Wheels are leaves on the base.
+A locked joint adds its link's inertia and force to those of the parent (hybrid dynamics,
+Featherstone 2008, chapter 9), which is faster than a free joint. Wheels are leaves on the base.
 """
 
 from __future__ import annotations
@@ -53,10 +53,10 @@ def aba(
 ) -> None:
     """Write the acceleration ``[v0dot, w0dot, thetadd]`` (N+6,) into ``out``.
 
-    It comes after `forward_kinematics` and `spatial_velocities`. ``force`` (N+6,) is
-    ``[f0, tau0, tau]``, the base's part on inertial axes, N and N m. Joints that are locked in
-    ``data`` do not accelerate, and ``data.holding`` tells what that takes. Of a base with wheels
-    they stand behind the joints, in velocities, force and ``out``.
+    Call it after `forward_kinematics` and `spatial_velocities`. ``force`` (N+6,) is
+    ``[f0, tau0, tau]``, the base's part in inertial axes, N and N m. Joints locked in ``data`` do
+    not accelerate; the required torque is in ``data.holding``. Wheels come after the joints in
+    velocities, force and ``out``.
     """
     # inwards: the articulated-body inertia and bias force of each link, free about its joint
     inertia = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
@@ -82,13 +82,13 @@ def aba(
         u = force[6 + j] - dot(angular, bias_moment) - dot(linear, bias_force)
         inverse = 1.0 / (dot(angular, U_angular) + dot(linear, U_linear))
         if data.locked[j] != 0.0:
-            inverse = 1.0  # U and u themselves: `holding` needs them
+            inverse = 1.0  # not divided by D, as `holding` needs
         u_over_d = u * inverse
         U_over_D_angular, U_over_D_linear = scale(U_angular, inverse), scale(U_linear, inverse)
         store(U_over_D_angular, data.U_over_D[i], 0)
         store(U_over_D_linear, data.U_over_D[i], 3)
         data.u_over_d[i] = u_over_d
-        # I^a = I^A - U U^T / D,  p^a = p^A + I^a c + U u / D; of a locked joint only p^A + I^A c
+        # I^a = I^A - U U^T / D,  p^a = p^A + I^a c + U u / D; for a locked joint only p^A + I^A c
         if data.locked[j] == 0.0:
             inertia = outer_subtracted(inertia, U_over_D_angular, U_angular)
             coupling = outer_subtracted_general(coupling, U_over_D_angular, U_linear)
@@ -120,7 +120,7 @@ def aba(
         inertia, bias_moment = take_wheels(
             model, omega_inertial, joint_velocities, force, data, inertia, bias_moment
         )
-    # the base floats: no joint to the ground
+    # free-floating base: no joint to the ground
     angular, linear = solve_spatial(
         inertia,
         coupling,
@@ -156,7 +156,7 @@ def aba(
 def solve_spatial(
     inertia: Symmetric, coupling: Matrix, mass: Symmetric, moment: Vector, force: Vector
 ) -> tuple[Vector, Vector]:
-    """Return angular and linear acceleration of a body of this spatial inertia under a wrench."""
+    """Return angular and linear acceleration of a body with a spatial inertia under a wrench."""
     inverse_mass = inverse_symmetric(mass)
     g = coupling
     rows = (

@@ -1,6 +1,6 @@
 """Algebra of three-vectors and of symmetric and general 3 x 3 matrices, as tuples.
 
-Tuples live in registers: the compiler need not ask which arrays overlap, as it must for views.
+Tuples are kept in registers, since the compiler need not consider overlaps as for array views.
 A symmetric matrix is ``(xx, yy, zz, xy, xz, yz)``, a general one nine numbers row by row.
 """
 

@@ -1,7 +1,7 @@
 """Attitude kinematics with unit quaternions ``[w, x, y, z]`` = ``{eta, eps}`` (Section II-A).
 
-Two angular velocities occur: ``omega_base`` in the base frame, where (1) holds, and
-``omega_inertial``, where the sign of its skew term flips. Every function here names its frame.
+Two angular velocities are used: ``omega_base`` in the base frame, for which (1) holds, and
+``omega_inertial``, for which its skew term has the opposite sign.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from space_robot_msgs_py.compiled.kernels import kernel
 Array = NDArray[np.float64]
 
 SINGULAR_ETA = 1e-6
-"""Below this |eta| the base has turned by 180 degrees and J0 cannot be inverted."""
+"""Limit of |eta| below which J0 counts as singular: a rotation by 180 degrees."""
 
 
 @kernel
@@ -36,7 +36,7 @@ def rotation_matrix(quaternion: Array, out: Array) -> None:
 def quaternion_rate(quaternion: Array, omega_inertial: Array, out: Array) -> None:
     """Write into ``out`` (4,) the rate of ``quaternion``, 1/s, by ``J0^T`` of (1).
 
-    ``omega_inertial`` (3,) rad/s is on inertial axes.
+    ``omega_inertial`` (3,) is in inertial axes, rad/s.
     """
     w, x, y, z = quaternion[0], quaternion[1], quaternion[2], quaternion[3]
     p, q, r = omega_inertial[0], omega_inertial[1], omega_inertial[2]
@@ -65,7 +65,7 @@ def attitude_jacobian(quaternion: Array, out: Array) -> None:
 def attitude_jacobian_inverse(quaternion: Array, out: Array) -> None:
     """Write into ``out`` (3, 3) ``J0^-1 = 2 (eta E - skew(eps) + eps eps^T / eta)``.
 
-    Exact for a unit quaternion; the caller keeps away from eta = 0 (``SINGULAR_ETA``).
+    Exact for a unit quaternion; the caller must avoid eta = 0 (``SINGULAR_ETA``).
     """
     w, x, y, z = quaternion[0], quaternion[1], quaternion[2], quaternion[3]
     out[0, 0] = 2.0 * (w + x * x / w)
@@ -81,13 +81,13 @@ def attitude_jacobian_inverse(quaternion: Array, out: Array) -> None:
 
 @kernel
 def rotate(matrix: Array, vector: Array, out: Array) -> None:
-    """Write ``matrix @ vector`` into ``out`` (3,); ``out`` is not ``vector``."""
+    """Write ``matrix @ vector`` into ``out`` (3,); ``out`` must not be ``vector``."""
     for i in range(3):
         out[i] = matrix[i, 0] * vector[0] + matrix[i, 1] * vector[1] + matrix[i, 2] * vector[2]
 
 
 @kernel
 def rotate_back(matrix: Array, vector: Array, out: Array) -> None:
-    """Write ``matrix.T @ vector`` into ``out`` (3,); ``out`` is not ``vector``."""
+    """Write ``matrix.T @ vector`` into ``out`` (3,); ``out`` must not be ``vector``."""
     for i in range(3):
         out[i] = matrix[0, i] * vector[0] + matrix[1, i] * vector[1] + matrix[2, i] * vector[2]

@@ -1,8 +1,8 @@
-"""Memory of bodies with several branches; a recursion keeps one branch in registers.
+"""Memory of bodies with several branches, for recursions that keep one branch in registers.
 
-Bodies are visited down each branch in turn (see `Model`). Along it the parent is the body visited
-before, and its numbers are at hand; where a branch begins they are read from memory. On the way
-inwards a branch's end result is added to its parent's memory, which the parent takes, and clears.
+Bodies are visited branch by branch (see `Model`). Along a branch the parent is the previous body,
+and its values are in registers; at the start of a branch they are read from memory. In the inward
+recursion the result of a branch is added to its parent's memory, which the parent reads and clears.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from .algebra import Matrix, Symmetric, Vector, add, add_symmetric, store, symme
 Array = NDArray[np.float64]
 Wrench = tuple[Vector, Vector]
 Articulated = tuple[Symmetric, Matrix, Symmetric, Vector, Vector]
-"""J, G and M of an articulated inertia, moment and force of its bias."""
+"""J, G and M of an articulated inertia, moment and force of its bias force."""
 
 
 @subroutine
@@ -30,7 +30,7 @@ def keep_frame(axes: Matrix, origin: Vector, row: Array) -> None:
 
 @subroutine
 def kept_frame(row: Array) -> tuple[Matrix, Vector]:
-    """Return what `keep_frame` wrote."""
+    """Return the axes and origin written by `keep_frame`."""
     axes = (row[0], row[1], row[2], row[3], row[4], row[5], row[6], row[7], row[8])
     return axes, vector(row, 9)
 
@@ -44,7 +44,7 @@ def keep_motion(angular: Vector, linear: Vector, row: Array) -> None:
 
 @subroutine
 def kept_motion(row: Array) -> Wrench:
-    """Return what `keep_motion` wrote."""
+    """Return the motion written by `keep_motion`."""
     return vector(row, 0), vector(row, 3)
 
 
@@ -65,7 +65,7 @@ def accumulate(
 def collect_children(
     row: Array, inertia: Symmetric, coupling: Matrix, mass: Symmetric, moment: Vector, force: Vector
 ) -> Articulated:
-    """Return the sum of the arguments and of what branches have handed in; clear ``row`` (27,)."""
+    """Return the sum of the arguments and the branches' contributions; clear ``row`` (27,)."""
     inertia = add_symmetric(inertia, symmetric(row))
     mass = add_symmetric(mass, symmetric(row[15:]))
     c = coupling
@@ -96,7 +96,7 @@ def hand_in_wrench(row: Array, moment: Vector, force: Vector) -> None:
 
 @subroutine
 def taken_in_wrench(row: Array, moment: Vector, force: Vector) -> Wrench:
-    """Return the sum of the arguments and of what branches have handed in; clear ``row`` (6,)."""
+    """Return the sum of the arguments and the branches' contributions; clear ``row`` (6,)."""
     total = add(moment, vector(row, 0)), add(force, vector(row, 3))
     for k in range(6):
         row[k] = 0.0

@@ -1,7 +1,7 @@
 """The inertia matrix H of ``H qdd + c = F`` by the composite-rigid-body algorithm, (8)-(10).
 
-Generalised velocity ``qdot = [v0, w0, thetadot]`` (N+6,), base part on inertial axes; H's rows have
-the same order. The sums of (8)-(10) are taken on inertial axes about the base CoM.
+Generalised velocity ``qdot = [v0, w0, thetadot]`` (N+6,), base part in inertial axes; the rows of H
+have the same order. The sums of (8)-(10) are taken in inertial axes about the base CoM.
 """
 
 from __future__ import annotations
@@ -33,9 +33,9 @@ Array = NDArray[np.float64]
 def crba(model: Model, data: Data, out: Array) -> None:
     """Write the inertia matrix H (N+6, N+6) into ``out``, after `forward_kinematics`.
 
-    The momentum of all bodies from joint j outwards, per unit of its velocity, gives column j of H;
-    its base rows are ``J_Tw`` and ``H_wphi``, its joint rows ``H_M``: zero for joints of another
-    branch.
+    The momentum of all bodies from joint j outwards, per unit of its velocity, is column j of H;
+    its base rows are ``J_Tw`` and ``H_wphi``, its joint rows ``H_M``, which is zero for joints of
+    different branches.
     """
     mass = 0.0
     moment = (0.0, 0.0, 0.0)
@@ -78,7 +78,7 @@ def crba(model: Model, data: Data, out: Array) -> None:
     out[3, 4] = out[4, 3] = xy
     out[3, 5] = out[5, 3] = xz
     out[4, 5] = out[5, 4] = yz
-    # -M r_0S~: the first moment of the whole
+    # -M r_0S~: the first moment of the whole robot
     out[0, 4] = out[4, 0] = moment[2]
     out[1, 3] = out[3, 1] = -moment[2]
     out[0, 5] = out[5, 0] = -moment[1]
@@ -101,7 +101,7 @@ def _hand_in(row: Array, mass: float, moment: Vector, inertia: Symmetric) -> Non
 def _taken_in(
     row: Array, mass: float, moment: Vector, inertia: Symmetric
 ) -> tuple[float, Vector, Symmetric]:
-    """Return the sum of the arguments and of what branches have handed in; clear it."""
+    """Return the sum of the arguments and the branches' contributions; clear ``row``."""
     mass, moment = mass + row[0], add(moment, vector(row, 1))
     inertia = add_symmetric(inertia, symmetric(row[4:]))
     for k in range(10):

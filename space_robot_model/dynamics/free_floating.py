@@ -3,8 +3,9 @@
 Without force and torque on the base all six of its coordinates are eliminated: with blocks
 B = [v0, w0] and M = thetadot of (7), ``H_f = H_MM - H_MB H_BB^-1 H_BM`` and
 ``c_f = c_M - H_MB H_BB^-1 c_B``, so that ``H_f thetadd + c_f = tau`` (the generalized inertia of
-Umetani and Yoshida 1989; Papadopoulos and Dubowsky 1991). It holds with any momentum. The base's
-translation goes first (`.rho_space`), then its rotation, on inertial axes: no attitude is singular.
+Umetani and Yoshida 1989; Papadopoulos and Dubowsky 1991). It holds for any momentum. The base's
+translation is eliminated first (`.rho_space`), then its rotation, in inertial axes, so that no
+attitude is singular.
 """
 
 from __future__ import annotations
@@ -43,9 +44,9 @@ def free_floating_into(
     joint_velocities: Array,
     out: RhoSpaceModel,
 ) -> None:
-    """Fill the joints' part of ``out.inertia`` and ``out.bias`` with H_f and c_f.
+    """Write H_f and c_f into the joints' part of ``out.inertia`` and ``out.bias``.
 
-    Args: see `rho_space_into`.
+    The arguments are those of `rho_space_into`.
     """
     semi_floating_into(model, quaternion, joint_positions, omega_base, joint_velocities, out)
     eliminate_rotation(out)
@@ -53,10 +54,10 @@ def free_floating_into(
 
 @kernel
 def eliminate_rotation(out: RhoSpaceModel) -> None:
-    """Turn H_r and c_r, as `semi_floating_into` leaves them, into H_f and c_f of the joints.
+    """Convert H_r and c_r of `semi_floating_into` to H_f and c_f of the joints.
 
-    The base's axes stand apart, with an inertia of 1 (that a law may invert the matrix) and no
-    bias: no acceleration asked of them, no force.
+    The base's axes are decoupled, with inertia 1 (so that laws can invert the matrix) and zero
+    bias: zero acceleration gives zero force.
     """
     inertia, bias = out.inertia, out.bias
     mobility, base_bias = _base_mobility(inertia), vector(bias, 0)
@@ -74,7 +75,7 @@ def eliminate_rotation(out: RhoSpaceModel) -> None:
 
 @subroutine
 def _base_mobility(inertia: Array) -> Symmetric:
-    """Return the inverse of the part of H_r (m, m) that is of the base's rotation."""
+    """Return the inverse of the base rotation's block of H_r (m, m)."""
     i = inertia
     return inverse_symmetric((i[0, 0], i[1, 1], i[2, 2], i[0, 1], i[0, 2], i[1, 2]))
 
@@ -83,16 +84,16 @@ def _base_mobility(inertia: Array) -> Symmetric:
 def free_inverse_dynamics_along(
     model: Model, references: Block, work: RhoSpaceModel, out: Array
 ) -> None:
-    """Write into ``out`` (N, n+3), N m, the torque that each of N references asks of the joints.
+    """Write the joint torques for each of N references into ``out`` (N, n+3), N m.
 
-    The robot has no momentum, so its base turns with ``w0 = -H_BB^-1 H_BM thetadot``; at which
-    attitude does not matter.
+    The momentum is zero, so the base rotates with ``w0 = -H_BB^-1 H_BM thetadot``; the attitude
+    does not matter.
 
     Args:
         model: the robot.
-        references: (N,) array of a `Reference` each, of unit quaternions.
+        references: (N,) block of `Reference`, with unit quaternions.
         work: scratch.
-        out: zero on the base's axes, then on the joints.
+        out: zero in the base's axes, then the joints.
     """
     inertia, inertial, omega_base = work.inertia, work.vectors[1], work.vectors[2]
     for k in range(references.size):

@@ -1,7 +1,7 @@
-"""The torque that a desired motion asks for, by the recursive Newton-Euler algorithm, (11)-(20).
+"""Torque of a desired motion by the recursive Newton-Euler algorithm, (11)-(20).
 
-The base floats freely: no force acts on it (``f0 = 0``), so its CoM accelerates as the motion of
-the whole pushes it, ``v0dot = -f / M``, where f is the force that (17) asks for at ``v0dot = 0``.
+The base floats freely (``f0 = 0``), so its CoM accelerates with ``v0dot = -f / M``, where f is the
+force of (17) for ``v0dot = 0``.
 """
 
 from __future__ import annotations
@@ -29,14 +29,14 @@ Block = NDArray[Any]
 def inverse_dynamics_along(
     model: Model, references: Block, data: Data, vectors: Array, out: Array
 ) -> None:
-    """Write into ``out`` (N, n+3), N m, the torque each of N references asks for.
+    """Write the torque for each of N references into ``out`` (N, n+3), N m.
 
     Args:
         model: the robot.
-        references: (N,) array of a `Reference` each, of unit quaternions.
+        references: (N,) block of `Reference`, with unit quaternions.
         data: scratch.
         vectors: (2, 3) scratch.
-        out: on the base's axes, which turn with it, then on the joints.
+        out: in base axes, then the joints.
     """
     for k in range(references.size):
         inverse_dynamics(model, references[k], data, vectors, out[k])
@@ -92,7 +92,7 @@ def inverse_dynamics(
 def _moved_along(
     model: Model, i: int, drift: Vector, moment: Vector, force: Vector, data: Data
 ) -> tuple[Vector, Vector]:
-    """Add to moment and force those of body i, which the whole robot's ``drift`` moves along."""
+    """Add moment and force of body i, including the acceleration ``drift`` of the whole robot."""
     moment = add(moment, vector(data.bias[i], 0))
     moment = add(moment, cross(vector(data.first_moment[i], 0), drift))
     return moment, add(force, add(vector(data.bias[i], 3), scale(drift, model.mass[i])))

@@ -1,4 +1,4 @@
-"""Positions and velocities of the bodies, on inertial axes with the base CoM as origin."""
+"""Positions and velocities of the bodies, in inertial axes with the base CoM as origin."""
 
 from __future__ import annotations
 
@@ -32,12 +32,12 @@ Array = NDArray[np.float64]
 
 @kernel
 def forward_kinematics(model: Model, quaternion: Array, joint_positions: Array, data: Data) -> None:
-    """Fill ``data.motion, first_moment, inertia``, along every branch of the tree.
+    """Compute ``data.motion, first_moment, inertia`` along every branch of the tree.
 
-    A joint's frame at zero lies at ``rotation`` and ``offset`` of its parent's; from there it turns
-    about its z axis or slides along it. For modified Denavit-Hartenberg numbers that is
+    A joint's frame at zero has ``rotation`` and ``offset`` relative to its parent; from there it
+    rotates about its z axis, or moves along it. With modified Denavit-Hartenberg parameters this is
     ``T(i-1 -> i) = Rx(alpha_{i-1}) Tx(a_{i-1}) Rz(theta_i) Tz(d_i)``. ``quaternion`` (4,) is the
-    base's attitude, ``joint_positions`` (N,) rad, or m of prismatic joints, in the order of
+    base's attitude, ``joint_positions`` (N,) are in rad, or m for prismatic joints, in the order of
     ``model``.
     """
     rotation_matrix(quaternion, data.rotation)
@@ -45,7 +45,7 @@ def forward_kinematics(model: Model, quaternion: Array, joint_positions: Array, 
     axes = (r[0, 0], r[0, 1], r[0, 2], r[1, 0], r[1, 1], r[1, 2], r[2, 0], r[2, 1], r[2, 2])
     joint = (0.0, 0.0, 0.0)
     keep_frame(axes, joint, data.frame[0])
-    # loops of their own: a call within the long one would drive its numbers out of the registers
+    # separate loops: a call within the long one would spill its registers
     for j in range(int(model.joint_count)):
         data.turn[j, 1], data.turn[j, 0] = sin_cos(joint_positions[j])
     for j in range(int(model.joint_count)):
@@ -83,7 +83,7 @@ def _combined(x: Vector, y: Vector, z: Vector, a: float, b: float, c: float) -> 
 
 @subroutine
 def _place(model: Model, data: Data) -> None:
-    """Write first moment and inertia of every body about the origin, from its frame."""
+    """Compute first moment and inertia of every body about the origin, from its frame."""
     for i in range(int(model.joint_count) + 1):
         axes, joint = kept_frame(data.frame[i])
         com = add(joint, transform(axes, vector(model.com[i], 0)))
@@ -102,7 +102,7 @@ def _place(model: Model, data: Data) -> None:
 
 @kernel
 def rotated_inertia(axes: Matrix, inertia: Symmetric) -> Symmetric:
-    """Return ``R I R^T``, the inertia (kg m2) on the axes that ``axes`` turns into."""
+    """Return ``R I R^T``, the inertia (kg m2) in outer axes, with R = ``axes``."""
     a = (axes[0], axes[1], axes[2])
     b = (axes[3], axes[4], axes[5])
     c = (axes[6], axes[7], axes[8])
@@ -116,11 +116,11 @@ def rotated_inertia(axes: Matrix, inertia: Symmetric) -> Symmetric:
 def spatial_velocities(
     model: Model, omega_inertial: Array, joint_velocities: Array, data: Data
 ) -> None:
-    """Fill ``data.coriolis`` and ``bias`` after `forward_kinematics`: (11), (12); (15), (16).
+    """Compute ``data.coriolis`` and ``bias`` after `forward_kinematics`: (11), (12); (15), (16).
 
-    Seen from an inertial frame that moves with the base CoM at this instant, so the base's
-    linear part is zero: H and c do not depend on ``v0`` (no gravity, Galilean invariance).
-    The bias is the rate of a body's momentum that its velocity alone brings about.
+    Velocities are relative to an inertial frame that moves with the base CoM at this instant, so
+    the base's linear velocity is zero: H and c do not depend on ``v0`` (no gravity, Galilean
+    invariance). The bias is the rate of a body's momentum without acceleration.
     """
     w = vector(omega_inertial, 0)
     v = (0.0, 0.0, 0.0)
@@ -133,7 +133,7 @@ def spatial_velocities(
         motion, coriolis = data.motion[j + 1], data.coriolis[j + 1]
         angular = scale(vector(motion, 0), joint_velocities[j])
         linear = scale(vector(motion, 3), joint_velocities[j])
-        # velocity of the parent times the joint's own: what (13), (14) add without qdd
+        # velocity of the parent times that of the joint: terms of (13), (14) without qdd
         store(cross(w, angular), coriolis, 0)
         store(add(cross(v, angular), cross(w, linear)), coriolis, 3)
         w, v = add(w, angular), add(v, linear)

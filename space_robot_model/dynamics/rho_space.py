@@ -1,8 +1,8 @@
 """The nominal model in the controlled coordinates ``rho = [eps, theta]`` (22)-(26), (28).
 
 The base floats freely (``f0 = 0``), so its translation is eliminated first: with blocks
-1 = v0 and 2 = [w0, thetadot], ``H_r = H22 - H21 H11^-1 H12``, ``c_r = c2 - H21 H11^-1 c1``;
-``H11 = M E`` makes that cheap. Then ``H_S = J^-T H_r J^-1`` and
+1 = v0 and 2 = [w0, thetadot], ``H_r = H22 - H21 H11^-1 H12``, ``c_r = c2 - H21 H11^-1 c1``, which
+is simple since ``H11 = M E``. Then ``H_S = J^-T H_r J^-1`` and
 ``c_S = J^-T (c_r - H_r J^-1 Jdot J^-1 rhodot)``, with ``F_S = J^-T F`` on the right of (25).
 """
 
@@ -35,7 +35,7 @@ class RhoSpaceModel(Record):
     full_bias: Array = shaped(lambda n: (n + 6,))
     """c."""
     to_force: Array = shaped(lambda n: (3, 3))
-    """``J0^-T`` for inertial axes, the transpose of ``J0^-1``."""
+    """``J0^-T`` in inertial axes, the transpose of ``J0^-1``."""
     rotation: Array = shaped(lambda n: (3, 3))
     """Rotation from the base frame to the inertial frame."""
     vectors: Array = shaped(lambda n: (3, 3))
@@ -52,14 +52,14 @@ def rho_space_into(
     joint_velocities: Array,
     out: RhoSpaceModel,
 ) -> None:
-    """Fill ``out.inertia`` and ``out.bias`` with H_S and c_S of the floating robot.
+    """Write H_S and c_S of the free-floating robot into ``out.inertia`` and ``out.bias``.
 
     Args:
         model: the nominal robot.
         quaternion: (4,) base attitude, unit; singular at eta = 0.
-        joint_positions: (n,) rad.
-        omega_base: (3,) base angular velocity in the base frame, as measured, rad/s.
-        joint_velocities: (n,) rad/s.
+        joint_positions: (n,) rad, or m for prismatic joints.
+        omega_base: (3,) base angular velocity in the base frame, rad/s.
+        joint_velocities: (n,) rad/s or m/s.
         out: results and scratch.
     """
     semi_floating_into(model, quaternion, joint_positions, omega_base, joint_velocities, out)
@@ -68,11 +68,11 @@ def rho_space_into(
 
 @kernel
 def to_rho_space(quaternion: Array, out: RhoSpaceModel) -> None:
-    """Turn H_r and c_r, as `semi_floating_into` leaves them, into H_S and c_S."""
+    """Convert H_r and c_r of `semi_floating_into` to H_S and c_S."""
     inertia, bias = out.inertia, out.bias
     omega, convective, moved = out.vectors[0], out.vectors[1], out.vectors[2]
-    # J0 on inertial axes is the transpose of J0 in the base frame, so its J0^-T is the latter's
-    # inverse. For a unit quaternion J0dot w0 = -|w0|^2 eps / 4.
+    # J0 in inertial axes is the transpose of J0 in the base frame, so its J0^-T is the inverse of
+    # the latter. For a unit quaternion J0dot w0 = -|w0|^2 eps / 4.
     attitude_jacobian_inverse(quaternion, out.to_force)
     squared_rate = omega[0] * omega[0] + omega[1] * omega[1] + omega[2] * omega[2]
     for k in range(3):
@@ -101,10 +101,10 @@ def semi_floating_into(
     joint_velocities: Array,
     out: RhoSpaceModel,
 ) -> None:
-    """Fill ``out.inertia`` and ``out.bias`` with H_r and c_r, the base's part on inertial axes.
+    """Write H_r and c_r into ``out.inertia`` and ``out.bias``, the base's part in inertial axes.
 
-    Args: see `rho_space_into`; no attitude is singular. ``out.vectors[0]`` is then the base's
-    angular velocity on inertial axes, rad/s.
+    The arguments are those of `rho_space_into`; no attitude is singular. ``out.vectors[0]`` becomes
+    the base's angular velocity in inertial axes, rad/s.
     """
     rotation_matrix(quaternion, out.rotation)
     rotate(out.rotation, omega_base, out.vectors[0])
@@ -117,7 +117,7 @@ def semi_floating_into(
 
 @kernel
 def _eliminate_translation(full: Array, full_bias: Array, inertia: Array, bias: Array) -> None:
-    """Write ``H_r = H22 - H21 H12 / M``, ``c_r = c2 - H21 c1 / M``: no force on the base's CoM."""
+    """Compute ``H_r = H22 - H21 H12 / M``, ``c_r = c2 - H21 c1 / M``: no force on the base."""
     total_mass = full[0, 0]
     for i in range(bias.size):
         bias[i] = full_bias[3 + i]

@@ -18,9 +18,9 @@ Array = NDArray[np.float64]
 def rnea_bias(model: Model, data: Data, out: Array) -> None:
     """Write ``c = f_NE(qdd = 0)`` (N+6,) into ``out``.
 
-    Call it after `forward_kinematics` and `spatial_velocities`. The accelerations (13), (14) run
-    outwards, the forces (17), (18) inwards, with the sign of the child's moment corrected; then
-    (19). The base's part of c is on inertial axes, N and N m, about the base CoM.
+    Call it after `forward_kinematics` and `spatial_velocities`. The outward recursion computes
+    accelerations (13), (14), the inward one forces (17), (18), with the sign of the child's moment
+    corrected, and (19). The base's part of c is in inertial axes, N and N m, about the base CoM.
     """
     angular = (0.0, 0.0, 0.0)
     linear = (0.0, 0.0, 0.0)
@@ -56,7 +56,7 @@ def rnea_bias(model: Model, data: Data, out: Array) -> None:
 
 @subroutine
 def force_of_body(model: Model, i: int, angular: Vector, linear: Vector, data: Data) -> None:
-    """Add to ``data.bias`` of body i what its acceleration asks for: (15), (16)."""
+    """Add the inertial force of the acceleration of body i, (15), (16), to ``data.bias``."""
     first_moment = vector(data.first_moment[i], 0)
     force = add(scale(linear, model.mass[i]), cross(angular, first_moment))
     moment = add(

@@ -1,17 +1,17 @@
 """Reaction wheels of the base, as leaves of the articulated-body algorithm.
 
-A balanced wheel of spin inertia J on the axis a, which turns at Omega against the base, obeys
+A balanced wheel with spin inertia J, axis a, and speed Omega relative to the base obeys
 
     J (Omegadot + a . w0dot) = u,
 
-and the base, whose inertia I0 has the wheels in it as if they were locked,
+and the base, whose inertia I0 includes the locked wheels, obeys
 
     I0 w0dot + w0 x (I0 w0 + sum J Omega a) + sum J Omegadot a = tau0,
 
-with the torque u on the wheel: its motor's less its friction. With Omegadot eliminated the base has
-the inertia ``I0 - sum J a a^T``, and ``- sum u a - w0 x sum J Omega a`` acts on it beside tau0.
-That is what a leaf of one joint comes to in `aba` (a gyrostat: Hughes, Spacecraft Attitude
-Dynamics, 1986, chapter 3). A wheel that stands is a locked joint.
+with the torque u on the wheel: motor torque minus friction. Without Omegadot the base has the
+inertia ``I0 - sum J a a^T`` and the additional torque ``- sum u a - w0 x sum J Omega a``. This is
+the result of `aba` for a leaf with one joint (a gyrostat: Hughes, Spacecraft Attitude Dynamics,
+1986, chapter 3). A wheel at rest by friction is a locked joint.
 """
 
 from __future__ import annotations
@@ -37,14 +37,14 @@ def take_wheels(
     inertia: Symmetric,
     bias_moment: Vector,
 ) -> tuple[Symmetric, Vector]:
-    """Return the base's articulated inertia and bias moment with its wheels in them.
+    """Return the base's articulated inertia and bias moment including its wheels.
 
     Args:
         model: of the robot.
-        omega_inertial: (3,) rad/s, of the base on inertial axes.
+        omega_inertial: (3,) angular velocity of the base in inertial axes, rad/s.
         velocities: (N+W,) of joints and wheels, rad/s.
         force: (N+6+W,) as in `aba`; the last W are the torques on the wheels, N m.
-        data: with the base's ``rotation``; its ``wheel_axis`` is filled.
+        data: with the base's ``rotation``; ``wheel_axis`` is written.
         inertia: of the base and its links about the base's CoM, kg m2.
         bias_moment: of the same, N m.
     """
@@ -68,10 +68,10 @@ def take_wheels(
 
 @kernel
 def turn_wheels(model: Model, angular: Vector, force: Array, data: Data, out: Array) -> None:
-    """Write the wheels' accelerations behind the joints' into ``out``, rad/s2.
+    """Write the wheels' accelerations, rad/s2, after those of the joints into ``out``.
 
-    ``angular`` is the base's acceleration, rad/s2. What holds a locked wheel goes into
-    ``data.holding``, N m.
+    ``angular`` is the base's angular acceleration, rad/s2. The torque that holds a locked wheel,
+    N m, is written into ``data.holding``.
     """
     n = int(model.joint_count)
     for k in range(int(model.wheel_count)):

@@ -1,5 +1,5 @@
-"""Sine, exponential and their like from + - * / and square root alone: the same bits everywhere.
+"""Elementary functions from + - * / and square root only: the same bits on every processor.
 
-The C library and NumPy choose the code of these functions by the processor, and their last bits
-with it. What is here is rounded as IEEE 754 says, operation by operation, on every processor.
+The C library and NumPy choose the code of these functions by processor, so their last bits may
+differ. The functions here consist of operations that are rounded by IEEE 754 on every processor.
 """

@@ -1,4 +1,4 @@
-"""The angle of a point in the plane."""
+"""Four-quadrant arctangent."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ REST_OF_QUARTERS = (
     1.5834785051444286e-17,
     3.061616997868383e-17,
 )
-"""What their rounding took from them."""
+"""Rounding errors of these constants, rad."""
 REST_OF_HALF_PI = 6.123233995736766e-17
 (A3, A5, A7, A9, A11, A13, A15, A17, A19) = ((-1.0) ** k / (2 * k + 1) for k in range(1, 10))
 
 
 def arctan2(y: ArrayLike, x: ArrayLike) -> Array:
-    """Return the angles of points, rad, from -pi to pi, in the shape of ``y`` and ``x``."""
+    """Return the angles of points (x, y), rad, from -pi to pi, in the shape of ``y`` and ``x``."""
     sines, cosines = np.broadcast_arrays(y, x)
     angles = np.empty(sines.shape)
     _fill(
@@ -45,10 +45,11 @@ def _fill(y: Array, x: Array, out: Array) -> None:
 
 @kernel
 def angle_of(y: float, x: float) -> float:
-    """Return what `arctan2` does, of one point, for kernels; NaN if it is not finite.
+    """Return `arctan2` of one point, rad, for kernels; NaN if the point is not finite.
 
-    With c the quarter next to the tangent t, ``arctan t = arctan c + arctan (t - c)/(1 + c t)``,
-    and the last is a Taylor series. Its error is below 2 units in the last place.
+    With c the multiple of 1/4 nearest to the tangent t,
+    ``arctan t = arctan c + arctan (t - c)/(1 + c t)``, and the second term is a Taylor series. The
+    error is below 2 units in the last place.
     """
     if not (math.isfinite(x) and math.isfinite(y)):
         return math.nan

@@ -9,9 +9,9 @@ import numpy as np
 from space_robot_msgs_py.compiled.kernels import kernel
 
 LN2 = (0.6931471803691238, 1.9082149292705877e-10)
-"""The logarithm of two in two parts, the first of 32 bits: a multiple by an exponent is exact."""
+"""log 2 in two parts, the first with 32 bits, so that its product with an exponent is exact."""
 LARGEST, SMALLEST = 709.782712893384, -745.1332191019412
-"""Of arguments whose exponential is a number, and not 0."""
+"""Range of arguments with a finite exponential above 0."""
 (E2, E3, E4, E5, E6, E7, E8, E9, E10, E11, E12, E13, E14) = (
     1.0 / math.factorial(k) for k in range(2, 15)
 )
@@ -20,9 +20,9 @@ LARGEST, SMALLEST = 709.782712893384, -745.1332191019412
 
 @kernel
 def exp(x: float) -> float:
-    """Return e to the ``x``; 0 and infinity where floats end.
+    """Return e to the power of ``x``; 0 and infinity outside the range of floats.
 
-    Its error is below 0.9 units in the last place, of numbers that have all their bits.
+    The error is below 0.9 units in the last place of normal numbers.
     """
     if not x <= LARGEST:  # NaN, too
         return x if np.isnan(x) else math.inf
@@ -38,10 +38,10 @@ def exp(x: float) -> float:
 
 @kernel
 def log(x: float) -> float:
-    """Return the natural logarithm of ``x``; minus infinity of 0, NaN below.
+    """Return the natural logarithm of ``x``; minus infinity for 0, NaN below.
 
-    With ``1 + f`` the mantissa between sqrt(1/2) and sqrt(2), and ``s = f / (2 + f)``, it is
-    ``2 artanh(s) = f - s (f - R)``, ``R = 2 s^2/3 + 2 s^4/5 + ...``. Its error is below
+    With the mantissa ``1 + f`` between sqrt(1/2) and sqrt(2), and ``s = f / (2 + f)``, it is
+    ``2 artanh(s) = f - s (f - R)``, ``R = 2 s^2/3 + 2 s^4/5 + ...``. The error is below
     0.9 units in the last place.
     """
     if not x > 0.0:

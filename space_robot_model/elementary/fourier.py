@@ -1,4 +1,4 @@
-"""The spectrum of real rows: a Fourier transform by Stockham's method, for any number of rows."""
+"""Spectrum of real samples by Stockham's Fourier transform, for any number of samples."""
 
 from __future__ import annotations
 
@@ -15,10 +15,9 @@ Array = NDArray[np.float64]
 
 
 def squared_spectrum(rows: Array) -> Array:
-    """Return the squared sizes of the transform of real ``rows`` (N, axes), (N // 2 + 1, axes).
+    """Return the squared magnitudes (N // 2 + 1, axes) of the transform of real ``rows`` (N, axes).
 
-    Two rows are one complex number on the way if N is even. It takes long where N has large prime
-    factors.
+    If N is even, two rows are combined into complex numbers. Large prime factors of N are slow.
     """
     size, count = len(rows), len(rows) // 2 + 1
     turns = np.arange(size, dtype=np.float64)
@@ -36,7 +35,7 @@ def squared_spectrum(rows: Array) -> Array:
 def _transformed(
     real: Array, imaginary: Array, sines: Array, cosines: Array
 ) -> tuple[Array, Array]:
-    """Return the transform of complex rows; ``sines`` and ``cosines`` are those of its angles."""
+    """Return the transform of complex rows; ``sines`` and ``cosines`` are the twiddle factors."""
     parts = np.ascontiguousarray(real), np.ascontiguousarray(imaginary)
     sines, cosines = np.ascontiguousarray(sines), np.ascontiguousarray(cosines)
     for factor, stride in _factors(len(real)):
@@ -71,7 +70,7 @@ def _stage(
     real_out: Array,
     imaginary_out: Array,
 ) -> None:
-    """Transform over one ``factor``; ``stride`` transforms of one row each are done before."""
+    """Run the stage of one ``factor``; ``stride`` is the product of the previous factors."""
     size, axes = real.shape
     rest = size // (stride * factor)
     for j in range(rest):
@@ -91,7 +90,7 @@ def _stage(
 
 @kernel
 def _squares(real: Array, imaginary: Array, sines: Array, cosines: Array, out: Array) -> None:
-    """Square the sizes of the spectrum of which even and odd rows are real and imaginary part."""
+    """Return in ``out`` the squared magnitudes, from even rows as real, odd as imaginary part."""
     size, axes = real.shape
     for f in range(len(out)):
         a, b = f % size, (size - f) % size

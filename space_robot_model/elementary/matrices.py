@@ -1,6 +1,6 @@
 """Operations on small matrices, summed term by term in a fixed order.
 
-NumPy hands these to a BLAS and a LAPACK, which sum in another order on another processor.
+NumPy uses BLAS and LAPACK, whose order of summation depends on the processor.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ Array = NDArray[np.float64]
 
 
 def product(a: ArrayLike, b: ArrayLike) -> Array:
-    """Return ``a @ b`` of vectors, matrices, or a stack of them in ``a``."""
+    """Return ``a @ b`` for vectors and matrices; ``a`` may be a stack of them."""
     left, right = np.asarray(a, dtype=np.float64), np.asarray(b, dtype=np.float64)
     result = np.zeros(left.shape[:-1] + right.shape[1:])
     for k in range(len(right)):
@@ -29,12 +29,12 @@ def rotate_tensor(rotation: Array, tensor: Array) -> Array:
 
 
 def norm(vector: ArrayLike) -> float:
-    """Return the length of a vector; its numbers' squares must be numbers, too."""
+    """Return the Euclidean norm of a vector; the squares must not overflow."""
     return math.sqrt(product(np.ravel(vector), np.ravel(vector)))
 
 
 def solve(matrix: Array, right: Array) -> Array:
-    """Return x of ``matrix x = right``, by Gauss's elimination with pivots of its column.
+    """Solve ``matrix x = right`` by Gaussian elimination with partial pivoting.
 
     Args:
         matrix: (n, n), not singular.

@@ -1,4 +1,4 @@
-"""The standard normal distribution: its distribution function, the inverse, random numbers."""
+"""Standard normal distribution: cumulative distribution function, quantiles, random numbers."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ Pair = tuple[float, float]
 
 ROOT_TWO_PI = 2.5066282746310007
 SERIES_LIMIT = 3.0
-"""Up to here the series of the distribution function is summed, beyond its continued fraction."""
+"""Limit between series and continued fraction of the cumulative distribution function."""
 CENTRE = 0.425
-"""So near to 1/2, Wichura's first pair of polynomials holds."""
+"""Distance from 1/2 up to which Wichura's first pair of polynomials is used."""
 TAIL = 5.0
-"""Up to this root of the negative logarithm his second, beyond it his third."""
+"""Limit of sqrt(-log p) between his second and third pair."""
 
-# Wichura's coefficients, above and below the line, of the highest power first.
+# Wichura's coefficients of numerator and denominator, highest power first.
 CENTRAL: tuple[Pair, ...] = (
     (2509.0809287301226727, 5226.4952788528545610),
     (33430.575583588128105, 28729.085735721942674),
@@ -56,10 +56,9 @@ OUTER: tuple[Pair, ...] = (
 
 
 def normal_quantile(share: ArrayLike) -> Array:
-    """Return the number that a ``share`` of normal numbers lies below, in the shape of ``share``.
+    """Return the standard normal quantiles of probabilities ``share``, in their shape.
 
-    That is the inverse of the standard normal distribution function: minus infinity at 0,
-    infinity at 1, NaN outside.
+    They are minus infinity at 0, infinity at 1, and NaN outside.
     """
     shares = np.asarray(share, dtype=np.float64)
     quantiles = np.empty(shares.size)
@@ -69,9 +68,9 @@ def normal_quantile(share: ArrayLike) -> Array:
 
 @kernel
 def normal_numbers(bits: NDArray[np.uint64], out: Array) -> None:
-    """Turn each of the random ``bits`` (N,) into a standard normal number, in ``out`` (N,).
+    """Convert random ``bits`` (N,) to standard normal numbers ``out`` (N,).
 
-    The upper 52 bits choose one of so many shares at equal distances between 0 and 1.
+    The upper 52 bits select one of 2**52 equidistant probabilities in (0, 1).
     """
     for i in range(out.size):
         out[i] = quantile((float(bits[i] >> np.uint64(12)) + 0.5) * 2.0**-52)
@@ -85,10 +84,10 @@ def _quantiles(shares: Array, out: Array) -> None:
 
 @kernel
 def quantile(share: float) -> float:
-    """Return what `normal_quantile` does, of one number, for kernels.
+    """Return `normal_quantile` of one number, for kernels.
 
     M. J. Wichura, "Algorithm AS 241: The Percentage Points of the Normal Distribution", Applied
-    Statistics 37 (1988). Its error is below 6 units in the last place.
+    Statistics 37 (1988). The error is below 6 units in the last place.
     """
     q = share - 0.5
     if abs(q) <= CENTRE:
@@ -103,7 +102,7 @@ def quantile(share: float) -> float:
 
 @subroutine
 def _ratio(polynomials: tuple[Pair, ...], r: float) -> float:
-    """Divide two polynomials in ``r`` by one another, of the coefficients of each power."""
+    """Return the ratio of two polynomials in ``r``, from their pairs of coefficients."""
     above, below = polynomials[0]
     for k in range(1, len(polynomials)):
         above, below = polynomials[k][0] + r * above, polynomials[k][1] + r * below
@@ -112,10 +111,10 @@ def _ratio(polynomials: tuple[Pair, ...], r: float) -> float:
 
 @kernel
 def normal_cdf(z: float) -> float:
-    """Return the share of standard normal numbers below ``z``.
+    """Return the standard normal cumulative distribution function at ``z``.
 
-    Within 3 of 0 that is ``1/2 + phi(z) (z + z^3/3 + z^5/(3 5) + ...)``, beyond Laplace's
-    continued fraction ``phi(z) / (z + 1/(z + 2/(z + ...)))``. Its error is below 3e-13 of it.
+    For |z| up to 3 it is ``1/2 + phi(z) (z + z^3/3 + z^5/(3 5) + ...)``, beyond it Laplace's
+    continued fraction ``phi(z) / (z + 1/(z + 2/(z + ...)))``. The relative error is below 3e-13.
     """
     if np.isnan(z):
         return z

@@ -11,11 +11,11 @@ from .series import plain_sin_cos
 Array = NDArray[np.float64]
 
 GIMBAL_LOCK = 1e-12
-"""Cosine of the pitch below which roll and yaw are about one axis."""
+"""Cosine of the pitch below which the axes of roll and yaw coincide (gimbal lock)."""
 
 
 def exact_sines_cosines(angles: ArrayLike) -> tuple[Array, Array]:
-    """Return sines and cosines; those of right angles without the rounding error of pi."""
+    """Return sines and cosines of angles, rad; exact for multiples of a right angle."""
     values = np.asarray(angles, dtype=np.float64)
     pairs = np.array([plain_sin_cos(float(angle)) for angle in values.flat])
     exact = _exact(pairs.reshape(*values.shape, 2))
@@ -23,7 +23,7 @@ def exact_sines_cosines(angles: ArrayLike) -> tuple[Array, Array]:
 
 
 def rotation_of_rpy(rpy: ArrayLike) -> Array:
-    """Return ``Rz(yaw) Ry(pitch) Rx(roll)``: roll, pitch, yaw (rad) about fixed axes x, y, z."""
+    """Return ``Rz(yaw) Ry(pitch) Rx(roll)`` (3, 3) of angles (rad) about fixed axes x, y, z."""
     (sr, sp, sy), (cr, cp, cy) = exact_sines_cosines(rpy)
     return np.array(
         [
@@ -35,10 +35,10 @@ def rotation_of_rpy(rpy: ArrayLike) -> Array:
 
 
 def rpy_of_rotation(rotation: Array) -> Array:
-    """Invert `rotation_of_rpy`; where roll and yaw turn about one axis, the yaw is 0.
+    """Return roll, pitch, yaw, rad, of a rotation matrix (3, 3); yaw is 0 at gimbal lock.
 
-    Yaw comes first and roll of what is left of the turn without it: near that axis both are
-    uncertain, but together they are the rotation to rounding.
+    Yaw is computed first, then roll from the rotation without yaw: near gimbal lock both are
+    inaccurate, but their combination is accurate to rounding.
     """
     from .arctangent import arctan2  # slow to import
 

@@ -1,6 +1,6 @@
 """Sine and cosine in plain Python, without compilation.
 
-In compiled code and for arrays it is ``@kernel`` of `sine`: the same lines, the same bits.
+For compiled code and arrays, `sine` compiles the same function, with the same bits.
 """
 
 from __future__ import annotations
@@ -10,11 +10,11 @@ import math
 import numpy as np
 
 TURNS = 2.0 / math.pi
-"""Quarter turns a radian."""
+"""Quarter turns per radian."""
 QUARTER = (1.5707963267341256, 6.077100506303966e-11, 2.0222662487111665e-21, 8.4784276603689e-32)
-"""Parts of a quarter turn, rad: three of 33 bits, so that a multiple by 20 bits is exact."""
+"""Parts of a quarter turn, rad: three of 33 bits, so that products with 20 bits are exact."""
 EXACT_LIMIT = 1.6e6
-"""Up to this angle, rad, a multiple of a quarter turn has no more than 20 bits."""
+"""Largest angle, rad, with at most 20 bits in its number of quarter turns."""
 (S3, S5, S7, S9, S11, S13, S15, S17) = (
     (-1.0) ** k / math.factorial(2 * k + 1) for k in range(1, 9)
 )
@@ -22,10 +22,10 @@ EXACT_LIMIT = 1.6e6
 
 
 def plain_sin_cos(angle: float) -> tuple[float, float]:
-    """Return sine and cosine of ``angle``, rad; NaN of an angle that is not finite.
+    """Return sine and cosine of ``angle``, rad; NaN if the angle is not finite.
 
-    Their error is below 0.8 units in the last place up to 1.6 million radians. Beyond, they are
-    those of an angle that is nearer to ``angle`` than its neighbours among the floats.
+    The error is below 0.8 units in the last place up to 1.6 million radians. Beyond, they are
+    exact for an angle that differs from ``angle`` by less than the spacing of floats.
     """
     if abs(angle) > EXACT_LIMIT:
         if not math.isfinite(angle):
@@ -33,7 +33,7 @@ def plain_sin_cos(angle: float) -> tuple[float, float]:
         angle = np.fmod(angle, 2.0 * math.pi)  # exact, by IEEE 754
     x, rest, quarter = angle, 0.0, 0.0
     if abs(angle) > 0.25 * math.pi:
-        # minus quarter turns, part by part; what rounding takes is exact, too (Knuth's two-sum)
+        # subtract quarter turns, part by part, with exact rounding errors (Knuth's two-sum)
         turns = np.floor(angle * TURNS + 0.5)
         a, b = angle - turns * QUARTER[0], turns * QUARTER[1]
         x = a - b

@@ -1,4 +1,4 @@
-"""Sine and cosine for compiled code, and of arrays."""
+"""Sine and cosine for compiled code and for arrays."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ sin_cos = kernel(plain_sin_cos)
 
 
 def sines_cosines(angles: ArrayLike) -> tuple[Array, Array]:
-    """Return sines and cosines of ``angles``, rad, in their shape."""
+    """Return sines and cosines of ``angles``, rad, in the same shape."""
     values = np.asarray(angles, dtype=np.float64, order="C")
     sines, cosines = np.empty(values.shape), np.empty(values.shape)
     _fill(values.reshape(-1), sines.reshape(-1), cosines.reshape(-1))

@@ -1,4 +1,4 @@
-"""Eigenvalues and axes of symmetric matrices, with the same bits on every processor."""
+"""Eigenvalues and eigenvectors of symmetric matrices, the same bits on every processor."""
 
 from __future__ import annotations
 
@@ -10,18 +10,18 @@ from space_robot_msgs_py.compiled.kernels import kernel, subroutine
 Array = NDArray[np.float64]
 
 MOST_SWEEPS = 20
-"""Jacobi's method converges quadratically: some six sweeps are enough for three rows."""
+"""Maximum number of sweeps; Jacobi's method needs about six for a (3, 3) matrix."""
 
 
 @kernel
 def diagonalise(matrix: Array, vectors: Array) -> None:
-    """Make a symmetric matrix diagonal by turning its axes.
+    """Diagonalise a symmetric matrix by Jacobi rotations.
 
-    By Jacobi's rotations (Golub & Van Loan, Matrix Computations, 8.5).
+    Golub & Van Loan, Matrix Computations, 8.5.
 
     Args:
-        matrix: (n, n), becomes diagonal: its eigenvalues, in no order.
-        vectors: (n, n), becomes the eigenvectors, one a column.
+        matrix: (n, n), replaced by the diagonal matrix of eigenvalues, in no order.
+        vectors: (n, n), replaced by the eigenvectors, as columns.
     """
     n = len(matrix)
     for i in range(n):
@@ -41,7 +41,7 @@ def diagonalise(matrix: Array, vectors: Array) -> None:
 
 @subroutine
 def _rotate(matrix: Array, vectors: Array, p: int, q: int) -> None:
-    """Make ``matrix[p, q]`` zero."""
+    """Apply the rotation that makes ``matrix[p, q]`` zero."""
     if matrix[p, q] == 0.0:
         return
     if abs(matrix[p, q]) < 1e-300 * max(abs(matrix[p, p]), abs(matrix[q, q])) or (
@@ -66,7 +66,7 @@ def _rotate(matrix: Array, vectors: Array, p: int, q: int) -> None:
 
 
 def principal_axes(tensor: Array) -> tuple[Array, Array]:
-    """Return the eigenvalues of a symmetric matrix (n, n), rising, and its axes as columns."""
+    """Return ascending eigenvalues and eigenvectors (columns) of a symmetric matrix (n, n)."""
     matrix = 0.5 * (tensor + tensor.T)
     axes = np.empty_like(matrix)
     diagonalise(matrix, axes)

@@ -1,4 +1,4 @@
 """Data sheets of hardware.
 
-The simulation builds hardware from them; flight software assumes other instances of the same.
+The simulation builds its hardware from them; flight software has separate instances.
 """

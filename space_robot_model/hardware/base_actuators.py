@@ -20,15 +20,15 @@ Array = NDArray[np.float64]
 
 BaseActuation = Literal["ideal", "hardware", "none"]
 LEAST_SHARE = 1e-6
-"""Of a unit torque: what no torque of the actuators may lack."""
+"""Tolerance of a unit torque in the check of the actuators."""
 
 
 class BaseActuatorSettings(StrictModel):
-    """Settings of the base's actuators; those of a file of config/actuators for the plant."""
+    """Settings of the base's actuators, as in a file of config/actuators."""
 
     base_actuation: BaseActuation = Field(
         "ideal",
-        description="what turns the base: ideal (the torque commanded), hardware (wheels, "
+        description="actuators of the base: ideal (the commanded torque), hardware (wheels, "
         "thrusters), none (the base floats freely)",
     )
     wheels: WheelSettings = WheelSettings()
@@ -51,7 +51,7 @@ class BaseActuatorSettings(StrictModel):
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Names of the actuators that are commanded one by one: wheels, then thrusters."""
+        """Names of the individually commanded actuators: wheels, then thrusters."""
         wheels = (f"wheel_{i + 1}" for i in range(self.wheel_count))
         return (*wheels, *(f"thruster_{i + 1}" for i in range(self.thruster_count)))
 
@@ -63,11 +63,11 @@ class BaseActuatorSettings(StrictModel):
         """Check that the settings are consistent and fit a robot.
 
         Args:
-            robot: whose base they are on.
-            file: whose they are: a name in config/actuators, or a path.
+            robot: with the base that carries them.
+            file: of the settings: a name in config/actuators, or a path.
 
         Raises:
-            InputError: they do not; in one line with file and key.
+            InputError: they are inconsistent; names file and key.
         """
         try:
             self._check(robot)
@@ -83,7 +83,7 @@ class BaseActuatorSettings(StrictModel):
                 )
             return
         if not parts:
-            raise InputError("base_actuation is hardware: wheels.axes or thrusters.positions lack")
+            raise InputError("base_actuation is hardware: no wheels.axes or thrusters.positions")
         self.wheels.check(robot.inertia[0])
         self.thrusters.check()
         _check_torques(self)
@@ -92,16 +92,16 @@ class BaseActuatorSettings(StrictModel):
 
 
 def _check_torques(settings: BaseActuatorSettings) -> None:
-    """Check that a torque in any direction can be had: wheels push both ways, thrusters one.
+    """Check that the actuators can produce a torque in any direction; thrusters have one sign.
 
     Raises:
-        InputError: says about which axis none can.
+        InputError: names an axis without torque.
     """
     axes, torques = settings.wheels.unit_axes, settings.thrusters.torques
     if not len(torques):
         if np.linalg.matrix_rank(axes, tol=LEAST_SHARE) < 3:
             raise InputError(
-                "wheels.axes must span all directions: there are torques that they cannot give"
+                "wheels.axes must span all directions: the wheels cannot produce all torques"
             )
         return
     sizes = np.linalg.norm(torques, axis=1)
@@ -113,15 +113,15 @@ def _check_torques(settings: BaseActuatorSettings) -> None:
             if not _can_push(columns, wanted):
                 side = "positive" if sign > 0.0 else "negative"
                 raise InputError(
-                    f"thrusters.directions: no {side} torque about {name} can be had of the "
+                    f"thrusters.directions: no {side} torque about {name} is possible with the "
                     "thrusters" + (" and wheels" if len(axes) else "")
                 )
 
 
 def _can_push(columns: Array, wanted: Array) -> bool:
-    """Return whether sizes of zero or more along ``columns`` (3, k) add up to ``wanted`` (3,).
+    """Return True if ``wanted`` (3,) is a non-negative combination of ``columns`` (3, k).
 
-    By a linear program: SciPy 1.15 reports the residual of non-negative least squares wrongly.
+    It is a linear program, because SciPy 1.15 returns a wrong residual of nnls.
     """
     from scipy.optimize import linprog  # slow to import
 

@@ -10,16 +10,16 @@ from .per_axis import PER_AXIS, Numbers, Sizes
 
 
 class DriveSettings(StrictModel):
-    """The difference between a torque that is asked for and the one that is given."""
+    """Errors of torque drives; by default none."""
 
-    drive_scale: Numbers = Field([1.0], description=f"torque given per torque asked; {PER_AXIS}")
-    drive_bias: Numbers = Field([0.0], description=f"torque given beside it, N m; {PER_AXIS}")
+    drive_scale: Numbers = Field([1.0], description=f"torque per commanded torque; {PER_AXIS}")
+    drive_bias: Numbers = Field([0.0], description=f"additional torque, N m; {PER_AXIS}")
     drive_lag: Sizes = Field(
         [0.0], description=f"time constant of the drive's lag, s (0: none); {PER_AXIS}"
     )
     drive_step: Sizes = Field(
-        [0.0], description=f"distance of two torques that can be given, N m (0: any); {PER_AXIS}"
+        [0.0], description=f"resolution of the torque, N m (0: unlimited); {PER_AXIS}"
     )
     drive_dead_band: Sizes = Field(
-        [0.0], description=f"torque below which none is given, N m; {PER_AXIS}"
+        [0.0], description=f"commanded torque below which none is applied, N m; {PER_AXIS}"
     )

@@ -1,4 +1,4 @@
-"""Flat lists of vectors and of values, as ROS parameters have them, for actuators on the base."""
+"""Flat lists of vectors and values, as in ROS parameters, for actuators on the base."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from space_robot_msgs_py.errors import InputError
 Array = NDArray[np.float64]
 
 NO_VECTORS = [0.0]
-"""ROS has no empty list of numbers."""
+"""Value for an empty list, because ROS has no empty list of numbers."""
 FEWEST = Field(min_length=1)
 Vectors = Annotated[list[Annotated[float, Field(ge=-1e3, le=1e3)]], FEWEST]
 Sizes = Annotated[list[Annotated[float, Field(ge=0.0, le=1e9)]], FEWEST]
@@ -21,10 +21,10 @@ Positive = Annotated[list[Annotated[float, Field(gt=0.0, le=1e9)]], FEWEST]
 
 
 def are_vectors(flat: list[float], most: int) -> list[float]:
-    """Return ``flat`` if it holds x, y, z of at most so many vectors, or none (``[0.0]``).
+    """Return ``flat`` if it has x, y, z of at most ``most`` vectors, or none (``[0.0]``).
 
     Raises:
-        ValueError: it does not.
+        ValueError: another number of values.
     """
     if flat != NO_VECTORS and (len(flat) % 3 or len(flat) > 3 * most):
         raise ValueError(
@@ -35,10 +35,10 @@ def are_vectors(flat: list[float], most: int) -> list[float]:
 
 
 def are_directions(flat: list[float], most: int) -> list[float]:
-    """Return ``flat`` if all vectors in it can be made unit vectors, see `are_vectors`.
+    """Return ``flat`` if all its vectors have norms near 1, see `are_vectors`.
 
     Raises:
-        ValueError: one is far too short or too long.
+        ValueError: a vector is too short or too long.
     """
     for i, norm in enumerate(np.linalg.norm(vectors(are_vectors(flat, most)), axis=1)):
         if not 1e-3 <= norm <= 1e3:
@@ -54,21 +54,21 @@ def vectors(flat: list[float]) -> Array:
 
 
 def directions(flat: list[float]) -> Array:
-    """Return the vectors (k, 3) of a flat list with length 1."""
+    """Return the vectors (k, 3) of a flat list, normalised."""
     rows = vectors(flat)
     units: Array = rows / np.linalg.norm(rows, axis=1, keepdims=True)
     return units
 
 
 def values_of(numbers: list[float], key: str, count: int, what: str) -> Array:
-    """Return (count,) values of a setting with one value for all, or one for each.
+    """Return the values (count,) of a setting with one value for all, or one for each.
 
     Raises:
-        InputError: it has another number of them.
+        InputError: another number of values.
     """
     if len(numbers) not in (1, count):
         raise InputError(
-            f"{key} has {len(numbers)} values, one for all or {count} are allowed: one a {what}"
+            f"{key} has {len(numbers)} values, one for all or {count} are allowed: one per {what}"
         )
     values: Array = np.broadcast_to(np.array(numbers, dtype=np.float64), count)
     return values

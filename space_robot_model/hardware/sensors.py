@@ -10,7 +10,7 @@ from .star_tracker import StarTrackerSettings
 
 
 class SensorSettings(StrictModel):
-    """Settings of the sensors."""
+    """Settings of all sensors."""
 
     star_tracker: StarTrackerSettings = StarTrackerSettings()
     gyro: GyroSettings = GyroSettings()

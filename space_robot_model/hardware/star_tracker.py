@@ -13,16 +13,16 @@ from ..elementary.matrices import norm
 Angle = Annotated[float, Field(ge=0.0, le=1.0)]
 
 LEAST_RATE = 1e-6
-"""Hz; a measurement in eleven days."""
+"""Smallest rate, Hz: one measurement in eleven days."""
 MOST_UNDER_WAY = 64
-"""Measurements that have been taken and are not released yet."""
+"""Maximum number of measurements that are not released yet."""
 
 
 def has_direction(vector: list[float]) -> list[float]:
-    """Return ``vector`` if it can be made a unit vector.
+    """Return ``vector`` if its norm is near 1.
 
     Raises:
-        ValueError: it is far too short or too long.
+        ValueError: the vector is too short or too long.
     """
     length = norm(vector)
     if not 1e-3 <= length <= 1e3:
@@ -41,11 +41,9 @@ class StarTrackerSettings(StrictModel):
         list[float], Field(min_length=3, max_length=3), AfterValidator(has_direction)
     ] = Field([0.0, 0.0, 1.0], description="axis of its optics in the base frame")
     rate: Annotated[float, Field(ge=0.0, le=1e5)] = Field(
-        0.0, description="measurements a second, to a whole number of ticks (0: one a tick)"
+        0.0, description="measurements per second, rounded to whole ticks (0: one per tick)"
     )
     delay: Annotated[float, Field(ge=0.0, le=100.0)] = Field(
         0.0, description="time from exposure to release, s, to a whole number of ticks"
     )
-    step: Angle = Field(
-        0.0, description="rotation that the last digit of the quaternion stands for, rad"
-    )
+    step: Angle = Field(0.0, description="resolution of the attitude, rad")

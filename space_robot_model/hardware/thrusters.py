@@ -28,7 +28,7 @@ Array = NDArray[np.float64]
 
 
 STANDARD_GRAVITY = 9.80665
-"""m/s2."""
+"""Standard gravity, m/s2."""
 PER_THRUSTER = "one value for all thrusters, or one each"
 Times = Annotated[list[Annotated[float, Field(ge=0.0, le=1.0)]], FEWEST]
 
@@ -46,18 +46,18 @@ class ThrusterSettings(StrictModel):
 
     positions: Annotated[Vectors, AfterValidator(_positions)] = Field(
         NO_VECTORS,
-        description="from the base's CoM, in the base frame, m: x, y, z of each thruster, one "
-        "behind the other ([0.0]: no thrusters)",
+        description="positions from the base's CoM, base frame, m: x, y, z of each thruster, one "
+        "after the other ([0.0]: no thrusters)",
     )
     directions: Annotated[Vectors, AfterValidator(_directions)] = Field(
         NO_VECTORS,
-        description="of the force on the base, in the base frame: x, y, z of each thruster, one "
-        "behind the other",
+        description="directions of the force on the base, base frame: x, y, z of each thruster, "
+        "one after the other",
     )
-    force: Positive = Field([1.0], description=f"of an open thruster, N; {PER_THRUSTER}")
+    force: Positive = Field([1.0], description=f"force of an open thruster, N; {PER_THRUSTER}")
     shortest_pulse: Times = Field(
         [0.0],
-        description="time for which a valve stays open once it is open, s, to a whole "
+        description="minimum opening time of a valve, s, to a whole "
         f"number of ticks; {PER_THRUSTER}",
     )
     delay: Times = Field(
@@ -65,11 +65,9 @@ class ThrusterSettings(StrictModel):
         description="time from a command to its valve, s, to a whole number of ticks; "
         f"{PER_THRUSTER}",
     )
-    specific_impulse: Positive = Field(
-        [220.0], description=f"impulse for a weight of propellant, s; {PER_THRUSTER}"
-    )
+    specific_impulse: Positive = Field([220.0], description=f"specific impulse, s; {PER_THRUSTER}")
     propellant: Annotated[float, Field(ge=0.0, le=1e9)] = Field(
-        0.0, description="in the tank at tick 0, kg (0: it never runs out)"
+        0.0, description="propellant in the tank at tick 0, kg (0: unlimited)"
     )
 
     @property
@@ -79,12 +77,12 @@ class ThrusterSettings(StrictModel):
 
     @property
     def places(self) -> Array:
-        """(T, 3) positions from the base's CoM, m."""
+        """(T, 3) positions relative to the base's CoM, m, base frame."""
         return vectors(self.positions)
 
     @property
     def unit_directions(self) -> Array:
-        """(T, 3) unit vectors of the forces on the base."""
+        """(T, 3) unit vectors of the forces on the base, base frame."""
         return directions(self.directions)
 
     @property
@@ -94,16 +92,16 @@ class ThrusterSettings(StrictModel):
         return np.asarray(np.cross(self.places, forces), dtype=np.float64)
 
     def values(self, name: str) -> Array:
-        """Return (T,) values of the setting ``name``, one a thruster.
+        """Return the values (T,) of the setting ``name``, one per thruster.
 
         Raises:
-            InputError: it has neither one value nor one a thruster.
+            InputError: neither one value, nor one per thruster.
         """
         return values_of(getattr(self, name), f"thrusters.{name}", self.count, "thruster")
 
     @property
     def mass_flow(self) -> Array:
-        """(T,) propellant that each open thruster burns, ``F / (I_sp g_0)``, kg/s."""
+        """(T,) mass flow of each open thruster, ``F / (I_sp g_0)``, kg/s."""
         impulse = self.values("specific_impulse") * STANDARD_GRAVITY
         flow: Array = self.values("force") / impulse
         return flow
@@ -113,15 +111,15 @@ class ThrusterSettings(StrictModel):
         return np.round(self.values(name) / period)
 
     def check(self) -> None:
-        """Check that the numbers fit one another.
+        """Check that the settings are consistent.
 
         Raises:
-            InputError: they do not.
+            InputError: they are inconsistent.
         """
         pointed = len(vectors(self.directions))
         if pointed != self.count:
             raise InputError(
-                f"thrusters.directions are those of {pointed} thrusters, thrusters.positions of "
+                f"thrusters.directions are for {pointed} thrusters, thrusters.positions for "
                 f"{self.count}"
             )
         for name in ("force", "shortest_pulse", "delay", "specific_impulse"):

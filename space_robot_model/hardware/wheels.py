@@ -27,16 +27,16 @@ def _axes(flat: list[float]) -> list[float]:
 class WheelSettings(StrictModel):
     """Balanced reaction wheels on the base; by default none.
 
-    The base's inertia in the robot's file is that with its wheels locked: their rotors' included.
+    The base's inertia in the robot's file includes the locked rotors of the wheels.
     """
 
     axes: Annotated[Vectors, AfterValidator(_axes)] = Field(
         NO_VECTORS,
-        description="spin axes in the base frame: x, y, z of each wheel, one behind the other "
+        description="spin axes in the base frame: x, y, z of each wheel, one after the other "
         "([0.0]: no wheels)",
     )
     rotor_inertia: Positive = Field(
-        [0.01], description=f"of the rotor about its axis, kg m2; {PER_WHEEL}"
+        [0.01], description=f"inertia of the rotor about its axis, kg m2; {PER_WHEEL}"
     )
     max_torque: Sizes = Field(
         [0.0], description=f"largest torque of the motor, N m (0: no limit); {PER_WHEEL}"
@@ -59,34 +59,34 @@ class WheelSettings(StrictModel):
 
     @property
     def unit_axes(self) -> Array:
-        """(W, 3) unit vectors in the base frame."""
+        """(W, 3) spin axes as unit vectors in the base frame."""
         return directions(self.axes)
 
     def values(self, name: str) -> Array:
-        """Return (W,) values of the setting ``name``, one a wheel.
+        """Return the values (W,) of the setting ``name``, one per wheel.
 
         Raises:
-            InputError: it has neither one value nor one a wheel.
+            InputError: neither one value, nor one per wheel.
         """
         return values_of(getattr(self, name), f"wheels.{name}", self.count, "wheel")
 
     def limits(self, name: str) -> Array:
-        """Return the `values` of a limit, infinite where its 0 says that there is none."""
+        """Return the `values` of a limit, with infinity for 0 (no limit)."""
         values = self.values(name)
         return np.where(values > 0.0, values, np.inf)
 
     def spin_momenta(self, speeds: Array) -> Array:
-        """Return ``J Omega`` (..., W), N m s, of speeds relative to the base (..., W), rad/s."""
+        """Return ``J Omega`` (..., W), N m s, for speeds relative to the base (..., W), rad/s."""
         return speeds * self.values("rotor_inertia")
 
     def check(self, base_inertia: Array) -> None:
-        """Check that the numbers fit one another and a base.
+        """Check that the settings are consistent with one another and with a base.
 
         Args:
-            base_inertia: (3, 3) kg m2 of the base with its wheels locked, about its CoM.
+            base_inertia: (3, 3) of the base with locked wheels about its CoM, kg m2.
 
         Raises:
-            InputError: they do not.
+            InputError: they are inconsistent.
         """
         if not self.count:
             return
@@ -102,5 +102,5 @@ class WheelSettings(StrictModel):
         if not moments[0] > 0.0:
             raise InputError(
                 "wheels.rotor_inertia: the base's inertia must be larger than its rotors', without "
-                f"them its smallest principal moment is {moments[0]:g} kg m2"
+                f"these its smallest principal moment is {moments[0]:g} kg m2"
             )

@@ -132,16 +132,16 @@ def test_a_bad_number_is_one_line_with_file_and_key(tmp_path: Path, text: str, w
 @pytest.mark.parametrize(
     ("text", "why"),
     [
-        (HARDWARE, "base_actuation is hardware: wheels.axes or thrusters.positions lack$"),
+        (HARDWARE, "base_actuation is hardware: no wheels.axes or thrusters.positions$"),
         ("wheels: {axes: [1, 0, 0]}", "wheels are for base_actuation hardware, got 'ideal'$"),
         ("base_actuation: none, thrusters: {positions: [1, 0, 0]}", "thrusters are for base_actu"),
         (
             HARDWARE + "wheels: {axes: [1, 0, 0, 0, 1, 0, 1, 1, 0]}",
-            "wheels.axes must span all directions: there are torques that they cannot give$",
+            "wheels.axes must span all directions: the wheels cannot produce all torques$",
         ),
         (
             HARDWARE + f"wheels: {{axes: {CROSS}, max_torque: [1, 2]}}",
-            "wheels.max_torque has 2 values, one for all or 3 are allowed: one a wheel$",
+            "wheels.max_torque has 2 values, one for all or 3 are allowed: one per wheel$",
         ),
         (
             HARDWARE + f"wheels: {{axes: {CROSS}, rotor_inertia: [1, 201, 1]}}",
@@ -161,20 +161,20 @@ def test_a_bad_number_is_one_line_with_file_and_key(tmp_path: Path, text: str, w
         ),
         (
             HARDWARE + "thrusters: {positions: [1, 0, 0], directions: [1, 0, 0, 0, 1, 0]}",
-            "thrusters.directions are those of 2 thrusters, thrusters.positions of 1$",
+            "thrusters.directions are for 2 thrusters, thrusters.positions for 1$",
         ),
         (
             HARDWARE + "thrusters: {positions: [1, 0, 0], directions: [1, 0, 0]}",
-            "thrusters.directions: no positive torque about x can be had of the thrusters$",
+            "thrusters.directions: no positive torque about x is possible with the thrusters$",
         ),
         (
             HARDWARE + "thrusters: {positions: [0, 1, 0], directions: [0, 0, 1], delay: [0, 0]}",
-            "thrusters.delay has 2 values, one for all or 1 are allowed: one a thruster$",
+            "thrusters.delay has 2 values, one for all or 1 are allowed: one per thruster$",
         ),
         (
             HARDWARE + "wheels: {axes: [1, 0, 0, 0, 1, 0]}, "
             "thrusters: {positions: [1, 0, 0], directions: [0, 1, 0]}",
-            "thrusters.directions: no negative torque about z can be had of the thrusters and "
+            "thrusters.directions: no negative torque about z is possible with the thrusters and "
             "wheels",
         ),
     ],
