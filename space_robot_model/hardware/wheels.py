@@ -102,5 +102,5 @@ class WheelSettings(StrictModel):
         if not moments[0] > 0.0:
             raise InputError(
                 "wheels.rotor_inertia: the base's inertia must be larger than its rotors', without "
-                f"these its smallest principal moment is {moments[0]:g} kg m2"
+                f"them its smallest principal moment is {moments[0]:g} kg m2"
             )
