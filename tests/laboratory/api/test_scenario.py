@@ -231,7 +231,7 @@ def test_what_cannot_be_flown_is_told_in_one_line(options: dict[str, Any], said:
 def test_a_robot_without_files_needs_a_mission_and_gains(paper_mission: dict[str, Any]) -> None:
     robot = Robot.from_yaml(config_directory() / "robots/paper.yaml")
     own = replace(robot, name="mine")
-    with pytest.raises(InputError, match="no mission of its own: give one"):
+    with pytest.raises(InputError, match="no mission of its own: choose one"):
         Scenario(robot=own).check()
     with pytest.raises(InputError, match="no gains of its own: give some"):
         Scenario(robot=own, mission=paper_mission).check()

@@ -77,4 +77,4 @@ def test_without_a_browser(bag: Path, tmp_path: Path, monkeypatch: pytest.Monkey
     monkeypatch.setattr(shutil, "which", lambda name: None)
     done = space_robot_here("view", str(bag), "--out", str(tmp_path / "one.gif"), "--no-open")
     assert done.returncode == 2
-    assert "a browser is needed, one of chromium" in done.stderr
+    assert "no browser is installed: one of chromium" in done.stderr

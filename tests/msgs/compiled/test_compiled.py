@@ -45,7 +45,9 @@ def check_elsewhere(tmp_path: Path, cache: Path, why: str) -> None:
     assert done.returncode == 0, done.stderr
     other = tmp_path / f"space_robot_{os.getuid()}"
     (line,) = done.stderr.splitlines()
-    assert line == f"space_robot: compiled code is stored in {other}: {cache} cannot be used ({why})"
+    assert (
+        line == f"space_robot: compiled code is stored in {other}: {cache} cannot be used ({why})"
+    )
     assert done.stdout.startswith(f"6.0 {other}/")
     assert list(other.rglob("*.nbc"))
 
