@@ -33,9 +33,6 @@ from .following import follow
 from .listeners import RESET_WITH, wait_for
 from .processes import Command, Graph, node_command, node_environment
 
-COMPOSED_DRAIN_S = 0.002
-"""In one process the recorder takes little and often: while it does, no tick is flown."""
-
 
 def fly(
     flight: Flight,
@@ -154,8 +151,6 @@ def flight_parameters(flight: Flight, bag: Path) -> dict[str, dict[str, Any]]:
     }
     parameters["controller"] |= {"wait_for": wait_for("controller")}
     parameters["recorder"] |= {"bag": str(bag.absolute()), "flight": json.dumps(flight.description)}
-    if flight.scenario.options.composed:
-        parameters["recorder"].setdefault("drain_period", COMPOSED_DRAIN_S)
     return parameters
 
 
