@@ -33,8 +33,6 @@ from .objects import (
 )
 from .option_table import option
 
-COMPOSED_DRAIN_S = 0.002
-"""Period of the recorder in one process with the other nodes: they wait while it writes, s."""
 NO_FRICTION = {"friction.coulomb": 0.0, "friction.viscous": 0.0}
 
 
@@ -141,7 +139,6 @@ class FlightPlan(StrictModel):
                 **period,
                 **({} if self.compression is None else {"compression": self.compression}),
                 **({} if self.split_size is None else {"split_size": int(self.split_size)}),
-                **({"drain_period": COMPOSED_DRAIN_S} if self.composed else {}),
             },
         }
 

@@ -33,6 +33,9 @@ from .following import follow
 from .listeners import RESET_WITH, wait_for
 from .processes import Command, Graph, node_command, node_environment
 
+COMPOSED_DRAIN_S = 0.002
+"""Period of the recorder in one process with the other nodes, which wait while it writes."""
+
 
 def fly(
     flight: Flight,
@@ -151,6 +154,9 @@ def flight_parameters(flight: Flight, bag: Path) -> dict[str, dict[str, Any]]:
     }
     parameters["controller"] |= {"wait_for": wait_for("controller")}
     parameters["recorder"] |= {"bag": str(bag.absolute()), "flight": json.dumps(flight.description)}
+    options = flight.scenario.options
+    if options.composed and "drain_period" not in options.parameters.get("recorder", {}):
+        parameters["recorder"]["drain_period"] = COMPOSED_DRAIN_S
     return parameters
 
 
