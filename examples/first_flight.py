@@ -47,6 +47,6 @@ def main(out: str | None = None) -> None:
 
 
 if __name__ == "__main__":
-    arguments = argparse.ArgumentParser(description="Fly the paper's robot, with free and held base.")
+    arguments = argparse.ArgumentParser(description="Fly the paper's robot, base free and held.")
     arguments.add_argument("--out", help="path of the second flight's figure, without a suffix")
     main(arguments.parse_args().out)
