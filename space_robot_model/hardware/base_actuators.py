@@ -28,7 +28,7 @@ class BaseActuatorSettings(StrictModel):
 
     base_actuation: BaseActuation = Field(
         "ideal",
-        description="what turns the base: ideal (the torque commanded), hardware (wheels, "
+        description="torque on the base: ideal (the commanded torque), hardware (wheels, "
         "thrusters), none (the base floats freely)",
     )
     wheels: WheelSettings = WheelSettings()

@@ -17,7 +17,9 @@ OnAxes = Annotated[
 class GyroSettings(StrictModel):
     """A gyro; by default without error."""
 
-    noise: Sigma = Field(0.0, description="white noise of each sample, whatever the period, rad/s")
+    noise: Sigma = Field(
+        0.0, description="white noise of each sample, independent of the period, rad/s"
+    )
     angle_random_walk: Sigma = Field(
         0.0, description="density sigma_v of the white noise on the rate, rad/s^1/2"
     )
@@ -28,6 +30,7 @@ class GyroSettings(StrictModel):
         [0.0, 0.0, 0.0], description="bias at tick 0 on base x, y, z, rad/s"
     )
     scale_factor_error: OnAxes = Field(
-        [0.0, 0.0, 0.0], description="e of (1 + e) times the true rate, on base x, y, z"
+        [0.0, 0.0, 0.0],
+        description="scale factor error e: the gyro measures (1 + e) times the rate; base x, y, z",
     )
-    step: Sigma = Field(0.0, description="distance of two values, rad/s (0: none)")
+    step: Sigma = Field(0.0, description="resolution, rad/s (0: continuous)")

@@ -14,7 +14,7 @@ Array = NDArray[np.float64]
 FEWEST, LEAST, MOST = Field(min_length=1), Field(ge=0.0, le=1e9), Field(ge=-1e9, le=1e9)
 Numbers = Annotated[list[Annotated[float, MOST]], FEWEST]
 Sizes = Annotated[list[Annotated[float, LEAST]], FEWEST]
-PER_AXIS = "one value for all axes, or one an axis: base x, y, z, joints"
+PER_AXIS = "one value for all axes, or one per axis: base x, y, z, joints"
 
 
 def per_axis(settings: object, name: str, n: int) -> Array:

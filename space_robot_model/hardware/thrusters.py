@@ -29,7 +29,7 @@ Array = NDArray[np.float64]
 
 STANDARD_GRAVITY = 9.80665
 """m/s2."""
-PER_THRUSTER = "one value for all thrusters, or one each"
+PER_THRUSTER = "one value for all thrusters, or one per thruster"
 Times = Annotated[list[Annotated[float, Field(ge=0.0, le=1.0)]], FEWEST]
 
 
@@ -46,30 +46,28 @@ class ThrusterSettings(StrictModel):
 
     positions: Annotated[Vectors, AfterValidator(_positions)] = Field(
         NO_VECTORS,
-        description="from the base's CoM, in the base frame, m: x, y, z of each thruster, one "
-        "behind the other ([0.0]: no thrusters)",
+        description="positions from the base's CoM, in the base frame, m: x, y, z of each "
+        "thruster, one behind the other ([0.0]: no thrusters)",
     )
     directions: Annotated[Vectors, AfterValidator(_directions)] = Field(
         NO_VECTORS,
-        description="of the force on the base, in the base frame: x, y, z of each thruster, one "
-        "behind the other",
+        description="directions of the force on the base, in the base frame: x, y, z of each "
+        "thruster, one behind the other",
     )
-    force: Positive = Field([1.0], description=f"of an open thruster, N; {PER_THRUSTER}")
+    force: Positive = Field([1.0], description=f"force of an open thruster, N; {PER_THRUSTER}")
     shortest_pulse: Times = Field(
         [0.0],
-        description="time for which a valve stays open once it is open, s, to a whole "
-        f"number of ticks; {PER_THRUSTER}",
+        description="shortest time for which a valve is open, s, rounded to a whole number of "
+        f"ticks; {PER_THRUSTER}",
     )
     delay: Times = Field(
         [0.0],
-        description="time from a command to its valve, s, to a whole number of ticks; "
+        description="delay from the command to the valve, s, rounded to a whole number of ticks; "
         f"{PER_THRUSTER}",
     )
-    specific_impulse: Positive = Field(
-        [220.0], description=f"impulse for a weight of propellant, s; {PER_THRUSTER}"
-    )
+    specific_impulse: Positive = Field([220.0], description=f"specific impulse, s; {PER_THRUSTER}")
     propellant: Annotated[float, Field(ge=0.0, le=1e9)] = Field(
-        0.0, description="in the tank at tick 0, kg (0: it never runs out)"
+        0.0, description="propellant in the tank at tick 0, kg (0: unlimited)"
     )
 
     @property

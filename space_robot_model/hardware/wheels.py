@@ -17,7 +17,7 @@ from .mounting import NO_VECTORS, Positive, Sizes, Vectors, are_directions, dire
 Array = NDArray[np.float64]
 
 
-PER_WHEEL = "one value for all wheels, or one each"
+PER_WHEEL = "one value for all wheels, or one per wheel"
 
 
 def _axes(flat: list[float]) -> list[float]:
@@ -36,15 +36,15 @@ class WheelSettings(StrictModel):
         "([0.0]: no wheels)",
     )
     rotor_inertia: Positive = Field(
-        [0.01], description=f"of the rotor about its axis, kg m2; {PER_WHEEL}"
+        [0.01], description=f"inertia of the rotor about its axis, kg m2; {PER_WHEEL}"
     )
     max_torque: Sizes = Field(
         [0.0], description=f"largest torque of the motor, N m (0: no limit); {PER_WHEEL}"
     )
     max_momentum: Sizes = Field(
         [0.0],
-        description="momentum rotor_inertia times speed up to which the motor speeds a wheel up, "
-        f"N m s (0: no limit); {PER_WHEEL}",
+        description="momentum (rotor_inertia times speed) up to which the motor accelerates the "
+        f"wheel, N m s (0: no limit); {PER_WHEEL}",
     )
     coulomb: Sizes = Field([0.0], description=f"Coulomb friction, N m; {PER_WHEEL}")
     viscous: Sizes = Field([0.0], description=f"viscous friction, N m s/rad; {PER_WHEEL}")

@@ -43,7 +43,7 @@ class NodeSettings(StrictModel):
         0.0005, description="length of a tick, s; the same for all nodes"
     )
     fifo_priority: Annotated[int, Field(ge=0, le=98)] = Field(
-        0, description="SCHED_FIFO priority to ask for (0: the usual scheduling)"
+        0, description="SCHED_FIFO priority to request (0: default scheduling)"
     )
 
     @field_validator("wait_for", check_fields=False)

@@ -64,7 +64,7 @@ class ManagedNode(LifecycleNode, Generic[Schema]):
         self.error: SpaceRobotError | None = None
         """Reason why the last transition failed."""
         description = ParameterDescriptor(
-            description="configure and activate without being told (false: wait for transitions)",
+            description="configure and activate at startup (false: wait for transitions)",
             read_only=True,
         )
         self.autostart = bool(self.declare_parameter(AUTOSTART, True, description).value)
