@@ -31,7 +31,7 @@ MOST = 20_000
 """Runs after which one gives up."""
 FIRST = 100
 """Runs after which one looks first and goes on as the report says."""
-AT_THEIR_RATE = "flying on by *more runs*, at their rate"
+AT_THEIR_RATE = "extended by *more runs*, at their rate"
 NEGLIGIBLE = 1e-9
 SAMPLES = 200_000
 
@@ -159,7 +159,7 @@ def rules(test: ShareTest) -> dict[str, Callable[[], tuple[float, float]]]:
         ),
         "until decided, a look every 50 runs": lambda: rule.looking(50),
         "until decided, a look after every run": lambda: rule.looking(1),
-        "flying on by *more runs*, if none fails": (
+        "extended by *more runs*, if none fails": (
             lambda: rule.flying_on(lambda failures, _: int(rule.met_from[failures]))
         ),
     }

@@ -71,7 +71,8 @@ def parameters() -> str:
         "# Parameters",
         MADE,
         "Defaults are those of a flight without options: the schema, `config/space_robot.yaml`,"
-        " the mission `paper`, case 1. [Configuration](../manual/configuration.md): setting them.",
+        " the mission `paper`, case 1. For how to set them see "
+        "[configuration](../manual/configuration.md).",
         "## All nodes",
         table(HEAD, iter([*_rows(shared, defaults), AUTOSTART])),
     ]
@@ -82,8 +83,9 @@ def parameters() -> str:
         parts += [f"## {node}_node", table(HEAD, iter(rows))]
         if node == "controller":
             parts += [
-                "A list for each gain `<law>.<gain>`, one value an axis or one for all; the set"
-                " has the defaults. Gains change in flight, as `controller` does.",
+                "Each gain `<law>.<gain>` is a list, with one value per axis or one for all axes; "
+                "its default is in the gain set. Like `controller`, gains can be changed in "
+                "flight.",
                 table(("parameter", "description"), _gains()),
             ]
     return "\n\n".join(parts) + "\n"
@@ -95,14 +97,14 @@ AUTOSTART = (
     "bool",
     "true",
     "",
-    "configure and activate by itself; false: wait to be told",
+    "configure and activate at startup; false: wait for transitions",
 )
 STEP_TICKS = (
     "`step_ticks`",
     "integer",
     "1",
     f"from 1 to {MOST_TICKS:g}",
-    "ticks of a step of the paused plant (service ~/step); changes in flight",
+    "ticks per step of a paused plant (service ~/step); can be changed in flight",
 )
 
 
@@ -156,10 +158,13 @@ def faults() -> str:
         "# Kinds of faults",
         MADE,
         "`KIND@T[-END][:ARGUMENT]`, times in simulated seconds;"
-        " [faults](../manual/faults.md) says how to use them.",
+        " their use is described in [faults](../manual/faults.md).",
     ]
-    for title, kinds in (("Of the plant", PLANT_KINDS), ("Of the processes", PROCESS_KINDS)):
-        head = ("fault", "unit", "default", "what is done", "example")
+    for title, kinds in (
+        ("Faults of the plant", PLANT_KINDS),
+        ("Faults of processes", PROCESS_KINDS),
+    ):
+        head = ("fault", "unit", "default", "effect", "example")
         parts += [f"## {title}", table(head, map(_kind, kinds.values()))]
     return "\n\n".join(parts) + "\n"
 
@@ -198,17 +203,14 @@ def topic_page() -> str:
             [
                 "# Topics",
                 MADE,
-                "All are reliable and keep the last messages. Fields, units, frames and rates "
-                "are in"
-                " [bags](../manual/bags.md#topics). Every topic but the last four is recorded; "
-                "what the"
-                " plant flies is noted with the bag. These are"
-                " the names of nodes without a namespace; in one, as `/sat1`, all but "
-                "`/diagnostics` begin"
-                " with it: `/sat1/joint_states`; so do the frames in `/tf`, but for "
-                "`inertial`. `/tf` and"
-                " `/tf_static` themselves are sent by a plant that finds tf2_msgs installed.",
-                table(("topic", "type", "history", "durability", "a message"), rows),
+                "All topics are reliable and keep the last messages (history). Fields, units, "
+                "frames and rates are in [bags](../manual/bags.md#topics). Every topic but the "
+                "last four is recorded; the plant's description is stored in the bag. These are "
+                "the names without a namespace. In a namespace, for instance `/sat1`, all topics"
+                " but `/diagnostics` begin with it (`/sat1/joint_states`), and so do the frames in"
+                " `/tf` except `inertial`. If tf2_msgs is installed, the plant also publishes"
+                " `/tf` and `/tf_static` themselves.",
+                table(("topic", "type", "history", "durability", "published"), rows),
             ]
         )
         + "\n"
@@ -223,16 +225,16 @@ def _occasion(topic: topics.Topic) -> str:
     if topic in (*topics.SCENE, topics.PLANT_DESCRIPTION) and topic.is_latched:
         return "once"
     if topic is topics.MARKERS:
-        return "every 33 ms or more, while somebody listens"
+        return "at most every 33 ms, while there is a subscriber"
     if topic.carries:
-        return "every 10 ms, or every tick if that is longer"
+        return "every 10 ms, or every tick if the period is longer"
     if topic is topics.SIGNALS:
         return "as /controller/telemetry"
     if topic.per_tick and topic.is_optional:
-        return "each tick, where there are any"
+        return "each tick, if the base has them"
     if topic.is_optional:
-        return "every 20 ticks, where sensors or actuators err"
-    return "each tick" if topic.per_tick else "an event" if topic.is_event else "now and then"
+        return "every 20 ticks, if sensors or actuators have errors"
+    return "each tick" if topic.per_tick else "at an event" if topic.is_event else "periodically"
 
 
 def main() -> None:

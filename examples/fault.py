@@ -1,9 +1,9 @@
-"""A fault, on the real graph of ROS 2 nodes: the link is dead for 0.3 s.
+"""A fault on the real graph of ROS 2 nodes: the link is interrupted for 0.3 s.
 
-No state reaches the controller, so no command comes back. For 0.1 s (``hold_ticks``) the plant
-holds the last command that was good, then it is safe: no torque at all. Meanwhile arm and base
-keep the momentum they have, and friction brakes the joints, so they fall behind. With the first
-state after the gap the law engages anew, from the torque that it finds applied.
+No state reaches the controller, so it sends no command. For 0.1 s (``hold_ticks``) the plant
+holds the last valid command; then it is in safe mode, with zero torque. Meanwhile arm and base
+keep their momentum, and friction slows the joints down, so the tracking error grows. With the
+first state after the gap the law starts again, from the torque that is applied at that time.
 
     python examples/fault.py
 
@@ -28,7 +28,7 @@ BEGIN_S, END_S = 1.0, 1.3
 
 
 def main(bag: Path) -> None:
-    """Fly, then see in the bag what the fault did."""
+    """Fly, then read the effects of the fault from the bag."""
     options = ["--composed", "--fault", f"drop_state@{BEGIN_S}-{END_S}:1", "--duration", "2"]
     command = ["space-robot", "fly", *options, "--bag", str(bag)]
     subprocess.run(command, check=True, capture_output=True)
@@ -50,6 +50,6 @@ def main(bag: Path) -> None:
 
 
 if __name__ == "__main__":
-    arguments = argparse.ArgumentParser(description="Cut the link of a ROS graph for 0.3 s.")
+    arguments = argparse.ArgumentParser(description="Interrupt the link of a ROS graph for 0.3 s.")
     arguments.add_argument("--bag", type=Path, default=Path("flights/cut"))
     main(arguments.parse_args().bag)

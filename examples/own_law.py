@@ -1,12 +1,13 @@
-"""Your own law: one class that reads like its equation, flown beside a shipped one.
+"""Your own law: one class that is written like its equation, compared with a shipped law.
 
-Time-delay control (37) is 20 lines: what the last tick's torque did not explain by ``H_bar rhodd``
-is taken to be there still, N_hat, and added. No model of the robot is in it, only a constant
-inertia an axis. TDE-STC has the super-twisting terms in the place of K_P and K_D.
+Time-delay control (37) has 20 lines. N_hat is the part of the last tick's torque that
+``H_bar rhodd`` does not explain; the law assumes that it has not changed, and adds it. The law
+needs no model of the robot, only a constant inertia per axis. TDE-STC has super-twisting terms
+in place of K_P and K_D.
 
     python examples/own_law.py
 
-prints the largest errors of 5 s of case 1 with friction:
+prints the largest errors in 5 s of case 1 with friction:
 
     tde:     attitude 1.1e-07, joints 1-3 1.7e-06 rad
     tde_stc: attitude 3.4e-08, joints 1-3 5.4e-08 rad
@@ -22,7 +23,7 @@ from space_robot_control.laws import ControlLaw, LawGains, Signals, per_axis
 
 
 class Gains(LawGains):
-    """One value for all axes, or one an axis: base x, y, z, then the joints."""
+    """Gains with one value for all axes, or one per axis: base x, y, z, then the joints."""
 
     h_bar = per_axis("constant inertia", "kg m2")
     k_p = per_axis("K_P", "1/s2")
@@ -30,7 +31,7 @@ class Gains(LawGains):
 
 
 class TimeDelayControl(ControlLaw):
-    """``F_S = H_bar (rhodd_d + K_D edot + K_P e) + N_hat``, (37)."""
+    """Time-delay control, (37): ``F_S = H_bar (rhodd_d + K_D edot + K_P e) + N_hat``."""
 
     name = "tde"
     gains_type = Gains
@@ -44,7 +45,7 @@ class TimeDelayControl(ControlLaw):
 
 
 def main() -> None:
-    """Fly both and print their errors."""
+    """Fly both laws and print their errors."""
     gains = {"h_bar": [50.0] * 3 + [5.0] * 3 + [0.5] * 3, "k_p": 100.0, "k_d": 20.0}
     scenario = Scenario(case="1", duration=5.0)
     for title, flight in (

@@ -1,9 +1,10 @@
-"""Your own mission: the same motion, slow and fast, and what speed costs.
+"""Your own mission: the same motion at two speeds, and how speed affects the base.
 
-A segment from rest to rest runs along a fifth-order polynomial. In half the time velocities double
-and accelerations are four times as high. So are the torques, for forces of inertia go with
-accelerations and with squares of velocities. The momentum that the base has to take up goes with
-velocities, and doubles. Friction, which would not follow that, is left out.
+A segment from rest to rest follows a fifth-order polynomial. In half the time the velocities are
+twice as high and the accelerations four times. So are the torques, because inertial forces are
+proportional to accelerations and to squares of velocities. The momentum that the base has to store
+is proportional to velocities, and doubles. Friction does not scale in this way, and is switched
+off.
 
     python examples/own_mission.py
 
@@ -24,13 +25,13 @@ REACHED_OUT = [30.0, 100.0, 150.0, 90.0, 30.0, -50.0]
 
 
 def fly_in(seconds: float) -> FlownFlight:
-    """Fly from one posture to the other in so many seconds."""
+    """Fly from one posture to the other in the specified time."""
     mission = {"waypoint_times": [0.0, seconds], "waypoints_deg": FOLDED + REACHED_OUT}
     return Scenario(mission=mission, friction=False).fly().check()
 
 
 def main() -> None:
-    """Fly the motion twice and compare what it asks of the base."""
+    """Fly the motion twice and compare the demands on the base."""
     torques, momenta = [], []
     for seconds in (20.0, 10.0):
         metrics = fly_in(seconds).metrics

@@ -1,9 +1,9 @@
-"""Your own robot: from a URDF to a flight, with a mission and gains of its own.
+"""Your own robot: from a URDF to a flight, with its own mission and gains.
 
-`two_link_arm.urdf` is a satellite of 200 kg with a light arm of three joints. A robot that is
-not shipped has no mission and no gains: they stand here. Computed torque knows the model, so two
-numbers are all it needs: every axis is critically damped at 10 rad/s. ``space-robot new
-two_link_arm.urdf`` makes a mission and gains of all five laws instead.
+`two_link_arm.urdf` is a satellite of 200 kg with a light arm of three joints. Mission and gains
+exist for the shipped robots only, so this program defines them. Computed torque uses the robot's
+model, so it needs only two gains: every axis is critically damped at 10 rad/s.
+``space-robot new two_link_arm.urdf`` creates a mission and gains for all five laws instead.
 
     python examples/own_robot.py
 
@@ -24,7 +24,7 @@ URDF = Path(__file__).with_name("two_link_arm.urdf")
 
 
 def main() -> None:
-    """Read the robot and fly it, base held and base free."""
+    """Read the robot and fly it with a controlled and with a free base."""
     robot = Robot.from_urdf(URDF)
     print(
         f"{robot.name}: base of {robot.mass[0]:g} kg, arm of {robot.mass[1:].sum():g} kg: "

@@ -1,9 +1,10 @@
-"""A flight as a table of pandas: where the energy goes, leg by leg.
+"""A flight as a pandas table: work and friction in each segment of the mission.
 
-`FlownFlight.table` (of a bag: `space_robot.analysis.export.dataframe(load_bag(...))`) has a
-row a tick, and columns that bear their units. The paper's mission has two legs of 15 s from rest
-to rest, so whatever the motors put in has gone into friction by their ends. Joint 2's motor takes
-energy out: the others drive that joint through the arm, and it brakes. That is dynamic coupling.
+`FlownFlight.table` (for a bag: `space_robot.analysis.export.dataframe(load_bag(...))`) has one
+row per tick, and units in the names of its columns. The paper's mission has two segments of 15 s
+from rest to rest, so at the end of each all work of the motors has been dissipated by friction.
+Joint 2's motor absorbs energy: the other motors drive that joint through the arm, and its motor
+brakes it. This is dynamic coupling.
 
     python examples/pandas_analysis.py
 
@@ -29,7 +30,7 @@ COULOMB_NM, VISCOUS_NMS = 0.02, 0.2
 
 
 def main() -> None:
-    """Fly case 1 and tabulate it."""
+    """Fly case 1 and print the work of its motors."""
     flight = Scenario(controller="tde_stc", case="1").fly()
     joints, period_s = flight.log.joint_names, flight.flight.period
     table = flight.table.set_index("time_s")

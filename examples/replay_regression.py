@@ -1,9 +1,9 @@
 """Replay: a bag as the regression test of a controller.
 
-A bag holds what the controller saw and what it answered. `replay` starts the controller's node,
-sends it the recorded bytes again, and compares every answer to the last bit. Record once with
-software that you trust; after a change of code, `has_passed` is the test's assertion. Here a gain
-plays the part of the change: the second replay finds the first tick that differs.
+A bag contains the controller's inputs and its commands. `replay` starts the controller's node,
+sends it the recorded bytes again, and compares every command to the last bit. Record once with
+software that you trust; after a change of code, assert `has_passed` in a test. Here a different
+gain represents the change: the second replay reports the first tick that differs.
 
     python examples/replay_regression.py
 

@@ -1,10 +1,11 @@
-"""A campaign: many flights over what is not known, and a verdict that knows its limits.
+"""A campaign: many flights with uncertain parameters, and verdicts with a confidence.
 
-Masses are off by up to 20 %, sensors are fine ones, and the navigation filters. Two laws fly the
-same draws. Required is that the quaternion's error stays below 2e-5 (8 arcsec) in 80 % of all
-such cases, at 90 % confidence. Eleven runs, fixed beforehand, are the fewest that can say so: were
-the share 80 %, all of eleven would be met with a probability of 0.8^11, 8.6 %. A verdict holds for
-what was varied, as it was varied, and for nothing else: here for the first second of case 3.
+Masses are wrong by up to 20 %, sensors are `fine`, and the navigation is filtered. Two laws fly
+the same draws. The requirement: the quaternion's error stays below 2e-5 (8 arcsec) in 80 % of all
+such cases, at 90 % confidence. Eleven runs, fixed in advance, are the smallest number that can
+show it: if the share were 80 %, all eleven would meet the limit with a probability of 0.8^11,
+8.6 %. A verdict is valid only for the parameters and distributions of the campaign, here also only
+for the first second of case 3.
 
     python examples/small_campaign.py
 
@@ -32,7 +33,7 @@ STUDY = {
 
 
 def main() -> None:
-    """Fly the campaign, print its verdicts, and fly its worst case again."""
+    """Fly the campaign, print its verdicts, and repeat its worst case."""
     flown = Campaign.of(STUDY).run(runs=11, seed=7, workers=0)
     for verdict in flown.verdicts:
         met = verdict.runs - verdict.failures

@@ -1,9 +1,9 @@
-"""Stepping by hand: your loop around the plant, a snapshot, and a second future.
+"""Stepping by hand: your own loop around the plant, and two continuations of one snapshot.
 
-The bench flies a scenario tick by tick under torques from anywhere. Here a PD law moves the joints
-and nothing turns the base, so the total angular momentum stays zero and the base must turn
-against the arm. `save` and `restore` try what would have come of another decision: from the same
-state on, once the motors go on and once they fall silent.
+The bench flies a scenario tick by tick with torques from any source. Here a PD law moves the
+joints and no torque acts on the base, so the total angular momentum stays zero and the base turns
+against the arm. `save` and `restore` compare two continuations from the same state: with the
+motors on and with the motors off.
 
     python examples/step_by_hand.py
 

@@ -1,8 +1,8 @@
-"""A law swapped in flight, on the real graph of ROS 2 nodes.
+"""A change of the law in flight, on the real graph of ROS 2 nodes.
 
 `space-robot fly` starts plant, controller, mission and recorder (here in one process), and the
-controller changes from TDE-STC to CTC between two ticks. The new law takes over from the torque
-that it finds applied, and passes to its own within 20 ms: the torque does not jump.
+controller changes from TDE-STC to CTC between two ticks. The new law starts from the applied
+torque, and blends to its own within 20 ms, so the torque has no step.
 In a flight of your own, ``ros2 param set /controller_node controller ctc`` does the same.
 
     python examples/swap_in_flight.py
@@ -27,7 +27,7 @@ from space_robot import load_bag
 
 
 def main(bag: Path) -> None:
-    """Fly, then read in the bag what the swap did."""
+    """Fly, then read the effects of the swap from the bag."""
     options = ["--composed", "--swap", "1:ctc", "--duration", "2", "--bag", str(bag)]
     subprocess.run(["space-robot", "fly", *options], check=True, capture_output=True)
     log = load_bag(bag)

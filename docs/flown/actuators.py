@@ -109,8 +109,8 @@ PAGE = Page(
             [_free(law) for law in LAWS],
         ),
         Sentence(
-            "the wheel that has most to do gives {} N m with the one, {} with the other, {} with "
-            "the null motion",
+            "the largest motor torque of a wheel is {} N m with `pseudo_inverse`, {} with "
+            "`least_largest`, {} with the null motion",
             tuple(
                 Number(options, largest_wheel_torque, ".2f")
                 for options in (
@@ -124,7 +124,7 @@ PAGE = Page(
             ),
         ),
         Sentence(
-            "costs CTC-SMC: {} attitude error in case 1 without, {} with it",
+            "causes with CTC-SMC: {} attitude error in case 1 without, {} with it",
             tuple(
                 Number(options, ATTITUDE)
                 for options in (
@@ -142,7 +142,7 @@ PAGE = Page(
             ),
         ),
         Sentence(
-            "With `fine` sensors and navigation filtered the numbers are the same (tde_stc {}), "
+            "With `fine` sensors and filtered navigation the error is about the same (tde_stc {}), "
             "with `tactical` {}.",
             (
                 Number({**ON_THRUSTERS, "sensors": "fine"}, ATTITUDE),
@@ -168,8 +168,8 @@ PAGE = Page(
             (Number(_on_wheels("tde_stc"), ATTITUDE), Number({"controller": "tde_stc"}, ATTITUDE)),
         ),
         Sentence(
-            "tde_stc {}, the joints as before; ctc and ctc_smc lose the joints, too ({} and {} "
-            "rad)",
+            "the attitude error is {} for tde_stc, with joints as before; ctc and ctc_smc lose "
+            "the joints, too ({} and {} rad)",
             (
                 Number({"actuators": "small_wheels", "controller": "tde_stc"}, ATTITUDE),
                 Number({"actuators": "small_wheels", "controller": "ctc"}, JOINTS_1_3),

@@ -110,16 +110,16 @@ PAGE = Page(
             ],
         ),
         Sentence(
-            "The mission asks {} N m of a base axis and {} N m s of momentum.",
+            "The mission needs {} N m about a base axis and {} N m s of momentum.",
             (Number(IDEAL, PEAKS[1], ".1f"), Number(IDEAL, "sizing.peak_momentum_n_m_s", ".1f")),
         ),
         Sentence(
-            "flies the legs in 50 s each on {} N m of the busiest wheel, with an attitude error "
+            "flies each leg in 50 s with {} N m of the most loaded wheel, and an attitude error "
             "of {}. That",
             (Number(SLOW, largest_wheel_torque), Number(SLOW, ATTITUDE)),
         ),
         Sentence(
-            "`--set controller.allocation.least_speed=50` keeps them from it: {})",
+            "`--set controller.allocation.least_speed=50` prevents this: {})",
             (
                 Number(
                     {
@@ -132,18 +132,18 @@ PAGE = Page(
             ),
         ),
         Sentence(
-            "Under TDE-STC they are at their limit in {} % of the ticks, first after {} s.",
+            "With TDE-STC they are at their limit in {} % of the ticks, first after {} s.",
             (
                 Number(STC_ON_SMALL_WHEELS, "wheel_saturation.share", ".0f", 100.0),
                 Number(STC_ON_SMALL_WHEELS, first_at_limit, ".1f"),
             ),
         ),
         Sentence(
-            "the base turns by {}°, whichever law flies",
+            "the base turns by {}° with every law",
             (Number({"actuators": "none", "controller": "tde_stc"}, DRIFT, ".1f"),),
         ),
         Sentence(
-            "`--fault wheel_fail@10:3` on `wheels` costs TDE-STC {} at most",
+            "`--fault wheel_fail@10:3` on `wheels` causes an error of at most {} with TDE-STC",
             (
                 Number(
                     {"actuators": "wheels", "faults": ["wheel_fail@10:3"]}, largest_attitude_error
@@ -151,7 +151,7 @@ PAGE = Page(
             ),
         ),
         Sentence(
-            "comes back: {} at 30 s, {} at 60 s, {} at 90 s, {} at the end.",
+            "recovers: {} at 30 s, {} at 60 s, {} at 90 s, {} at the end.",
             tuple(
                 Number(COMES_BACK, attitude_error_at(t), ".2g", 1e3)
                 for t in (30.0, 60.0, 90.0, 180.0)

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from space_robot_control.controller.gains import build_law
+from space_robot_control.controller.gains import build_law, split_gains
 from space_robot_control.controller.settings import ControllerNodeSettings
 from space_robot_control.laws.trust import check_file, check_law, is_plain
 from space_robot_control.navigation.low_pass import low_pass_weight
@@ -22,10 +22,13 @@ from space_robot_model.robot import Robot
 from space_robot_model.robot.find import find_robot
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.bag.law_history import laws_of
+from space_robot_msgs_py.config.settings import leaves
 from space_robot_msgs_py.config.text import shortened
+from space_robot_msgs_py.config.trees import nest
 from space_robot_msgs_py.config.validation import short, validate
 from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.simulated_time import tick_from
+from space_robot_sim.actuators.actuators import ActuatorSettings
 from space_robot_sim.environment.captures import Captures
 from space_robot_sim.environment.environment import EnvironmentSettings
 from space_robot_sim.environment.events import Event, named_targets, parse_events
@@ -44,6 +47,9 @@ IDEAL = "ideal"
 """Name of the sensors without error."""
 MOST_LETTERS = 400
 """Of the joints' names in an error."""
+_NUMBERS = {
+    name for schema in (EnvironmentSettings, ActuatorSettings) for name, _ in leaves(schema)
+}
 DIRECT = "direct"
 """Name of the navigation without filter."""
 
@@ -158,8 +164,13 @@ def event_times(log: FlightLog) -> Array:
 
 
 def _plant_settings(log: FlightLog, keys: Sequence[str] = ()) -> PlantNodeSettings:
-    """Return the plant's settings; if all ``keys`` are given, nothing but these is looked at."""
+    """Return the plant's settings; if all ``keys`` are given, nothing but these is looked at.
+
+    The bag has every number. An older one has those that were set, and names of files.
+    """
     parameters = _parameters(log, PlantNodeSettings.node)
+    if parameters.keys() >= _NUMBERS:
+        return validate(PlantNodeSettings, nest(parameters), "plant parameters of the bag")
     if not parameters:
         parameters = {
             key: log.flight[key] for key in ("robot", "case", "mission") if key in log.flight
@@ -280,7 +291,8 @@ def _described_h_bar(log: FlightLog) -> Array:
         h_bar = np.array(gains.get("h_bar", ()), dtype=np.float64)
     else:
         chosen: dict[str, Any] = {key: flight[key] for key in ("robot", "gains") if key in flight}
-        chosen |= {**_parameters(log, ControllerNodeSettings.node), "controller": name}
+        recorded, _ = split_gains(_parameters(log, ControllerNodeSettings.node))
+        chosen |= {**recorded, "controller": name}
         _check_files(log, chosen)
         if not log.trusted:
             check_law(str(name))

@@ -24,7 +24,7 @@ STOPS = {
         f"stop_{node}",
         _SECONDS,
         math.inf,
-        f"the {node}'s process stands still, then goes on",
+        f"the {node}'s process is stopped, and continues after SECONDS",
         lasts=False,
     )
     for node in _NODES

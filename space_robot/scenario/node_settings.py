@@ -6,14 +6,12 @@ from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 from space_robot_control.controller.gains import gains_as_path, split_gains
-from space_robot_control.controller.settings import ControllerNodeSettings, set_file
+from space_robot_control.controller.settings import ControllerNodeSettings
 from space_robot_control.guidance.settings import MissionNodeSettings
 from space_robot_control.laws import ControlLaw
 from space_robot_control.navigation.assumed_sensors import assumed_numbers
-from space_robot_model.robot.find import mission_layers
 from space_robot_msgs_py.bag.recorder_settings import RecorderNodeSettings
-from space_robot_msgs_py.config.directory import config_directory
-from space_robot_msgs_py.config.files import GIVEN, named_layers, node_parameters
+from space_robot_msgs_py.config.files import GIVEN
 from space_robot_msgs_py.config.settings import NodeSettings
 from space_robot_msgs_py.config.trees import Tree, flatten, merge, nest
 from space_robot_msgs_py.config.validation import one_of
@@ -57,8 +55,6 @@ class FlightSettings(NamedTuple):
     recorder: RecorderNodeSettings
     gains: dict[str, Tree]
     """Gains by law, which override the gain set."""
-    overrides: dict[str, tuple[str, ...]]
-    """Dotted names of the settings of each node that override its files."""
 
     @classmethod
     def resolve(cls, options: Given, parameters: Given) -> FlightSettings:
@@ -68,65 +64,38 @@ class FlightSettings(NamedTuple):
             InputError: a parameter is invalid or cannot be set this way.
         """
         check_may_be_set(parameters)
-        overrides = {
-            node: dict(flatten(nest({**options.get(node, {}), **parameters.get(node, {})})))
-            for node in NODES
+        given = {
+            node: nest({**options.get(node, {}), **parameters.get(node, {})}) for node in NODES
         }
-        plant = PlantNodeSettings.resolve(overrides["plant"])
-        mission = MissionNodeSettings.resolve(overrides["mission"])
-        for node in (plant, mission):  # a file that is not shipped: a bag tells all of it
-            for file in mission_layers(node.robot, node.mission):
-                if config_directory() not in file.parents:
-                    of_file = dict(flatten(node_parameters(file, node.node)))
-                    overrides[node.node] = {**of_file, **overrides[node.node]}
-        if events := [str(event) for event in plant.parsed_events]:  # their files' numbers too
-            overrides["plant"]["events"] = events
+        plant = PlantNodeSettings.resolve(given["plant"])
+        if events := [str(event) for event in plant.parsed_events]:  # with the targets' numbers
             plant = plant.model_copy(update={"events": events})
-        overrides["controller"].setdefault("actuators", plant.actuators)
-        if plant.realtime:  # by the wall clock there is no time to wait
-            overrides["controller"] = {"reference_timeout": 0.0, **overrides["controller"]}
-        own, gains = split_gains(overrides["controller"])
-        controller = ControllerNodeSettings.resolve(own)
-        path = gains_as_path(controller.gains, controller.robot)
-        of_flight = named_layers("actuators", controller.actuators)
-        # as if given: a bag tells of it
-        for file in (*of_flight, *set_file(controller.robot, path)):
-            of_the_set = dict(flatten(node_parameters(file, "controller")))
-            overrides["controller"] = {**of_the_set, **overrides["controller"]}
-            own = merge(nest(of_the_set), own)
-            controller = ControllerNodeSettings.resolve(own)
-        if controller.navigation == "filtered" and "navigation_sensors" not in own:
-            if plant.sensors == GIVEN:
-                assumed = {"navigation_filter": assumed_numbers(plant, plant.period)}
-                overrides["controller"] = {**dict(flatten(assumed)), **overrides["controller"]}
-                own = merge(assumed, own)
-            else:
-                own["navigation_sensors"] = plant.sensors
-                overrides["controller"]["navigation_sensors"] = plant.sensors
-            controller = ControllerNodeSettings.resolve(own)
+        controller, gains = _controller(given["controller"], plant)
         settings = cls(
             plant,
-            controller.model_copy(update={"gains": path}),
-            mission,
-            RecorderNodeSettings.resolve(overrides["recorder"]),
+            controller,
+            MissionNodeSettings.resolve(given["mission"]),
+            RecorderNodeSettings.resolve(given["recorder"]),
             gains,
-            {node: tuple(names) for node, names in overrides.items()},
         )
         settings._check_periods()
         return settings
 
     def parameters(self, laws: Mapping[str, ControlLaw]) -> dict[str, dict[str, Any]]:
-        """Return the resolved values of the parameters set for each node, by dotted name."""
-        gains = {
+        """Return all parameters of every node but those of `NOT_TO_BE_SET`, by dotted name."""
+        parameters = {
+            node: {
+                name: value
+                for name, value in flatten(getattr(self, node).model_dump(mode="json"))
+                if f"{node}.{name}" not in NOT_TO_BE_SET or name == "period"
+            }
+            for node in NODES
+        }
+        parameters["controller"] |= {
             f"{name}.{gain}": values.tolist()
             for name, law in laws.items()
             for gain, values in law.gain_values.items()
         }
-        parameters = {}
-        for node, names in self.overrides.items():
-            settings: NodeSettings = getattr(self, node)
-            resolved = dict(flatten(settings.model_dump())) | gains
-            parameters[node] = {name: resolved[name] for name in names if name in resolved}
         return parameters
 
     def _check_periods(self) -> None:
@@ -136,6 +105,28 @@ class FlightSettings(NamedTuple):
             raise InputError(
                 f"the period must be the same for all nodes, got {said} s: use --period"
             )
+
+
+def _controller(
+    given: Tree, plant: PlantNodeSettings
+) -> tuple[ControllerNodeSettings, dict[str, Tree]]:
+    """Resolve the controller's settings and the gains given by law; defaults are the plant's."""
+    own, gains = split_gains(given)
+    own.setdefault("actuators", plant.actuators)
+    if plant.realtime:  # by the wall clock there is no time to wait
+        own.setdefault("reference_timeout", 0.0)
+    controller = ControllerNodeSettings.resolve(own)
+    own["gains"] = gains_as_path(controller.gains, controller.robot)
+    if controller.navigation == "filtered" and "navigation_sensors" not in own:
+        if plant.sensors == GIVEN:
+            numbers = {"navigation_filter": assumed_numbers(plant, plant.period)}
+            own = merge(numbers, own)
+        else:
+            own["navigation_sensors"] = plant.sensors
+    controller = ControllerNodeSettings.resolve(own)
+    if (filtered := controller.filter_settings) is not None:
+        controller = controller.model_copy(update={"navigation_filter": filtered})
+    return controller, gains
 
 
 def check_may_be_set(parameters: Given) -> None:

@@ -19,50 +19,53 @@ class AllocationSettings(StrictModel):
 
     wheels: WheelAllocation = Field(
         "pseudo_inverse",
-        description="how wheels share a torque: pseudo_inverse (least squares of their loads) or "
-        "least_largest (least largest load)",
+        description="allocation of a torque to the wheels: pseudo_inverse (least squares of their "
+        "loads) or least_largest (smallest largest load)",
     )
     null_gain: Annotated[float, Field(ge=0.0, le=1e3)] = Field(
         1.0,
-        description="rate at which momentum that wheels hold against one another is corrected, "
-        "1/s (0: never)",
+        description="rate at which the wheels' momentum in the null space is corrected, 1/s "
+        "(0: never)",
     )
     null_share: Share = Field(
-        0.2, description="share of a wheel's largest torque that this may take"
+        0.2, description="largest share of a wheel's largest torque for this correction"
     )
     least_speed: Annotated[float, Field(ge=0.0, le=1e6)] = Field(
         0.0,
-        description="speed above which wheels are kept by momentum against one another, rad/s "
-        "(0: they are balanced alone)",
+        description="speed above which the wheels are kept by momentum in the null space, rad/s "
+        "(0: the wheels are only balanced)",
     )
     failure_ticks: Annotated[int, Field(ge=0, le=10**6)] = Field(
         100,
-        description="ticks in a row without the torque asked for until a wheel counts as failed; "
-        "more than commands are late (0: never)",
+        description="successive ticks without the commanded torque after which a wheel counts as "
+        "failed; must exceed the latency of commands (0: never)",
     )
     modulation: Modulation = Field(
-        "schmitt", description="how thrusters make a mean torque: pwm, sigma_delta or schmitt"
+        "schmitt", description="modulation of the thrusters: pwm, sigma_delta or schmitt"
     )
     modulation_period: Annotated[float, Field(ge=1e-6, le=100.0)] = Field(
-        0.1, description="of pwm: time from one pulse to the next, s"
+        0.1, description="pwm: time from one pulse to the next, s"
     )
     schmitt_on: Annotated[float, Field(ge=1e-3, le=1e3)] = Field(
-        1.0, description="of schmitt: a thruster opens when it owes so many shortest pulses"
+        1.0, description="schmitt: impulse error at which a thruster opens, in shortest pulses"
     )
     schmitt_off: Annotated[float, Field(ge=-1e3, le=1e3)] = Field(
-        0.0, description="of schmitt: it closes when it owes no more than so many"
+        0.0, description="schmitt: impulse error at which it closes, in shortest pulses"
     )
     force_weight: Share = Field(
         0.03,
-        description="weight of the thrusters' force on the base against their torque, over their "
-        "mean lever arm",
+        description="weight of the thrusters' force times their mean lever arm, relative to their "
+        "torque",
     )
     unload_above: Share = Field(
-        0.7, description="share of its largest momentum from which on thrusters unload a wheel"
+        0.7,
+        description="share of a wheel's largest momentum above which thrusters unload the wheels",
     )
-    unload_to: Share = Field(0.3, description="share at which they have unloaded all wheels")
+    unload_to: Share = Field(
+        0.3, description="share of the largest momentum below which unloading ends"
+    )
     unload_time: Annotated[float, Field(ge=1e-3, le=1e6)] = Field(
-        20.0, description="time constant with which the wheels' momentum is unloaded, s"
+        20.0, description="time constant of unloading, s"
     )
 
     @model_validator(mode="after")

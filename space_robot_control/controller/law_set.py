@@ -10,7 +10,6 @@ from rclpy.parameter import Parameter
 from space_robot_model.hardware.base_actuators import BaseActuatorSettings
 from space_robot_model.robot import Robot
 from space_robot_msgs_py.bag.law_history import LawChange
-from space_robot_msgs_py.config.trees import nest
 from space_robot_msgs_py.config.validation import one_of
 from space_robot_msgs_py.errors import SpaceRobotError
 from space_robot_msgs_py.ros.managed_node import ManagedNode
@@ -19,7 +18,7 @@ from space_robot_msgs_py.samples import Reference, RobotState
 
 from ..laws import ControlLaw
 from .controller import Controller
-from .gains import PARAMETERS, build_laws, check_gains, gain_lengths, gain_range
+from .gains import build_laws, check_gains, gain_lengths, gain_range, split_gains
 from .law_choice import LawChoice
 from .settings import ControllerNodeSettings
 from .swaps import parse_swaps
@@ -35,7 +34,8 @@ class LawSet:
             InputError: a law, a gain or a swap is invalid.
         """
         self._node, self._settings, self._axes = node, settings, axes
-        self._laws = build_laws(settings, axes)
+        _, gains = split_gains(overrides(node))
+        self._laws = build_laws(settings, axes, gains)
         for law in self._laws.values():
             self._declare(law)
         swaps = [
@@ -72,13 +72,10 @@ class LawSet:
         self._node.remove_on_set_parameters_callback(self._on_set)
 
     def _declare(self, law: ControlLaw) -> None:
-        """Declare the gains of a law; parameters override its file."""
-        node, descriptions = self._node, law.gain_descriptions()
-        overridden = overrides(node, [f"{law.name}.{gain}" for gain in descriptions])
-        tree = {**law.gain_values, **nest(overridden).get(law.name, {})}
-        law.gain_values = check_gains(tree, type(law), self._axes, PARAMETERS)
+        """Declare the gains of a law as parameters."""
+        descriptions = law.gain_descriptions()
         for gain, values in law.gain_values.items():
-            node.declare_parameter(
+            self._node.declare_parameter(
                 f"{law.name}.{gain}",
                 values.tolist(),
                 ParameterDescriptor(

@@ -60,53 +60,59 @@ class ControllerNodeSettings(NodeSettings):
     )
 
     controller: str = Field(
-        "tde_stc", description="control law in force, or file.py:Class or module:Class of your own"
+        "tde_stc", description="control law: a name, or file.py:Class or module:Class of your own"
     )
     gains: str = Field(
         "default", description="gain set of config/gains/<robot>, or a path to a file or folder"
     )
     actuators: str = Field(
         "ideal",
-        description="actuators that the controller believes the base to have: of "
-        "config/actuators, or a path to their YAML",
+        description="the base's actuators that the controller assumes: a name of config/actuators, "
+        "or a path to a YAML file",
     )
     telemetry_decimation: Annotated[int, Field(ge=1, le=10**6)] = Field(
         20,
         description="ticks between two messages on /controller/telemetry and /controller/signals",
     )
     swaps: Texts = Field(
-        [""], description="laws to swap to in flight, each as T:LAW with T in simulated seconds"
+        [""], description="changes of the law in flight, each as T:LAW with T in simulated seconds"
     )
     acceleration_filter_hz: Annotated[float, Field(ge=0.0, le=1e5)] = Field(
-        0.0, description="corner of the low-pass of the time-delay estimate's pair, Hz (0: none)"
+        0.0,
+        description="corner frequency of the low-pass filter of the time-delay estimate, Hz "
+        "(0: none)",
     )
     navigation: Mode = Field(
-        "direct", description="what the laws see: direct (what is measured) or filtered"
+        "direct", description="input of the laws: direct (measurements) or filtered (estimates)"
     )
     navigation_sensors: str = Field(
         "fine",
-        description="sensors that the filter is for: of config/sensors, or a path to their YAML",
+        description="sensors that the filter assumes: a name of config/sensors, or a path to a "
+        "YAML file",
     )
     navigation_filter: NavigationFilterSettings = NavigationFilterSettings()
     allocation: AllocationSettings = AllocationSettings()
     hold_ticks: Annotated[int, Field(ge=0, le=10**6)] = Field(
-        200, description="bad states over which the last torque is repeated; then it is zero"
+        200, description="invalid states for which the last torque is held; then the torque is zero"
     )
     longest_jump: Annotated[int, Field(ge=1, le=10**9)] = Field(
-        2000, description="ticks from one state to the next that are still believed"
+        2000, description="largest accepted number of ticks from one state to the next"
     )
     reference_timeout: Annotated[float, Field(ge=0.0, le=1e6)] = Field(
-        2.0, description="s by the wall clock to wait for a reference; then its last point is held"
+        2.0,
+        description="time to wait for a reference, s of the wall clock; then its last point is "
+        "held",
     )
     state_timeout: Annotated[float, Field(ge=0.001, le=1e6)] = Field(
-        2.0, description="s by the wall clock without a state until that is reported"
+        2.0, description="time without a state after which this is reported, s of the wall clock"
     )
     wait_for: Texts = Field(
         [""],
-        description="who must listen before the first command: NODE:TOPIC, or NODE to all it sends",
+        description="subscribers to wait for before the first command: NODE:TOPIC, or NODE for "
+        "all topics",
     )
     listener_timeout: Annotated[float, Field(ge=0.0, le=1e6)] = Field(
-        0.0, description="s by the wall clock that wait_for is waited for (0: as long as it takes)"
+        0.0, description="longest time to wait for wait_for, s of the wall clock (0: no limit)"
     )
 
     @property

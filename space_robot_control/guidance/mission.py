@@ -23,12 +23,12 @@ class MissionSettings(StrictModel):
     """Waypoints as flat lists, as ROS parameters hold them."""
 
     waypoint_times: list[float] = Field(
-        [0.0], description="time of each waypoint, s, rising from 0", min_length=1
+        [0.0], description="time of each waypoint, s, increasing from 0", min_length=1
     )
     waypoints_deg: list[float] = Field(
         [0.0],
-        description="positions of the joints with motors in all waypoints one after the other, "
-        "degrees (of prismatic joints m)",
+        description="positions of the actuated joints, waypoint by waypoint, degrees (prismatic "
+        "joints: m)",
     )
     base_quaternion: Annotated[list[float], Field(min_length=4, max_length=4)] = Field(
         [1.0, 0.0, 0.0, 0.0], description="base attitude to hold: w, x, y, z"

@@ -21,13 +21,13 @@ class MissionNodeSettings(MissionSettings, NodeSettings):
     selectors: ClassVar[tuple[str, ...]] = ("robot", "mission")
 
     mission: str = Field(
-        "", description="a mission of config/missions (empty: the robot's), or a path"
+        "", description="a mission of config/missions, or a path to its YAML (empty: the robot's)"
     )
     chunk_ticks: Annotated[int, Field(ge=1, le=10_000)] = Field(
-        100, description="ticks in one message of the reference"
+        100, description="ticks per message of the reference"
     )
     lead_ticks: Annotated[int, Field(ge=1, le=10_000)] = Field(
-        1000, description="how far the stream is kept ahead of the plant, ticks"
+        1000, description="lead of the reference ahead of the plant, ticks"
     )
 
     @classmethod

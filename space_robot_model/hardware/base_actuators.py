@@ -28,7 +28,7 @@ class BaseActuatorSettings(StrictModel):
 
     base_actuation: BaseActuation = Field(
         "ideal",
-        description="actuators of the base: ideal (the commanded torque), hardware (wheels, "
+        description="torque on the base: ideal (the commanded torque), hardware (wheels, "
         "thrusters), none (the base floats freely)",
     )
     wheels: WheelSettings = WheelSettings()

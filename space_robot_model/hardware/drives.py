@@ -12,14 +12,16 @@ from .per_axis import PER_AXIS, Numbers, Sizes
 class DriveSettings(StrictModel):
     """Errors of torque drives; by default none."""
 
-    drive_scale: Numbers = Field([1.0], description=f"torque per commanded torque; {PER_AXIS}")
-    drive_bias: Numbers = Field([0.0], description=f"additional torque, N m; {PER_AXIS}")
+    drive_scale: Numbers = Field(
+        [1.0], description=f"applied torque divided by commanded torque; {PER_AXIS}"
+    )
+    drive_bias: Numbers = Field([0.0], description=f"torque that the drive adds, N m; {PER_AXIS}")
     drive_lag: Sizes = Field(
         [0.0], description=f"time constant of the drive's lag, s (0: none); {PER_AXIS}"
     )
     drive_step: Sizes = Field(
-        [0.0], description=f"resolution of the torque, N m (0: unlimited); {PER_AXIS}"
+        [0.0], description=f"resolution of the torque, N m (0: continuous); {PER_AXIS}"
     )
     drive_dead_band: Sizes = Field(
-        [0.0], description=f"commanded torque below which none is applied, N m; {PER_AXIS}"
+        [0.0], description=f"torque below which the drive applies none, N m; {PER_AXIS}"
     )

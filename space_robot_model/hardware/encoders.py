@@ -18,13 +18,15 @@ class EncoderSettings(StrictModel):
     """Encoders of all joints; by default without error."""
 
     bits: Annotated[int, Field(ge=0, le=32)] = Field(
-        0, description="resolution in bits per turn, or per metre (0: unlimited)"
+        0, description="resolution: 2^bits steps per revolution, or per metre (0: continuous)"
     )
     noise: Sigma = Field(0.0, description="white noise of each angle, rad or m")
     difference_ticks: Annotated[int, Field(ge=0, le=MOST_DIFFERENCED)] = Field(
-        0, description="joint rates are differences of angles over N ticks (0: measured)"
+        0,
+        description="ticks over which angles are differenced to joint rates (0: rates are "
+        "measured)",
     )
     velocity_noise: Sigma = Field(0.0, description="white noise of each joint rate, rad/s or m/s")
     velocity_step: Sigma = Field(
-        0.0, description="resolution of joint rates, rad/s or m/s (0: unlimited)"
+        0.0, description="resolution of joint rates, rad/s or m/s (0: continuous)"
     )

@@ -17,7 +17,9 @@ OnAxes = Annotated[
 class GyroSettings(StrictModel):
     """A gyro; by default without error."""
 
-    noise: Sigma = Field(0.0, description="white noise of each sample, for any period, rad/s")
+    noise: Sigma = Field(
+        0.0, description="white noise of each sample, independent of the period, rad/s"
+    )
     angle_random_walk: Sigma = Field(
         0.0, description="density sigma_v of the white noise on the rate, rad/s^1/2"
     )
@@ -29,6 +31,6 @@ class GyroSettings(StrictModel):
     )
     scale_factor_error: OnAxes = Field(
         [0.0, 0.0, 0.0],
-        description="scale-factor error e: (1 + e) times the true rate, on base x, y, z",
+        description="scale factor error e: the gyro measures (1 + e) times the rate; base x, y, z",
     )
-    step: Sigma = Field(0.0, description="resolution, rad/s (0: unlimited)")
+    step: Sigma = Field(0.0, description="resolution, rad/s (0: continuous)")

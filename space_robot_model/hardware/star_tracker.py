@@ -34,16 +34,19 @@ class StarTrackerSettings(StrictModel):
     """A star tracker; by default without error, at every tick."""
 
     noise_across: Angle = Field(
-        0.0, description="standard deviation about each axis across the boresight, rad"
+        0.0, description="noise about each axis across the boresight, standard deviation, rad"
     )
-    noise_about: Angle = Field(0.0, description="standard deviation about the boresight, rad")
+    noise_about: Angle = Field(
+        0.0, description="noise about the boresight, standard deviation, rad"
+    )
     boresight: Annotated[
         list[float], Field(min_length=3, max_length=3), AfterValidator(has_direction)
-    ] = Field([0.0, 0.0, 1.0], description="axis of its optics in the base frame")
+    ] = Field([0.0, 0.0, 1.0], description="boresight in the base frame")
     rate: Annotated[float, Field(ge=0.0, le=1e5)] = Field(
-        0.0, description="measurements per second, rounded to whole ticks (0: one per tick)"
+        0.0,
+        description="measurements per second, rounded to a whole number of ticks (0: one per tick)",
     )
     delay: Annotated[float, Field(ge=0.0, le=100.0)] = Field(
-        0.0, description="time from exposure to release, s, to a whole number of ticks"
+        0.0, description="time from exposure to output, s, rounded to a whole number of ticks"
     )
-    step: Angle = Field(0.0, description="resolution of the attitude, rad")
+    step: Angle = Field(0.0, description="resolution of the attitude, rad (0: continuous)")

@@ -28,8 +28,8 @@ Array = NDArray[np.float64]
 
 
 STANDARD_GRAVITY = 9.80665
-"""Standard gravity, m/s2."""
-PER_THRUSTER = "one value for all thrusters, or one each"
+"""m/s2."""
+PER_THRUSTER = "one value for all thrusters, or one per thruster"
 Times = Annotated[list[Annotated[float, Field(ge=0.0, le=1.0)]], FEWEST]
 
 
@@ -46,23 +46,23 @@ class ThrusterSettings(StrictModel):
 
     positions: Annotated[Vectors, AfterValidator(_positions)] = Field(
         NO_VECTORS,
-        description="positions from the base's CoM, base frame, m: x, y, z of each thruster, one "
-        "after the other ([0.0]: no thrusters)",
+        description="positions from the base's CoM, in the base frame, m: x, y, z of each "
+        "thruster, one behind the other ([0.0]: no thrusters)",
     )
     directions: Annotated[Vectors, AfterValidator(_directions)] = Field(
         NO_VECTORS,
-        description="directions of the force on the base, base frame: x, y, z of each thruster, "
-        "one after the other",
+        description="directions of the force on the base, in the base frame: x, y, z of each "
+        "thruster, one behind the other",
     )
     force: Positive = Field([1.0], description=f"force of an open thruster, N; {PER_THRUSTER}")
     shortest_pulse: Times = Field(
         [0.0],
-        description="minimum opening time of a valve, s, to a whole "
-        f"number of ticks; {PER_THRUSTER}",
+        description="shortest time for which a valve is open, s, rounded to a whole number of "
+        f"ticks; {PER_THRUSTER}",
     )
     delay: Times = Field(
         [0.0],
-        description="time from a command to its valve, s, to a whole number of ticks; "
+        description="delay from the command to the valve, s, rounded to a whole number of ticks; "
         f"{PER_THRUSTER}",
     )
     specific_impulse: Positive = Field([220.0], description=f"specific impulse, s; {PER_THRUSTER}")

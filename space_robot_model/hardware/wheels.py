@@ -17,7 +17,7 @@ from .mounting import NO_VECTORS, Positive, Sizes, Vectors, are_directions, dire
 Array = NDArray[np.float64]
 
 
-PER_WHEEL = "one value for all wheels, or one each"
+PER_WHEEL = "one value for all wheels, or one per wheel"
 
 
 def _axes(flat: list[float]) -> list[float]:
@@ -43,8 +43,8 @@ class WheelSettings(StrictModel):
     )
     max_momentum: Sizes = Field(
         [0.0],
-        description="momentum rotor_inertia times speed up to which the motor speeds a wheel up, "
-        f"N m s (0: no limit); {PER_WHEEL}",
+        description="momentum (rotor_inertia times speed) up to which the motor accelerates the "
+        f"wheel, N m s (0: no limit); {PER_WHEEL}",
     )
     coulomb: Sizes = Field([0.0], description=f"Coulomb friction, N m; {PER_WHEEL}")
     viscous: Sizes = Field([0.0], description=f"viscous friction, N m s/rad; {PER_WHEEL}")

@@ -24,15 +24,17 @@ class RecorderNodeSettings(NodeSettings):
     bag: str = Field(
         "", description="folder of the bag to write; it must not exist (empty: bag_<time>)"
     )
-    flight: str = Field("{}", description="what is flown, as a JSON object; stored with the bag")
-    compression: Compression = Field("lz4", description="of the bag: none, lz4 or zstd")
+    flight: str = Field(
+        "{}", description="description of the flight, a JSON object; stored in the bag"
+    )
+    compression: Compression = Field("lz4", description="compression of the bag: none, lz4 or zstd")
     split_size: ByteSize = Field(
         ByteSize(0),
-        description="bytes after which the bag goes on in another file, as 500K, 100M, 2G "
+        description="size in bytes at which a new file of the bag starts, as 500K, 100M, 2G "
         "(powers of 1000) or 512KiB (0: one file)",
     )
     drain_period: Annotated[float, Field(ge=0.0005, le=0.1)] = Field(
-        0.02, description="time between two rounds of emptying the queues, s"
+        0.02, description="period of reading the queues, s"
     )
 
     @field_validator("split_size")

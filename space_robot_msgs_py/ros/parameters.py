@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from typing import Any, TypeVar
 
 from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
@@ -13,6 +12,9 @@ from ..config.settings import NodeSettings, leaves
 from ..config.trees import flatten
 from ..errors import InputError
 from .rclpy_internals import declared_parameters, parameter_overrides
+
+QOS_OVERRIDES = "qos_overrides."
+"""Beginning of the names of parameters for QoS policies."""
 
 Schema = TypeVar("Schema", bound=NodeSettings)
 
@@ -49,7 +51,8 @@ def declare_settings(node: Node, schema: type[Schema], changeable: tuple[str, ..
         InputError: an invalid file or parameter.
     """
     fields = dict(leaves(schema))
-    settings = schema.resolve(overrides(node, fields))
+    given = overrides(node)
+    settings = schema.resolve({name: given[name] for name in fields if name in given})
     usual = schema.model_fields["period"].default
     if settings.period != usual:
         node.get_logger().info(
@@ -62,10 +65,15 @@ def declare_settings(node: Node, schema: type[Schema], changeable: tuple[str, ..
     return settings
 
 
-def overrides(node: Node, names: Iterable[str]) -> dict[str, Any]:
-    """Return the user's values of these parameters, from the command line or a file."""
+def overrides(node: Node) -> dict[str, Any]:
+    """Return what the user gave for the node's parameters, on the command line or in a file.
+
+    Overrides of QoS policies are not among them: rclpy declares these.
+    """
     values = parameter_overrides(node)
-    return {name: _plain(values[name].value) for name in names if name in values}
+    return {
+        name: _plain(values[name].value) for name in values if not name.startswith(QOS_OVERRIDES)
+    }
 
 
 def refuse_unknown(node: Node) -> None:
@@ -75,8 +83,8 @@ def refuse_unknown(node: Node) -> None:
         InputError: an unknown parameter; lists the existing ones.
     """
     allowed = sorted(declared_parameters(node))
-    for name in parameter_overrides(node):
-        if name not in allowed and not name.startswith("qos_overrides."):
+    for name in overrides(node):
+        if name not in allowed:
             raise InputError(
                 f"{node.get_name()} parameters: unknown parameter {name!r}: "
                 f"{choices(name, allowed)}"

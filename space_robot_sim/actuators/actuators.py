@@ -54,7 +54,7 @@ class CommandDelaySettings(StrictModel):
     """Settings of the delay of commands."""
 
     command_latency_ticks: Annotated[int, Field(ge=0, le=1000)] = Field(
-        0, description="ticks by which a command is applied late"
+        0, description="delay of commands, ticks"
     )
 
 

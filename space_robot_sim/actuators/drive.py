@@ -117,13 +117,13 @@ DRIVE_SCALE = Kind(
     "drive_scale",
     Argument("FACTOR", "1", -100.0, 100.0, about=About.AXIS),
     None,
-    "the torque given is FACTOR times the one asked for",
+    "the applied torque is FACTOR times the commanded torque",
 )
 DRIVE_BIAS = Kind(
     "drive_bias",
     Argument("TORQUE", "N m", -1e6, 1e6, about=About.AXIS),
     None,
-    "TORQUE is given beside what is asked for",
+    "the applied torque is TORQUE plus the commanded torque",
 )
 
 

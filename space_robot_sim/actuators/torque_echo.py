@@ -34,13 +34,13 @@ class TorqueEchoSettings(StrictModel):
 
     torque_echo: Literal["command", "given"] = Field(
         "command",
-        description="torque that is reported as applied: command, the one asked for within its "
-        "limits; given, the one that acts on the robot",
+        description="torque that is reported as applied: command (the commanded torque within its "
+        "limits) or given (the torque that acts on the robot)",
     )
     echo_scale: Numbers = Field(
-        [1.0], description=f"torque reported per torque of torque_echo; {PER_AXIS}"
+        [1.0], description=f"reported torque divided by that of torque_echo; {PER_AXIS}"
     )
-    echo_bias: Numbers = Field([0.0], description=f"torque reported beside it, N m; {PER_AXIS}")
+    echo_bias: Numbers = Field([0.0], description=f"torque added to the report, N m; {PER_AXIS}")
 
 
 class TorqueEcho(Record):
@@ -95,13 +95,13 @@ TORQUE_SCALE = Kind(
     "torque_scale",
     Argument("FACTOR", "1", 1e-3, 1e3, about=About.AXIS),
     None,
-    "the torque given is FACTOR times the one reported",
+    "the applied torque is FACTOR times the reported torque",
 )
 TORQUE_BIAS = Kind(
     "torque_bias",
     Argument("TORQUE", "N m", -1e6, 1e6, about=About.AXIS),
     None,
-    "the torque given is TORQUE more than the one reported",
+    "the applied torque is TORQUE plus the reported torque",
 )
 
 

@@ -23,10 +23,10 @@ class TorqueLimitSettings(StrictModel):
     """Settings of the torque limits."""
 
     base_torque_limit: Limit = Field(
-        0.0, description="largest torque on each base axis, N m (0: none); of an ideal base"
+        0.0, description="largest torque on each axis of an ideal base, N m (0: no limit)"
     )
     joint_torque_limit: Limit = Field(
-        0.0, description="largest torque on each joint, N m or N (0: none)"
+        0.0, description="largest torque on each joint, N m or N (0: no limit)"
     )
 
 
@@ -62,8 +62,8 @@ def limit_torque(limits: TorqueLimit, torque: Array) -> float:
 
 
 _TORQUE = Argument("TORQUE", "N m", 0.0, 1e6)
-SATURATE_BASE = Kind("saturate_base", _TORQUE, None, "the actuators of an ideal base give no more")
-SATURATE_JOINTS = Kind("saturate_joints", _TORQUE, None, "the joints' motors give no more")
+SATURATE_BASE = Kind("saturate_base", _TORQUE, None, "torque limit of an ideal base")
+SATURATE_JOINTS = Kind("saturate_joints", _TORQUE, None, "torque limit of the joints' motors")
 
 
 class WeakActuators:

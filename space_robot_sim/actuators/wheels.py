@@ -101,7 +101,7 @@ WHEEL_FAIL = Kind(
     "wheel_fail",
     Argument("", "", 0.0, 0.0, about=About.WHEEL),
     None,
-    "the motor of a reaction wheel is dead: the wheel runs on freely",
+    "the motor of a reaction wheel has no torque: the wheel turns freely",
 )
 
 

@@ -23,15 +23,17 @@ class DisturbanceSettings(StrictModel):
     """Disturbance torques: ``scale * amplitude * (sin(2 pi f1 t) + sin(2 pi f2 t))``, (61)."""
 
     scale: Amplitude = Field(0.0, description="factor on all disturbances, k of (61)-(63)")
-    base_amplitude: Amplitude = Field(0.010, description="on base x, y, z, N m")
-    base_frequencies: Frequencies = Field([0.5, 0.75], description="of its two sines, Hz (0: none)")
-    inner_amplitude: Amplitude = Field(0.005, description="on joints 1 to 3, N m")
-    inner_frequencies: Frequencies = Field(
-        [0.25, 0.5], description="of its two sines, Hz (0: none)"
+    base_amplitude: Amplitude = Field(0.010, description="amplitude on base x, y, z, N m")
+    base_frequencies: Frequencies = Field(
+        [0.5, 0.75], description="frequencies of the two sines of this disturbance, Hz (0: none)"
     )
-    outer_amplitude: Amplitude = Field(0.002, description="on joints 4 and up, N m")
+    inner_amplitude: Amplitude = Field(0.005, description="amplitude on joints 1 to 3, N m")
+    inner_frequencies: Frequencies = Field(
+        [0.25, 0.5], description="frequencies of the two sines of this disturbance, Hz (0: none)"
+    )
+    outer_amplitude: Amplitude = Field(0.002, description="amplitude on joints 4 and up, N m")
     outer_frequencies: Frequencies = Field(
-        [0.25, 0.0], description="of its two sines, Hz (0: none)"
+        [0.25, 0.0], description="frequencies of the two sines of this disturbance, Hz (0: none)"
     )
 
 

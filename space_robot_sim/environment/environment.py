@@ -25,8 +25,7 @@ class EnvironmentSettings(StrictModel):
     payload: PayloadSettings = PayloadSettings()
     events: EventTexts = Field(
         [""],
-        description="what is captured and released: capture@T:TARGET, release@T[:SPEED], see "
-        "docs/manual",
+        description="captures and releases: capture@T:TARGET, release@T[:SPEED], see docs/manual",
     )
 
     @property

@@ -39,7 +39,7 @@ class FrictionSettings(StrictModel):
     set_valued: bool = Field(
         True,
         description="a joint at rest is held by up to f_C (false: sign(thetadot) inside the "
-        "integration step, which chatters by itself, as in simple simulators)",
+        "integration step, which causes chatter, as in simple simulators)",
     )
 
 
@@ -113,7 +113,7 @@ class StuckJoint:
             "stuck_joint",
             Argument("TORQUE", "N m", 0.0, 1e3, about=About.JOINT),
             None,
-            "a joint's Coulomb friction rises to TORQUE",
+            "a joint's Coulomb friction is raised to TORQUE",
         ),
     )
 

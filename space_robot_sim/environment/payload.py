@@ -15,7 +15,7 @@ class PayloadSettings(StrictModel):
     """A payload as the last link's new mass and inertia; unknown to every controller."""
 
     mass: Annotated[float, Field(ge=0.0, le=1e6)] = Field(
-        0.0, description="mass of the last link with payload, kg (0: nominal)"
+        0.0, description="mass of the last link with its payload, kg (0: nominal)"
     )
     inertia: Inertia = Field(
         [1.0, 1.0, 1.0, 0.0, 0.0, 0.0],

@@ -26,9 +26,14 @@ class LinkKinds(NamedTuple):
         """Declare those of the link that carries ``what``: "state" or "command"."""
         return cls(
             Kind(f"drop_{what}", PROBABILITY, 1.0, f"a {what} is lost"),
-            Kind(f"repeat_{what}", PROBABILITY, 1.0, f"a {what} comes again a tick later"),
-            Kind(f"delay_{what}", TICKS, 1.0, f"{what}s come late"),
-            Kind(f"jitter_{what}", TICKS, 1.0, f"{what}s come late by 0 to TICKS, any as likely"),
+            Kind(f"repeat_{what}", PROBABILITY, 1.0, f"a {what} arrives again one tick later"),
+            Kind(f"delay_{what}", TICKS, 1.0, f"{what}s arrive TICKS late"),
+            Kind(
+                f"jitter_{what}",
+                TICKS,
+                1.0,
+                f"{what}s arrive 0 to TICKS late, uniformly distributed",
+            ),
         )
 
 

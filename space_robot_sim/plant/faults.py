@@ -49,7 +49,7 @@ class FaultSettings(StrictModel):
     """Settings of the faults of the plant."""
 
     faults: Annotated[Texts, AfterValidator(_readable)] = Field(
-        [""], description="faults to bring about, each `KIND@T[-END][:ARGUMENT]`, see docs/manual"
+        [""], description="faults of the flight, each `KIND@T[-END][:ARGUMENT]`, see docs/manual"
     )
     fault_seed: Annotated[int, Field(ge=0, le=2**31 - 1)] = Field(
         0, description="seed of the random numbers of faults and sensors"

@@ -50,13 +50,13 @@ class PlantSettings(ActuatorSettings, EnvironmentSettings, SensorSettings, Fault
 
     initial_joints_deg: list[float] = Field(
         [0.0],
-        description="positions at tick 0 of the joints with motors, degrees (of prismatic ones m)",
+        description="positions of the actuated joints at tick 0, degrees (prismatic joints: m)",
     )
     initial_quaternion: Annotated[list[float], Field(min_length=4, max_length=4)] = Field(
         [1.0, 0.0, 0.0, 0.0], description="base attitude at tick 0: w, x, y, z"
     )
     substeps: Annotated[int, Field(ge=1, le=1000)] = Field(
-        1, description="integration steps in a tick; the command is held over all of them"
+        1, description="integration steps per tick; the command is held over all of them"
     )
 
 

@@ -36,21 +36,24 @@ class PlantNodeSettings(PlantSettings, NodeSettings):
     )
 
     mission: str = Field(
-        "", description="a mission of config/missions (empty: the robot's), or a path"
+        "", description="a mission of config/missions, or a path to its YAML (empty: the robot's)"
     )
     case: str = Field("1", description="a case of config/cases, or a path to its YAML")
-    sensors: str = Field("ideal", description="of config/sensors, or a path to their YAML")
+    sensors: str = Field(
+        "ideal", description="a set of sensors of config/sensors, or a path to its YAML"
+    )
     actuators: str = Field(
-        "ideal", description="of the base: of config/actuators, or a path to their YAML"
+        "ideal",
+        description="the base's actuators: a name of config/actuators, or a path to a YAML file",
     )
     ticks: Annotated[int, Field(ge=0, le=MOST_TICKS)] = Field(
         0, description="ticks to fly, then exit (0: until stopped)"
     )
     realtime: bool = Field(
-        False, description="step by the wall clock whatever happens (false: lockstep)"
+        False, description="step by the wall clock, without waiting for commands (false: lockstep)"
     )
     paused: bool = Field(
-        False, description="begin paused at tick 0, until told to resume or to step"
+        False, description="start paused at tick 0, until a call of ~/resume or ~/step"
     )
     reset_with: Texts = Field(
         [""],
@@ -61,15 +64,17 @@ class PlantNodeSettings(PlantSettings, NodeSettings):
         20, description="ticks between two messages on /clock"
     )
     hold_ticks: Annotated[int, Field(ge=0, le=10**6)] = Field(
-        200, description="ticks for which the last good command is held; then the torque is zero"
+        200, description="ticks for which the last valid command is held; then the torque is zero"
     )
     silence_timeout: Annotated[float, Field(ge=0.0, le=1e6)] = Field(
         3.0,
-        description="s by the wall clock a tick waits for its command in lockstep (0: for ever)",
+        description="longest time that a tick waits for its command in lockstep, s of the wall "
+        "clock (0: no limit)",
     )
     wait_for: Texts = Field(
         [""],
-        description="who must listen before the first tick: NODE:TOPIC, or NODE to all it sends",
+        description="subscribers to wait for before the first tick: NODE:TOPIC, or NODE for all "
+        "topics",
     )
 
     @property

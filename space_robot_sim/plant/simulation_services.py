@@ -28,7 +28,7 @@ def offer_services(node: ManagedNode[PlantNodeSettings]) -> None:
     """Offer the services, in all states of the node's lifecycle."""
     simulation = Simulation(node)
     descriptor = ParameterDescriptor(
-        description="ticks of a step of the paused plant (service ~/step)",
+        description="ticks per step of a paused plant (service ~/step)",
         integer_range=[IntegerRange(from_value=1, to_value=MOST_TICKS)],
     )
     node.declare_parameter(STEP_TICKS, 1, descriptor)

@@ -139,12 +139,12 @@ class EncoderFault(SensorFault):
                 "encoder_stuck",
                 Argument("", "", 0.0, 0.0, about=About.JOINT),
                 None,
-                "the measured joint angle stands, its rate is zero",
+                "the measured joint angle is constant, its rate is zero",
             ): _hold
         },
         "step": {
             Kind(
-                "quantise_joint_position", STEP_RAD, None, "the measured joint angles come in steps"
+                "quantise_joint_position", STEP_RAD, None, "the measured joint angles are quantised"
             ): coarsen
         },
         "velocity_step": {
@@ -152,7 +152,7 @@ class EncoderFault(SensorFault):
                 "quantise_joint_velocity",
                 STEP_RAD_PER_S,
                 None,
-                "the measured joint velocities come in steps",
+                "the measured joint velocities are quantised",
             ): coarsen
         },
     }

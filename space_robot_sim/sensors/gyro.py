@@ -100,12 +100,12 @@ class GyroFault(SensorFault):
                 "gyro_bias",
                 Argument("RATE", "rad/s", -10.0, 10.0, about=About.BASE_AXIS),
                 None,
-                "RATE is measured beside the base's rate about an axis",
+                "RATE is added to the measured base rate about an axis",
             ): _add_bias
         },
         "step": {
             Kind(
-                "quantise_gyro", STEP_RAD_PER_S, None, "the measured base rate comes in steps"
+                "quantise_gyro", STEP_RAD_PER_S, None, "the measured base rate is quantised"
             ): coarsen
         },
     }

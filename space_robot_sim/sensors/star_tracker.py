@@ -156,12 +156,12 @@ class StarTrackerFault(SensorFault):
                 "noise_attitude",
                 SIGMA_RAD,
                 None,
-                "the measured attitude is turned by SIGMA about each axis",
+                "noise of standard deviation SIGMA about each axis of the measured attitude",
             ): add_noise
         },
         "blind": {
             Kind(
-                "tracker_blind", None, None, "no attitude is measured, the last one is held"
+                "tracker_blind", None, None, "no attitude is measured; the last one is held"
             ): _blind
         },
         "step": {
@@ -169,7 +169,7 @@ class StarTrackerFault(SensorFault):
                 "quantise_attitude",
                 Argument("STEP", "rad", 1e-12, 1.0),
                 None,
-                "the measured quaternion's numbers come in steps of STEP / 2",
+                "the measured quaternion is quantised in steps of STEP / 2",
             ): coarsen
         },
     }

@@ -48,13 +48,9 @@ def file_digests(values: Any) -> dict[str, str]:
 
 
 def flight_digest(flight: Flight) -> str:
-    """Return a digest of a flight's description, including the numbers of its files.
-
-    The software is not included; it is compared separately.
-    """
-    others = ("versions", "commit", "scenario")  # the scenario repeats the other entries
-    content = {k: v for k, v in flight.description.items() if k not in others}
-    return digest(json.dumps(content, sort_keys=True, default=str).encode())
+    """Return a digest of a flight's resolved scenario: of every number, and of no file's name."""
+    content = json.dumps(flight.scenario.tree, sort_keys=True, default=str)
+    return digest(content.encode())
 
 
 def digest(data: bytes) -> str:

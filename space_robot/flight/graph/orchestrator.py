@@ -34,7 +34,7 @@ from .listeners import RESET_WITH, wait_for
 from .processes import Command, Graph, node_command, node_environment
 
 COMPOSED_DRAIN_S = 0.002
-"""In one process the recorder takes little and often: while it does, no tick is flown."""
+"""Period of the recorder in one process with the other nodes, which wait while it writes."""
 
 
 def fly(
@@ -154,8 +154,9 @@ def flight_parameters(flight: Flight, bag: Path) -> dict[str, dict[str, Any]]:
     }
     parameters["controller"] |= {"wait_for": wait_for("controller")}
     parameters["recorder"] |= {"bag": str(bag.absolute()), "flight": json.dumps(flight.description)}
-    if flight.scenario.options.composed:
-        parameters["recorder"].setdefault("drain_period", COMPOSED_DRAIN_S)
+    options = flight.scenario.options
+    if options.composed and "drain_period" not in options.parameters.get("recorder", {}):
+        parameters["recorder"]["drain_period"] = COMPOSED_DRAIN_S
     return parameters
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
 from collections.abc import Mapping
 from contextlib import suppress
 from pathlib import Path
@@ -18,12 +17,13 @@ from space_robot_control.controller.gains import (
     gains_as_path,
     split_gains,
 )
-from space_robot_control.controller.settings import ControllerNodeSettings
+from space_robot_control.controller.settings import DEFAULT, ControllerNodeSettings
 from space_robot_control.controller.swaps import parse_swaps
 from space_robot_control.laws import ControlLaw, find_law
 from space_robot_control.laws.trust import check_file, check_law, is_plain
 from space_robot_model.robot import Robot
 from space_robot_model.robot.find import OWN, find_robot
+from space_robot_msgs_py.config.trees import Tree, flatten
 from space_robot_msgs_py.config.validation import one_of
 from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.samples import LawInForce, RobotNames
@@ -73,6 +73,7 @@ class ControllerChoice:
         gains = gains_as_path(gains, str(flown.get("robot", "paper")))
         self._flight, self._folder, self._trust = flight, folder, trust
         self._flown = flown
+        self._flown_swaps = [text for text in flown.get("swaps", ()) if text.strip()]
         self._said = {
             **({"controller": controller} if controller else {}),
             **({"gains": gains} if gains else {}),
@@ -82,16 +83,17 @@ class ControllerChoice:
         if not trust:
             self._check_laws(str(named), flown)
         self.gains_name = gains or str(flown.get("gains", "default"))
-        self._left_out = ""
-        """Gains that were flown, but are not read."""
         law = find_law(str(named))
         self.law_name = law.name
         is_same_law = law.name == flight.get("controller", law.name)
-        self.parameters: dict[str, Any] = {**flown, **self._robot(flown)}
-        """The node's parameters, by dotted name."""
         recorded_gains = flight.get("gains_used", {})
-        if recorded_gains and is_same_law and not gains:
-            self.parameters["gains"] = self._gains_folder(law, recorded_gains)
+        own, of_laws = split_gains(flown)
+        self.parameters: dict[str, Any] = {**dict(flatten(own)), **self._robot(flown)}
+        """The node's parameters, by dotted name."""
+        if not gains:
+            if recorded_gains and is_same_law:
+                of_laws = {law.name: dict(recorded_gains), **of_laws}
+            self.parameters |= self._gains(of_laws)
         if "actuators" not in self._said:
             self.parameters |= self._actuators(flown)
         if "navigation_sensors" not in self._said:
@@ -101,14 +103,7 @@ class ControllerChoice:
             self._check_files(flown)
         self.swaps = [text for text in self.parameters.get("swaps", []) if text.strip()]
         """Laws swapped to in flight."""
-        try:
-            self.robot, self.names, now = self._check()
-        except InputError as error:
-            if not self._left_out:
-                raise
-            raise InputError(
-                f"{error}; the gains flown are of {self._left_out!r}, read only with --trust"
-            ) from None
+        self.robot, self.names, now = self._check()
         self.is_as_flown = is_same_law and (
             not gains or gains == flown.get("gains") or _same(now.gain_values, recorded_gains)
         )
@@ -127,8 +122,8 @@ class ControllerChoice:
         if "controller" not in self._said:
             check_law(named)
         if "swaps" not in self._said:
-            for swap in filter(str.strip, flown.get("swaps", ())):
-                check_law(swap.partition(":")[2].strip())
+            for swap in self._flown_swaps:
+                check_law(_law_of_swap(swap))
 
     def _check_files(self, flown: Mapping[str, Any]) -> None:
         """Check that no file is read whose path the bag tells."""
@@ -157,25 +152,22 @@ class ControllerChoice:
         _write(path, {f"{OWNER}_node": {"ros__parameters": content}})
         return {"actuators": str(path)}
 
-    def _gains_folder(self, law: type[ControlLaw], recorded: Mapping[str, Any]) -> str:
-        """The recorded gains, and those of other laws that exist on this machine."""
-        folder = self._folder / "gains"
-        folder.mkdir()
-        files: dict[str, Path] = {}
-        if self._trust or is_plain(self.gains_name):
-            with suppress(InputError):  # recorded elsewhere
+    def _gains(self, of_laws: Mapping[str, Tree]) -> dict[str, Any]:
+        """The recorded gains by law, in place of a gain set that is not on this machine."""
+        parameters = dict(flatten(of_laws))
+        if of_laws and set(map(_law_of_swap, self._flown_swaps)) <= set(of_laws):
+            parameters["gains"] = self.gains_name if self._has_gain_set() else DEFAULT
+        return parameters
+
+    def _has_gain_set(self) -> bool:
+        with suppress(InputError):
+            if self._trust or is_plain(self.gains_name):
                 robot = (self._flown if self._trust else self.parameters).get("robot", "paper")
-                files = gain_files(str(robot), self.gains_name)
-        else:
-            self._left_out = self.gains_name
-        for name, file in files.items():
-            shutil.copyfile(file, folder / f"{name}.yaml")
-        section = {law.name: dict(recorded)}
-        _write(folder / f"{law.name}.yaml", {f"{NODE}_node": {"ros__parameters": section}})
-        return str(folder)
+                return bool(gain_files(str(robot), self.gains_name))
+        return False
 
     def _check(self) -> tuple[Robot, RobotNames, ControlLaw]:
-        """The robot, the names in its messages, and the law with the gains of the files."""
+        """The robot, the names in its messages, and the law with the gains of its set."""
         own, gains = split_gains(self.parameters)
         settings = ControllerNodeSettings.resolve(own)
         robot = find_robot(settings.robot)
@@ -184,7 +176,9 @@ class ControllerChoice:
         for swap in parse_swaps(settings.swaps, settings.period):
             one_of(swap.name, laws, "controller", " of swaps")
         names = assumed_actuators(settings.actuators, robot).robot_names(robot)
-        return robot, names, build_law(settings.controller, settings, axes)
+        if "gains" in self._said:
+            return robot, names, build_law(settings.controller, settings, axes)
+        return robot, names, next(iter(laws.values()))
 
 
 def recorded_parameters(flight: Mapping[str, Any]) -> dict[str, Any]:
@@ -201,6 +195,10 @@ def recorded_navigation(flight: Mapping[str, Any]) -> dict[str, Any]:
     recorded = flight.get("navigation_filter", {})
     numbers = {f"navigation_filter.{name}": value for name, value in recorded.items()}
     return {"navigation_sensors": "fine", **numbers} if numbers else {}
+
+
+def _law_of_swap(text: str) -> str:
+    return text.partition(":")[2].strip()
 
 
 def _same(now: Mapping[str, Any], recorded: Mapping[str, Any]) -> bool:

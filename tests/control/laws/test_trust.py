@@ -16,9 +16,11 @@ from space_robot.analysis import analyze
 from space_robot.flight.plan import Flight, FlightPlan, resolve
 from space_robot.flight.replay.choice import ControllerChoice
 from space_robot.flight.simulate import simulate
+from space_robot_control.controller.gains import split_gains
 from space_robot_control.laws import find_law
 from space_robot_control.laws.trust import NotTrustedError, is_plain
 from space_robot_msgs_py.bag.reader import read_flight
+from space_robot_msgs_py.config.trees import flatten
 from space_robot_msgs_py.errors import InputError
 
 MODULE = "law_of_a_stranger"
@@ -50,8 +52,10 @@ def ran(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[[], bool]:
 
 
 def described(**changes: Any) -> dict[str, Any]:
+    """A description as of an older bag, whose parameters hold no gains."""
     description = json.loads(json.dumps(Flight(resolve(FlightPlan())).description))
-    parameters = description["parameters"]["controller"] | changes.pop("controller_node", {})
+    recorded, _ = split_gains(description["parameters"]["controller"])
+    parameters = dict(flatten(recorded)) | changes.pop("controller_node", {})
     description["parameters"]["controller"] = parameters
     return {**description, **changes}
 
@@ -87,7 +91,7 @@ def test_with_trust_it_does_and_the_users_own_word_needs_none(
     assert ControllerChoice(flight, trusted, trust=True).law_name == "stranger"
     assert ran()
     assert ControllerChoice(flight, given, LAW).law_name == "stranger"
-    by_set = ControllerChoice(flight, given / "gains", chosen={"controller": "tde_stc"})
+    by_set = ControllerChoice(flight, given, chosen={"controller": "tde_stc"})
     assert by_set.law_name == by_set.parameters["controller"] == "tde_stc"
 
 
@@ -147,8 +151,10 @@ def test_a_replay_reads_no_file_that_a_bag_names(tmp_path: Path) -> None:
         ControllerChoice(lacking, tmp_path / "actuators_named")
     swapped = described(controller_node={"gains": str(secret), "swaps": ["0.1:ctc"]})
     (tmp_path / "swapped").mkdir()
-    with pytest.raises(InputError, match=r"secret.yaml', read only with --trust"):
+    with pytest.raises(InputError, match="read only with --trust"):
         ControllerChoice(swapped, tmp_path / "swapped")
+    swapped["parameters"]["controller"] |= {"ctc.k_p": [1e4], "ctc.k_d": [2e2]}
+    assert ControllerChoice(swapped, tmp_path / "swapped").swaps == ["0.1:ctc"]
 
 
 def test_on_the_command_line_it_is_one_line_and_an_option(

@@ -8,14 +8,13 @@ from typing import Any
 
 import numpy as np
 import pytest
-import yaml
 from rosbags.rosbag2 import StoragePlugin, Writer
 
 from space_robot.flight.plan import Flight, FlightPlan, resolve
 from space_robot.flight.replay.choice import ControllerChoice
 from space_robot.flight.replay.recording import Recording
 from space_robot.flight.simulate import simulate
-from space_robot_control.controller.gains import build_law
+from space_robot_control.controller.gains import build_laws, split_gains
 from space_robot_control.controller.settings import ControllerNodeSettings
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.bag.folder import open_bag
@@ -116,15 +115,16 @@ def described(**options: Any) -> dict[str, Any]:
 def test_robot_and_gains_are_the_recorded_numbers(tmp_path: Path) -> None:
     """Whatever the files of their names say here."""
     flight = described(swaps=["0.1:ctc"])
-    flight["gains_used"]["k_1"] = [7.0] * 9
+    flight["parameters"]["controller"]["tde_stc.k_1"] = [7.0] * 9
     flight["robot_file"]["robot"]["base"]["mass"] = 1234.5
     choice = ControllerChoice(flight, tmp_path)
     assert choice.is_as_flown
     assert choice.robot.mass[0] == 1234.5
     assert choice.swaps == ["0.1:ctc"]
-    settings = ControllerNodeSettings.resolve(choice.parameters)
-    assert build_law("tde_stc", settings, 9).gains.k_1.tolist() == [7.0] * 9
-    assert build_law("ctc", settings, 9).name == "ctc"
+    own, gains = split_gains(choice.parameters)
+    laws = build_laws(ControllerNodeSettings.resolve(own), 9, gains)
+    assert laws["tde_stc"].gain_values["k_1"].tolist() == [7.0] * 9
+    assert "ctc" in laws
 
 
 def test_a_bag_from_elsewhere_needs_no_files_of_its_names(tmp_path: Path) -> None:
@@ -194,9 +194,3 @@ def test_a_bag_without_references_is_refused(bag: Path, tmp_path: Path) -> None:
     (tmp_path / "empty").mkdir()
     with pytest.raises(InputError, match="not a bag"):
         Recording(tmp_path / "empty")
-
-
-def test_the_gains_file_is_what_a_node_reads(tmp_path: Path) -> None:
-    choice = ControllerChoice(described(controller="ctc"), tmp_path)
-    content = yaml.safe_load((Path(choice.parameters["gains"]) / "ctc.yaml").read_text("utf-8"))
-    assert list(content) == ["controller_node"]
