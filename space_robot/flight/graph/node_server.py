@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import atexit
 import gc
+import inspect
 import os
 import signal
 import sys
@@ -104,9 +105,16 @@ def main() -> None:
     setproctitle("space_robot: server of the nodes")  # the first time, before that changes
     for module in MODULES.values():
         import_module(module)
+    from space_robot_msgs_py import topics
+    from space_robot_msgs_py.ros.endpoints import message_type
+
     from ..compilation import load_kernels
 
     load_kernels()
+    for topic in topics.ALL:
+        message_type(topic.type).__import_type_support__()
+    # ROS' log looks for its caller in every module; what it finds is kept
+    inspect.getmodule(inspect.currentframe())
     gc.freeze()  # a collection in a child would copy the pages that hold it all
     serve_standard_input(run_program)
 
