@@ -103,6 +103,7 @@ def main() -> None:
     """Load what nodes need, then fork them."""
     os.environ["SPT_NOENV"] = "1"  # a title must not be written over what /proc shows of it
     setproctitle("space_robot: server of the nodes")  # the first time, before that changes
+    gc.disable()  # nothing of what is loaded is ever let go
     for module in MODULES.values():
         import_module(module)
     from space_robot_msgs_py import topics
@@ -116,6 +117,7 @@ def main() -> None:
     # ROS' log looks for its caller in every module; what it finds is kept
     inspect.getmodule(inspect.currentframe())
     gc.freeze()  # a collection in a child would copy the pages that hold it all
+    gc.enable()
     serve_standard_input(run_program)
 
 
