@@ -119,6 +119,7 @@ def main() -> None:
     gc.freeze()  # a collection in a child would copy the pages that hold it all
     gc.enable()
     serve_standard_input(run_program)
+    os._exit(0)  # who has started it waits for its end
 
 
 if __name__ == "__main__":
