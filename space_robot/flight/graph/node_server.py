@@ -1,6 +1,6 @@
 """Fork server for nodes, with all modules and kernels preloaded.
 
-A node of its own makes 1.5 s of imports and of reading compiled kernels. The server does that
+A node of its own makes 1 s of imports and of reading compiled kernels. The server does that
 once, while the command that starts the nodes still looks at its options.
 """
 
