@@ -25,7 +25,8 @@ from .ros.serialized_take import serialized_take, take_by_rclpy
 from .wire.definitions import decode
 
 SILENCE_S = 0.3
-"""Told to stop, the recorder leaves when nothing sent before has come for this long."""
+"""Told to stop, the recorder leaves when nothing sent before has come for this long, or when nobody
+is left who could have sent something."""
 DRAIN_S = 8.0
 """But it leaves after this long in any case, whatever still comes."""
 QUEUE_DEPTH = 20_000
@@ -142,6 +143,8 @@ class RecorderLoop:
             self._recorder.flush_if_due()
             if is_timely or self._recorder.is_behind:
                 last_arrival = time.monotonic()  # a round may last longer than the silence
+            elif not (busy or self._has_publishers()):
+                break
             if not busy:
                 time.sleep(self._settings.drain_period)
         self._recorder.flush()
@@ -183,6 +186,9 @@ class RecorderLoop:
         for topic in [t for t in self._unsent if self._node.count_publishers(self._names[t])]:
             self._unsent.remove(topic)
             self._inputs.append(self._listen_to(topic))
+
+    def _has_publishers(self) -> bool:
+        return any(map(self._node.count_publishers, self._names.values()))
 
     def _take_round(self) -> tuple[bool, bool]:
         """Give each topic its turn; whether something was sent in time, whether more waits.

@@ -19,11 +19,9 @@ from space_robot_msgs_py.samples import Command, Reference, RobotState
 from space_robot_msgs_py.wire.codecs import CommandCodec, StateCodec
 from space_robot_msgs_py.wire.compiled_codec import read, write
 
-from ..console.progress import watching_progress
 from ..processes.child_process import child_process
 from .closed_loop import fly_ticks
 from .plan import Flight, FlightPlan, resolve
-from .simulate import simulate
 
 MARK, ALLOCATION_MARK = "complete", "allocation"
 
@@ -50,6 +48,8 @@ def _compile_flights() -> None:
     mark = cache_directory() / MARK
     if mark.exists():
         return
+    from .simulate import simulate  # nodes load kernels without it
+
     own = [law.kernel for law in laws().values() if issubclass(law, CompiledLaw)]
     with _progress("the dynamics and the laws", fly_ticks, read, write, *own):
         with child_process(module_command(__name__), stdout=subprocess.DEVNULL) as helper:
@@ -64,6 +64,8 @@ def _compile_flights() -> None:
 
 def _progress(what: str, *kernels: Any) -> AbstractContextManager[None]:
     """Show the progress of compilation, including other processes."""
+    from ..console.progress import watching_progress  # only once an installation
+
     click.echo(f"compiling {what} (once an installation, a minute or two) ...", err=True)
     files = index_files(kernels)
     return watching_progress("kernels", len(files), lambda: count_compiled(files))

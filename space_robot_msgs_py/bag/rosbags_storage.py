@@ -5,12 +5,15 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
-from rosbags.rosbag2 import Reader
 
 from ..errors import InputError
 from .batch import Batch
+
+if TYPE_CHECKING:
+    from rosbags.rosbag2 import Reader
 
 _BATCH = 1000
 
@@ -31,7 +34,7 @@ class RosbagsStorage:
         self._fault = ""
         self._not_messages = 0
         try:
-            with Reader(path) as reader:
+            with _reader(path) as reader:
                 names = {c.topic: c.msgtype for c in reader.connections}
         except Exception as error:  # sqlite and zstd have errors of their own
             raise InputError(f"{path}: cannot be read ({_line(error)})") from None
@@ -57,7 +60,7 @@ class RosbagsStorage:
         self._fault, self._not_messages = "", 0
         waiting: dict[str, list[tuple[int, bytes]]] = {name: [] for name in self._types}
         try:
-            with Reader(self._path) as reader:
+            with _reader(self._path) as reader:
                 for connection, log_ns, data in reader.messages():
                     if connection.topic not in waiting or not isinstance(data, bytes):
                         self._not_messages += 1
@@ -81,6 +84,12 @@ class RosbagsStorage:
         log_ns = np.array([stamp % 2**63 for stamp, _ in entries], np.int64)
         starts = np.cumsum(lengths) - lengths
         return Batch(topic, self._types[topic], "cdr", data, starts, lengths, log_ns, log_ns)
+
+
+def _reader(path: Path) -> Reader:
+    from rosbags.rosbag2 import Reader  # few bags need it, with its YAML and SQLite
+
+    return Reader(path)
 
 
 def _is_text(*values: object) -> bool:

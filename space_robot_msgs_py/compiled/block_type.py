@@ -20,9 +20,7 @@ from numba.core.typing.templates import (
     signature,
 )
 from numba.core.typing.typeof import typeof_impl
-from numba.cpython import slicing
 from numba.extending import models, register_model, unbox
-from numba.np import arrayobj
 
 from .layouts import Layout
 from .record_type import BYTES, RecordType, digest, joints, value_of
@@ -59,6 +57,8 @@ def _typeof_block(value: Any, context: Any) -> Any:
 
 @unbox(BlockType)
 def _unbox_block(kind: BlockType, array: Any, c: Any) -> Any:
+    from numba.np import arrayobj  # only the compiler needs it
+
     plain = types.Array(types.uint8, 1, "A")
     native = arrayobj.make_array(plain)(c.context, c.builder)
     pointer = c.builder.bitcast(native._getpointer(), c.pyapi.voidptr)
@@ -120,6 +120,8 @@ def _get_item(context: Any, builder: Any, sig: Any, args: Any) -> Any:
 
 @imputils.lower_builtin(operator.getitem, BlockType, types.SliceType)
 def _get_items(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+    from numba.cpython import slicing  # only the compiler needs it
+
     kind, slice_type = sig.args
     block = cgutils.create_struct_proxy(kind)(context, builder, value=args[0])
     part = context.make_helper(builder, slice_type, args[1])

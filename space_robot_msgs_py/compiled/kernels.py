@@ -15,7 +15,11 @@ from contextlib import contextmanager, suppress
 from typing import Any, TypeVar, cast
 
 import numba
+from numba.core.caching import FunctionCache
+from numba.core.ccallback import CFunc
 from numba.core.errors import NumbaError
+from numba.core.runtime.nrt import rtsys
+from numba.experimental import function_type  # noqa: F401  (what Numba makes of a RecordFunction)
 
 from ..errors import InputError
 from . import block_type  # noqa: F401  (registers the type of blocks)
@@ -28,6 +32,8 @@ _njit: Any = numba.njit
 config: Any = numba.config
 _FunctionType: Any = numba.types.WrapperAddressProtocol
 _Function = TypeVar("_Function", bound=Callable[..., Any])
+_CFunc: Any = CFunc
+_FunctionCache: Any = FunctionCache
 _COLOURS = re.compile(r"\x1b\[\d*m")
 """Escape sequences of terminals, which Numba's errors contain."""
 
@@ -39,21 +45,41 @@ def kernel(function: _Function) -> _Function:
     same bits in every process and on every processor, except in kernels that call functions of the
     C library other than the square root (sine, exponential, ...).
     """
+    compiled = _njit(**_OPTIONS)(function)
     with _our_cache():
-        compiled = _njit(cache=True, **_OPTIONS)(function)
-    save = compiled._cache.save_overload
-
-    def save_if_there_is_room(*arguments: Any) -> None:
-        with suppress(OSError):  # the next process compiles it again
-            save(*arguments)
-
-    compiled._cache.save_overload = save_if_there_is_room
+        compiled._cache = _KernelCache(function)
     return cast(_Function, compiled)
 
 
 def subroutine(function: _Function) -> _Function:
     """Compile a small function that only kernels call, in half the time of a kernel."""
     return cast(_Function, _njit(no_cpython_wrapper=True, **_OPTIONS)(function))
+
+
+class _KernelCache(_FunctionCache):  # type: ignore[misc]
+    """Numba's cache of a function (0.58 to 0.68), for machine code as it is.
+
+    Numba's own loads the whole compiler and SciPy's linear algebra first, which takes longer than
+    all else; a function that is not in the cache has them loaded when it is compiled.
+    """
+
+    def load_overload(self, sig: Any, target_context: Any) -> Any:
+        """Load a compiled function; None if it is not in the cache."""
+        rtsys.initialize(target_context)  # what machine code calls
+        return self._load_overload(sig, target_context)
+
+    def save_overload(self, sig: Any, data: Any) -> None:
+        """Save a compiled function if there is room; else the next process compiles it again."""
+        with suppress(OSError):
+            super().save_overload(sig, data)
+
+
+class _Callback(_CFunc):  # type: ignore[misc]
+    """A function to be called by its address, with the same cache."""
+
+    def enable_caching(self) -> None:
+        with _our_cache():
+            self._cache = _KernelCache(self._pyfunc)
 
 
 class RecordFunction(_FunctionType):  # type: ignore[misc]
@@ -82,14 +108,14 @@ class RecordFunction(_FunctionType):  # type: ignore[misc]
         """
         compiled: Any = function
         own, self._signature = _signature(records), _signature(seen_as)
-        with _our_cache():
-            try:
-                self._code = numba.cfunc(own, cache=True, error_model="numpy")(compiled.py_func)
-            except OSError:  # no space in the cache
-                self._code = numba.cfunc(own, error_model="numpy")(compiled.py_func)
-            except NumbaError as error:
-                name = function.__qualname__
-                raise InputError(f"{name} cannot be compiled: {_reason(error)}") from error
+        whole = own.args, own.return_type
+        self._code = _Callback(compiled.py_func, whole, {}, {"error_model": "numpy"})
+        self._code.enable_caching()
+        try:
+            self._code.compile()
+        except NumbaError as error:
+            name = function.__qualname__
+            raise InputError(f"{name} cannot be compiled: {_reason(error)}") from error
         self._address = int(self._code.address or 0)
         arguments = [ctypes.c_void_p, ctypes.c_ssize_t] * (len(own.args) - 1)
         self.call = ctypes.CFUNCTYPE(None, *arguments, ctypes.c_double)(self._address)

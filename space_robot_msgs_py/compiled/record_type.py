@@ -18,7 +18,6 @@ from numba.core.registry import cpu_target
 from numba.core.typing.templates import AttributeTemplate, infer_getattr
 from numba.core.typing.typeof import typeof_impl
 from numba.extending import models, register_model, unbox
-from numba.np import arrayobj
 
 from .layouts import Dimension, Layout, Polynomial
 from .records import layout_of
@@ -116,6 +115,8 @@ def _get_field(context: Any, builder: Any, kind: RecordType, value: Any, name: s
     numbers = builder.bitcast(place, _FLOAT.as_pointer())
     if not field:
         return builder.load(numbers)
+    from numba.np import arrayobj  # only the compiler needs it
+
     array = arrayobj.make_array(types.Array(types.float64, len(field), "C"))(context, builder)
     shape = [value_of(builder, Polynomial(*dimension), record.n) for dimension in field]
     strides: list[Any] = []

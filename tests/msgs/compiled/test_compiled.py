@@ -12,12 +12,13 @@ import pytest
 from space_robot_msgs_py.compiled.cache import _temporary_cache
 
 PROGRAM = """
+import sys
 import numpy as np
 from space_robot_msgs_py.compiled.cache import cache_directory
 from space_robot_msgs_py.compiled.kernels import kernel
 from space_robot_msgs_py.bag.kernels import walk_messages
 exec(compile(open({file!r}).read(), {file!r}, "exec"))
-print(double(np.arange(3.0)).sum(), cache_directory())
+print(double(np.arange(3.0)).sum(), cache_directory(), *{{"scipy.linalg"}} & set(sys.modules))
 """
 KERNEL = """
 from space_robot_msgs_py.compiled.kernels import kernel
@@ -70,6 +71,13 @@ def test_a_full_or_read_only_folder_is_replaced(tmp_path: Path, options: str, wh
         check_elsewhere(tmp_path, folder, why)
     finally:
         subprocess.run(["umount", "-l", str(folder)], check=True)
+
+
+def test_what_is_in_the_cache_needs_no_compiler(tmp_path: Path) -> None:
+    """Numba compiles with SciPy's linear algebra, and a command should not wait for that."""
+    first, second = (run(tmp_path, tmp_path / "cache").stdout.split() for _ in range(2))
+    assert [first[0], first[2:]] == ["6.0", ["scipy.linalg"]]
+    assert [second[0], second[2:]] == ["6.0", []]
 
 
 def test_the_temporary_folder_is_nobody_elses(
