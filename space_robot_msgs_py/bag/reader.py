@@ -8,20 +8,27 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .. import topics
 from ..config.text import printable
 from ..errors import InputError, MessageError
-from ..samples import MOST_PASSIVE, RobotNames, Timebase
+from ..samples import (
+    ACTUATOR_FIELDS,
+    MOST_PASSIVE,
+    PASSIVE_FIELDS,
+    STATE_FIELDS,
+    RobotNames,
+    Timebase,
+)
 from ..wire.definitions import decode
 from .accounts import Account, foreign, noted_accounts, paused
 from .batch import Batch
 from .contents import Bag
 from .description import read_description
 from .findings import half_truth, missing_ticks, unread_messages
-from .flight_log import FlightLog
+from .flight_log import REFERENCE, FlightLog, MeasuredStates, finite_rows
 from .folder import open_bag
-from .gaps import fill_gaps
 from .message_accounting import (
     LONGEST_JUMP,
     MessageAccounting,
@@ -36,6 +43,37 @@ from .selection import Selection
 DEFAULT_PERIOD = 0.0005
 """Period of a bag without a description, s."""
 _STAMPS_LOOKED_AT = 200
+
+
+def fill_gaps(log: FlightLog) -> None:
+    """Give ticks without a usable state the one before, and missing references the last point.
+
+    From the first whole tick to the last state; `FlightLog.filled` counts the states. Only what
+    the sensors report is filled in: the truth has no such gaps.
+    """
+    measured = log if log.measured is None else log.measured
+    states = finite_rows(getattr(measured, name) for name in STATE_FIELDS)
+    known = log.finite(STATE_FIELDS) | states
+    end = len(known) - int(np.argmax(known[::-1])) if known.any() else 0
+    log.filled = int(np.count_nonzero(~states[:end]))
+    _repeat_before(measured, STATE_FIELDS, states, end)
+    passive = finite_rows(getattr(measured, name) for name in PASSIVE_FIELDS)
+    _repeat_before(measured, PASSIVE_FIELDS, passive, end)
+    _repeat_before(log, ACTUATOR_FIELDS, log.finite(ACTUATOR_FIELDS), end)
+    references = log.finite(REFERENCE)
+    _repeat_before(log, REFERENCE, references, end)
+    log.reference_joints[:end][~references[:end], 1:] = 0.0  # at rest
+    log.reference_base[:end][~references[:end], 4:] = 0.0
+
+
+def _repeat_before(
+    log: FlightLog | MeasuredStates, columns: tuple[str, ...], good: NDArray[np.bool_], end: int
+) -> None:
+    source = np.maximum.accumulate(np.where(good[:end], np.arange(end), -1))
+    bad = np.flatnonzero(~good[:end] & (source >= 0))
+    for name in columns:
+        column: Any = getattr(log, name)
+        column[bad] = column[source[bad]]
 
 
 def read_flight(

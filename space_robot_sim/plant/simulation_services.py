@@ -6,7 +6,7 @@ the robot, where that package is there.
 
 from __future__ import annotations
 
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable, Callable, Iterator
 from functools import partial
 from typing import Any
 
@@ -14,14 +14,117 @@ from rcl_interfaces.msg import IntegerRange, ParameterDescriptor
 from rclpy.callback_groups import ReentrantCallbackGroup
 from std_srvs.srv import Trigger
 
-from space_robot_msgs_py.errors import SpaceRobotError
+from space_robot_msgs_py.errors import FlightError, InputError, SpaceRobotError
 from space_robot_msgs_py.ros.managed_node import ManagedNode
 
 from .settings import MOST_TICKS, PlantNodeSettings
-from .simulation import Simulation
-from .standard_services import standard_services
+from .simulation import Simulation, SimulationState
 
 STEP_TICKS = "step_ticks"
+
+
+FEATURES = (
+    "SIMULATION_RESET",
+    "SIMULATION_STATE_GETTING",
+    "SIMULATION_STATE_SETTING",
+    "SIMULATION_STATE_PAUSE",
+    "STEP_SIMULATION_SINGLE",
+    "STEP_SIMULATION_MULTIPLE",
+)
+"""Names of constants of SimulatorFeatures.
+
+SIMULATION_RESET_TIME and SIMULATION_RESET_STATE are missing: they announce that each can be reset
+alone.
+"""
+ABOUT = "space_robot: time, state, controller, mission and bag are reset together"
+
+Service = tuple[Any, str, Callable[[Any, Any], Any]]
+"""Type, name and callback of a service."""
+
+
+def standard_services(simulation: Simulation) -> Iterator[Service]:
+    """Yield the services; none without the package."""
+    try:
+        from simulation_interfaces import msg, srv
+    except ImportError:
+        return
+    standard = StandardServices(simulation, msg, srv)
+    yield srv.GetSimulatorFeatures, "get_simulator_features", standard.get_features
+    yield srv.GetSimulationState, "get_simulation_state", standard.get_state
+    yield srv.SetSimulationState, "set_simulation_state", standard.set_state
+    yield srv.StepSimulation, "step_simulation", standard.step
+    yield srv.ResetSimulation, "reset_simulation", standard.reset
+
+
+class StandardServices:
+    """The callbacks."""
+
+    def __init__(self, simulation: Simulation, msg: Any, srv: Any) -> None:
+        """``msg``, ``srv``: the package's modules."""
+        self._simulation = simulation
+        self._features, self._result, self._srv = msg.SimulatorFeatures, msg.Result, srv
+        states = msg.SimulationState
+        self._numbers = {
+            SimulationState.STOPPED: states.STATE_STOPPED,
+            SimulationState.PLAYING: states.STATE_PLAYING,
+            SimulationState.PAUSED: states.STATE_PAUSED,
+        }
+
+    def get_features(self, request: Any, response: Any) -> Any:
+        """Return the supported features."""
+        response.features.features = [getattr(self._features, name) for name in FEATURES]
+        response.features.custom_info = ABOUT
+        return response
+
+    def get_state(self, request: Any, response: Any) -> Any:
+        """Return the state of the simulation."""
+        response.state.state = self._numbers[self._simulation.state]
+        return self._end(response, self._result.RESULT_OK)
+
+    async def set_state(self, request: Any, response: Any) -> Any:
+        """Play, pause, or stop, which is a reset that stays paused."""
+        simulation, kind = self._simulation, self._srv.SetSimulationState.Response
+        wanted = {number: state for state, number in self._numbers.items()}.get(request.state.state)
+        if wanted is None:
+            text = "a simulation can be told to play, to pause and to stop"
+            return self._end(response, self._result.RESULT_FEATURE_UNSUPPORTED, text)
+        if wanted is simulation.state:
+            return self._end(response, kind.ALREADY_IN_TARGET_STATE)
+        try:
+            if wanted is SimulationState.PLAYING:
+                simulation.resume()
+            elif wanted is SimulationState.PAUSED:
+                simulation.pause()
+            else:
+                await simulation.reset(stop=True)
+        except (InputError, FlightError) as error:
+            return self._end(response, kind.STATE_TRANSITION_ERROR, str(error))
+        return self._end(response, self._result.RESULT_OK)
+
+    async def step(self, request: Any, response: Any) -> Any:
+        """Step; answered once the steps are done."""
+        try:
+            await self._simulation.step(request.steps)
+        except (InputError, FlightError) as error:
+            return self._end(response, self._result.RESULT_OPERATION_FAILED, str(error))
+        return self._end(response, self._result.RESULT_OK)
+
+    async def reset(self, request: Any, response: Any) -> Any:
+        """Reset time and state together: of a flight neither can be reset alone."""
+        kind = self._srv.ResetSimulation.Request
+        both = kind.SCOPE_TIME | kind.SCOPE_STATE
+        if request.scope != kind.SCOPE_DEFAULT and request.scope & both != both:
+            text = "only time and state together can be reset"
+            return self._end(response, self._result.RESULT_FEATURE_UNSUPPORTED, text)
+        try:
+            await self._simulation.reset()
+        except (InputError, FlightError) as error:
+            return self._end(response, self._result.RESULT_OPERATION_FAILED, str(error))
+        return self._end(response, self._result.RESULT_OK)
+
+    def _end(self, response: Any, result: int, text: str = "") -> Any:
+        response.result.result, response.result.error_message = result, text
+        return response
 
 
 def offer_services(node: ManagedNode[PlantNodeSettings]) -> None:

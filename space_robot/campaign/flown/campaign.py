@@ -6,8 +6,12 @@ campaign.table, campaign.verdicts, campaign.rerun(4711).log
 
 from __future__ import annotations
 
+import re
+import shutil
 import warnings
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import closing
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -15,19 +19,95 @@ import yaml
 
 from space_robot_msgs_py.config.validation import short, validate
 from space_robot_msgs_py.config.yaml_text import read_file
-from space_robot_msgs_py.errors import InputError
+from space_robot_msgs_py.errors import FlightError, InputError
 
-from ...processes.pool import check_scheduler, cores
+from ...console.files import make_folder
+from ...flight.ending import DIVERGED, UNANSWERED
+from ...flight.simulate import fly_blocks
+from ...processes.pool import check_scheduler, cores, run_many
 from ...processes.scratch_folder import ScratchFolder
-from ..store.folder import MANIFEST, begin_or_resume, held_folder
+from ..row.fly import RowFlyer
+from ..row.row import Row, Task
+from ..store.folder import BAGS, MANIFEST, begin_or_resume, held_folder
+from ..store.journal import Journal
 from ..store.recovery import open_journal
 from ..store.table import check_tables
 from ..study import Study, read_study
-from .bags import fly_bags
 from .current_table import WRITTEN, write_if_older
 from .flights import Flights, Progress
 from .flown_campaign import FlownCampaign
+from .precision import is_met
 from .preparation import Preparation
+
+
+@dataclass(frozen=True)
+class BagFlyer:
+    """Flies a task and records its bag."""
+
+    flyer: RowFlyer
+    folder: Path
+    """Folder of the bags."""
+
+    def __call__(self, task: Task) -> None:
+        """Fly a task; the bag gets its final name once it is complete."""
+        unfinished = self.folder / f".{bag_name(task)}"
+        flight = self.flyer.draws.scenario(task.run, task.law).check()
+        with closing(fly_blocks(flight, unfinished)) as blocks:
+            try:
+                for _ in blocks:
+                    pass
+            except FlightError:  # its row says so
+                pass
+        unfinished.rename(self.folder / bag_name(task))
+
+
+def bag_name(task: Task) -> str:
+    """Return the folder name of a task's bag, such as ``4711_tde_stc``."""
+    return f"{task.run}_{re.sub(r'[^A-Za-z0-9_.=-]', '_', task.law)}"
+
+
+def fly_bags(folder: Path, flyer: RowFlyer, journal: Journal, runs: int, workers: int) -> None:
+    """Record the missing bags of the flights selected by the campaign's file.
+
+    Args:
+        folder: of the campaign, locked by this process.
+        flyer: of the campaign's tasks.
+        journal: with all rows.
+        runs: number of runs in the table.
+        workers: number of processes.
+
+    Raises:
+        InputError: a bag cannot be written.
+    """
+    if flyer.study.keep.bag == "never":
+        return
+    bags = folder.absolute() / BAGS
+    make_folder(bags)
+    for unfinished in bags.glob(".*"):  # of a process that was killed
+        shutil.rmtree(unfinished)
+    tasks = [
+        task for task in _wanted(flyer.study, journal, runs) if not (bags / bag_name(task)).exists()
+    ]
+    if not tasks:
+        return
+    flown = run_many(BagFlyer(flyer, bags), tasks, workers=workers)
+    with closing(flown) as done:
+        for result in done:
+            if result.error is not None:
+                raise InputError(f"{bags / bag_name(result.item)}: {result.error}")
+
+
+def _wanted(study: Study, journal: Journal, runs: int) -> Iterator[Task]:
+    """Yield the tasks whose bags are requested; refused and killed flights have no bag."""
+    for row in journal.rows(runs):
+        has_flight = row.is_complete or row.outcome in (DIVERGED, UNANSWERED)
+        if has_flight and (study.keep.bag == "always" or _has_failed(study, row)):
+            yield row.task
+
+
+def _has_failed(study: Study, row: Row) -> bool:
+    """Return whether a flight ended early or missed a requirement."""
+    return not (row.is_complete and all(is_met(row, study.require, name) for name in study.require))
 
 
 class Campaign:

@@ -13,7 +13,7 @@ from click.testing import CliRunner, Result
 from paths import CONFIG, DATA
 
 from space_robot.campaign.new_robot import robot_texts
-from space_robot.campaign.new_robot.motion import mission_text, rest_to_rest
+from space_robot.campaign.new_robot.make import mission_text, rest_to_rest
 from space_robot.cli.main import cli
 from space_robot.flight.plan import Flight, FlightPlan, resolve
 from space_robot.flight.simulate import simulate

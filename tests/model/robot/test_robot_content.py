@@ -14,7 +14,7 @@ from random_robots import random_robot
 from random_trees import random_bodies
 
 from space_robot_model.robot import Robot
-from space_robot_model.robot.document import document_of
+from space_robot_model.robot.source import document_of
 from space_robot_model.robot.tree.bodies import JointLimits
 from space_robot_msgs_py.errors import InputError
 

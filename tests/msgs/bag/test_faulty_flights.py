@@ -22,9 +22,8 @@ from bags import (
 
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.bag.flight_log import REFERENCE, FlightLog
-from space_robot_msgs_py.bag.gaps import fill_gaps
 from space_robot_msgs_py.bag.mcap_storage import McapStorage
-from space_robot_msgs_py.bag.reader import read_flight, timebase_of
+from space_robot_msgs_py.bag.reader import fill_gaps, read_flight, timebase_of
 from space_robot_msgs_py.bag.recorder import BagRecorder
 from space_robot_msgs_py.bag.rows import stamps_of
 from space_robot_msgs_py.samples import STATE_FIELDS

@@ -12,7 +12,7 @@ from space_robot.analysis.described import estimator
 from space_robot.analysis.estimate_error import EstimateErrors, HBar
 from space_robot.analysis.excerpt import excerpt
 from space_robot.flight.plan import Flight, FlightPlan, resolve
-from space_robot.flight.replay.laws import RecordedLaws
+from space_robot.flight.replay.run import RecordedLaws
 from space_robot.flight.simulate import simulate
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.bag.law_history import LawChange, as_data, in_words, same, within

@@ -17,11 +17,14 @@ from space_robot_msgs_py.ros.loop import Wait
 from space_robot_msgs_py.ros.node_scheduler import (
     GLANCE_S,
     LISTENER_PERIOD_S,
+    LONGEST_PAUSE_S,
+    PERIOD_S,
     REMIND_S,
+    SERVICE_SHARE,
     NodeScheduler,
     ScheduledNode,
+    Upkeep,
 )
-from space_robot_msgs_py.ros.upkeep import LONGEST_PAUSE_S, PERIOD_S, SERVICE_SHARE, Upkeep
 
 
 class Clock:

@@ -16,9 +16,9 @@ rclpy = pytest.importorskip("rclpy")
 from rcl_interfaces.srv import GetParameters  # noqa: E402
 from rclpy.executors import SingleThreadedExecutor  # noqa: E402
 
-from space_robot_msgs_py.ros import service_calls, upkeep  # noqa: E402
+from space_robot_msgs_py.ros import node_scheduler, service_calls  # noqa: E402
+from space_robot_msgs_py.ros.node_scheduler import PERIOD_S, Upkeep  # noqa: E402
 from space_robot_msgs_py.ros.service_calls import ServiceCalls  # noqa: E402
-from space_robot_msgs_py.ros.upkeep import PERIOD_S, Upkeep  # noqa: E402
 
 REQUESTS = 8  # a client keeps ten answers
 
@@ -145,7 +145,7 @@ class _Asked:
 def calls_in_half_a_second(monkeypatch: pytest.MonkeyPatch) -> Callable[[float], int]:
     def count(took_s: float) -> int:
         node: Any = _Asked(took_s)
-        monkeypatch.setattr(upkeep, "time", node)
+        monkeypatch.setattr(node_scheduler, "time", node)
         served, begin = Upkeep(node), node.now
         while node.now < begin + 0.5:
             node.now = max(node.now + 1e-4, served.run())

@@ -16,7 +16,7 @@ pytest.importorskip("rclpy")
 from space_robot_sim.plant.loop import PlantLoop
 from space_robot_sim.plant.run_control import RunControl
 from space_robot_sim.plant.simulation import Simulation
-from space_robot_sim.plant.standard_services import StandardServices
+from space_robot_sim.plant.simulation_services import StandardServices
 
 if TYPE_CHECKING:
     from space_robot_msgs_py.ros.managed_node import ManagedNode

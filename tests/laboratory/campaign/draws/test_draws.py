@@ -15,8 +15,8 @@ from scipy.stats import qmc, truncnorm
 
 from space_robot.api import Scenario
 from space_robot.campaign.draws import Draws
+from space_robot.campaign.draws.changes import rotation, spread
 from space_robot.campaign.draws.designs import shifted
-from space_robot.campaign.draws.robot_arrays import rotation, spread
 from space_robot.campaign.study import Study
 from space_robot_model.elementary.symmetric import principal_axes
 from space_robot_model.robot import Robot

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from space_robot.flight.graph.degraded import degradation
+from space_robot.flight.graph.following import degradation
 
 HELD = {"controller_node": {"tick": "5", "references_held": "300"}}
 WORDS = ["controller_node held the reference for 300 ticks, for the mission's did not come"]
