@@ -13,10 +13,11 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from forked import Forked
 
 from space_robot_msgs_py.ros.process_environment import DEFAULTS
 
-Start = Callable[..., "subprocess.Popen[str]"]
+Start = Callable[..., Forked]
 """Starts a node with parameters."""
 COMMAND = [sys.executable, "-m", "space_robot.cli.main"]
 
@@ -44,6 +45,11 @@ def space_robot(
         check=False,
         env=environment,
     )
+
+
+def forked_space_robot(*arguments: str) -> Forked:
+    """Begin ``space-robot`` in a process forked from a loaded one: see `forked`."""
+    return Forked.of_command(arguments, ros_environment())
 
 
 def space_robot_here(*arguments: str) -> subprocess.CompletedProcess[str]:

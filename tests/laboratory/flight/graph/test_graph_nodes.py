@@ -11,6 +11,7 @@ from pathlib import Path
 
 import pytest
 from flights import COMMAND, Start, ros_environment
+from forked import Forked
 
 from space_robot.flight.graph.listeners import wait_for
 from space_robot.processes.node_modules import MODULES
@@ -21,7 +22,7 @@ set_defaults()
 rclpy = pytest.importorskip("rclpy")
 
 
-def _end(process: subprocess.Popen[str], number: int = signal.SIGINT) -> int:
+def _end(process: Forked, number: int = signal.SIGINT) -> int:
     process.send_signal(number)
     process.communicate(timeout=30)
     return process.returncode

@@ -8,7 +8,6 @@ from __future__ import annotations
 import json
 import re
 import signal
-import subprocess
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -16,7 +15,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import pytest
-from flights import COMMAND, Flown, Start, ros_environment, space_robot_here
+from flights import Flown, Start, forked_space_robot, space_robot_here
+from forked import Forked
 
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.bag.folder import open_bag
@@ -63,17 +63,13 @@ def assert_same_messages(bag: Path, other: Path) -> None:
 
 
 @contextmanager
-def flying(domain: int, *options: str) -> Iterator[subprocess.Popen[str]]:
+def flying(domain: int, *options: str) -> Iterator[Forked]:
     """``fly --json`` in a domain, begun paused; ended if it is left before its end."""
-    command = [*COMMAND, "fly", "--paused", "--domain", str(domain), *options, "--json"]
-    process = subprocess.Popen(
-        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=ros_environment()
-    )
+    process = forked_space_robot("fly", "--paused", "--domain", str(domain), *options, "--json")
     try:
         yield process
     finally:
-        if process.poll() is None:
-            process.send_signal(signal.SIGINT)
+        process.send_signal(signal.SIGINT)
         process.communicate(timeout=TIMEOUT_S)
 
 
