@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from forked import Forked
+from forked import SPACE_ROBOT, Forked
 
 from space_robot_msgs_py.ros.process_environment import DEFAULTS
 
@@ -49,7 +49,7 @@ def space_robot(
 
 def forked_space_robot(*arguments: str) -> Forked:
     """Begin ``space-robot`` in a process forked from a loaded one: see `forked`."""
-    return Forked.of_command(arguments, ros_environment())
+    return Forked.of_command([SPACE_ROBOT, *arguments], ros_environment())
 
 
 def space_robot_here(*arguments: str) -> subprocess.CompletedProcess[str]:

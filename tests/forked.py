@@ -8,6 +8,7 @@ their ``main()`` on. Tests of how a command begins start one anew, with `flights
 from __future__ import annotations
 
 import os
+import runpy
 import signal
 import subprocess
 import sys
@@ -15,6 +16,7 @@ import threading
 import time
 from collections.abc import Mapping, Sequence
 from importlib import import_module
+from pathlib import Path
 from types import TracebackType
 from typing import cast
 
@@ -22,6 +24,7 @@ from paths import TESTS
 
 ERRORS = "FORKED_STANDARD_ERROR"
 """In a command's environment: the inode of the pipe that takes its standard error."""
+SPACE_ROBOT = "space-robot"
 POLL_S = 0.005
 
 
@@ -38,7 +41,9 @@ class Forked:
         environment: Mapping[str, str],
         *,
         has_stderr: bool = False,
+        folder: Path | None = None,
     ) -> None:
+        """``folder``: where it is started (None: here)."""
         from space_robot.flight.graph.node_server import Program, node_server
 
         self._server = node_server()
@@ -52,16 +57,18 @@ class Forked:
             os.close(theirs)
         self.stdout, *others = (os.fdopen(ours, encoding="utf-8") for ours, _ in pipes)
         self.stderr = others[0] if others else None
-        self._connection.send((Program(module, arguments), environment, os.getcwd()))
+        self._connection.send((Program(module, arguments), environment, str(folder or Path.cwd())))
         self._texts: dict[str, str] = {}
         self._readers: list[threading.Thread] = []
 
     @classmethod
-    def of_command(cls, arguments: Sequence[str], environment: Mapping[str, str]) -> Forked:
-        """A `space-robot` command."""
+    def of_command(
+        cls, command: Sequence[str], environment: Mapping[str, str], folder: Path | None = None
+    ) -> Forked:
+        """A command: `space-robot` or a program's file, and the arguments."""
         paths = [str(TESTS), *filter(None, [environment.get("PYTHONPATH")])]
         searched = {**environment, "PYTHONPATH": os.pathsep.join(paths)}
-        return cls(__name__, arguments, searched, has_stderr=True)
+        return cls(__name__, command, searched, has_stderr=True, folder=folder)
 
     def poll(self) -> int | None:
         """Its exit code, below zero for a signal's number; None while it runs."""
@@ -125,7 +132,7 @@ class Forked:
 
 
 def main() -> None:
-    """In the forked process: run the command that `Forked.of_command` asks for."""
+    """In the forked process: run the command or program that `Forked.of_command` asks for."""
     from setproctitle import setproctitle
 
     from space_robot.flight.graph.node_server import run_program
@@ -142,8 +149,12 @@ def main() -> None:
     begun_anew = ForkServer.of_module
     ForkServer.of_module = lambda module: servers.pop() if servers else begun_anew(module)  # type: ignore[method-assign,assignment]
     server = servers[0]
+    del sys.argv[0]
     try:
-        import_module("space_robot.cli.main").main(sys.argv[1:])
+        if sys.argv[0] == SPACE_ROBOT:
+            import_module("space_robot.cli.main").main(sys.argv[1:])
+        sys.path.insert(0, str(Path(sys.argv[0]).parent))
+        runpy.run_path(sys.argv[0], run_name="__main__")
     finally:
         server.close()
 
