@@ -8,7 +8,7 @@ from contextlib import closing
 from pathlib import Path
 
 import pytest
-from flights import forked_space_robot, space_robot_here
+from flights import forked_space_robot, space_robot_here, wait_for_nodes
 
 from space_robot.flight.graph.domain import ros_domain
 from space_robot.flight.graph.node_services import call_trigger, get_parameters, set_parameters
@@ -97,6 +97,7 @@ def flown(tmp_path_factory: pytest.TempPathFactory) -> Flown:
     plan = ("--duration", str(SECONDS), "--swap", f"{SWAP_S}:tde_smc", "--bag", str(bag))
     process = forked_space_robot("fly", "--paused", *plan, "--domain", str(domain))
     try:
+        wait_for_nodes(domain)
         swapped_to = change_laws(domain)
         table, errors = process.communicate(timeout=TIMEOUT_S)
     finally:
