@@ -189,6 +189,7 @@ def test_the_command_leaves_a_whole_bag(tmp_path: Path) -> None:
     assert read_flight(bag).ticks == 11
 
 
+@pytest.mark.ros
 def test_the_bag_is_that_of_the_graph(tmp_path: Path) -> None:
     """The same states, commands, laws, and stamps of telemetry and clock, to the last byte."""
     pytest.importorskip("rclpy")
