@@ -31,9 +31,9 @@ def _end(process: Forked, number: int = signal.SIGINT) -> int:
 def test_start_up_in_any_order(start: Start, tmp_path: Path) -> None:
     """Plant first and recorder last: nothing moves until all are there, nothing is lost."""
     plant = start("plant", ticks=300, wait_for=wait_for("plant"))
-    time.sleep(2.0)
-    controller = start("controller", wait_for=wait_for("controller"))
     time.sleep(1.0)
+    controller = start("controller", wait_for=wait_for("controller"))
+    time.sleep(0.5)
     mission = start("mission")
     recorder = start("recorder", bag=tmp_path / "bag")
     output, _ = plant.communicate(timeout=90)

@@ -25,7 +25,7 @@ from space_robot_msgs_py.bag.reader import read_flight
 pytest.importorskip("rclpy")
 
 RECORDER = "recorder_node"
-REPORTS_IN_FLIGHT = 4
+REPORTS_IN_FLIGHT = 3
 PERIOD_S = 0.002
 TIMEOUT_S = 60.0
 REFERENCE, IN_FLIGHT = 20_000, 1_000_000

@@ -126,7 +126,7 @@ def fly(domain: int, bag: Path, shown: list[Poses], *options: str) -> FlightLog:
         return space_robot_here("sim", *words, "--domain", str(domain)).returncode == 0
 
     where = ("--domain", str(domain), "--bag", str(bag))
-    how = ("--paused", "--realtime", "--duration", "3")
+    how = ("--paused", "--realtime", "--duration", "2")
     with forked_space_robot("fly", *how, *where, *options) as process:
         until = time.monotonic() + TIMEOUT_S
         while not (sim("step", "--ticks", "50") and any(is_robot_in(poses) for poses in shown)):
