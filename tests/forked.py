@@ -152,7 +152,7 @@ def main() -> None:
     del sys.argv[0]
     try:
         if sys.argv[0] == SPACE_ROBOT:
-            import_module("space_robot.cli.main").main(sys.argv[1:])
+            import_module("space_robot.cli.main").main()
         sys.path.insert(0, str(Path(sys.argv[0]).parent))
         runpy.run_path(sys.argv[0], run_name="__main__")
     finally:

@@ -4,13 +4,11 @@ from __future__ import annotations
 
 import os
 import signal
-import subprocess
-import sys
 import time
 from pathlib import Path
 
 import pytest
-from flights import COMMAND, Start, ros_environment
+from flights import Start, forked_space_robot, ros_environment
 from forked import Forked
 
 from space_robot.flight.graph.listeners import wait_for
@@ -143,12 +141,10 @@ def test_node_refuses_bad_parameters(
 @pytest.mark.parametrize("node", MODULES)
 def test_help_is_a_few_lines(node: str) -> None:
     pytest.importorskip("rclpy")
-    command = [sys.executable, "-m", MODULES[node], "--help"]
-    result = subprocess.run(
-        command, capture_output=True, text=True, timeout=60, check=False, env=ros_environment()
-    )
-    assert (result.returncode, result.stderr) == (0, "")
-    usage, *parameters = result.stdout.splitlines()
+    process = Forked(MODULES[node], ["--help"], ros_environment())
+    output, _ = process.communicate(timeout=60)
+    assert process.returncode == 0, output
+    usage, *parameters = output.splitlines()
     assert usage.startswith(f"usage: {node}_node [--ros-args")
     assert "autostart, robot, period" in parameters[0]
 
@@ -158,14 +154,8 @@ def test_help_is_a_few_lines(node: str) -> None:
 )
 def test_arguments_that_are_not_of_ros_are_refused(arguments: list[str]) -> None:
     pytest.importorskip("rclpy")
-    result = subprocess.run(
-        [*COMMAND, "plant_node", *arguments],
-        capture_output=True,
-        text=True,
-        timeout=60,
-        check=False,
-        env=ros_environment(),
-    )
-    assert result.returncode == 2
-    (line,) = result.stderr.splitlines()
+    process = forked_space_robot("plant_node", *arguments)
+    _, errors = process.communicate(timeout=60)
+    assert process.returncode == 2
+    (line,) = errors.splitlines()
     assert line.startswith("plant_node: error: unknown argument '--case'")
