@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import signal
-import subprocess
 import sys
 from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
@@ -24,6 +23,7 @@ else:
 
 from command import Ran, Run
 from flights import Flown, Start, ros_environment, space_robot_here
+from forked import Forked
 from paths import CONFIG, TESTS
 
 from space_robot.flight.graph.domain import ros_domain
@@ -206,28 +206,19 @@ def free_domain() -> int:
 @pytest.fixture
 def start(domain: int) -> Iterator[Start]:
     """Start nodes in a domain of their own; what still runs at the end is stopped."""
-    running: list[subprocess.Popen[str]] = []
+    running: list[Forked] = []
 
-    def run(node: str, **parameters: object) -> subprocess.Popen[str]:
-        command = [sys.executable, "-m", MODULES[node]]
-        if parameters:
-            command.append("--ros-args")
+    def run(node: str, **parameters: object) -> Forked:
+        arguments = ["--ros-args"] if parameters else []
         for name, value in parameters.items():
-            command += ["-p", f"{name.replace('__', '.')}:={value}"]
-        process = subprocess.Popen(
-            command,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.STDOUT,
-            text=True,
-            env={**ros_environment(), "ROS_DOMAIN_ID": str(domain)},
-        )
-        running.append(process)
-        return process
+            arguments += ["-p", f"{name.replace('__', '.')}:={value}"]
+        environment = {**ros_environment(), "ROS_DOMAIN_ID": str(domain)}
+        running.append(Forked(MODULES[node], arguments, environment))
+        return running[-1]
 
     yield run
     for process in running:
-        if process.poll() is None:
-            process.kill()
+        process.kill()
         process.communicate()
 
 

@@ -6,6 +6,7 @@ import io
 import os
 import subprocess
 import sys
+import time
 from collections.abc import Callable
 from contextlib import redirect_stderr, redirect_stdout
 from dataclasses import dataclass
@@ -13,10 +14,12 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from forked import SPACE_ROBOT, Forked
 
+from space_robot_msgs_py.ros.locks import nodes_in
 from space_robot_msgs_py.ros.process_environment import DEFAULTS
 
-Start = Callable[..., "subprocess.Popen[str]"]
+Start = Callable[..., Forked]
 """Starts a node with parameters."""
 COMMAND = [sys.executable, "-m", "space_robot.cli.main"]
 
@@ -46,6 +49,11 @@ def space_robot(
     )
 
 
+def forked_space_robot(*arguments: str) -> Forked:
+    """Begin ``space-robot`` in a process forked from a loaded one: see `forked`."""
+    return Forked.of_command([SPACE_ROBOT, *arguments], ros_environment())
+
+
 def space_robot_here(*arguments: str) -> subprocess.CompletedProcess[str]:
     """Run ``space-robot`` in this process: what it starts anew takes seconds of the processor.
 
@@ -69,6 +77,17 @@ def space_robot_here(*arguments: str) -> subprocess.CompletedProcess[str]:
     code = int(ended.value.code or 0)
     out, err = (stream.buffer.getvalue().decode() for stream in streams.values())
     return subprocess.CompletedProcess([*COMMAND, *arguments], code, out, err)
+
+
+def wait_for_nodes(domain: int, timeout_s: float = 60.0) -> None:
+    """Return when a node has begun in a domain.
+
+    A flight that finds the domain empty at its start need not look out for others.
+    """
+    until = time.monotonic() + timeout_s
+    while not nodes_in(domain):
+        assert time.monotonic() < until
+        time.sleep(0.02)
 
 
 @dataclass

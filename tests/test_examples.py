@@ -5,17 +5,17 @@ from __future__ import annotations
 import ast
 import os
 import shlex
-import subprocess
 import sys
 from pathlib import Path
 
 import pytest
 from flights import ros_environment
+from forked import Forked
 from shown import ROOT, differences
 
+pytest.importorskip("rclpy")  # of some of them, and of the server that they are forked from
 EXAMPLES = ROOT / "examples"
 PROGRAMS = sorted(EXAMPLES.glob("*.py"))
-ON_THE_GRAPH = {"fault", "replay_regression", "swap_in_flight"}
 NEEDS = {"pandas_analysis": "pandas", "small_campaign": "pyarrow"}
 
 
@@ -28,10 +28,9 @@ def blocks(program: Path) -> list[list[str]]:
 
 @pytest.mark.parametrize("program", PROGRAMS, ids=lambda path: path.stem)
 def test_an_example_prints_what_it_shows(program: Path, tmp_path: Path) -> None:
+    """In a process forked from a loaded one: most of its time would be that of its imports."""
     if module := NEEDS.get(program.stem):
         pytest.importorskip(module)
-    if program.stem in ON_THE_GRAPH:
-        pytest.importorskip("rclpy")
     (command,), shown = blocks(program)
     python, name, *arguments = shlex.split(command)
     assert (python, ROOT / name) == ("python", program)
@@ -41,17 +40,10 @@ def test_an_example_prints_what_it_shows(program: Path, tmp_path: Path) -> None:
         "PATH": os.pathsep.join((str(scripts), os.environ.get("PATH", ""))),
         "PYTHONPATH": os.pathsep.join((str(ROOT), os.environ.get("PYTHONPATH", ""))),
     }
-    done = subprocess.run(
-        [sys.executable, str(program), *arguments],
-        cwd=tmp_path,
-        env=environment,
-        capture_output=True,
-        text=True,
-        timeout=200,
-        check=False,
-    )
-    assert done.returncode == 0, done.stderr
-    found = list(differences([line.strip() for line in shown], done.stdout.splitlines()))
+    process = Forked.of_command([str(program), *arguments], environment, tmp_path)
+    output, errors = process.communicate(timeout=200)
+    assert process.returncode == 0, errors
+    found = list(differences([line.strip() for line in shown], output.splitlines()))
     assert not found, "\n".join(found)
     for option, value in zip(arguments[::2], arguments[1::2], strict=True):
         assert option == "--out"

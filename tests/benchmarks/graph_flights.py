@@ -15,8 +15,9 @@ import psutil
 from numpy.typing import NDArray
 
 from space_robot.flight.graph.domain import ros_domain
+from space_robot.flight.graph.node_server import Program
 from space_robot.flight.graph.orchestrator import flight_parameters, require_ros
-from space_robot.flight.graph.processes import Graph, node_environment, ros_arguments
+from space_robot.flight.graph.processes import Command, Graph, node_environment, ros_arguments
 from space_robot.flight.plan import Flight
 from space_robot.processes.node_modules import MODULES
 from space_robot_msgs_py.bag.accounts import noted_accounts
@@ -74,7 +75,8 @@ class GraphRun:
 def fly_graph(flight: Flight, empty: bool = False, timed: bool = True) -> GraphRun:
     """Fly on plant and controller, mission and recorder, each a process.
 
-    ``timed`` ones are those of `nodes`, which keep every duration in memory.
+    ``timed`` ones are those of `nodes`, which keep every duration in memory. They are forked, as
+    those of `space-robot fly`; untimed ones are started anew, so that their memory is their own.
 
     Raises:
         FlightError: a node ended before the flight did, or the flight takes for ever.
@@ -85,15 +87,16 @@ def fly_graph(flight: Flight, empty: bool = False, timed: bool = True) -> GraphR
         parameters = flight_parameters(flight, bag)
         work = "empty" if empty else "full"
         files = {node: Path(folder) / f"{node}.npz" for node in ("plant", "controller")}
-        stopwatches = {
-            node: ["benchmarks.nodes", node, work, str(file)]
-            for node, file in files.items()
-            if timed
-        }
-        commands = {
-            node: module_command(*stopwatches.get(node, [module]), *ros_arguments(parameters[node]))
-            for node, module in MODULES.items()
-        }
+        commands: dict[str, Command] = {}
+        for node, module in MODULES.items():
+            arguments = ros_arguments(parameters[node])
+            if not timed:
+                commands[node] = module_command(module, *arguments)
+            elif node in files:
+                watched = [node, work, str(files[node]), *arguments]
+                commands[node] = Program("benchmarks.nodes", watched)
+            else:
+                commands[node] = Program(module, arguments)
         with Graph(commands, _environment(domain)) as graph:
             use = _watch(graph)
         accounts = noted_accounts(open_bag(bag).custom_data())
@@ -115,7 +118,7 @@ def naive_ticks_per_s(ticks: int) -> float:
     with tempfile.TemporaryDirectory(prefix="space_robot_bench_") as folder, ros_domain() as domain:
         file = Path(folder) / "rate"
         commands = {
-            node: module_command("benchmarks.naive", node, str(file), str(ticks))
+            node: Program("benchmarks.naive", [node, str(file), str(ticks)])
             for node in ("controller", "plant")
         }
         with Graph(commands, _environment(domain)) as graph:

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-import subprocess
+import threading
 import time
 from contextlib import closing
 from pathlib import Path
-from typing import Any
 
 import pytest
-from flights import COMMAND, ros_environment, space_robot_here
+from flights import forked_space_robot, space_robot_here, wait_for_nodes
 
 from space_robot.flight.graph.domain import ros_domain
+from space_robot.flight.graph.node_services import call_trigger, get_parameters, set_parameters
 from space_robot.flight.graph.temporary_node import TemporaryNode
 from space_robot.flight.replay.outcome import ReplayOptions
 from space_robot.flight.replay.run import replay
@@ -19,61 +19,65 @@ from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.bag.reader import read_flight
 
 pytest.importorskip("rclpy")
-SWAP_S = 6.0
-"""Late enough for the pilot to have changed everything before, on a busy machine, too."""
-SECONDS = 7.5
-"""Long enough after the swap for the pilot to ask for the law."""
+SWAP_S = 0.5
+"""After all that the pilot changes: the plant goes on when the pilot says so, and no further."""
+SECONDS = 0.6
+TIMEOUT_S = 150.0
 
 
 class Pilot:
-    """Changes a controller's parameters with the services of ``ros2 param``."""
+    """Lets a paused plant go on, and changes a controller's parameters as ``ros2 param`` does."""
 
     def __init__(self, domain: int) -> None:
-        from rcl_interfaces.srv import GetParameters, SetParameters
-        from rclpy.executors import SingleThreadedExecutor
-        from rosgraph_msgs.msg import Clock
+        from rcl_interfaces.srv import SetParameters
 
-        self._visitor = TemporaryNode("pilot", domain)
-        node = self._visitor.node
-        self._executor = SingleThreadedExecutor(context=node.context)
-        self._executor.add_node(node)
-        self._set = node.create_client(SetParameters, "/controller_node/set_parameters")
-        self._get = node.create_client(GetParameters, "/controller_node/get_parameters")
-        self._types = SetParameters.Request, GetParameters.Request
-        self.simulated_s = 0.0
-        node.create_subscription(Clock, "/clock", self._hear, 10)
+        self._visitors = [TemporaryNode(name, domain) for name in ("pilot", "stepper")]
+        self._node, self._stepper = (visitor.node for visitor in self._visitors)
+        self._set = self._node.create_client(SetParameters, "/controller_node/set_parameters")
+        self._request = SetParameters.Request
+        self._until = time.monotonic() + TIMEOUT_S
 
-    def _hear(self, message: object) -> None:
-        self.simulated_s = message.clock.sec + message.clock.nanosec * 1e-9  # type: ignore[attr-defined]
+    def _check(self) -> None:
+        assert time.monotonic() < self._until
 
-    def wait_until(self, simulated_s: float) -> None:
-        until = time.monotonic() + 150.0
-        while self.simulated_s < simulated_s and time.monotonic() < until:
-            self._executor.spin_once(timeout_sec=1.0)
+    def begin(self) -> None:
+        """Fly the first tick, as soon as the plant is active."""
+        self.law()  # with its answer those of the other service arrive, too
+        while not self._ask_plant("step"):
+            self._check()
+
+    def step(self, ticks: int) -> None:
+        set_parameters(self._stepper, "plant_node", {"step_ticks": ticks}, self._check)
+        assert self._ask_plant("step")
+
+    def resume(self) -> None:
+        assert self._ask_plant("resume")
+
+    def _ask_plant(self, action: str) -> bool:
+        return call_trigger(self._stepper, f"plant_node/{action}", self._check)[0]
 
     def set(self, **values: object) -> list[bool]:
         """In one call; whether each was accepted."""
+        from rclpy.executors import SingleThreadedExecutor
         from rclpy.parameter import Parameter
 
         parameters = [Parameter(k.replace("__", "."), value=v) for k, v in values.items()]
-        request = self._types[0](parameters=[p.to_parameter_msg() for p in parameters])
-        return [result.successful for result in self._call(self._set, request).results]
+        request = self._request(parameters=[p.to_parameter_msg() for p in parameters])
+        executor = SingleThreadedExecutor(context=self._node.context)
+        executor.add_node(self._node)
+        future = self._set.call_async(request)
+        executor.spin_until_future_complete(future, TIMEOUT_S)
+        executor.shutdown()
+        assert future.done()
+        return [result.successful for result in future.result().results]
 
     def law(self) -> str:
         """The parameter ``controller``."""
-        answer = self._call(self._get, self._types[1](names=["controller"]))
-        return str(answer.values[0].string_value)
-
-    def _call(self, client: Any, request: Any) -> Any:
-        assert client.wait_for_service(30.0), client.srv_name
-        future = client.call_async(request)
-        self._executor.spin_until_future_complete(future, 30.0)
-        assert future.done(), client.srv_name
-        return future.result()
+        return str(get_parameters(self._node, "controller_node", ["controller"], self._check)[0])
 
     def close(self) -> None:
-        self._executor.shutdown()
-        self._visitor.leave()
+        for visitor in self._visitors:
+            visitor.leave()
 
 
 class Flown:
@@ -90,27 +94,12 @@ def flown(tmp_path_factory: pytest.TempPathFactory) -> Flown:
     bag = tmp_path_factory.mktemp("changed") / "bag"
     with ros_domain() as domain:
         pass  # a free one, for the flight to take
-    process = subprocess.Popen(
-        [
-            *COMMAND,
-            "fly",
-            "--duration",
-            str(SECONDS),
-            "--swap",
-            f"{SWAP_S}:tde_smc",
-            "--bag",
-            str(bag),
-            "--domain",
-            str(domain),
-        ],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-        env=ros_environment(),
-    )
+    plan = ("--duration", str(SECONDS), "--swap", f"{SWAP_S}:tde_smc", "--bag", str(bag))
+    process = forked_space_robot("fly", "--paused", *plan, "--domain", str(domain))
     try:
+        wait_for_nodes(domain)
         swapped_to = change_laws(domain)
-        table, errors = process.communicate(timeout=150)
+        table, errors = process.communicate(timeout=TIMEOUT_S)
     finally:
         process.kill()
     assert process.returncode == 0, errors
@@ -120,9 +109,13 @@ def flown(tmp_path_factory: pytest.TempPathFactory) -> Flown:
 def change_laws(domain: int) -> str:
     """The law by its parameter after the planned swap."""
     with closing(Pilot(domain)) as pilot:
-        pilot.wait_until(0.1)
+        pilot.begin()
+        pilot.step(100)
+        going_on = threading.Thread(target=pilot.step, args=[400])
+        going_on.start()
         assert pilot.set(controller="tde_tsmc") == [True]
-        pilot.wait_until(pilot.simulated_s + 0.02)
+        going_on.join()
+        pilot.step(40)
         assert pilot.set(controller="pid", tde_stc__k_1=[0.3], tde_stc__lambda=[-1.0]) == [
             False,
             True,
@@ -130,12 +123,14 @@ def change_laws(domain: int) -> str:
         ]
         for _ in range(2):
             assert pilot.set(tde_tsmc__k_1=[0.5]) == [True]
-            pilot.wait_until(pilot.simulated_s + 0.02)
+            pilot.step(40)
         assert pilot.set(controller="ctc", tde_tsmc__k_d=[3.0]) == [True, True]
-        pilot.wait_until(pilot.simulated_s + 0.05)
+        pilot.step(100)
         assert pilot.set(controller="tde_stc") == [True]
-        pilot.wait_until(SWAP_S + 0.05)
-        return pilot.law()
+        pilot.step(400)
+        law = pilot.law()
+        pilot.resume()
+        return law
 
 
 def test_every_change_is_in_the_bag_with_its_tick(flown: Flown) -> None:

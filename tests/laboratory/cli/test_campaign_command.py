@@ -7,6 +7,7 @@ import os
 import signal
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import pytest
@@ -141,7 +142,7 @@ def test_ctrl_c_says_how_to_go_on(file: Path, tmp_path: Path) -> None:
     )
     journal = tmp_path / "a/journal.db-wal"
     while process.poll() is None and not (journal.exists() and journal.stat().st_size > 100_000):
-        pass
+        time.sleep(0.02)
     os.kill(process.pid, signal.SIGINT)
     stdout, stderr = process.communicate(timeout=60)
     assert process.returncode == 130

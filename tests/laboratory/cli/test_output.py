@@ -180,19 +180,17 @@ def test_letters_that_no_terminal_has_are_shown_somehow(bag: Path, tmp_path: Pat
     assert b"Traceback" not in result.stderr
 
 
-def test_a_flight_that_diverges_is_told_in_json_too(tmp_path: Path) -> None:
+def test_a_flight_that_diverges_is_told_in_json_too(tmp_path: Path, space_robot: Run) -> None:
     given = ["simulate", "--controller", "ctc", "--gains", "printed", "--duration", "1", "--json"]
     for bag in (None, tmp_path / "bag"):
         options = ["--bag", str(bag)] if bag else []
-        result = subprocess.run(
-            [*COMMAND, *given, *options], capture_output=True, text=True, check=False
-        )
-        assert result.returncode == 1
-        report = json.loads(result.stdout)
+        code, out, err = space_robot(*given, *options)
+        assert code == 1
+        report = json.loads(out)
         assert (report["controller"], report["gains"]) == ("ctc", "printed")
         tick = report["diverged"]["tick"]
         assert f"diverged at tick {tick}" in report["error"]
-        assert report["error"] in result.stderr
+        assert report["error"] in err
         assert (report["outcome"], report["reason"]) == ("diverged", report["error"])
         assert report["diverged"]["time_s"] == pytest.approx(tick * 0.0005)
         if bag:

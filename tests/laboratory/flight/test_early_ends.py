@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from flights import space_robot, space_robot_here
+from flights import space_robot_here
 
 from space_robot.analysis import analyze
 from space_robot.flight.plan import Flight, FlightPlan, resolve
@@ -182,12 +182,14 @@ def test_the_error_has_the_log() -> None:
 
 def test_the_command_leaves_a_whole_bag(tmp_path: Path) -> None:
     bag = tmp_path / "bag"
-    result = space_robot("simulate", "--controller", "ctc", "--gains", "printed", "--bag", str(bag))
+    given = ("--controller", "ctc", "--gains", "printed", "--bag", str(bag))
+    result = space_robot_here("simulate", *given)
     assert result.returncode == 1
     assert "diverged at tick 11 (t = 0.0055 s)" in result.stderr
     assert read_flight(bag).ticks == 11
 
 
+@pytest.mark.ros
 def test_the_bag_is_that_of_the_graph(tmp_path: Path) -> None:
     """The same states, commands, laws, and stamps of telemetry and clock, to the last byte."""
     pytest.importorskip("rclpy")

@@ -5,12 +5,13 @@ from __future__ import annotations
 import signal
 import subprocess
 import sys
+import time
 from collections import namedtuple
 from pathlib import Path
 
 import psutil
 import pytest
-from flights import COMMAND, ros_environment, space_robot
+from flights import COMMAND, ros_environment, space_robot_here
 
 from space_robot.flight import disk_space as room
 from space_robot.flight.plan import Flight, FlightPlan, resolve
@@ -62,6 +63,7 @@ def test_the_longest_flight_flies_and_can_be_interrupted(tmp_path: Path) -> None
     ) as process:
         while not (bag / "bag_0.mcap").exists() or (bag / "bag_0.mcap").stat().st_size < 1_000_000:
             assert process.poll() is None
+            time.sleep(0.02)
         process.send_signal(signal.SIGINT)
         _, said = process.communicate(timeout=60)
     assert process.returncode == 130
@@ -74,7 +76,7 @@ def test_a_whole_flight_in_memory_that_does_not_fit_is_refused() -> None:
     """Of those who need it whole: `stability`, and Python."""
     with pytest.raises(InputError, match=r"duration 1e\+06 s: the whole flight .* GB are free"):
         simulate(Flight(resolve(FlightPlan(duration=1e6))))
-    result = space_robot("stability", "--duration", "1e6")
+    result = space_robot_here("stability", "--duration", "1e6")
     assert result.returncode == 2
     assert result.stderr.splitlines()[-1].startswith("space-robot: error: duration 1e+06 s")
     assert "Traceback" not in result.stderr

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import os
 import signal
-import subprocess
 import time
 from typing import Any
 
 import numpy as np
 import pytest
 from flights import Start
+from forked import Forked
 
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.ros.process_environment import set_defaults
@@ -136,7 +136,7 @@ class Rogue:
 def test_bad_commands_are_refused_counted_and_change_nothing(
     start: Start, ground: Ground, tmp_path: Any
 ) -> None:
-    nodes: list[subprocess.Popen[str]] = [
+    nodes: list[Forked] = [
         start("recorder", bag=tmp_path / "bag"),
         start("mission"),
         start("controller"),

@@ -81,7 +81,9 @@ class Player:
             time.sleep(max(0.0, begin + count / RATE_HZ - time.monotonic()))
 
     def close(self) -> None:
+        """Once all has arrived."""
         for out in self._outs.values():
+            out.flush(TIMEOUT_S)
             out._node.destroy_publisher(out._publisher)
         self._claim.release()
 
@@ -105,7 +107,6 @@ def test_the_bag_is_the_flight_and_nothing_else(
         player = Player(ground)
         wait(player.is_heard, "listeners")
         player.send(part)
-        time.sleep(0.3)
         player.close()
     time.sleep(0.5)
     assert flood.poll() is None

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import signal
-import subprocess
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import pytest
 from bags import read_accounts
 from flights import Start
+from forked import Forked
 
 from space_robot.flight.graph.listeners import wait_for
 from space_robot_msgs_py.bag.reader import read_flight
@@ -19,7 +19,7 @@ pytest.importorskip("rclpy")
 if TYPE_CHECKING:
     from ground import Ground
 
-Nodes = dict[str, "subprocess.Popen[str]"]
+Nodes = dict[str, Forked]
 
 
 @pytest.fixture

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import pytest
@@ -18,7 +19,7 @@ OPTIONAL = (*topics.TRUTH, topics.WHEELS_STATE, topics.THRUSTERS_STATE)
 
 
 def test_topics_of_some_flights_are_listened_to_once_they_are_published(
-    start: Start, ground: Ground
+    start: Start, ground: Ground, tmp_path: Path
 ) -> None:
     from space_robot_msgs_py.ros.endpoints import RawPublisher
 
@@ -26,7 +27,7 @@ def test_topics_of_some_flights_are_listened_to_once_they_are_published(
         every = (*OPTIONAL, topics.JOINT_STATES)
         return {topic for topic in every if ground.node.count_subscribers(topic.name)}
 
-    start("recorder")
+    start("recorder", bag=tmp_path / "bag")
     ground.until(lambda: ground.monitor.modes.get("recorder_node") == "nominal", "the recorder")
     ground.until(lambda: topics.JOINT_STATES in heard(), "what every flight has")
     assert heard() == {topics.JOINT_STATES}

@@ -16,7 +16,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from flights import COMMAND, Flown, ros_environment, space_robot, space_robot_here
+from flights import COMMAND, Flown, ros_environment, space_robot_here
 
 from space_robot.flight.plan import Flight, FlightPlan, resolve
 from space_robot.flight.simulate import simulate
@@ -112,7 +112,7 @@ def test_plans_are_refused_likewise() -> None:
 def test_a_flight_that_diverges_ends_with_the_tick(tmp_path: Path) -> None:
     bag = tmp_path / "bag"
     gains = ("--controller", "ctc", "--gains", "printed")
-    result = space_robot("fly", "--composed", *SHORT, *gains, "--bag", str(bag), "--json")
+    result = space_robot_here("fly", "--composed", *SHORT, *gains, "--bag", str(bag), "--json")
     assert result.returncode == 1, result.stderr
     assert "Traceback" not in result.stderr
     report = json.loads(result.stdout)

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import signal
-import subprocess
 import time
 from collections.abc import Callable, Iterator
 
 import numpy as np
 import pytest
 from flights import Start
+from forked import Forked
 
 from space_robot.flight.graph.listeners import wait_for
 from space_robot_control.allocation.assumed_actuators import assumed_actuators
@@ -146,7 +146,7 @@ def test_a_missing_mission_is_told_and_a_restarted_one_followed(
     start("plant", silence_timeout=0.0)
     waiting = "waiting for the reference: no mission sends it"
     until(monitor, lambda: monitor.modes.get("controller_node") == waiting, pause)
-    first: subprocess.Popen[str] = start("mission")
+    first: Forked = start("mission")
     until(monitor, lambda: monitor.simulated_s > 0.2, pause)
     first.send_signal(signal.SIGKILL)
     until(monitor, lambda: monitor.modes.get("controller_node") == waiting, pause)

@@ -6,14 +6,14 @@ import json
 import os
 import resource
 import signal
-import subprocess
 import time
 from contextlib import suppress
 from pathlib import Path
 
 import psutil
 import pytest
-from flights import COMMAND, ros_environment, space_robot_here
+from flights import forked_space_robot, space_robot_here
+from forked import Forked
 
 from space_robot_msgs_py.bag.reader import read_flight
 
@@ -31,15 +31,9 @@ def _nodes(pid: int) -> dict[str, int]:
     return nodes
 
 
-def _start(bag: Path, *options: str) -> tuple[subprocess.Popen[str], dict[str, int]]:
+def _start(bag: Path, *options: str) -> tuple[Forked, dict[str, int]]:
     """A long flight in progress, and the pids of its nodes by name."""
-    process = subprocess.Popen(
-        [*COMMAND, "fly", "--bag", str(bag), *options],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-        env=ros_environment(),
-    )
+    process = forked_space_robot("fly", "--bag", str(bag), *options)
     file = bag / f"{bag.name}_0.mcap"
     until = time.monotonic() + 90.0
     while time.monotonic() < until and process.poll() is None:

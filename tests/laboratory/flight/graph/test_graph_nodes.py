@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import os
 import signal
-import subprocess
-import sys
 import time
 from pathlib import Path
 
 import pytest
-from flights import COMMAND, Start, ros_environment
+from flights import Start, forked_space_robot, ros_environment
+from forked import Forked
 
 from space_robot.flight.graph.listeners import wait_for
 from space_robot.processes.node_modules import MODULES
@@ -21,7 +20,7 @@ set_defaults()
 rclpy = pytest.importorskip("rclpy")
 
 
-def _end(process: subprocess.Popen[str], number: int = signal.SIGINT) -> int:
+def _end(process: Forked, number: int = signal.SIGINT) -> int:
     process.send_signal(number)
     process.communicate(timeout=30)
     return process.returncode
@@ -30,9 +29,9 @@ def _end(process: subprocess.Popen[str], number: int = signal.SIGINT) -> int:
 def test_start_up_in_any_order(start: Start, tmp_path: Path) -> None:
     """Plant first and recorder last: nothing moves until all are there, nothing is lost."""
     plant = start("plant", ticks=300, wait_for=wait_for("plant"))
-    time.sleep(2.0)
-    controller = start("controller", wait_for=wait_for("controller"))
     time.sleep(1.0)
+    controller = start("controller", wait_for=wait_for("controller"))
+    time.sleep(0.5)
     mission = start("mission")
     recorder = start("recorder", bag=tmp_path / "bag")
     output, _ = plant.communicate(timeout=90)
@@ -142,12 +141,10 @@ def test_node_refuses_bad_parameters(
 @pytest.mark.parametrize("node", MODULES)
 def test_help_is_a_few_lines(node: str) -> None:
     pytest.importorskip("rclpy")
-    command = [sys.executable, "-m", MODULES[node], "--help"]
-    result = subprocess.run(
-        command, capture_output=True, text=True, timeout=60, check=False, env=ros_environment()
-    )
-    assert (result.returncode, result.stderr) == (0, "")
-    usage, *parameters = result.stdout.splitlines()
+    process = Forked(MODULES[node], ["--help"], ros_environment())
+    output, _ = process.communicate(timeout=60)
+    assert process.returncode == 0, output
+    usage, *parameters = output.splitlines()
     assert usage.startswith(f"usage: {node}_node [--ros-args")
     assert "autostart, robot, period" in parameters[0]
 
@@ -157,14 +154,8 @@ def test_help_is_a_few_lines(node: str) -> None:
 )
 def test_arguments_that_are_not_of_ros_are_refused(arguments: list[str]) -> None:
     pytest.importorskip("rclpy")
-    result = subprocess.run(
-        [*COMMAND, "plant_node", *arguments],
-        capture_output=True,
-        text=True,
-        timeout=60,
-        check=False,
-        env=ros_environment(),
-    )
-    assert result.returncode == 2
-    (line,) = result.stderr.splitlines()
+    process = forked_space_robot("plant_node", *arguments)
+    _, errors = process.communicate(timeout=60)
+    assert process.returncode == 2
+    (line,) = errors.splitlines()
     assert line.startswith("plant_node: error: unknown argument '--case'")

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import signal
-import subprocess
 import time
 from collections.abc import Callable
 from pathlib import Path
 
 import psutil
 import pytest
-from flights import COMMAND, ros_environment, space_robot_here
+from flights import forked_space_robot, space_robot_here
+from forked import Forked
 
 from space_robot_msgs_py.bag.reader import read_flight
 
@@ -19,16 +19,11 @@ pytest.importorskip("rclpy")
 TIMEOUT_S = 90.0
 
 
-def _start(bag: Path, domain: int, *options: str) -> subprocess.Popen[bytes]:
-    return subprocess.Popen(
-        [*COMMAND, "fly", "--bag", str(bag), "--domain", str(domain), *options],
-        stdout=subprocess.DEVNULL,
-        stderr=subprocess.DEVNULL,
-        env=ros_environment(),
-    )
+def _start(bag: Path, domain: int, *options: str) -> Forked:
+    return forked_space_robot("fly", "--bag", str(bag), "--domain", str(domain), *options)
 
 
-def _nodes(flight: subprocess.Popen[bytes]) -> list[psutil.Process]:
+def _nodes(flight: Forked) -> list[psutil.Process]:
     return [
         child
         for child in psutil.Process(flight.pid).children(recursive=True)
@@ -50,7 +45,7 @@ def _has_ended(process: psutil.Process) -> bool:
         return True
 
 
-def _wait_until(condition: Callable[[], bool], flight: subprocess.Popen[bytes]) -> None:
+def _wait_until(condition: Callable[[], bool], flight: Forked) -> None:
     until = time.monotonic() + TIMEOUT_S
     while not condition():
         assert flight.poll() is None

@@ -10,7 +10,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
-from flights import COMMAND, ros_environment, space_robot_here
+from flights import forked_space_robot, ros_environment, space_robot_here
 
 from space_robot.analysis import analyze
 from space_robot.flight.bag_path import check_bag_path
@@ -65,12 +65,8 @@ def refused(domain: int, bag: Path) -> str:
 def test_of_two_at_the_same_moment_one_flies(tmp_path: Path, free_domain: int) -> None:
     bags = [tmp_path / "one", tmp_path / "two"]
     flights = [
-        subprocess.Popen(
-            [*COMMAND, "fly", "--duration", "0.2", "--domain", str(free_domain), "--bag", str(bag)],
-            stdout=subprocess.DEVNULL,
-            stderr=subprocess.PIPE,
-            text=True,
-            env=ros_environment(),
+        forked_space_robot(
+            "fly", "--duration", "0.2", "--domain", str(free_domain), "--bag", str(bag)
         )
         for bag in bags
     ]

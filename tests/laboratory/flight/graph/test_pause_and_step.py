@@ -8,7 +8,6 @@ from __future__ import annotations
 import json
 import re
 import signal
-import subprocess
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -16,8 +15,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import pytest
-from flights import COMMAND, Flown, Start, ros_environment, space_robot_here
+from flights import Flown, Start, forked_space_robot, space_robot_here, wait_for_nodes
+from forked import Forked
 
+from space_robot.flight.graph import simulation_calls
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.bag.folder import open_bag
 from space_robot_msgs_py.bag.reader import read_flight
@@ -63,17 +64,14 @@ def assert_same_messages(bag: Path, other: Path) -> None:
 
 
 @contextmanager
-def flying(domain: int, *options: str) -> Iterator[subprocess.Popen[str]]:
+def flying(domain: int, *options: str) -> Iterator[Forked]:
     """``fly --json`` in a domain, begun paused; ended if it is left before its end."""
-    command = [*COMMAND, "fly", "--paused", "--domain", str(domain), *options, "--json"]
-    process = subprocess.Popen(
-        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=ros_environment()
-    )
+    process = forked_space_robot("fly", "--paused", "--domain", str(domain), *options, "--json")
     try:
+        wait_for_nodes(domain)
         yield process
     finally:
-        if process.poll() is None:
-            process.send_signal(signal.SIGINT)
+        process.send_signal(signal.SIGINT)
         process.communicate(timeout=TIMEOUT_S)
 
 
@@ -210,8 +208,9 @@ def test_a_step_that_the_end_of_the_flight_cuts_short_is_told(
     ],
 )
 def test_what_cannot_be_is_refused_in_one_line(
-    words: tuple[str, ...], said: str, free_domain: int
+    words: tuple[str, ...], said: str, free_domain: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    monkeypatch.setattr(simulation_calls, "FIND_S", 0.2)  # there is nothing to be found
     result = space_robot_here("sim", *words, "--domain", str(free_domain))
     assert (result.returncode, result.stdout) == (2, "")
     (line,) = result.stderr.splitlines()

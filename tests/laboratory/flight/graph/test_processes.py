@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import sys
+import time
 
 from space_robot.flight.graph.processes import TAIL_LINES, NodeProcess
 
@@ -15,7 +16,7 @@ def test_an_error_is_told_though_much_was_said_after_it() -> None:
     process = NodeProcess("composed", [sys.executable, "-c", code], os.environ)
     try:
         while process.exit_code is None:
-            pass
+            time.sleep(0.005)
         first, *rest = str(process.early_end()).splitlines()[1:]
     finally:
         process.stop()

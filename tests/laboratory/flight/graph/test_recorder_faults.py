@@ -9,13 +9,13 @@ import re
 import resource
 import shutil
 import signal
-import subprocess
 import time
 from pathlib import Path
 from typing import Any
 
 import pytest
 from flights import Start, space_robot_here
+from forked import Forked
 
 from space_robot.flight.graph.listeners import wait_for
 from space_robot.flight.graph.monitor import Monitor
@@ -25,7 +25,7 @@ from space_robot_msgs_py.bag.reader import read_flight
 pytest.importorskip("rclpy")
 
 RECORDER = "recorder_node"
-REPORTS_IN_FLIGHT = 4
+REPORTS_IN_FLIGHT = 3
 PERIOD_S = 0.002
 TIMEOUT_S = 60.0
 REFERENCE, IN_FLIGHT = 20_000, 1_000_000
@@ -34,7 +34,7 @@ REFERENCE, IN_FLIGHT = 20_000, 1_000_000
 
 def _start_graph(
     start: Start, bag: Path, ticks: int, realtime: bool = False, **common: Any
-) -> dict[str, subprocess.Popen[str]]:
+) -> dict[str, Forked]:
     """A flight begun when the recorder has what mission sends in advance."""
     flight = json.dumps(json.dumps({"realtime": realtime}))  # as text in YAML
     nodes = {
@@ -55,7 +55,7 @@ def _wait_for_size(file: Path, size: int) -> None:
         time.sleep(0.02)
 
 
-def _end(process: subprocess.Popen[str]) -> str:
+def _end(process: Forked) -> str:
     process.send_signal(signal.SIGINT)
     output, _ = process.communicate(timeout=30)
     return output

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import json
 import shutil
-import subprocess
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 import yaml
-from flights import COMMAND, ros_environment, space_robot_here
+from flights import forked_space_robot, space_robot_here
 from paths import CONFIG
 
 from space_robot.flight.graph.domain import ros_domain
@@ -66,27 +65,20 @@ def test_both_fly_at_once_and_each_as_simulated(tmp_path: Path, free_domain: int
     robots = {"/sat1": "paper", "/fleet/sat2": str(with_a_panel(tmp_path / "flexible"))}
     bags = {namespace: tmp_path / namespace.replace("/", "_") for namespace in robots}
     flights = {
-        namespace: subprocess.Popen(
-            [
-                *COMMAND,
-                "fly",
-                "--namespace",
-                namespace,
-                "--domain",
-                str(free_domain),
-                "--bag",
-                str(bags[namespace]),
-                "--duration",
-                "0.3",
-                "--robot",
-                robot,
-                "--json",
-                *(["--composed"] if namespace == "/fleet/sat2" else ["--controller", "ctc"]),
-            ],
-            stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE,
-            text=True,
-            env=ros_environment(),
+        namespace: forked_space_robot(
+            "fly",
+            "--namespace",
+            namespace,
+            "--domain",
+            str(free_domain),
+            "--bag",
+            str(bags[namespace]),
+            "--duration",
+            "0.3",
+            "--robot",
+            robot,
+            "--json",
+            *(["--composed"] if namespace == "/fleet/sat2" else ["--controller", "ctc"]),
         )
         for namespace, robot in robots.items()
     }

@@ -5,7 +5,6 @@ from __future__ import annotations
 import csv
 import json
 import signal
-import subprocess
 import time
 from collections.abc import Callable
 from dataclasses import replace
@@ -15,7 +14,7 @@ import numpy as np
 import psutil
 import pytest
 from command import Run
-from flights import COMMAND, Flown, ros_environment, space_robot_here
+from flights import Flown, forked_space_robot, space_robot_here
 
 from space_robot.flight.plan import Flight, FlightPlan, resolve
 from space_robot.flight.replay.outcome import Replay, ReplayOptions
@@ -254,25 +253,29 @@ def test_a_replay_that_is_cut_short_tells_what_it_has_and_leaves_no_process(
     recorded: Callable[..., Path], victim: str, number: int, code: int, said: str
 ) -> None:
     """By the clock so slowly that there is time: it would take 15 s."""
-    process = subprocess.Popen(
-        [*COMMAND, "replay", str(recorded()), "--rate", "0.01", "--json"],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-        env=ros_environment(),
-    )
-    replaying = psutil.Process(process.pid)
-    until = time.monotonic() + 60.0
-    while time.monotonic() < until and not (children := replaying.children()):
+    process = forked_space_robot("replay", str(recorded()), "--rate", "0.01", "--json")
+    replaying, until = psutil.Process(process.pid), time.monotonic() + 60.0
+    while not (nodes := controllers(replaying)):
+        assert time.monotonic() < until
         time.sleep(0.05)
-    controller = children[0]
-    while time.monotonic() < until and controller.cpu_times().user < 1.0:
-        time.sleep(0.05)
-    time.sleep(2.0)
-    (controller if victim == "controller" else replaying).send_signal(number)
+    time.sleep(1.0)
+    (nodes[0] if victim == "controller" else replaying).send_signal(number)
     output, errors = process.communicate(timeout=60)
     assert process.returncode == code, errors
     assert said in errors
     if output:  # the playing had begun
         assert json.loads(output)["error"]
-    assert not controller.is_running()
+    assert not nodes[0].is_running()
+
+
+def controllers(replaying: psutil.Process) -> list[psutil.Process]:
+    """The controller's process, once it is there."""
+    found = replaying.children(recursive=True)
+    return [process for process in found if "controller_node" in name(process)]
+
+
+def name(process: psutil.Process) -> str:
+    try:
+        return " ".join(process.cmdline())
+    except psutil.Error:  # it has just ended
+        return ""

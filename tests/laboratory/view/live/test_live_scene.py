@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from flights import COMMAND, ros_environment, space_robot_here
+from flights import COMMAND, forked_space_robot, ros_environment, space_robot_here
 from numpy.typing import NDArray
 
 from space_robot.view.live import serve as serving
@@ -125,25 +125,9 @@ def fly(domain: int, bag: Path, shown: list[Poses], *options: str) -> FlightLog:
     def sim(*words: str) -> bool:
         return space_robot_here("sim", *words, "--domain", str(domain)).returncode == 0
 
-    with subprocess.Popen(
-        [
-            *COMMAND,
-            "fly",
-            "--paused",
-            "--realtime",
-            "--duration",
-            "3",
-            "--domain",
-            str(domain),
-            "--bag",
-            str(bag),
-            *options,
-        ],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-        env=ros_environment(),
-    ) as process:
+    where = ("--domain", str(domain), "--bag", str(bag))
+    how = ("--paused", "--realtime", "--duration", "2")
+    with forked_space_robot("fly", *how, *where, *options) as process:
         until = time.monotonic() + TIMEOUT_S
         while not (sim("step", "--ticks", "50") and any(is_robot_in(poses) for poses in shown)):
             assert time.monotonic() < until
