@@ -41,6 +41,8 @@ NOT_TO_BE_SET = {
     **{f"{node}.period": "use --period, which is for all nodes" for node in NODES},
 }
 """Parameters set by the flight itself, and the option to use instead."""
+OPTIONS_OF_NODES = ("period", "paused")
+"""Those among them that options of a flight set."""
 
 Given = Mapping[str, Mapping[str, Any]]
 """Parameters by node and dotted name."""
@@ -64,30 +66,30 @@ class FlightSettings(NamedTuple):
             InputError: a parameter is invalid or cannot be set this way.
         """
         check_may_be_set(parameters)
-        given = {
+        chosen = {
             node: nest({**options.get(node, {}), **parameters.get(node, {})}) for node in NODES
         }
-        plant = PlantNodeSettings.resolve(given["plant"])
+        plant = PlantNodeSettings.resolve(chosen["plant"])
         if events := [str(event) for event in plant.parsed_events]:  # with the targets' numbers
             plant = plant.model_copy(update={"events": events})
-        controller, gains = _controller(given["controller"], plant)
+        controller, gains = _controller(chosen["controller"], plant)
         settings = cls(
             plant,
             controller,
-            MissionNodeSettings.resolve(given["mission"]),
-            RecorderNodeSettings.resolve(given["recorder"]),
+            MissionNodeSettings.resolve(chosen["mission"]),
+            RecorderNodeSettings.resolve(chosen["recorder"]),
             gains,
         )
         settings._check_periods()
         return settings
 
     def parameters(self, laws: Mapping[str, ControlLaw]) -> dict[str, dict[str, Any]]:
-        """Return all parameters of every node but those of `NOT_TO_BE_SET`, by dotted name."""
+        """Return all parameters of every node but those that the flight sets at its start."""
         parameters = {
             node: {
                 name: value
                 for name, value in flatten(getattr(self, node).model_dump(mode="json"))
-                if f"{node}.{name}" not in NOT_TO_BE_SET or name == "period"
+                if f"{node}.{name}" not in NOT_TO_BE_SET or name in OPTIONS_OF_NODES
             }
             for node in NODES
         }
@@ -108,10 +110,10 @@ class FlightSettings(NamedTuple):
 
 
 def _controller(
-    given: Tree, plant: PlantNodeSettings
+    chosen: Tree, plant: PlantNodeSettings
 ) -> tuple[ControllerNodeSettings, dict[str, Tree]]:
     """Resolve the controller's settings and the gains given by law; defaults are the plant's."""
-    own, gains = split_gains(given)
+    own, gains = split_gains(chosen)
     own.setdefault("actuators", plant.actuators)
     if plant.realtime:  # by the wall clock there is no time to wait
         own.setdefault("reference_timeout", 0.0)

@@ -51,8 +51,8 @@ def declare_settings(node: Node, schema: type[Schema], changeable: tuple[str, ..
         InputError: an invalid file or parameter.
     """
     fields = dict(leaves(schema))
-    given = overrides(node)
-    settings = schema.resolve({name: given[name] for name in fields if name in given})
+    own = overrides(node)
+    settings = schema.resolve({name: own[name] for name in fields if name in own})
     usual = schema.model_fields["period"].default
     if settings.period != usual:
         node.get_logger().info(

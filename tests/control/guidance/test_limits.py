@@ -70,8 +70,8 @@ def test_remarks_name_joint_number_and_unit() -> None:
     assert not limit_remarks(ROBOT, mission([30.0, 0.8, -10.0], (0.0, 8.0)))
     said = limit_remarks(ROBOT, mission([60.0, 1.4, -10.0], (0.0, 0.5)))
     assert [tuple(line.split(" ")[2:4]) for line in said] == [
-        ("shoulder", "is"),
-        ("boom", "is"),
+        ("shoulder", "would"),
+        ("boom", "would"),
         ("shoulder", "needs"),
         ("boom", "needs"),
     ]

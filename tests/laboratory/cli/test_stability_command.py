@@ -143,7 +143,7 @@ def test_flight_of_a_few_ticks_is_refused() -> None:
 
 def test_folder_that_cannot_be_made_is_refused(tmp_path: Path) -> None:
     (tmp_path / "file").touch()
-    with pytest.raises(InputError, match="no folder"):
+    with pytest.raises(InputError, match="the folder cannot be created"):
         run("--plot", str(tmp_path / "file" / "figures"))
 
 

@@ -17,6 +17,7 @@ from space_robot.analysis.figures.single_flight import control_results
 from space_robot.analysis.words import remarks
 from space_robot.flight.plan import Flight, FlightPlan, resolve
 from space_robot.flight.simulate import simulate
+from space_robot.scenario.comparison import recorded_scenario
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.bag.reader import read_flight
 from space_robot_msgs_py.errors import InputError
@@ -61,7 +62,7 @@ def test_a_bag_tells_the_targets_numbers_and_flies_again(bag: tuple[Path, Flight
         "capture",
     ]
     assert all("_satellite" not in text.partition("{")[0] for text in described["events"])
-    again = Flight(resolve(FlightPlan(parameters=described["parameters"], duration=0.3)))
+    again = Flight(resolve(FlightPlan.model_validate(recorded_scenario(bag[0]))))
     assert again.description["events"] == described["events"]
     log = simulate(again)
     for column in COLUMNS:

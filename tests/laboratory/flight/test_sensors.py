@@ -112,8 +112,8 @@ def test_a_flight_tells_its_sensors() -> None:
     flight = Flight(resolve(FlightPlan(sensors="tactical")))
     assert flight.description["sensors"] == "tactical"
     assert flight.description["parameters"]["plant"]["sensors"] == "tactical"
-    again = Flight(resolve(FlightPlan(parameters=flight.description["parameters"])))
-    assert again.plant_settings == flight.plant_settings
+    again = Flight(resolve(FlightPlan.model_validate(flight.scenario.tree)))
+    assert again.scenario.tree == flight.scenario.tree
     with pytest.raises(InputError, match="unknown sensor 'best': choose one of coarse, fine"):
         Flight(resolve(FlightPlan(sensors="best")))
 

@@ -133,5 +133,5 @@ def test_namespaces_are_names_of_ros() -> None:
         "/a/b_2",
     ]
     for text in ("1sat", "a b", "sat-1", "a//b", "a__b", "~x", "{node}"):
-        with pytest.raises(InputError, match="no digit first"):
+        with pytest.raises(InputError, match="not starting with a digit"):
             full_namespace(text)

@@ -12,7 +12,7 @@ import pytest
 
 pytest.importorskip("rclpy")
 
-from space_robot_msgs_py.ros import node_scheduler, upkeep
+from space_robot_msgs_py.ros import node_scheduler
 from space_robot_msgs_py.ros.loop import Wait
 from space_robot_msgs_py.ros.node_scheduler import (
     GLANCE_S,
@@ -99,7 +99,6 @@ class Node:
 def clock(monkeypatch: pytest.MonkeyPatch) -> Clock:
     clock = Clock()
     monkeypatch.setattr(node_scheduler, "time", clock)
-    monkeypatch.setattr(upkeep, "time", clock)
     monkeypatch.setattr(gc, "freeze", lambda: None)
     monkeypatch.setattr(gc, "collect", lambda: None)
     monkeypatch.setattr(node_scheduler, "ask_for_fifo", lambda priority: f"fifo {priority}")

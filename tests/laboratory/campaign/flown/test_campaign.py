@@ -13,7 +13,7 @@ from typing import Any
 import pytest
 
 from space_robot import load_bag
-from space_robot.campaign.flown import Campaign, FlownCampaign, bags, flights, precision
+from space_robot.campaign.flown import Campaign, FlownCampaign, campaign, flights, precision
 from space_robot.campaign.flown.flights import Progress
 from space_robot.campaign.report.findings import Findings
 from space_robot.campaign.report.subject import subject_of
@@ -198,7 +198,7 @@ def test_failures_are_kept_as_bags(tmp_path: Path, monkeypatch: pytest.MonkeyPat
     (tmp_path / "b/bags/0_tde_stc").rename(tmp_path / "b/bags/.0_tde_stc")  # killed while at it
     keep.run(1, 7, tmp_path / "b", workers=0)
     assert sorted(path.name for path in (tmp_path / "b/bags").iterdir()) == kept
-    assert bags.bag_name(Task(3, "ctc=my/gains")) == "3_ctc=my_gains"
+    assert campaign.bag_name(Task(3, "ctc=my/gains")) == "3_ctc=my_gains"
 
 
 def test_without_a_folder_it_lasts_as_long_as_the_object() -> None:

@@ -69,6 +69,7 @@ def test_nodes_close_the_bag_and_the_next_flight_has_the_domain(
         "fly", "--duration", "0.2", "--domain", str(free_domain), "--bag", str(tmp_path / "next")
     )
     assert following.returncode == 0, following.stderr
+    psutil.wait_procs(nodes, TIMEOUT_S)
     assert not any(node.is_running() for node in nodes)
     log = read_flight(bag)
     assert not log.unfinished
