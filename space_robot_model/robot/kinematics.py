@@ -1,0 +1,156 @@
+"""Pose and Jacobians of a tool, and the coupling of momentum, in new arrays."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from space_robot_msgs_py.config.validation import one_of
+from space_robot_msgs_py.errors import InputError
+
+from ..dynamics.tool_kinematics import ToolKinematics, tool_kinematics_into
+from ..elementary.least_squares import null_space, singular_values
+from .dynamics import _checked, _quaternion, _vector
+
+if TYPE_CHECKING:
+    from .robot import Robot
+    from .tree import Tool
+
+Array = NDArray[np.float64]
+Attitude = Literal["held", "free"]
+
+
+class ToolState(NamedTuple):
+    """Pose and Jacobians of a tool, see `space_robot_model.dynamics.tool_kinematics`.
+
+    A twist is ``[v; w]``, m/s and rad/s, on inertial axes; columns are the robot's N joints,
+    passive ones last.
+    """
+
+    position: Array
+    """(3,) m, origin of the tool from the robot's centre of mass, inertial axes."""
+    rotation: Array
+    """(3, 3) from the tool's frame to the inertial frame."""
+    base: Array
+    """(6, 6) ``J_b``: twist by ``[v0; w0]``."""
+    joints: Array
+    """(6, N) ``J_m``: twist by joint velocities with the base fixed."""
+    attitude: Array
+    """(6, 3) ``J_w``: twist by ``w0``, linear momentum zero."""
+    held: Array
+    """(6, N) twist by joint velocities, attitude held, linear momentum zero."""
+    free: Array
+    """(6, N) ``J_g``: the same, base free, both momenta zero: the generalised Jacobian."""
+    turn: Array
+    """(3, N) ``w0`` of a free base by joint velocities, inertial axes."""
+    coupling: Array
+    """(3, N) angular momentum about the centre of mass by joint velocities, attitude held."""
+
+
+def tool_state(
+    robot: Robot, quaternion_wxyz: ArrayLike, joint_positions: ArrayLike, tool: str | None = None
+) -> ToolState:
+    """Return pose and Jacobians of a tool.
+
+    Args:
+        robot: the robot's numbers.
+        quaternion_wxyz: (4,) base attitude, unit.
+        joint_positions: (N,) of all joints, rad, or m of prismatic ones.
+        tool: name of one of ``robot.tools``; None: the first.
+
+    Raises:
+        InputError: an argument has another type or shape, the quaternion is not unit, or there is
+            no such tool.
+    """
+    n, order = _checked(robot).joint_count, list(robot.order)
+    frame, model = tool_named(robot, tool), robot.model
+    out = ToolKinematics.allocate(n)
+    positions = _vector(joint_positions, n, "joint_positions")[order]
+    tool_kinematics_into(
+        model,
+        _quaternion(quaternion_wxyz),
+        positions,
+        body_row(robot, frame),
+        np.ascontiguousarray(frame.rotation),
+        np.ascontiguousarray(frame.position),
+        out,
+    )
+    columns = [int(model.row[joint]) for joint in range(n)]
+    of_base = (out.position, out.rotation, out.base)
+    return ToolState(
+        *(array.copy() for array in of_base),
+        out.joints[:, columns],
+        out.attitude.copy(),
+        out.held[:, columns],
+        out.free[:, columns],
+        out.turn[:, columns],
+        out.coupling[:, columns],
+    )
+
+
+def tool_jacobian(
+    robot: Robot,
+    quaternion_wxyz: ArrayLike,
+    joint_positions: ArrayLike,
+    attitude: Attitude = "held",
+    tool: str | None = None,
+) -> Array:
+    """Return the Jacobian (6, N) of a tool by joint velocities, with zero linear momentum.
+
+    Args:
+        robot: the robot's numbers.
+        quaternion_wxyz: (4,) base attitude, unit.
+        joint_positions: (N,) of all joints, rad, or m of prismatic ones.
+        attitude: "held": the base does not turn; "free": angular momentum is zero, too, which gives
+            the generalised Jacobian (Umetani & Yoshida 1989).
+        tool: name of one of ``robot.tools``; None: the first.
+
+    Raises:
+        InputError: see `tool_state`.
+    """
+    one_of(attitude, ("held", "free"), "attitude")
+    state = tool_state(robot, quaternion_wxyz, joint_positions, tool)
+    return state.held if attitude == "held" else state.free
+
+
+def reaction_null_space(
+    robot: Robot, quaternion_wxyz: ArrayLike, joint_positions: ArrayLike
+) -> Array:
+    """Return an orthonormal basis of the joint velocities that leave the base's attitude alone.
+
+    They have no angular momentum about the robot's centre of mass (Nenchev, Yoshida & Uchiyama
+    1992): a column (N,) each, N - 3 of them in general.
+
+    Raises:
+        InputError: see `tool_state`.
+    """
+    return null_space(tool_state(robot, quaternion_wxyz, joint_positions).coupling)
+
+
+def manipulability(jacobian: Array) -> float:
+    """Return ``sqrt(det(J J^T))`` of Yoshikawa (1985): zero in a singular posture.
+
+    With the generalised Jacobian a posture where it is zero is a dynamic singularity.
+    """
+    return float(np.prod(singular_values(jacobian)))
+
+
+def tool_named(robot: Robot, name: str | None) -> Tool:
+    """Return a tool of a robot; None: the first.
+
+    Raises:
+        InputError: there is no tool of that name.
+    """
+    if name is None:
+        return robot.tool
+    tools = {tool.name: tool for tool in robot.tools}
+    if name not in tools:
+        raise InputError(f"tool: {name!r}: choose one of {', '.join(tools)}")
+    return tools[name]
+
+
+def body_row(robot: Robot, tool: Tool) -> int:
+    """Return the number in `Model` of the body that carries a tool."""
+    return int(robot.model.row[tool.body - 1]) + 1 if tool.body else 0
