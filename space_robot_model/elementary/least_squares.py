@@ -29,7 +29,7 @@ def least_squares_into(
         matrix: A (m, n), m at most n.
         right: b (m,).
         damping: 0 for full rank; above 0 for the damped solution (Nakamura & Hanafusa 1986).
-        work: (m, m+1) scratch.
+        work: (m, n) scratch, at least (m, m+1).
         solution: x (n,). It is not finite if A has not full rank and ``damping`` is 0.
     """
     m, n = matrix.shape

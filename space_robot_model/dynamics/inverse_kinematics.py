@@ -1,0 +1,96 @@
+"""Joint positions that bring a tool along a path while the base's attitude is led.
+
+With zero momentum and a led attitude the tool's pose is a function of attitude and joints, so that
+inverse kinematics is a problem of positions: Newton's method with the Jacobian ``J_held`` of
+`.tool_kinematics`, from the solution at the point before. Where joints are more than the path
+asks for, each step is the smallest one.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from space_robot_msgs_py.compiled.kernels import kernel
+
+from ..elementary.least_squares import least_squares_into
+from .model import Model
+from .tool_kinematics import ToolKinematics, tool_kinematics_into
+
+Array = NDArray[np.float64]
+
+MOST_STEPS = 50
+TOLERANCE = 1e-12
+"""Remaining error of a pose, m and rad."""
+
+
+@kernel
+def rotation_error(wanted: Array, actual: Array, out: Array) -> None:
+    """Write into ``out`` (3,) the vector part of the turn from ``actual`` to ``wanted``.
+
+    It is ``sin(angle)`` about the turn's axis, on the outer axes; up to 90 degrees it grows with
+    the angle.
+    """
+    for i in range(3):
+        j, k = (i + 1) % 3, (i + 2) % 3
+        out[i] = 0.0
+        for c in range(3):
+            out[i] += 0.5 * (actual[j, c] * wanted[k, c] - actual[k, c] * wanted[j, c])
+
+
+@kernel
+def follow_path_into(
+    model: Model,
+    quaternions: Array,
+    positions: Array,
+    rotations: Array,
+    body: int,
+    mounting: Array,
+    point: Array,
+    damping: float,
+    start: Array,
+    work: ToolKinematics,
+    out: Array,
+) -> int:
+    """Fill ``out`` (K, N) with joint positions, until a pose cannot be reached.
+
+    Args:
+        model: the robot.
+        quaternions: (K, 4) attitude of the base, unit.
+        positions: (K, 3) of the tool from the robot's centre of mass, inertial axes, m.
+        rotations: (K, 3, 3) of the tool; (0, 3, 3): its orientation is free.
+        body: see `tool_kinematics_into`, as ``mounting`` and ``point``.
+        mounting: rotation of the tool on the body.
+        point: position of the tool on the body.
+        damping: of the least-squares steps.
+        start: (N,) joint positions near the first pose.
+        work: scratch.
+        out: solutions, in the order of ``model``.
+
+    Returns:
+        K, or the number of the first pose that was not reached; its row has the nearest posture.
+    """
+    rows = 6 if len(rotations) else 3
+    error, scratch = np.zeros(rows), np.zeros((6, 7))
+    step, posture = np.zeros(len(start)), start.copy()
+    for k in range(len(positions)):
+        is_reached = False
+        for _ in range(MOST_STEPS):
+            tool_kinematics_into(model, quaternions[k], posture, body, mounting, point, work)
+            for i in range(3):
+                error[i] = positions[k, i] - work.position[i]
+            if rows == 6:
+                rotation_error(rotations[k], work.rotation, error[3:])
+            largest = 0.0
+            for i in range(rows):
+                largest = max(largest, abs(error[i]))
+            if largest <= TOLERANCE:
+                is_reached = True
+                break
+            least_squares_into(work.held[:rows], error, damping, scratch, step)
+            for j in range(len(step)):
+                posture[j] += step[j]
+        out[k] = posture
+        if not is_reached:
+            return k
+    return len(positions)

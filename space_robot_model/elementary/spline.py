@@ -1,0 +1,83 @@
+"""Cubic splines with two continuous derivatives, with the same bits on every processor.
+
+SciPy solves for the rates with LAPACK, whose sums differ between processors.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from space_robot_msgs_py.compiled.kernels import kernel
+
+Array = NDArray[np.float64]
+
+
+@kernel
+def spline_rates_into(times: Array, values: Array, rates: Array, work: Array) -> None:
+    """Fill the inner rows of ``rates`` so that the second derivative is continuous.
+
+    By Thomas' elimination of the tridiagonal system (de Boor, A Practical Guide to Splines, IV).
+
+    Args:
+        times: (K,) s, rising.
+        values: (K, D) at these times.
+        rates: (K, D); the first and the last row are given.
+        work: (K,) scratch.
+    """
+    last = len(times) - 1
+    for k in range(1, last):
+        before, after = 1.0 / (times[k] - times[k - 1]), 1.0 / (times[k + 1] - times[k])
+        pivot = 2.0 * (before + after) - before * work[k - 1] if k > 1 else 2.0 * (before + after)
+        work[k] = after / pivot
+        for d in range(values.shape[1]):
+            slope = before * before * (values[k, d] - values[k - 1, d])
+            slope += after * after * (values[k + 1, d] - values[k, d])
+            rates[k, d] = (3.0 * slope - before * rates[k - 1, d]) / pivot
+    for k in range(last - 1, 0, -1):
+        for d in range(values.shape[1]):
+            rates[k, d] -= work[k] * rates[k + 1, d]
+
+
+class CubicSpline:
+    """A cubic spline through values at given times, at given rates at both ends."""
+
+    def __init__(
+        self,
+        times: Array,
+        values: Array,
+        first_rate: Array | float = 0.0,
+        last_rate: Array | float = 0.0,
+    ) -> None:
+        """Solve for the rates.
+
+        Args:
+            times: (K,) s, rising, at least two.
+            values: (K, D) at these times.
+            first_rate: (D,) at the first time, 1/s.
+            last_rate: (D,) at the last time.
+        """
+        self.times, self.values = times, np.ascontiguousarray(values)
+        self.rates = np.empty_like(self.values)
+        self.rates[0], self.rates[-1] = first_rate, last_rate
+        spline_rates_into(self.times, self.values, self.rates, np.zeros(len(times)))
+
+    def at(self, time: Array) -> Array:
+        """Return (T, 3, D): value, rate (1/s) and second derivative (1/s2).
+
+        Outside its times the spline is at rest at the nearer end.
+        """
+        inside = np.clip(time, self.times[0], self.times[-1])
+        k = np.clip(np.searchsorted(self.times, inside, side="right") - 1, 0, len(self.times) - 2)
+        span = (self.times[k + 1] - self.times[k])[:, np.newaxis]
+        u = (inside - self.times[k])[:, np.newaxis] / span
+        first, rise = self.values[k], self.values[k + 1] - self.values[k]
+        m0, m1 = self.rates[k] * span, self.rates[k + 1] * span
+        square, cube = 3.0 * rise - 2.0 * m0 - m1, m0 + m1 - 2.0 * rise
+        rows = np.empty((len(time), 3, self.values.shape[1]))
+        rows[:, 0] = first + u * (m0 + u * (square + u * cube))
+        rows[:, 1] = (m0 + u * (2.0 * square + u * 3.0 * cube)) / span
+        rows[:, 2] = (2.0 * square + u * 6.0 * cube) / (span * span)
+        is_outside = (time < self.times[0]) | (time > self.times[-1])
+        rows[is_outside, 1:] = 0.0
+        return rows
