@@ -44,6 +44,7 @@ def follow_path_into(
     quaternions: Array,
     positions: Array,
     rotations: Array,
+    from_base: bool,
     body: int,
     mounting: Array,
     point: Array,
@@ -57,8 +58,9 @@ def follow_path_into(
     Args:
         model: the robot.
         quaternions: (K, 4) attitude of the base, unit.
-        positions: (K, 3) of the tool from the robot's centre of mass, inertial axes, m.
+        positions: (K, 3) of the tool on inertial axes, m.
         rotations: (K, 3, 3) of the tool; (0, 3, 3): its orientation is free.
+        from_base: whether positions are from the base's centre of mass; else from the robot's.
         body: see `tool_kinematics_into`, as ``mounting`` and ``point``.
         mounting: rotation of the tool on the body.
         point: position of the tool on the body.
@@ -79,6 +81,8 @@ def follow_path_into(
             tool_kinematics_into(model, quaternions[k], posture, body, mounting, point, work)
             for i in range(3):
                 error[i] = positions[k, i] - work.position[i]
+                if from_base:
+                    error[i] -= work.centre_of_mass[i]
             if rows == 6:
                 rotation_error(rotations[k], work.rotation, error[3:])
             largest = 0.0
@@ -87,7 +91,8 @@ def follow_path_into(
             if largest <= TOLERANCE:
                 is_reached = True
                 break
-            least_squares_into(work.held[:rows], error, damping, scratch, step)
+            jacobian = work.joints if from_base else work.held
+            least_squares_into(jacobian[:rows], error, damping, scratch, step)
             for j in range(len(step)):
                 posture[j] += step[j]
         out[k] = posture

@@ -56,6 +56,8 @@ class ToolKinematics(Record):
 
     position: Array = shaped(lambda n: (3,))
     """Origin of the tool from the robot's centre of mass, inertial axes, m."""
+    centre_of_mass: Array = shaped(lambda n: (3,))
+    """The robot's centre of mass from the base's, inertial axes, m."""
     rotation: Array = shaped(lambda n: (3, 3))
     """Rotation from the tool's frame to the inertial frame."""
     base: Array = shaped(lambda n: (6, 6))
@@ -137,6 +139,7 @@ def _momentum_coupling(tool: Vector, out: ToolKinematics) -> None:
     full = out.full_inertia
     mass = full[0, 0]
     com = (full[1, 5] / mass, full[2, 3] / mass, full[0, 4] / mass)
+    store(com, out.centre_of_mass, 0)
     store(subtract(tool, com), out.position, 0)
     for j in range(out.coupling.shape[1]):
         linear = (full[0, 6 + j], full[1, 6 + j], full[2, 6 + j])

@@ -52,3 +52,26 @@ def rpy_of_rotation(rotation: Array) -> Array:
 def _exact(values: Array) -> Array:
     rounded = np.round(values)
     return np.where(np.abs(values - rounded) < 1e-15, rounded, values)
+
+
+def quaternion_of_rotation(rotation: Array) -> Array:
+    """Return the unit quaternion ``[w, x, y, z]`` of a rotation (3, 3), with the largest part > 0.
+
+    The part that is largest is taken from the diagonal (Shepperd 1978).
+    """
+    r = rotation
+    trace = r[0, 0] + r[1, 1] + r[2, 2]
+    squares = np.array([trace, r[0, 0], r[1, 1], r[2, 2]])
+    largest = int(np.argmax(squares))
+    q = np.empty(4)
+    if largest == 0:
+        q[0] = 1.0 + trace
+        q[1:] = r[2, 1] - r[1, 2], r[0, 2] - r[2, 0], r[1, 0] - r[0, 1]
+    else:
+        i = largest - 1
+        j, k = (i + 1) % 3, (i + 2) % 3
+        q[1 + i] = 1.0 + 2.0 * r[i, i] - trace
+        q[0] = r[k, j] - r[j, k]
+        q[1 + j], q[1 + k] = r[j, i] + r[i, j], r[k, i] + r[i, k]
+    unit: Array = q / norm(q)
+    return unit

@@ -31,6 +31,8 @@ class ToolState(NamedTuple):
 
     position: Array
     """(3,) m, origin of the tool from the robot's centre of mass, inertial axes."""
+    centre_of_mass: Array
+    """(3,) m, the robot's centre of mass from the base's, inertial axes."""
     rotation: Array
     """(3, 3) from the tool's frame to the inertial frame."""
     base: Array
@@ -78,7 +80,7 @@ def tool_state(
         out,
     )
     columns = [int(model.row[joint]) for joint in range(n)]
-    of_base = (out.position, out.rotation, out.base)
+    of_base = (out.position, out.centre_of_mass, out.rotation, out.base)
     return ToolState(
         *(array.copy() for array in of_base),
         out.joints[:, columns],

@@ -1,0 +1,157 @@
+"""Motions of the joints and of the base over time, from which a mission is put together.
+
+Each gives position, rate and acceleration that belong together at any time. Before it begins and
+after it ends it is at rest.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from space_robot_model.elementary.sine import sines_cosines
+from space_robot_model.elementary.spline import CubicSpline
+
+Array = NDArray[np.float64]
+
+
+class Course(Protocol):
+    """A motion of the joints, (T, 3, n), or of the base, (T, 10), as in a `ReferenceChunk`."""
+
+    def at(self, time: Array) -> Array:
+        """Return the motion at times (T,), s."""
+        ...
+
+
+def quintic(u: Array) -> tuple[Array, Array, Array]:
+    """Return ``10 u^3 - 15 u^4 + 6 u^5`` and its first two derivatives, ``u`` from 0 to 1."""
+    return (
+        u * u * u * (10.0 + u * (-15.0 + 6.0 * u)),
+        30.0 * u * u * (1.0 - u) * (1.0 - u),
+        60.0 * u * (1.0 - u) * (1.0 - 2.0 * u),
+    )
+
+
+class QuinticLeg(NamedTuple):
+    """Joints from rest to rest: ``theta_a + (theta_b - theta_a)(10 u^3 - 15 u^4 + 6 u^5)``."""
+
+    begin: float
+    """s."""
+    span: float
+    """s, above 0."""
+    start: Array
+    """(n,) rad, or m of prismatic joints."""
+    rise: Array
+    """(n,) goal minus start."""
+
+    def at(self, time: Array) -> Array:
+        """Return (T, 3, n) at times (T,), s."""
+        share, rate, acceleration = quintic(
+            np.clip((time - self.begin)[:, np.newaxis] / self.span, 0.0, 1.0)
+        )
+        rows = np.empty((len(time), 3, len(self.start)))
+        rows[:, 0] = self.start + self.rise * share
+        rows[:, 1] = self.rise * rate / self.span
+        rows[:, 2] = self.rise * acceleration / (self.span * self.span)
+        return rows
+
+
+class SplineCourse(NamedTuple):
+    """Joints along a cubic spline."""
+
+    begin: float
+    """s, time zero of the spline."""
+    spline: CubicSpline
+
+    def at(self, time: Array) -> Array:
+        """Return (T, 3, n) at times (T,), s."""
+        return self.spline.at(time - self.begin)
+
+
+class Slew(NamedTuple):
+    """The base turns about one axis from rest to rest; the angle is quintic."""
+
+    begin: float
+    """s."""
+    span: float
+    """s, above 0."""
+    quaternion: Array
+    """(4,) attitude at the begin, unit."""
+    axis: Array
+    """(3,) unit, in the base frame; its components do not change during the turn."""
+    angle: float
+    """rad."""
+
+    def at(self, time: Array) -> Array:
+        """Return (T, 10) at times (T,), s: quaternion, velocity and acceleration, base frame."""
+        rows = np.zeros((len(time), 10))
+        rows[:, :4] = self.quaternion
+        if self.angle == 0.0:
+            return rows
+        share, rate, acceleration = quintic(np.clip((time - self.begin) / self.span, 0.0, 1.0))
+        sine, cosine = sines_cosines(0.5 * self.angle * share)
+        turn = np.column_stack((cosine, sine[:, np.newaxis] * self.axis))
+        rows[:, :4] = multiplied(self.quaternion, turn)
+        rows[:, 4:7] = (self.angle * rate / self.span)[:, np.newaxis] * self.axis
+        rows[:, 7:] = (self.angle * acceleration / self.span**2)[:, np.newaxis] * self.axis
+        return rows
+
+
+class AttitudeCourse(NamedTuple):
+    """The base along a cubic spline of the components of its quaternion, then normalised."""
+
+    begin: float
+    """s, time zero of the spline."""
+    spline: CubicSpline
+    """Of quaternions in one hemisphere."""
+
+    def at(self, time: Array) -> Array:
+        """Return (T, 10) at times (T,), s: quaternion, velocity and acceleration, base frame."""
+        p, p_rate, p_second = np.moveaxis(self.spline.at(time - self.begin), 1, 0)
+        length = np.sqrt(_dot(p, p))
+        q = p / length
+        stretch = _dot(p, p_rate) / length
+        q_rate = (p_rate - q * stretch) / length
+        stretch_rate = (_dot(p_rate, p_rate) + _dot(p, p_second) - stretch * stretch) / length
+        q_second = (p_second - 2.0 * q_rate * stretch - q * stretch_rate) / length
+        back = q * np.array([1.0, -1.0, -1.0, -1.0])
+        # omega = 2 q* qdot; its derivative has |qdot|^2 in the scalar part only
+        omega, alpha = multiplied(back, 2.0 * q_rate), multiplied(back, 2.0 * q_second)
+        return np.hstack((q, omega[:, 1:], alpha[:, 1:]))
+
+
+def multiplied(first: Array, second: Array) -> Array:
+    """Return the products (..., 4) of quaternions ``[w, x, y, z]``."""
+    w, x, y, z = np.moveaxis(np.asarray(first), -1, 0)
+    a, b, c, d = np.moveaxis(np.asarray(second), -1, 0)
+    return np.stack(
+        (
+            w * a - x * b - y * c - z * d,
+            w * b + x * a + y * d - z * c,
+            w * c - x * d + y * a + z * b,
+            w * d + x * c - y * b + z * a,
+        ),
+        axis=-1,
+    )
+
+
+def turn_between(first: Array, second: Array) -> tuple[Array, float]:
+    """Return axis (3,) in the first frame and angle (rad, 0 to pi) of the shortest turn."""
+    from space_robot_model.elementary.arctangent import arctan2  # slow to import
+
+    turn = multiplied(first * np.array([1.0, -1.0, -1.0, -1.0]), second)
+    turn = -turn if turn[0] < 0.0 else turn
+    sine = float(np.sqrt(_dot(turn[1:], turn[1:])[0]))
+    if sine == 0.0:
+        return np.array([1.0, 0.0, 0.0]), 0.0
+    return turn[1:] / sine, 2.0 * float(arctan2(sine, float(turn[0])))
+
+
+def _dot(a: Array, b: Array) -> Array:
+    """Return the dot products (..., 1) of the last axis, summed in order."""
+    total = a[..., 0] * b[..., 0]
+    for k in range(1, a.shape[-1]):
+        total = total + a[..., k] * b[..., k]
+    return total[..., np.newaxis]

@@ -1,0 +1,58 @@
+"""What a motion asks of joints and base: rates, torques and momentum, without flying it."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from space_robot_model.robot import Robot
+from space_robot_model.robot.dynamics import inverse_dynamics
+from space_robot_model.robot.momentum import Motion, robot_momentum
+from space_robot_msgs_py.samples import ReferenceChunk
+
+from .courses import Course
+
+Array = NDArray[np.float64]
+
+SAMPLE_S = 0.01
+
+
+class Demand(NamedTuple):
+    """A desired motion, and what it asks for with zero momentum at the start."""
+
+    time: Array
+    """(K,) s."""
+    joints: Array
+    """(K, 3, n) positions, velocities and accelerations, rad or m."""
+    base: Array
+    """(K, 10) quaternion, angular velocity and acceleration, base frame."""
+    torque: Array
+    """(K, n+3) N m on the base's axes, then N m or N of the joints; without friction."""
+    momentum: Array
+    """(K, 3) N m s, angular momentum that the base's actuators take up, inertial axes."""
+
+    @property
+    def base_torque(self) -> Array:
+        """(K,) N m, the largest component on the base's axes."""
+        return _largest(self.torque[:, :3])
+
+    @property
+    def stored_momentum(self) -> Array:
+        """(K,) N m s, length of the momentum."""
+        total = sum(self.momentum[:, k] * self.momentum[:, k] for k in range(3))
+        return np.sqrt(total)
+
+
+def demand(robot: Robot, joints: Course, base: Course, begin: float, end: float) -> Demand:
+    """Sample a motion and compute what it asks of a robot whose joints are all actuated."""
+    time = np.linspace(begin, end, max(101, round((end - begin) / SAMPLE_S) + 1))
+    chunk = ReferenceChunk(0, joints.at(time), base.at(time))
+    torque = inverse_dynamics(robot, chunk.references())
+    motion = Motion(chunk.base[:, :4], chunk.base[:, 4:7], chunk.joints[:, 0], chunk.joints[:, 1])
+    return Demand(time, chunk.joints, chunk.base, torque, robot_momentum(robot, motion).angular)
+
+
+def _largest(values: Array) -> Array:
+    return np.max(np.abs(values), axis=1)

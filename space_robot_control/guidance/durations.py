@@ -1,0 +1,89 @@
+"""The shortest duration of a segment under limits.
+
+A segment is a path with a quintic course in time, and the robot has no momentum and no weight: with
+twice the duration its velocities and momenta are half, its accelerations and torques a quarter. So
+one sample of it tells the duration at which each limit is reached.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from typing import Annotated
+
+import numpy as np
+from pydantic import Field
+
+from space_robot_model.robot import Robot
+from space_robot_msgs_py.config.validation import StrictModel
+from space_robot_msgs_py.errors import InputError
+
+from .courses import Course
+from .demand import demand
+
+Limit = Annotated[float, Field(ge=0.0, le=1e9)]
+SHORTEST_S = 0.1
+"""Duration of a segment in which nothing moves, s."""
+
+
+class MissionLimits(StrictModel):
+    """What a fast segment may ask for, beside the limits of the robot's joints; 0: no limit."""
+
+    base_torque: Limit = Field(0.0, description="on each axis of the base, N m")
+    base_momentum: Limit = Field(0.0, description="angular momentum taken up by the base, N m s")
+    base_rate_deg: Limit = Field(0.0, description="angular velocity of the base, degrees/s")
+    joint_acceleration_deg: Limit = Field(
+        0.0, description="of each joint, degrees/s2, or m/s2 of prismatic joints"
+    )
+
+
+def shortest_duration(
+    robot: Robot, limits: MissionLimits, joints: Course, base: Course, begin: float, span: float
+) -> float:
+    """Return the duration at which a segment comes to the first of its limits.
+
+    Args:
+        robot: whose joints are all actuated.
+        limits: beside those of the robot's joints.
+        joints: of the segment in ``span``.
+        base: of the segment in ``span``.
+        begin: s.
+        span: s, any duration that the segment was sampled with.
+
+    Raises:
+        InputError: none of what moves has a limit.
+    """
+    shares = list(_shares(robot, limits, joints, base, begin, span))
+    if not shares:
+        raise InputError(
+            "fast: no limit of velocity, acceleration, torque or momentum is known: give a "
+            "duration, or limits (base_torque, base_momentum, base_rate_deg, "
+            "joint_acceleration_deg)"
+        )
+    return max(SHORTEST_S, span * max(shares))
+
+
+def _shares(
+    robot: Robot, limits: MissionLimits, joints: Course, base: Course, begin: float, span: float
+) -> Iterator[float]:
+    """Yield the factor on ``span`` that each limit asks for."""
+    asked = demand(robot, joints, base, begin, begin + span)
+    rates = np.max(np.abs(asked.joints[:, 1]), axis=0)
+    accelerations = np.max(np.abs(asked.joints[:, 2]), axis=0)
+    efforts = np.max(np.abs(asked.torque[:, 3:]), axis=0)
+    per_unit = np.where(robot.is_prismatic[: robot.n], 1.0, np.pi / 180.0)
+    for joint, limit in enumerate(robot.limits):
+        if math.isfinite(limit.velocity):
+            yield float(rates[joint]) / limit.velocity
+        if math.isfinite(limit.effort):
+            yield math.sqrt(float(efforts[joint]) / limit.effort)
+        if limits.joint_acceleration_deg:
+            bound = limits.joint_acceleration_deg * float(per_unit[joint])
+            yield math.sqrt(float(accelerations[joint]) / bound)
+    if limits.base_torque:
+        yield math.sqrt(float(np.max(asked.base_torque)) / limits.base_torque)
+    if limits.base_momentum:
+        yield float(np.max(asked.stored_momentum)) / limits.base_momentum
+    if limits.base_rate_deg:
+        turn = np.sqrt(sum(asked.base[:, k] * asked.base[:, k] for k in (4, 5, 6)))
+        yield float(np.max(turn)) / math.radians(limits.base_rate_deg)

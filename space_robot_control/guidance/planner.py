@@ -1,0 +1,196 @@
+"""The plan of a mission: a course of the joints and one of the base for each of its segments."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from space_robot_model.dynamics.attitude import rotation_matrix
+from space_robot_model.elementary.matrices import norm, product
+from space_robot_model.elementary.rotations import quaternion_of_rotation
+from space_robot_model.elementary.sine import sines_cosines
+from space_robot_model.elementary.spline import CubicSpline
+from space_robot_model.robot import Robot
+
+from .courses import Course, QuinticLeg, Slew, SplineCourse, multiplied, quintic, turn_between
+from .reactionless import reactionless_path
+from .segments import Segment, ToolGoal, segment_number
+from .tool_path import ToolFollower
+
+Array = NDArray[np.float64]
+
+KNOT_S = 0.01
+"""Spacing of the knots of a spline along a path, s."""
+FEWEST_KNOTS = 101
+
+
+class Piece(NamedTuple):
+    """A planned segment."""
+
+    begin: float
+    """s."""
+    end: float
+    """s."""
+    joints: Course
+    base: Course
+    goal: Array
+    """(n,) joints at the end, rad, or m of prismatic joints."""
+    attitude: Array
+    """(4,) quaternion at the end."""
+
+
+Courses = tuple[Course, Course]
+Maker = Callable[[float], Courses]
+"""Makes the courses of a segment of a duration in s."""
+
+
+class Planner:
+    """Plans segments one after the other, each from where the one before ends."""
+
+    def __init__(self, robot: Robot, joints: Array, quaternion: Array) -> None:
+        """Begin a plan.
+
+        Args:
+            robot: as the flight software knows it.
+            joints: (n,) at the start, rad, or m of prismatic joints.
+            quaternion: (4,) of the base at the start, unit.
+        """
+        self._robot = robot.nominal
+        self._tools: dict[str | None, ToolFollower] = {}
+        self.time, self.joints, self.quaternion = 0.0, joints, quaternion
+        pose = ToolFollower(self._robot, None).pose(quaternion, joints)
+        self._origin = pose.position - pose.from_base
+        """Origin of the inertial frame, the base's CoM at t = 0, from the robot's CoM."""
+        self._number = 0
+
+    def plan(
+        self, segments: Sequence[Segment], duration_of: Callable[[Maker], float]
+    ) -> list[Piece]:
+        """Return the plan of all segments.
+
+        Args:
+            segments: of the mission.
+            duration_of: returns the shortest duration, s, of a segment that is flown fast.
+
+        Raises:
+            InputError: a segment cannot be flown; names it, with time and amount.
+        """
+        pieces = []
+        for self._number, segment in enumerate(segments, 1):
+            make = self._maker(segment)
+            span = segment.hold or segment.duration or duration_of(make)
+            joints, base = make(span)
+            end = np.array([self.time + span])
+            goal, attitude = joints.at(end)[0, 0], base.at(end)[0, :4]
+            pieces.append(Piece(self.time, self.time + span, joints, base, goal, attitude))
+            self.time, self.joints, self.quaternion = self.time + span, goal, attitude
+        return pieces
+
+    def _maker(self, segment: Segment) -> Maker:
+        turn = self._turn(segment)
+        if segment.tool is not None:
+            return lambda span: self._follow_tool(segment.tool, turn, span)  # type: ignore[arg-type]
+        if segment.reactionless_deg is not None:
+            path = self._reactionless(segment.reactionless_deg)
+            return lambda span: (self._along(path, span), turn(span))
+        goal = self.joints
+        if segment.joints_deg is not None:
+            goal = self._of_degrees(segment.joints_deg, "joints_deg")
+        begin, start = self.time, self.joints
+        return lambda span: (QuinticLeg(begin, span, start, goal - start), turn(span))
+
+    def _of_degrees(self, values: Sequence[float], key: str) -> Array:
+        if len(values) != self._robot.n:
+            raise segment_number(
+                self._number, f"{key}: {self._robot.n} values were expected, got {len(values)}"
+            )
+        return self._robot.from_degrees(values)
+
+    def _turn(self, segment: Segment) -> Callable[[float], Slew]:
+        begin, start, axis, angle = self.time, self.quaternion, np.array([1.0, 0.0, 0.0]), 0.0
+        if segment.base is not None:
+            goal = segment.base.unit_quaternion
+            assert goal is not None
+            axis, angle = turn_between(start, goal)
+        return lambda span: Slew(begin, span, start, axis, angle)
+
+    def _follow_tool(self, goal: ToolGoal, turn: Callable[[float], Slew], span: float) -> Courses:
+        """Plan a straight line and the shortest turn of the tool, both quintic in time."""
+        follower = self._tools.setdefault(goal.link, ToolFollower(self._robot, goal.link))
+        times = _knots(span)
+        slew, (share, _, _) = turn(span), quintic(times / span)
+        attitudes = slew.at(self.time + times)[:, :4]
+        positions, rotations = self._path(goal, follower, attitudes, share)
+        from_base = goal.frame == "base"
+        joints, reached = follower.follow(attitudes, positions, rotations, from_base, self.joints)
+        if reached < len(times):
+            pose = follower.pose(attitudes[reached], joints[reached])
+            left = positions[-1] - (pose.from_base if from_base else pose.position)
+            raise segment_number(
+                self._number,
+                f"the tool cannot follow its path beyond t = {self.time + times[reached]:.2f} s, "
+                f"{norm(left):.3g} m from its goal: out of reach, or a singular posture",
+            )
+        return SplineCourse(self.time, CubicSpline(times, joints)), slew
+
+    def _path(
+        self, goal: ToolGoal, follower: ToolFollower, attitudes: Array, share: Array
+    ) -> tuple[Array, Array]:
+        """Return positions (K, 3), and orientations (K, 3, 3) on inertial axes; (0, 3, 3): free."""
+        here, quaternion = follower.pose(self.quaternion, self.joints), goal.unit_quaternion
+        turn = None if quaternion is None else _matrix(quaternion)
+        xyz = None if goal.xyz is None else np.array(goal.xyz)
+        if goal.frame == "base":
+            axes = np.array([_matrix(attitude) for attitude in attitudes])
+            first = product(axes[0].T, here.from_base)
+            line = _line(first, first if xyz is None else xyz, share)
+            positions = np.array([product(a, p) for a, p in zip(axes, line, strict=True)])
+            if turn is None:
+                return positions, np.empty((0, 3, 3))
+            inner = _turned(product(axes[0].T, here.rotation), turn, share)
+            return positions, np.array([product(a, r) for a, r in zip(axes, inner, strict=True)])
+        end = here.position
+        if xyz is not None:
+            end = (here.position if goal.frame == "start" else self._origin) + xyz
+        positions = _line(here.position, end, share)
+        if turn is None:
+            return positions, np.empty((0, 3, 3))
+        last = product(turn, here.rotation) if goal.frame == "start" else turn
+        return positions, _turned(here.rotation, last, share)
+
+    def _reactionless(self, values: Sequence[float]) -> CubicSpline:
+        goal = self._of_degrees(values, "reactionless")
+        return reactionless_path(self._robot, self.quaternion, self.joints, goal)
+
+    def _along(self, path: CubicSpline, span: float) -> SplineCourse:
+        """Return the course along a path over (0, 1), quintic in time."""
+        times = _knots(span)
+        share, _, _ = quintic(times / span)
+        return SplineCourse(self.time, CubicSpline(times, path.at(share)[:, 0]))
+
+
+def _knots(span: float) -> Array:
+    return np.linspace(0.0, span, max(FEWEST_KNOTS, math.ceil(span / KNOT_S) + 1))
+
+
+def _matrix(quaternion: Array) -> Array:
+    matrix = np.empty((3, 3))
+    rotation_matrix(quaternion, matrix)
+    return matrix
+
+
+def _line(first: Array, last: Array, share: Array) -> Array:
+    return first + (last - first) * share[:, np.newaxis]
+
+
+def _turned(first: Array, last: Array, share: Array) -> Array:
+    """Return rotations (K, 3, 3) on the shortest turn from ``first`` to ``last``."""
+    start, goal = quaternion_of_rotation(first), quaternion_of_rotation(last)
+    axis, angle = turn_between(start, goal)
+    sine, cosine = sines_cosines(0.5 * angle * share)
+    steps = multiplied(start, np.column_stack((cosine, sine[:, np.newaxis] * axis)))
+    return np.array([_matrix(step) for step in steps])

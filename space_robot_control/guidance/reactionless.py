@@ -1,0 +1,97 @@
+"""Motion towards a posture that asks nothing of the base's attitude control.
+
+The joint velocity is the part of the way to the goal that lies in the reaction null space
+(Nenchev, Yoshida & Uchiyama 1992): ``dtheta/ds = (E - H~^+ H~)(theta_goal - theta)``, with the
+coupling ``H~`` of angular momentum about the robot's centre of mass. It ends where that part is
+zero: at the goal, or as near to it as the null space leads.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from space_robot_model.dynamics.model import Model
+from space_robot_model.dynamics.tool_kinematics import ToolKinematics, tool_kinematics_into
+from space_robot_model.elementary.least_squares import least_squares_into
+from space_robot_model.elementary.spline import CubicSpline
+from space_robot_model.robot import Robot
+from space_robot_msgs_py.compiled.kernels import kernel
+
+Array = NDArray[np.float64]
+
+STEP = 0.01
+"""Step in s of the integration, by Runge and Kutta's method of fourth order."""
+END = 30.0
+"""Where it ends: what is left of a way within reach has fallen by e^-30."""
+SHORTEST = 1e-9
+"""Length of a path, rad or m, below which there is none."""
+KNOTS = 400
+"""Of the path, equally far apart."""
+
+
+def reactionless_path(robot: Robot, quaternion: Array, start: Array, goal: Array) -> CubicSpline:
+    """Return the path from ``start`` as a spline over 0 to 1, by its length.
+
+    Args:
+        robot: whose joints are all actuated.
+        quaternion: (4,) attitude of the base, unit.
+        start: (N,) joint positions, rad or m.
+        goal: (N,) joint positions to approach.
+    """
+    row = [int(robot.model.row[joint]) for joint in range(robot.joint_count)]
+    steps, ordered = np.empty((round(END / STEP) + 1, len(start))), np.empty((2, len(start)))
+    ordered[:, row] = start, goal
+    work = ToolKinematics.allocate(robot.joint_count)
+    integrate_into(robot.model, quaternion, ordered[0], ordered[1], np.eye(3), work, steps)
+    path = steps[:, row]
+    moves, squares = np.diff(path, axis=0), np.zeros(len(path) - 1)
+    for column in moves.T:
+        squares += column * column
+    lengths = np.concatenate(([0.0], np.cumsum(np.sqrt(squares))))
+    if lengths[-1] < SHORTEST:
+        return CubicSpline(np.array([0.0, 1.0]), np.array([start, start]))
+    shares = lengths / lengths[-1]
+    places = np.linspace(0.0, 1.0, KNOTS + 1)
+    knots = np.column_stack([np.interp(places, shares, path[:, j]) for j in range(len(start))])
+    rates = (moves[0] / (shares[1] - shares[0]), (knots[-1] - knots[-2]) * KNOTS)
+    return CubicSpline(places, knots, *rates)
+
+
+@kernel
+def integrate_into(
+    model: Model,
+    quaternion: Array,
+    start: Array,
+    goal: Array,
+    axes: Array,
+    work: ToolKinematics,
+    out: Array,
+) -> None:
+    """Fill ``out`` (S, N) with postures `STEP` apart, in the order of ``model``.
+
+    ``axes`` (3, 3) is the unit matrix.
+    """
+    n = len(start)
+    direction, posture, slopes = np.empty(n), np.empty(n), np.empty((4, n))
+    scratch, momentum, origin = np.empty((3, 4)), np.empty(3), np.zeros(3)
+    out[0] = start
+    for s in range(1, len(out)):
+        for stage in range(4):
+            part = 0.0 if stage == 0 else 0.5 * STEP if stage < 3 else STEP
+            for j in range(n):
+                posture[j] = out[s - 1, j]
+                if stage:
+                    posture[j] += part * slopes[stage - 1, j]
+                slopes[stage, j] = goal[j] - posture[j]
+            tool_kinematics_into(model, quaternion, posture, 0, axes, origin, work)
+            for k in range(3):
+                momentum[k] = 0.0
+                for j in range(n):
+                    momentum[k] += work.coupling[k, j] * slopes[stage, j]
+            least_squares_into(work.coupling, momentum, 0.0, scratch, direction)
+            for j in range(n):
+                slopes[stage, j] -= direction[j]
+        for j in range(n):
+            total = slopes[0, j] + 2.0 * slopes[1, j] + 2.0 * slopes[2, j] + slopes[3, j]
+            out[s, j] = out[s - 1, j] + STEP / 6.0 * total

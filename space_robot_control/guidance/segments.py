@@ -1,0 +1,147 @@
+"""Segments of a mission as they are written in its file."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field, model_validator
+
+from space_robot_model.elementary.matrices import norm
+from space_robot_model.elementary.rotations import exact_sines_cosines
+from space_robot_msgs_py.config.validation import StrictModel
+from space_robot_msgs_py.errors import InputError
+
+from .courses import multiplied
+
+Array = NDArray[np.float64]
+
+Vector = Annotated[list[float], Field(min_length=3, max_length=3)]
+Quaternion = Annotated[list[float], Field(min_length=4, max_length=4)]
+Seconds = Annotated[float, Field(gt=0.0, le=1e6)]
+Frame = Literal["inertial", "base", "start"]
+MOTIONS = ("joints_deg", "tool", "hold", "reactionless_deg", "file")
+"""Keys of which a segment has one; a segment of the base alone has none."""
+
+
+class Orientation(StrictModel):
+    """An orientation, as roll, pitch and yaw about fixed axes or as a quaternion."""
+
+    rpy_deg: Vector | None = Field(None, description="roll, pitch, yaw about fixed axes, degrees")
+    quaternion: Quaternion | None = Field(None, description="w, x, y, z")
+
+    @model_validator(mode="after")
+    def _one_of_both(self) -> Orientation:
+        if self.rpy_deg is not None and self.quaternion is not None:
+            raise ValueError("rpy_deg and quaternion were given: give one of them")
+        if self.quaternion is not None and not 1e-3 <= norm(self.quaternion) <= 1e3:
+            raise ValueError("quaternion must have a norm near 1")
+        return self
+
+    @property
+    def unit_quaternion(self) -> Array | None:
+        """(4,) ``[w, x, y, z]``; None if no orientation is given."""
+        if self.quaternion is not None:
+            return np.array(self.quaternion) / norm(self.quaternion)
+        if self.rpy_deg is None:
+            return None
+        sines, cosines = exact_sines_cosines(np.radians(self.rpy_deg) / 2.0)
+        total = np.array([1.0, 0.0, 0.0, 0.0])
+        for k in (2, 1, 0):  # Rz Ry Rx
+            turn = np.zeros(4)
+            turn[0], turn[1 + k] = cosines[k], sines[k]
+            total = multiplied(total, turn)
+        return total
+
+
+class ToolGoal(Orientation):
+    """Where a tool goes in a straight line; without an orientation the shortest joint motion."""
+
+    xyz: Vector | None = Field(None, description="position, m (none: it stays)")
+    frame: Frame = Field(
+        "start",
+        description="axes of the goal: inertial (origin: the base's CoM at t = 0), base (at the end"
+        " of the segment), or start (a displacement and a turn on inertial axes)",
+    )
+    link: str | None = Field(None, description="name of the tool, of a robot with several")
+
+    @model_validator(mode="after")
+    def _something(self) -> ToolGoal:
+        if self.xyz is None and self.unit_quaternion is None:
+            raise ValueError("give xyz, rpy_deg or quaternion")
+        return self
+
+
+class BaseGoal(Orientation):
+    """The attitude that the base turns to, about one axis."""
+
+    @model_validator(mode="after")
+    def _something(self) -> BaseGoal:
+        if self.unit_quaternion is None:
+            raise ValueError("give rpy_deg or quaternion")
+        return self
+
+
+class Segment(StrictModel):
+    """A part of a mission, from rest to rest."""
+
+    joints_deg: list[float] | None = Field(None, description="joints, degrees or m")
+    tool: ToolGoal | None = None
+    hold: Seconds | None = Field(None, description="time to stay, s")
+    reactionless_deg: list[float] | None = Field(
+        None, description="joints to approach without a torque on the base, degrees or m"
+    )
+    file: str | None = Field(None, description="CSV or Parquet file of a trajectory")
+    base: BaseGoal | None = None
+    duration: Seconds | None = Field(None, description="s")
+    fast: bool = Field(False, description="as fast as the limits of joints and base allow")
+
+    @model_validator(mode="before")
+    @classmethod
+    def _as_written(cls, content: Any) -> Any:
+        """Accept ``reactionless: {joints_deg: [...]}`` and ``fast`` in place of a duration."""
+        if not isinstance(content, dict):
+            return content
+        content = dict(content)
+        if isinstance(inner := content.get("reactionless"), dict) and set(inner) == {"joints_deg"}:
+            content["reactionless_deg"] = inner["joints_deg"]
+            del content["reactionless"]
+        if content.get("duration") == "fast":
+            content |= {"fast": True}
+            del content["duration"]
+        return content
+
+    @model_validator(mode="after")
+    def _fits(self) -> Segment:
+        motions = [name for name in MOTIONS if getattr(self, name) is not None]
+        if len(motions) > 1:
+            raise ValueError(f"{' and '.join(motions)} were given: a segment has one of them")
+        if not motions and self.base is None:
+            raise ValueError(f"give one of {', '.join(MOTIONS)}, or base")
+        if self.base is not None and motions and motions[0] in ("hold", "file", "reactionless_deg"):
+            raise ValueError(f"base cannot be combined with {motions[0]}")
+        timed = [self.duration is not None, self.fast, self.hold is not None]
+        if self.file is None and sum(timed) != 1:
+            raise ValueError("give duration (s), or duration: fast; hold has its own")
+        return self
+
+
+class Start(StrictModel):
+    """Posture and attitude that a mission begins with."""
+
+    joints_deg: list[float]
+    base: BaseGoal | None = None
+
+
+class MissionDocument(StrictModel):
+    """The content of a mission's file below the key ``mission``."""
+
+    start: Start
+    segments: list[Segment] = Field(min_length=1)
+    events: list[Any] = Field([])
+
+
+def segment_number(number: int, error: str) -> InputError:
+    """Return an error that names a segment, counted from 1."""
+    return InputError(f"segment {number}: {error}")

@@ -1,0 +1,84 @@
+"""Paths of a tool: a straight line and the shortest turn, and the joints that follow them."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from space_robot_model.dynamics.inverse_kinematics import follow_path_into
+from space_robot_model.dynamics.tool_kinematics import ToolKinematics, tool_kinematics_into
+from space_robot_model.robot import Robot
+from space_robot_model.robot.kinematics import body_row, tool_named
+
+Array = NDArray[np.float64]
+
+
+class ToolPose(NamedTuple):
+    """Pose of a tool on inertial axes, with the base's attitude held."""
+
+    position: Array
+    """(3,) m, from the robot's centre of mass."""
+    from_base: Array
+    """(3,) m, from the base's centre of mass."""
+    rotation: Array
+    """(3, 3) from the tool's frame."""
+    jacobian: Array
+    """(6, N) ``J_held``."""
+
+
+class ToolFollower:
+    """The tool of a robot whose joints are all actuated, and the joints that lead it."""
+
+    def __init__(self, robot: Robot, tool: str | None) -> None:
+        """Take a tool by name; None: the first.
+
+        Raises:
+            InputError: there is no such tool.
+        """
+        frame = tool_named(robot, tool)
+        self._robot, self._body = robot, body_row(robot, frame)
+        self._mounting = np.ascontiguousarray(frame.rotation)
+        self._point = np.ascontiguousarray(frame.position)
+        self._work = ToolKinematics.allocate(robot.joint_count)
+        self._rows = [int(robot.model.row[joint]) for joint in range(robot.joint_count)]
+
+    def pose(self, quaternion: Array, joints: Array) -> ToolPose:
+        """Return the pose of the tool at an attitude (4,) and joint positions (N,)."""
+        columns, work = np.empty(len(joints)), self._work
+        columns[self._rows] = joints
+        tool_kinematics_into(
+            self._robot.model, quaternion, columns, self._body, self._mounting, self._point, work
+        )
+        return ToolPose(
+            work.position.copy(),
+            work.position + work.centre_of_mass,
+            work.rotation.copy(),
+            work.held[:, self._rows],
+        )
+
+    def follow(
+        self, quaternions: Array, positions: Array, rotations: Array, from_base: bool, start: Array
+    ) -> tuple[Array, int]:
+        """Return joint positions (K, N), and how many of the K poses were reached.
+
+        Args: see `follow_path_into`; ``start`` (N,) is the posture at the first pose.
+        """
+        out, first = np.zeros((len(positions), len(start))), np.empty(len(start))
+        first[self._rows] = start
+        reached = follow_path_into(
+            self._robot.model,
+            quaternions,
+            positions,
+            rotations,
+            from_base,
+            self._body,
+            self._mounting,
+            self._point,
+            0.0,
+            first,
+            self._work,
+            out,
+        )
+        return out[:, self._rows], int(reached)
