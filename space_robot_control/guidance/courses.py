@@ -25,6 +25,21 @@ class Course(Protocol):
         ...
 
 
+class Piece(NamedTuple):
+    """A planned segment."""
+
+    begin: float
+    """s."""
+    end: float
+    """s."""
+    joints: Course
+    base: Course
+    goal: Array
+    """(n,) joints at the end, rad, or m of prismatic joints."""
+    attitude: Array
+    """(4,) quaternion at the end."""
+
+
 def quintic(u: Array) -> tuple[Array, Array, Array]:
     """Return ``10 u^3 - 15 u^4 + 6 u^5`` and its first two derivatives, ``u`` from 0 to 1."""
     return (

@@ -42,7 +42,8 @@ class Demand(NamedTuple):
     def stored_momentum(self) -> Array:
         """(K,) N m s, length of the momentum."""
         total = sum(self.momentum[:, k] * self.momentum[:, k] for k in range(3))
-        return np.sqrt(total)
+        length: Array = np.sqrt(total)
+        return length
 
 
 def demand(robot: Robot, joints: Course, base: Course, begin: float, end: float) -> Demand:
@@ -55,4 +56,5 @@ def demand(robot: Robot, joints: Course, base: Course, begin: float, end: float)
 
 
 def _largest(values: Array) -> Array:
-    return np.max(np.abs(values), axis=1)
+    largest: Array = np.max(np.abs(values), axis=1)
+    return largest

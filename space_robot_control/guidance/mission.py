@@ -1,7 +1,8 @@
-"""The mission: rest-to-rest joint trajectories through waypoints, the base's attitude held."""
+"""The mission: joints through waypoints, the base's attitude held, then segments of any kind."""
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import Annotated
 
 import numpy as np
@@ -10,17 +11,22 @@ from pydantic import Field
 
 from space_robot_model.elementary.matrices import norm
 from space_robot_model.robot import Robot
+from space_robot_msgs_py.config.settings import Texts
 from space_robot_msgs_py.config.validation import StrictModel
 from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.samples import ReferenceChunk
 
+from .courses import Piece, QuinticLeg, Slew
+from .durations import MissionLimits
 from .limits import check_positions
+from .planner import Planner
+from .segments import read_segments
 
 Array = NDArray[np.float64]
 
 
 class MissionSettings(StrictModel):
-    """Waypoints as flat lists, as ROS parameters hold them."""
+    """Waypoints as flat lists, as ROS parameters hold them, and segments that follow them."""
 
     waypoint_times: list[float] = Field(
         [0.0], description="time of each waypoint, s, increasing from 0", min_length=1
@@ -33,13 +39,19 @@ class MissionSettings(StrictModel):
     base_quaternion: Annotated[list[float], Field(min_length=4, max_length=4)] = Field(
         [1.0, 0.0, 0.0, 0.0], description="base attitude to hold: w, x, y, z"
     )
+    segments: Texts = Field(
+        [""],
+        description="segments that follow the last waypoint, each as YAML text: see the manual on "
+        "missions",
+    )
+    limits: MissionLimits = MissionLimits()
 
 
 class Mission:
-    """Fifth-order polynomial segments, at rest in every waypoint, sampled at ticks.
+    """The desired motion of joints and base, sampled at ticks.
 
-    ``theta_d(u) = theta_a + (theta_b - theta_a)(10 u^3 - 15 u^4 + 6 u^5)``. Before the first
-    waypoint and after the last the arm is held there.
+    It leads through waypoints with a rest in each, then through segments. Before the first waypoint
+    and after the end all is held.
     """
 
     def __init__(self, robot: Robot, settings: MissionSettings, period: float) -> None:
@@ -47,7 +59,7 @@ class Mission:
 
         Raises:
             InputError: the waypoints do not fit the times or the joints, or are beyond the limits
-                of these.
+                of these; a segment is wrong or cannot be flown.
         """
         n, times = robot.n, np.array(settings.waypoint_times)
         if len(settings.waypoints_deg) != n * len(times):
@@ -60,49 +72,53 @@ class Mission:
         length = norm(settings.base_quaternion)
         if not 1e-3 <= length <= 1e3:
             raise InputError(f"base_quaternion must have a norm near 1, got {length:g}")
-        self._times = times
-        self._waypoints = robot.from_degrees(np.reshape(settings.waypoints_deg, (len(times), n)))
-        check_positions(robot, self._waypoints)
-        self._quaternion = np.array(settings.base_quaternion) / length
+        waypoints = robot.from_degrees(np.reshape(settings.waypoints_deg, (len(times), n)))
+        check_positions(robot, waypoints)
+        quaternion = np.array(settings.base_quaternion) / length
         self._period = period
+        self.pieces = [
+            _leg(begin, end, start, goal, quaternion)
+            for (begin, end), (start, goal) in zip(
+                pairwise(times), pairwise(waypoints), strict=True
+            )
+        ]
+        """Legs between the waypoints, then the segments; at least one."""
+        if segments := read_segments(settings.segments):
+            planner = Planner(robot, waypoints[0], quaternion, settings.limits)
+            self.pieces += planner.plan(float(times[-1]), waypoints[-1], segments)
+        self.duration = self.pieces[-1].end if self.pieces else 0.0
+        """s, until the end of the last segment."""
+        if not self.pieces:
+            self.pieces = [_leg(0.0, 1.0, waypoints[0], waypoints[0], quaternion)]
+        self._first, self._begins = waypoints[0], np.array([piece.begin for piece in self.pieces])
 
     @property
     def times(self) -> Array:
-        """(K,) s, of the waypoints."""
-        return self._times
+        """(K,) s, of the waypoints and of the ends of the segments."""
+        ends = [piece.end for piece in self.pieces] if self.duration else []
+        return np.array([0.0, *ends])
 
     @property
     def waypoints(self) -> Array:
-        """(K, n) rad, or m of prismatic joints."""
-        return self._waypoints
-
-    @property
-    def duration(self) -> float:
-        """Time of the last waypoint, s."""
-        return float(self._times[-1])
+        """(K, n) desired positions at `times`, rad, or m of prismatic joints."""
+        goals = [piece.goal for piece in self.pieces] if self.duration else []
+        return np.array([self._first, *goals])
 
     def chunk(self, start: int, length: int) -> ReferenceChunk:
         """The reference of ``length`` ticks from tick ``start`` on."""
         time = np.arange(start, start + length, dtype=np.float64) * self._period
-        base = np.zeros((length, 10))
-        base[:, :4] = self._quaternion
-        return ReferenceChunk(start, self._joints(time), base)
+        parts = np.split(time, np.searchsorted(time, self._begins[1:]))  # a piece has its begin
+        flown = [pair for pair in zip(self.pieces, parts, strict=True) if len(pair[1])]
+        flown = flown or [(self.pieces[0], time)]
+        return ReferenceChunk(
+            start,
+            np.concatenate([piece.joints.at(part) for piece, part in flown]),
+            np.concatenate([piece.base.at(part) for piece, part in flown]),
+        )
 
-    def _joints(self, time: Array) -> Array:
-        last = len(self._times) - 1
-        if last == 0:
-            rows = np.zeros((len(time), 3, self._waypoints.shape[1]))
-            rows[:, 0] = self._waypoints[0]
-            return rows
-        rows = np.empty((len(time), 3, self._waypoints.shape[1]))
-        changes = np.searchsorted(time, self._times[1:-1])  # at a waypoint the next leg begins
-        legs = zip(np.split(time, changes), np.split(rows, changes), strict=True)
-        for index, (part, row) in enumerate(legs):
-            begin, span = self._times[index], self._times[index + 1] - self._times[index]
-            u = np.clip((part - begin)[:, np.newaxis] / span, 0.0, 1.0)
-            leg = self._waypoints[index + 1] - self._waypoints[index]
-            course = u * u * u * (10.0 + u * (-15.0 + 6.0 * u))
-            row[:, 0] = self._waypoints[index] + leg * course
-            row[:, 1] = leg * (30.0 * u * u * (1.0 - u) * (1.0 - u)) / span
-            row[:, 2] = leg * (60.0 * u * (1.0 - u) * (1.0 - 2.0 * u)) / (span * span)
-        return rows
+
+def _leg(begin: float, end: float, start: Array, goal: Array, quaternion: Array) -> Piece:
+    """Return a leg of the joints between two waypoints; the attitude is held."""
+    span, still = float(end - begin), Slew(begin, 1.0, quaternion, np.zeros(3), 0.0)
+    course = QuinticLeg(begin, span, start, goal - start)
+    return Piece(float(begin), float(end), course, still, goal, quaternion)

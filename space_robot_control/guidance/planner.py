@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,10 +14,22 @@ from space_robot_model.elementary.rotations import quaternion_of_rotation
 from space_robot_model.elementary.sine import sines_cosines
 from space_robot_model.elementary.spline import CubicSpline
 from space_robot_model.robot import Robot
+from space_robot_msgs_py.errors import InputError
 
-from .courses import Course, QuinticLeg, Slew, SplineCourse, multiplied, quintic, turn_between
+from .checks import check_piece
+from .courses import (
+    Course,
+    Piece,
+    QuinticLeg,
+    Slew,
+    SplineCourse,
+    multiplied,
+    quintic,
+    turn_between,
+)
+from .durations import MissionLimits, shortest_duration
 from .reactionless import reactionless_path
-from .segments import Segment, ToolGoal, segment_number
+from .segments import Segment, ToolGoal
 from .tool_path import ToolFollower
 
 Array = NDArray[np.float64]
@@ -26,69 +37,62 @@ Array = NDArray[np.float64]
 KNOT_S = 0.01
 """Spacing of the knots of a spline along a path, s."""
 FEWEST_KNOTS = 101
+TRIAL_S = 10.0
+"""Duration that a fast segment is tried with."""
 
 
-class Piece(NamedTuple):
-    """A planned segment."""
-
-    begin: float
-    """s."""
-    end: float
-    """s."""
-    joints: Course
-    base: Course
-    goal: Array
-    """(n,) joints at the end, rad, or m of prismatic joints."""
-    attitude: Array
-    """(4,) quaternion at the end."""
-
-
-Courses = tuple[Course, Course]
-Maker = Callable[[float], Courses]
-"""Makes the courses of a segment of a duration in s."""
+Maker = Callable[[float], tuple[Course, Course]]
+"""Makes the courses of joints and base of a segment of a duration in s."""
 
 
 class Planner:
     """Plans segments one after the other, each from where the one before ends."""
 
-    def __init__(self, robot: Robot, joints: Array, quaternion: Array) -> None:
+    def __init__(
+        self, robot: Robot, joints: Array, quaternion: Array, limits: MissionLimits
+    ) -> None:
         """Begin a plan.
 
         Args:
             robot: as the flight software knows it.
-            joints: (n,) at the start, rad, or m of prismatic joints.
-            quaternion: (4,) of the base at the start, unit.
+            joints: (n,) at t = 0, rad, or m of prismatic joints.
+            quaternion: (4,) of the base at t = 0, unit.
+            limits: of fast segments, beside those of the joints.
         """
-        self._robot = robot.nominal
+        self._robot, self._limits = robot.nominal, limits
         self._tools: dict[str | None, ToolFollower] = {}
-        self.time, self.joints, self.quaternion = 0.0, joints, quaternion
+        self._time, self._joints, self._quaternion = 0.0, joints, quaternion
         pose = ToolFollower(self._robot, None).pose(quaternion, joints)
         self._origin = pose.position - pose.from_base
         """Origin of the inertial frame, the base's CoM at t = 0, from the robot's CoM."""
-        self._number = 0
 
-    def plan(
-        self, segments: Sequence[Segment], duration_of: Callable[[Maker], float]
-    ) -> list[Piece]:
-        """Return the plan of all segments.
-
-        Args:
-            segments: of the mission.
-            duration_of: returns the shortest duration, s, of a segment that is flown fast.
+    def plan(self, begin: float, joints: Array, segments: Sequence[Segment]) -> list[Piece]:
+        """Return the plan of segments that follow one another from a time and posture on.
 
         Raises:
-            InputError: a segment cannot be flown; names it, with time and amount.
+            InputError: a segment cannot be flown; names it, with time, joint and amount.
         """
-        pieces = []
-        for self._number, segment in enumerate(segments, 1):
-            make = self._maker(segment)
-            span = segment.hold or segment.duration or duration_of(make)
-            joints, base = make(span)
-            end = np.array([self.time + span])
-            goal, attitude = joints.at(end)[0, 0], base.at(end)[0, :4]
-            pieces.append(Piece(self.time, self.time + span, joints, base, goal, attitude))
-            self.time, self.joints, self.quaternion = self.time + span, goal, attitude
+        pieces, self._time, self._joints = [], begin, joints
+        for number, segment in enumerate(segments, 1):
+            try:
+                piece = self._piece(segment)
+                check_piece(self._robot, piece)
+            except InputError as error:
+                raise InputError(f"segment {number}: {error}") from None
+            pieces.append(piece)
+            self._time, self._joints, self._quaternion = piece.end, piece.goal, piece.attitude
         return pieces
+
+    def _piece(self, segment: Segment) -> Piece:
+        make = self._maker(segment)
+        span = segment.hold or segment.duration
+        if span is None:
+            trial = make(TRIAL_S)
+            span = shortest_duration(self._robot, self._limits, *trial, self._time, TRIAL_S)
+        joints, base = make(span)
+        end = np.array([self._time + span])
+        goal, attitude = joints.at(end)[0, 0], base.at(end)[0, :4]
+        return Piece(self._time, self._time + span, joints, base, goal, attitude)
 
     def _maker(self, segment: Segment) -> Maker:
         turn = self._turn(segment)
@@ -97,51 +101,50 @@ class Planner:
         if segment.reactionless_deg is not None:
             path = self._reactionless(segment.reactionless_deg)
             return lambda span: (self._along(path, span), turn(span))
-        goal = self.joints
+        goal = self._joints
         if segment.joints_deg is not None:
             goal = self._of_degrees(segment.joints_deg, "joints_deg")
-        begin, start = self.time, self.joints
+        begin, start = self._time, self._joints
         return lambda span: (QuinticLeg(begin, span, start, goal - start), turn(span))
 
     def _of_degrees(self, values: Sequence[float], key: str) -> Array:
         if len(values) != self._robot.n:
-            raise segment_number(
-                self._number, f"{key}: {self._robot.n} values were expected, got {len(values)}"
-            )
+            raise InputError(f"{key}: {self._robot.n} values were expected, got {len(values)}")
         return self._robot.from_degrees(values)
 
     def _turn(self, segment: Segment) -> Callable[[float], Slew]:
-        begin, start, axis, angle = self.time, self.quaternion, np.array([1.0, 0.0, 0.0]), 0.0
+        begin, start, axis, angle = self._time, self._quaternion, np.array([1.0, 0.0, 0.0]), 0.0
         if segment.base is not None:
             goal = segment.base.unit_quaternion
             assert goal is not None
             axis, angle = turn_between(start, goal)
         return lambda span: Slew(begin, span, start, axis, angle)
 
-    def _follow_tool(self, goal: ToolGoal, turn: Callable[[float], Slew], span: float) -> Courses:
+    def _follow_tool(
+        self, goal: ToolGoal, turn: Callable[[float], Slew], span: float
+    ) -> tuple[Course, Course]:
         """Plan a straight line and the shortest turn of the tool, both quintic in time."""
         follower = self._tools.setdefault(goal.link, ToolFollower(self._robot, goal.link))
         times = _knots(span)
         slew, (share, _, _) = turn(span), quintic(times / span)
-        attitudes = slew.at(self.time + times)[:, :4]
+        attitudes = slew.at(self._time + times)[:, :4]
         positions, rotations = self._path(goal, follower, attitudes, share)
         from_base = goal.frame == "base"
-        joints, reached = follower.follow(attitudes, positions, rotations, from_base, self.joints)
+        joints, reached = follower.follow(attitudes, positions, rotations, from_base, self._joints)
         if reached < len(times):
             pose = follower.pose(attitudes[reached], joints[reached])
             left = positions[-1] - (pose.from_base if from_base else pose.position)
-            raise segment_number(
-                self._number,
-                f"the tool cannot follow its path beyond t = {self.time + times[reached]:.2f} s, "
-                f"{norm(left):.3g} m from its goal: out of reach, or a singular posture",
+            raise InputError(
+                f"the tool cannot follow its path beyond t = {self._time + times[reached]:.2f} s, "
+                f"{norm(left):.3g} m from its goal: out of reach, or a singular posture"
             )
-        return SplineCourse(self.time, CubicSpline(times, joints)), slew
+        return SplineCourse(self._time, CubicSpline(times, joints)), slew
 
     def _path(
         self, goal: ToolGoal, follower: ToolFollower, attitudes: Array, share: Array
     ) -> tuple[Array, Array]:
         """Return positions (K, 3), and orientations (K, 3, 3) on inertial axes; (0, 3, 3): free."""
-        here, quaternion = follower.pose(self.quaternion, self.joints), goal.unit_quaternion
+        here, quaternion = follower.pose(self._quaternion, self._joints), goal.unit_quaternion
         turn = None if quaternion is None else _matrix(quaternion)
         xyz = None if goal.xyz is None else np.array(goal.xyz)
         if goal.frame == "base":
@@ -164,13 +167,13 @@ class Planner:
 
     def _reactionless(self, values: Sequence[float]) -> CubicSpline:
         goal = self._of_degrees(values, "reactionless")
-        return reactionless_path(self._robot, self.quaternion, self.joints, goal)
+        return reactionless_path(self._robot, self._quaternion, self._joints, goal)
 
     def _along(self, path: CubicSpline, span: float) -> SplineCourse:
         """Return the course along a path over (0, 1), quintic in time."""
         times = _knots(span)
         share, _, _ = quintic(times / span)
-        return SplineCourse(self.time, CubicSpline(times, path.at(share)[:, 0]))
+        return SplineCourse(self._time, CubicSpline(times, path.at(share)[:, 0]))
 
 
 def _knots(span: float) -> Array:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Annotated, Any, Literal
 
 import numpy as np
@@ -10,7 +11,8 @@ from pydantic import Field, model_validator
 
 from space_robot_model.elementary.matrices import norm
 from space_robot_model.elementary.rotations import exact_sines_cosines
-from space_robot_msgs_py.config.validation import StrictModel
+from space_robot_msgs_py.config.validation import StrictModel, validate
+from space_robot_msgs_py.config.yaml_text import YamlTextError, parse_yaml
 from space_robot_msgs_py.errors import InputError
 
 from .courses import multiplied
@@ -142,6 +144,17 @@ class MissionDocument(StrictModel):
     events: list[Any] = Field([])
 
 
-def segment_number(number: int, error: str) -> InputError:
-    """Return an error that names a segment, counted from 1."""
-    return InputError(f"segment {number}: {error}")
+def read_segments(texts: Sequence[str]) -> list[Segment]:
+    """Return the segments written in YAML texts; empty texts count for nothing.
+
+    Raises:
+        InputError: a segment is wrong; names it, counted from 1.
+    """
+    segments = []
+    for number, text in enumerate((text for text in texts if text.strip()), 1):
+        try:
+            content = parse_yaml(text)
+        except YamlTextError as error:
+            raise InputError(f"segment {number}: {error}") from None
+        segments.append(validate(Segment, content, f"segment {number}"))
+    return segments

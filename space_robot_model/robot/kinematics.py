@@ -80,9 +80,11 @@ def tool_state(
         out,
     )
     columns = [int(model.row[joint]) for joint in range(n)]
-    of_base = (out.position, out.centre_of_mass, out.rotation, out.base)
     return ToolState(
-        *(array.copy() for array in of_base),
+        out.position.copy(),
+        out.centre_of_mass.copy(),
+        out.rotation.copy(),
+        out.base.copy(),
         out.joints[:, columns],
         out.attitude.copy(),
         out.held[:, columns],
