@@ -6,7 +6,6 @@ from functools import cached_property
 from typing import Any
 
 from space_robot_control.controller.controller import Controller
-from space_robot_control.guidance.mission import Mission
 from space_robot_control.laws import ControlLaw
 from space_robot_msgs_py.errors import InputError
 from space_robot_sim.plant.plant import Plant
@@ -41,7 +40,7 @@ class Flight:
         self.law = scenario.law
         """Law in force at the start."""
         self.plant = Plant(self.robot, scenario.plant, self.period)
-        self.mission = Mission(self.robot, scenario.mission, self.period)
+        self.mission = scenario.reference
         self.controller = self.build_controller(self.law)
         self.ticks = scenario.ticks
 

@@ -21,15 +21,13 @@ from space_robot_model.hardware.base_actuators import BaseActuatorSettings
 from space_robot_model.hardware.sensors import SensorSettings
 from space_robot_model.robot import Robot
 from space_robot_model.robot.find import ROBOTS, robot_as_path
+from space_robot_model.robot.mission_document import OF_PLANT, document_settings
 from space_robot_msgs_py.config.files import GIVEN, is_named
 from space_robot_msgs_py.config.trees import Tree, nest
 from space_robot_msgs_py.config.validation import StrictModel, validate
 from space_robot_sim.actuators.actuators import ActuatorSettings
 from space_robot_sim.environment.environment import EnvironmentSettings
 from space_robot_sim.environment.events import Capture, Release
-
-OF_PLANT = ("initial_joints_deg", "initial_quaternion", "events")
-"""Keys of a mission for the plant: its initial state, captures and releases."""
 
 
 def _name(value: Any, otherwise: str) -> str:
@@ -60,6 +58,9 @@ def _settings(schema: type[StrictModel], more: tuple[str, ...] = ()) -> Callable
         if not isinstance(value, (Mapping, BaseModel)):
             return _name(value, f"{schema.__name__} (an object or a mapping)")
         tree = nest(_plain(value))
+        if schema is MissionSettings and "start" in tree:
+            document_settings(tree, "mission")
+            return tree
         if isinstance(value, BaseModel):  # one of more, as the plant's settings, holds these
             tree = {key: tree[key] for key in (*schema.model_fields, *more) if key in tree}
         own = {key: inner for key, inner in tree.items() if key not in more}
@@ -159,6 +160,8 @@ def mission_of(mission: str | Tree) -> tuple[str, Tree, Tree]:
     """
     if isinstance(mission, str):
         return mission, {}, {}
+    if "start" in mission:
+        mission = document_settings(mission, "mission")
     of_mission = {key: v for key, v in mission.items() if key not in OF_PLANT}
     waypoints = validate(MissionSettings, of_mission, "mission")
     joints = len(waypoints.waypoints_deg) // len(waypoints.waypoint_times)

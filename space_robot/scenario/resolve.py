@@ -6,6 +6,7 @@ from space_robot_control.allocation.assumed_actuators import assumed_actuators
 from space_robot_control.controller.gains import build_laws
 from space_robot_control.controller.plain_laws import NoLaw
 from space_robot_control.controller.swaps import parse_swaps
+from space_robot_control.guidance.mission import Mission
 from space_robot_control.laws import ControlLaw
 from space_robot_model.hardware.base_actuators import BaseActuatorSettings
 from space_robot_model.robot import Robot
@@ -40,6 +41,7 @@ def resolve(plan: FlightPlan) -> ResolvedScenario:
         settings,
         settings.mission.mission or robot_files(settings.mission.robot).name,
         robots,
+        Mission(robots.controller, settings.mission, settings.plant.period),
         laws,
         [
             (tick, laws[one_of(name, laws, "controller", " of swaps")])

@@ -12,7 +12,7 @@ from pydantic import BaseModel
 
 from space_robot_control.controller.plain_laws import NoLaw
 from space_robot_control.controller.settings import DEFAULT, ControllerNodeSettings
-from space_robot_control.guidance.mission import MissionSettings
+from space_robot_control.guidance.mission import Mission, MissionSettings
 from space_robot_control.guidance.settings import MissionNodeSettings
 from space_robot_control.laws import ControlLaw
 from space_robot_model.hardware.base_actuators import BaseActuatorSettings
@@ -66,6 +66,8 @@ class ResolvedScenario:
     """Name of the mission's file; the robot's name if the mission belongs to the robot."""
     robots: Robots
     """Robot of the plant, and robot assumed by the flight software."""
+    reference: Mission
+    """Desired motion of joints and base."""
     laws: Mapping[str, ControlLaw]
     """All laws of the gain set, by name; the first is in force at the start."""
     swaps: list[tuple[int, ControlLaw]]
@@ -124,7 +126,7 @@ class ResolvedScenario:
         """
         duration, period = self.options.duration, self.plant.period
         if duration is None:
-            duration = self.mission.waypoint_times[-1]
+            duration = self.reference.duration
         if duration <= 0.0:
             raise InputError("the mission has a single waypoint: give a duration")
         ticks = max(1, math.floor(duration / period + 1e-6))

@@ -115,9 +115,7 @@ class Planner:
     def _turn(self, segment: Segment) -> Callable[[float], Slew]:
         begin, start, axis, angle = self._time, self._quaternion, np.array([1.0, 0.0, 0.0]), 0.0
         if segment.base is not None:
-            goal = segment.base.unit_quaternion
-            assert goal is not None
-            axis, angle = turn_between(start, goal)
+            axis, angle = turn_between(start, segment.base.unit_quaternion)
         return lambda span: Slew(begin, span, start, axis, angle)
 
     def _follow_tool(
@@ -144,8 +142,8 @@ class Planner:
         self, goal: ToolGoal, follower: ToolFollower, attitudes: Array, share: Array
     ) -> tuple[Array, Array]:
         """Return positions (K, 3), and orientations (K, 3, 3) on inertial axes; (0, 3, 3): free."""
-        here, quaternion = follower.pose(self._quaternion, self._joints), goal.unit_quaternion
-        turn = None if quaternion is None else _matrix(quaternion)
+        here = follower.pose(self._quaternion, self._joints)
+        turn = _matrix(goal.unit_quaternion) if goal.is_given else None
         xyz = None if goal.xyz is None else np.array(goal.xyz)
         if goal.frame == "base":
             axes = np.array([_matrix(attitude) for attitude in attitudes])

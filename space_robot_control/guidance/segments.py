@@ -5,56 +5,17 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Annotated, Any, Literal
 
-import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
-from space_robot_model.elementary.matrices import norm
-from space_robot_model.elementary.rotations import exact_sines_cosines
+from space_robot_model.robot.orientation import Attitude, Orientation, Vector
 from space_robot_msgs_py.config.validation import StrictModel, validate
 from space_robot_msgs_py.config.yaml_text import YamlTextError, parse_yaml
 from space_robot_msgs_py.errors import InputError
 
-from .courses import multiplied
-
-Array = NDArray[np.float64]
-
-Vector = Annotated[list[float], Field(min_length=3, max_length=3)]
-Quaternion = Annotated[list[float], Field(min_length=4, max_length=4)]
 Seconds = Annotated[float, Field(gt=0.0, le=1e6)]
 Frame = Literal["inertial", "base", "start"]
 MOTIONS = ("joints_deg", "tool", "hold", "reactionless_deg", "file")
 """Keys of which a segment has one; a segment of the base alone has none."""
-
-
-class Orientation(StrictModel):
-    """An orientation, as roll, pitch and yaw about fixed axes or as a quaternion."""
-
-    rpy_deg: Vector | None = Field(None, description="roll, pitch, yaw about fixed axes, degrees")
-    quaternion: Quaternion | None = Field(None, description="w, x, y, z")
-
-    @model_validator(mode="after")
-    def _one_of_both(self) -> Orientation:
-        if self.rpy_deg is not None and self.quaternion is not None:
-            raise ValueError("rpy_deg and quaternion were given: give one of them")
-        if self.quaternion is not None and not 1e-3 <= norm(self.quaternion) <= 1e3:
-            raise ValueError("quaternion must have a norm near 1")
-        return self
-
-    @property
-    def unit_quaternion(self) -> Array | None:
-        """(4,) ``[w, x, y, z]``; None if no orientation is given."""
-        if self.quaternion is not None:
-            return np.array(self.quaternion) / norm(self.quaternion)
-        if self.rpy_deg is None:
-            return None
-        sines, cosines = exact_sines_cosines(np.radians(self.rpy_deg) / 2.0)
-        total = np.array([1.0, 0.0, 0.0, 0.0])
-        for k in (2, 1, 0):  # Rz Ry Rx
-            turn = np.zeros(4)
-            turn[0], turn[1 + k] = cosines[k], sines[k]
-            total = multiplied(total, turn)
-        return total
 
 
 class ToolGoal(Orientation):
@@ -70,18 +31,8 @@ class ToolGoal(Orientation):
 
     @model_validator(mode="after")
     def _something(self) -> ToolGoal:
-        if self.xyz is None and self.unit_quaternion is None:
+        if self.xyz is None and not self.is_given:
             raise ValueError("give xyz, rpy_deg or quaternion")
-        return self
-
-
-class BaseGoal(Orientation):
-    """The attitude that the base turns to, about one axis."""
-
-    @model_validator(mode="after")
-    def _something(self) -> BaseGoal:
-        if self.unit_quaternion is None:
-            raise ValueError("give rpy_deg or quaternion")
         return self
 
 
@@ -95,7 +46,7 @@ class Segment(StrictModel):
         None, description="joints to approach without a torque on the base, degrees or m"
     )
     file: str | None = Field(None, description="CSV or Parquet file of a trajectory")
-    base: BaseGoal | None = None
+    base: Attitude | None = None
     duration: Seconds | None = Field(None, description="s")
     fast: bool = Field(False, description="as fast as the limits of joints and base allow")
 
@@ -127,21 +78,6 @@ class Segment(StrictModel):
         if self.file is None and sum(timed) != 1:
             raise ValueError("give duration (s), or duration: fast; hold has its own")
         return self
-
-
-class Start(StrictModel):
-    """Posture and attitude that a mission begins with."""
-
-    joints_deg: list[float]
-    base: BaseGoal | None = None
-
-
-class MissionDocument(StrictModel):
-    """The content of a mission's file below the key ``mission``."""
-
-    start: Start
-    segments: list[Segment] = Field(min_length=1)
-    events: list[Any] = Field([])
 
 
 def read_segments(texts: Sequence[str]) -> list[Segment]:

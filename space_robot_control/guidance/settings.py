@@ -9,7 +9,9 @@ from typing import Annotated, ClassVar
 from pydantic import Field
 
 from space_robot_model.robot.find import mission_layers
+from space_robot_model.robot.mission_document import mission_layer
 from space_robot_msgs_py.config.settings import NodeSettings
+from space_robot_msgs_py.config.trees import Tree
 
 from .mission import MissionSettings
 
@@ -34,3 +36,12 @@ class MissionNodeSettings(MissionSettings, NodeSettings):
     def layers(cls, selected: Mapping[str, str]) -> list[Path]:
         """The mission's own file over the graph's."""
         return [*super().layers(selected), *mission_layers(selected["robot"], selected["mission"])]
+
+    @classmethod
+    def read_layer(cls, path: Path) -> Tree:
+        """Read a parameter file, or a mission's document.
+
+        Raises:
+            InputError: the file cannot be read, or a key in it is wrong.
+        """
+        return mission_layer(path, cls.node)

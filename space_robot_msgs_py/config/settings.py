@@ -72,6 +72,15 @@ class NodeSettings(StrictModel):
         return [config_directory() / GRAPH_FILE]
 
     @classmethod
+    def read_layer(cls, path: Path) -> Tree:
+        """Read what a file says to the node.
+
+        Raises:
+            InputError: the file cannot be read.
+        """
+        return node_parameters(path, cls.node)
+
+    @classmethod
     def resolve(cls, overrides: Mapping[str, Any]) -> Self:
         """Read the settings from the files and the user's (dotted or nested) overrides.
 
@@ -84,7 +93,7 @@ class NodeSettings(StrictModel):
         chosen = validate(cls, merge(base, own), where)
         selected = {name: str(getattr(chosen, name)) for name in cls.selectors}
         for path in cls.layers(selected):
-            layer = node_parameters(path, cls.node)
+            layer = cls.read_layer(path)
             validate(cls, merge(tree, layer), str(path))
             tree = merge(tree, layer)
         return validate(cls, merge(tree, own), where)

@@ -9,9 +9,11 @@ from typing import Annotated, ClassVar
 from pydantic import Field
 
 from space_robot_model.robot.find import mission_layers
+from space_robot_model.robot.mission_document import mission_layer
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.config.files import named_layers
 from space_robot_msgs_py.config.settings import NodeSettings, Texts
+from space_robot_msgs_py.config.trees import Tree
 
 from .plant import PlantSettings
 
@@ -92,3 +94,12 @@ class PlantNodeSettings(PlantSettings, NodeSettings):
             *named_layers("sensors", selected["sensors"]),
             *named_layers("actuators", selected["actuators"]),
         ]
+
+    @classmethod
+    def read_layer(cls, path: Path) -> Tree:
+        """Read a parameter file, or a mission's document.
+
+        Raises:
+            InputError: the file cannot be read, or a key in it is wrong.
+        """
+        return mission_layer(path, cls.node)
