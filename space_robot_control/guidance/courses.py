@@ -38,6 +38,8 @@ class Piece(NamedTuple):
     """(n,) joints at the end, rad, or m of prismatic joints."""
     attitude: Array
     """(4,) quaternion at the end."""
+    motion: str = "joints"
+    """What is moved how, in a word or two."""
 
 
 def quintic(u: Array) -> tuple[Array, Array, Array]:

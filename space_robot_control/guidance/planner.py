@@ -92,7 +92,7 @@ class Planner:
         joints, base = make(span)
         end = np.array([self._time + span])
         goal, attitude = joints.at(end)[0, 0], base.at(end)[0, :4]
-        return Piece(self._time, self._time + span, joints, base, goal, attitude)
+        return Piece(self._time, self._time + span, joints, base, goal, attitude, segment.motion)
 
     def _maker(self, segment: Segment) -> Maker:
         turn = self._turn(segment)

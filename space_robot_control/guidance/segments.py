@@ -79,6 +79,13 @@ class Segment(StrictModel):
             raise ValueError("give duration (s), or duration: fast; hold has its own")
         return self
 
+    @property
+    def motion(self) -> str:
+        """What the segment moves, in a word or two."""
+        moved = [name for name in MOTIONS if getattr(self, name) is not None]
+        words = [name.removesuffix("_deg") for name in moved]
+        return " and ".join([*words, "base"] if self.base is not None else words)
+
 
 def read_segments(texts: Sequence[str]) -> list[Segment]:
     """Return the segments written in YAML texts; empty texts count for nothing.

@@ -26,6 +26,8 @@ class ToolPose(NamedTuple):
     """(3, 3) from the tool's frame."""
     jacobian: Array
     """(6, N) ``J_held``."""
+    free_jacobian: Array
+    """(6, N) ``J_g``."""
 
 
 class ToolFollower:
@@ -56,6 +58,7 @@ class ToolFollower:
             work.position + work.centre_of_mass,
             work.rotation.copy(),
             work.held[:, self._rows],
+            work.free[:, self._rows],
         )
 
     def follow(

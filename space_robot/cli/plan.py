@@ -1,0 +1,78 @@
+"""The command ``space-robot plan``: show what a mission asks for, without flying it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import click
+
+from .numbers import FiniteRange
+from .options import file_option, flight_options, plan_flight
+
+
+@click.command()
+@click.argument("mission", default="")
+@flight_options("robot", "period", "set", "json")
+@click.option(
+    "--base-torque",
+    type=FiniteRange(min=0.0, min_open=True),
+    metavar="NM",
+    help="Stretch segments until no component of the base's torque is above this, N m.",
+)
+@click.option(
+    "--momentum",
+    type=FiniteRange(min=0.0, min_open=True),
+    metavar="NMS",
+    help="Stretch segments until the base takes up no more angular momentum than this, N m s.",
+)
+@file_option("--out", help="Write the mission as it was planned to a file.")
+@file_option("--figure", help="Draw joints, tool, torque, momentum: FIGURE.svg and FIGURE.png.")
+def plan(
+    mission: str,
+    as_json: bool,
+    base_torque: float | None,
+    momentum: float | None,
+    out: Path | None,
+    figure: Path | None,
+    **options: Any,
+) -> None:
+    """Plan a mission without flying it: duration, tool, torque and momentum of the base.
+
+    MISSION is a name of config/missions or a path; without it, the robot's own. Demands are those
+    of the nominal robot without friction, with zero momentum at the start.
+
+    \b
+    Examples:
+      space-robot plan
+      space-robot plan line.yaml --figure line.png
+      space-robot plan line.yaml --base-torque 0.5 --out slow.yaml
+      space-robot plan --robot seven_joint --json
+    """
+    from space_robot_control.guidance.mission import Mission, MissionSettings
+
+    from ..analysis.mission_plan import plan_report, planned_segments
+    from ..analysis.stretched_mission import mission_text, stretched_mission
+    from ..console.files import write_text
+    from ..console.terminal import echo_json, terminal
+    from .plan_display import print_plan
+
+    flight = plan_flight(mission=mission, **options)
+    robot = flight.scenario.robots.controller
+    settings: MissionSettings = flight.mission_settings
+    segments = planned_segments(robot, flight.mission)
+    report = plan_report(robot, segments)
+    if base_torque is not None or momentum is not None:
+        settings = stretched_mission(settings, report, base_torque, momentum)
+        segments = planned_segments(robot, Mission(robot, settings, flight.period))
+        report = {**plan_report(robot, segments), "before": report}
+    if out is not None:
+        write_text(mission_text(settings), out)
+    if figure is not None:
+        from ..analysis.figures.mission_plan import draw_plan
+
+        draw_plan(robot, segments, figure)
+    if as_json:
+        echo_json(report)
+    else:
+        print_plan(report, terminal())

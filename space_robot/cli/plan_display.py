@@ -1,0 +1,72 @@
+"""The plan of a mission on a terminal."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from rich.console import Console
+
+from ..console.tables import Column, JudgedCell, Table
+from ..console.terminal import say
+from ..console.terminal_tables import print_table
+
+SEGMENTS = (
+    Column("segment", is_label=True),
+    Column("begin", "s", ".2f"),
+    Column("duration", "s", ".2f"),
+    Column("tool path", "m", ".3f"),
+    Column("base torque", "N m", ".3g"),
+    Column("momentum", "N m s", ".3g"),
+    Column("singular value", "", ".2g"),
+    Column("base free", "", ".2g"),
+)
+ACTUATORS = (
+    Column("actuators", is_label=True),
+    Column("torque", "%", ".0f"),
+    Column("momentum", "%", ".0f"),
+    Column("feasible", is_label=True),
+)
+
+
+def print_plan(report: Mapping[str, Any], console: Console) -> None:
+    """Print the report of `space_robot.analysis.mission_plan.plan_report`."""
+    rows = [
+        (
+            f"{s['segment']} {s['motion']}",
+            s["begin_s"],
+            s["duration_s"],
+            s["tool_travel_m"],
+            s["base_torque"],
+            s["momentum"],
+            s["singular_value"],
+            s["free_singular_value"],
+        )
+        for s in report["segments"]
+    ]
+    print_table(Table.of("", SEGMENTS, rows), console)
+    judged = [
+        (
+            a["actuators"],
+            100.0 * a["torque"],
+            100.0 * a["momentum"],
+            JudgedCell("", "yes" if a["is_feasible"] else "no", _tone(a["is_feasible"])),
+        )
+        for a in report["actuators"]
+    ]
+    print_table(Table.of("", ACTUATORS, judged), console)
+    say(
+        console,
+        f"{report['duration_s']:.2f} s; largest base torque {report['base_torque']:.3g} N m, "
+        f"largest momentum {report['momentum']:.3g} N m s",
+    )
+    if before := report.get("before"):
+        say(
+            console,
+            f"before: {before['duration_s']:.2f} s, {before['base_torque']:.3g} N m, "
+            f"{before['momentum']:.3g} N m s",
+        )
+
+
+def _tone(is_good: bool) -> str:
+    return "good" if is_good else "bad"
