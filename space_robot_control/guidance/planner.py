@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,6 +32,7 @@ from .durations import MissionLimits, shortest_duration
 from .reactionless import reactionless_path
 from .segments import Segment, ToolGoal
 from .tool_path import ToolFollower
+from .trajectory_file import Trajectory, read_columns
 
 Array = NDArray[np.float64]
 
@@ -84,15 +86,23 @@ class Planner:
         return pieces
 
     def _piece(self, segment: Segment) -> Piece:
+        if (columns := segment.trajectory) is None and segment.file is not None:
+            columns = read_columns(Path(segment.file))
+        if columns is not None:
+            trajectory = Trajectory(columns, self._robot.joint_names)
+            courses = trajectory.courses(self._time, self._joints, self._quaternion)
+            return self._ended(trajectory.duration, *courses, segment.motion)
         make = self._maker(segment)
         span = segment.hold or segment.duration
         if span is None:
             trial = make(TRIAL_S)
             span = shortest_duration(self._robot, self._limits, *trial, self._time, TRIAL_S)
-        joints, base = make(span)
+        return self._ended(span, *make(span), segment.motion)
+
+    def _ended(self, span: float, joints: Course, base: Course, motion: str) -> Piece:
         end = np.array([self._time + span])
         goal, attitude = joints.at(end)[0, 0], base.at(end)[0, :4]
-        return Piece(self._time, self._time + span, joints, base, goal, attitude, segment.motion)
+        return Piece(self._time, self._time + span, joints, base, goal, attitude, motion)
 
     def _maker(self, segment: Segment) -> Maker:
         turn = self._turn(segment)

@@ -14,8 +14,10 @@ from space_robot_msgs_py.errors import InputError
 
 Seconds = Annotated[float, Field(gt=0.0, le=1e6)]
 Frame = Literal["inertial", "base", "start"]
-MOTIONS = ("joints_deg", "tool", "hold", "reactionless_deg", "file")
+MOTIONS = ("joints_deg", "tool", "hold", "reactionless_deg", "file", "trajectory")
 """Keys of which a segment has one; a segment of the base alone has none."""
+ALONE = ("hold", "reactionless_deg", "file", "trajectory")
+"""Those that go without ``base``."""
 
 
 class ToolGoal(Orientation):
@@ -46,6 +48,9 @@ class Segment(StrictModel):
         None, description="joints to approach without a torque on the base, degrees or m"
     )
     file: str | None = Field(None, description="CSV or Parquet file of a trajectory")
+    trajectory: dict[str, list[float]] | None = Field(
+        None, description="the columns of such a file"
+    )
     base: Attitude | None = None
     duration: Seconds | None = Field(None, description="s")
     fast: bool = Field(False, description="as fast as the limits of joints and base allow")
@@ -72,10 +77,13 @@ class Segment(StrictModel):
             raise ValueError(f"{' and '.join(motions)} were given: a segment has one of them")
         if not motions and self.base is None:
             raise ValueError(f"give one of {', '.join(MOTIONS)}, or base")
-        if self.base is not None and motions and motions[0] in ("hold", "file", "reactionless_deg"):
+        if self.base is not None and motions and motions[0] in ALONE:
             raise ValueError(f"base cannot be combined with {motions[0]}")
         timed = [self.duration is not None, self.fast, self.hold is not None]
-        if self.file is None and sum(timed) != 1:
+        if self.file is not None or self.trajectory is not None:
+            if any(timed):
+                raise ValueError("a trajectory has its own duration")
+        elif sum(timed) != 1:
             raise ValueError("give duration (s), or duration: fast; hold has its own")
         return self
 

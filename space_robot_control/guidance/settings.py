@@ -14,6 +14,7 @@ from space_robot_msgs_py.config.settings import NodeSettings
 from space_robot_msgs_py.config.trees import Tree
 
 from .mission import MissionSettings
+from .trajectory_file import with_columns
 
 
 class MissionNodeSettings(MissionSettings, NodeSettings):
@@ -44,4 +45,7 @@ class MissionNodeSettings(MissionSettings, NodeSettings):
         Raises:
             InputError: the file cannot be read, or a key in it is wrong.
         """
-        return mission_layer(path, cls.node)
+        layer = mission_layer(path, cls.node)
+        if texts := layer.get("segments"):
+            layer["segments"] = [with_columns(text, path.parent) for text in texts]
+        return layer
