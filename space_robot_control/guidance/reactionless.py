@@ -20,14 +20,14 @@ from space_robot_msgs_py.compiled.kernels import kernel
 
 Array = NDArray[np.float64]
 
-STEP = 0.01
+STEP = 0.0025
 """Step in s of the integration, by Runge and Kutta's method of fourth order."""
-END = 30.0
-"""Where it ends: what is left of a way within reach has fallen by e^-30."""
+END = 25.0
+"""Where it ends: what is left of a way within reach has fallen by e^-25."""
 SHORTEST = 1e-9
 """Length of a path, rad or m, below which there is none."""
 KNOTS = 400
-"""Of the path, equally far apart."""
+"""Of the path, nearly equally far apart."""
 
 
 def reactionless_path(robot: Robot, quaternion: Array, start: Array, goal: Array) -> CubicSpline:
@@ -52,10 +52,21 @@ def reactionless_path(robot: Robot, quaternion: Array, start: Array, goal: Array
     if lengths[-1] < SHORTEST:
         return CubicSpline(np.array([0.0, 1.0]), np.array([start, start]))
     shares = lengths / lengths[-1]
-    places = np.linspace(0.0, 1.0, KNOTS + 1)
-    knots = np.column_stack([np.interp(places, shares, path[:, j]) for j in range(len(start))])
-    rates = (moves[0] / (shares[1] - shares[0]), (knots[-1] - knots[-2]) * KNOTS)
-    return CubicSpline(places, knots, *rates)
+    # points of the path itself: between them a straight line would have momentum
+    nearest = np.searchsorted(shares, np.linspace(0.0, 1.0, KNOTS + 1))
+    chosen = np.unique([*nearest[:-1], np.searchsorted(shares, 1.0)])
+    places, points = shares[chosen], path[chosen]
+    return CubicSpline(
+        places, points, _slope(places[:3], points[:3]), _slope(places[:-4:-1], points[:-4:-1])
+    )
+
+
+def _slope(places: Array, points: Array) -> Array:
+    """Return the slope at the first of three points of a parabola."""
+    near, far = places[1] - places[0], places[2] - places[0]
+    rises = (points[1] - points[0]) / near, (points[2] - points[0]) / far
+    slope: Array = (rises[0] * far - rises[1] * near) / (far - near)
+    return slope
 
 
 @kernel
