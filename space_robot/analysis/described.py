@@ -85,6 +85,17 @@ def robot_of(log: FlightLog) -> Robot:
     return robot
 
 
+def assumed_robot_of(log: FlightLog) -> Robot:
+    """Build the robot that the flight software assumed: the one that was flown, if none is named.
+
+    Raises:
+        InputError: see `robot_of`.
+    """
+    if isinstance(content := log.flight.get("controller_robot_file"), dict):
+        return Robot.from_dict(content, where="controller_robot_file of the bag")
+    return robot_of(log)
+
+
 def check_joints(robot: Robot, log: FlightLog) -> None:
     """Check that a robot has the joints of a bag.
 

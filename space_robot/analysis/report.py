@@ -18,6 +18,7 @@ from .attitude_drift import UNAVAILABLE, AttitudeDrift, controls_base
 from .columns import recording
 from .described import (
     actuators_of,
+    assumed_robot_of,
     estimator,
     event_labels,
     flown_actuators,
@@ -36,6 +37,7 @@ from .pointing import Pointing
 from .ripple import Ripple
 from .settling import Settling
 from .sizing import ActuatorSet, Sizing
+from .tool_error import ToolError
 from .wheel_saturation import WheelSaturation
 
 DESCRIBED = ("controller", "case", "gains", "robot")
@@ -189,6 +191,7 @@ _METRICS: dict[str, Callable[[FlightLog], Metric]] = {
     "missed_deadlines": _missed_deadlines,
     "estimate_error": lambda log: EstimateError(log, *estimator(log)),
     "pointing": lambda log: Pointing(log, robot_of(log)),
+    "tool": lambda log: ToolError(log, robot_of(log), assumed_robot_of(log)),
     "sizing": lambda log: _sizing(log, None),
     "momentum": lambda log: MomentumBudget(momentum_of(log)),
 }

@@ -1,0 +1,78 @@
+"""The tool's distance from the path that its mission leads along, on inertial axes.
+
+The wanted path follows from the reference: with zero momentum the robot's centre of mass does not
+move, so attitude and joints give the pose of the tool by the masses that the flight software
+assumes. The true pose follows from the base's true position
+and attitude and the true joints. So it includes what the flight software does not know: a payload,
+and momentum that something else has brought in.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from space_robot_model.robot import Robot
+from space_robot_model.robot.momentum import Motion, robot_momentum
+from space_robot_model.robot.tool import tool_pose
+from space_robot_msgs_py.bag.blocks import Metric
+from space_robot_msgs_py.bag.flight_log import FlightLog
+
+from .metrics import AxisMaximum, AxisRms
+from .pointing import rotation_angle
+
+Array = NDArray[np.float64]
+
+
+class ToolError(Metric):
+    """Takes RMS and maximum of the tool's error in position and rotation."""
+
+    def __init__(self, log: FlightLog, robot: Robot, assumed: Robot) -> None:
+        """Take the place where the path begins.
+
+        Args:
+            log: the first rows; the base's centre of mass is at the path's origin at the first one.
+            robot: the true robot.
+            assumed: as the flight software knows it; its joints are all actuated.
+        """
+        self._robot, self._assumed = robot, assumed.nominal
+        self._origin = log.base_position[:1] + self._centre(log.rows(0, 1))
+        self._rms, self._maximum = AxisRms(2), AxisMaximum(2)
+
+    def add(self, log: FlightLog, error: Array) -> None:
+        """Take further rows."""
+        values = self.errors(log)
+        self._rms.add(values)
+        self._maximum.add(values)
+
+    def errors(self, log: FlightLog) -> Array:
+        """Return (N, 2): distance, m, and angle of the one rotation between both frames, rad."""
+        quaternion = _unit(log.reference_base[:, :4])
+        desired, place = tool_pose(self._assumed, quaternion, log.reference_joints[:, 0])
+        wanted = self._origin + place - self._centre(log)
+        actual, offset = tool_pose(self._robot, _unit(log.quaternion), log.all_positions)
+        away = log.base_position + offset - wanted
+        distance = np.sqrt(sum(away[:, k] * away[:, k] for k in range(3)))
+        return np.column_stack((distance, rotation_angle(actual, desired)))
+
+    def result(self) -> dict[str, float]:
+        """``rms_m``, ``largest_m``, ``rms_deg`` and ``largest_deg``."""
+        rms, largest = self._rms.value, self._maximum.value
+        return {
+            "rms_m": float(rms[0]),
+            "largest_m": float(largest[0]),
+            "rms_deg": float(np.degrees(rms[1])),
+            "largest_deg": float(np.degrees(largest[1])),
+        }
+
+    def _centre(self, log: FlightLog) -> Array:
+        """Return (N, 3) m, the assumed robot's centre of mass from its base's, in the reference."""
+        base, joints = log.reference_base, log.reference_joints[:, 0]
+        still = np.zeros((len(base), 3)), np.zeros_like(joints)
+        motion = Motion(_unit(base[:, :4]), still[0], joints, still[1])
+        return robot_momentum(self._assumed, motion).centre_of_mass
+
+
+def _unit(quaternion: Array) -> Array:
+    unit: Array = quaternion / np.linalg.norm(quaternion, axis=1, keepdims=True)
+    return unit
