@@ -43,6 +43,8 @@ DEFINITIONS = {
     "rotation": "angle of the one rotation between the end effector's desired and measured frame",
     "tool position": "distance from the desired position, the base at its measured position",
     "base's drift": "of the base's centre of mass from where it began; nothing holds it",
+    "tool on its path": "distance and rotation of the end effector from the path that the mission "
+    "leads along, on inertial axes",
     "momentum": "largest angular momentum about the common centre of mass: of the robot with "
     "its wheels locked, of its base in that, of the wheels' spin, and what came from outside; and "
     "how far robot and wheels together drifted from what is conserved",
@@ -168,6 +170,7 @@ def lines(reports: Sequence[Report], brief: bool = False) -> list[Line]:
         rows += each(group, ("pointing", key), text=_angle, label=_upper)
     for group, key in (("tool position", "tool_position_m"), ("base's drift", "base_drift_m")):
         rows += each(group, ("pointing", key), "m", label=_upper)
+    rows += each("tool on its path", ("tool",), lambda key: key.split("_")[-1], label=_kind)
     rows += each("momentum", ("momentum", "peak_n_m_s"), "N m s", label="{} at most".format)
     rows += each(
         "momentum",
@@ -315,6 +318,10 @@ def _differing(report: Report) -> str:
 
 def _axes(key: str, kind: str) -> str:
     return f"{key if key == 'base' else f'joints_{key}'} {_upper(kind)}"
+
+
+def _kind(key: str) -> str:
+    return "RMS" if key.startswith("rms") else "max"
 
 
 def _end_or_max(key: str) -> str:

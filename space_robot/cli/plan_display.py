@@ -14,11 +14,11 @@ from ..console.terminal_tables import print_table
 SEGMENTS = (
     Column("segment", is_label=True),
     Column("begin", "s", ".2f"),
-    Column("duration", "s", ".2f"),
-    Column("tool path", "m", ".3f"),
-    Column("base torque", "N m", ".3g"),
+    Column("length", "s", ".2f"),
+    Column("tool", "m", ".3f"),
+    Column("torque", "N m", ".3g"),
     Column("momentum", "N m s", ".3g"),
-    Column("singular value", "", ".2g"),
+    Column("singular", "", ".2g"),
     Column("base free", "", ".2g"),
 )
 ACTUATORS = (

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -141,6 +141,45 @@ class Robot(TreeArrays):
                 f"got an array of shape {numbers.shape}"
             )
         return numbers
+
+    def tool_jacobian(
+        self,
+        joint_positions: ArrayLike,
+        quaternion_wxyz: ArrayLike = (1.0, 0.0, 0.0, 0.0),
+        attitude: Literal["held", "free"] = "held",
+        tool: str | None = None,
+    ) -> Array:
+        """Return the Jacobian (6, N) of a tool by joint velocities, with zero linear momentum.
+
+        Rows are the tool's velocity (m/s) and angular velocity (rad/s) on inertial axes. See
+        `space_robot_model.robot.kinematics.tool_jacobian`.
+
+        Args:
+            joint_positions: (N,) of all joints, rad, or m of prismatic ones.
+            quaternion_wxyz: (4,) base attitude, unit.
+            attitude: "held": the base does not turn; "free": angular momentum is zero, too.
+            tool: name of one of `tools`; None: the first.
+
+        Raises:
+            InputError: an argument has another type or shape, or there is no such tool.
+        """
+        from .kinematics import tool_jacobian
+
+        return tool_jacobian(self, quaternion_wxyz, joint_positions, attitude, tool)
+
+    def reaction_null_space(
+        self, joint_positions: ArrayLike, quaternion_wxyz: ArrayLike = (1.0, 0.0, 0.0, 0.0)
+    ) -> Array:
+        """Return a basis (N, K) of the joint velocities without angular momentum of the robot.
+
+        Args: see `tool_jacobian`.
+
+        Raises:
+            InputError: an argument has another type or shape.
+        """
+        from .kinematics import reaction_null_space
+
+        return reaction_null_space(self, quaternion_wxyz, joint_positions)
 
     def with_last_link(self, mass: float, inertia: list[float]) -> Robot:
         """Return the robot with mass and inertia of the body with the tool replaced, CoM kept.
