@@ -1,0 +1,84 @@
+"""The tool's error on its path: zero if all is as the reference, else what it is moved by."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from random_robots import random_quaternion, random_robot
+from scipy.spatial.transform import Rotation
+
+import space_robot as sr
+from space_robot.analysis.tool_error import ToolError
+from space_robot_model.robot import Robot
+from space_robot_model.robot.momentum import Motion, robot_momentum
+from space_robot_msgs_py.bag.flight_log import FlightLog
+from space_robot_msgs_py.samples import Timebase
+
+TICKS = 5
+SEEDS = st.integers(0, 2**31 - 1)
+
+
+def on_its_path(robot: Robot, seed: int) -> FlightLog:
+    """A log that is on its reference, and whose centre of mass does not move."""
+    rng = np.random.default_rng(seed)
+    log = FlightLog.allocate(TICKS, robot.joint_names, Timebase(500_000))
+    log.reference_base[:] = 0.0
+    log.reference_base[:, :4] = [random_quaternion(rng) for _ in range(TICKS)]
+    log.reference_joints[:] = rng.uniform(-3.0, 3.0, (TICKS, 3, robot.n))
+    log.quaternion[:] = log.reference_base[:, :4]
+    log.joint_positions[:] = log.reference_joints[:, 0]
+    still = np.zeros((TICKS, 3)), np.zeros((TICKS, robot.n))
+    motion = Motion(log.quaternion, still[0], log.joint_positions, still[1])
+    log.base_position[:] = rng.normal(size=3) - robot_momentum(robot, motion).centre_of_mass
+    return log
+
+
+@given(SEEDS, st.integers(1, 8))
+def test_a_flight_on_its_path_has_no_error(seed: int, n: int) -> None:
+    robot = random_robot(np.random.default_rng(seed), n)
+    log = on_its_path(robot, seed)
+    errors = ToolError(log, robot, robot).errors(log)
+    np.testing.assert_allclose(errors, 0.0, atol=1e-12)
+
+
+@given(SEEDS, st.integers(1, 8))
+def test_a_displaced_and_turned_base_displaces_and_turns_the_tool(seed: int, n: int) -> None:
+    rng = np.random.default_rng(seed)
+    robot = random_robot(rng, n)
+    log = on_its_path(robot, seed)
+    metric = ToolError(log, robot, robot)
+    shift, angle = rng.normal(size=3), 0.3
+    turn = Rotation.from_rotvec([0.0, 0.0, angle])
+    log.base_position[1:] += shift
+    errors = metric.errors(log)
+    np.testing.assert_allclose(errors[1:, 0], np.linalg.norm(shift), rtol=1e-12)
+    np.testing.assert_allclose(errors[:, 1], 0.0, atol=1e-12)
+    attitude = turn * Rotation.from_quat(np.roll(log.quaternion, -1, axis=1))
+    log.quaternion[:] = np.roll(attitude.as_quat(), 1, axis=1)
+    np.testing.assert_allclose(metric.errors(log)[:, 1], angle, rtol=1e-9)
+
+
+def test_a_line_is_flown_within_a_micrometre_and_a_payload_moves_it() -> None:
+    start, goal = [0, 90, 200, 20, 30, 10], {"xyz": [0.3, 0.0, -0.4], "rpy_deg": [0, 0, 0]}
+    mission = {"start": {"joints_deg": start}, "segments": [{"tool": goal, "duration": 2}]}
+    flown = sr.Scenario(controller="ctc", mission=mission, friction=False, case="1").fly()
+    tool = flown.report()["tool"]
+    assert tool["rms_m"] <= tool["largest_m"] < 1e-6
+    assert tool["rms_deg"] <= tool["largest_deg"] < 1e-5
+    loaded = sr.Scenario(
+        controller="ctc", mission=mission, friction=False, case={"payload": {"mass": 20.0}}
+    )
+    assert loaded.fly().report()["tool"]["largest_m"] > 1e-3
+
+
+@pytest.mark.parametrize("law", ["ctc", "ctc_smc", "tde_smc", "tde_tsmc", "tde_stc"])
+def test_every_law_follows_a_slew_with_the_arm_moving(law: str) -> None:
+    segments = [
+        {"joints_deg": [5, 115, 215, 5, -5, 5], "base": {"rpy_deg": [0, 0, 3]}, "duration": 4}
+    ]
+    mission = {"start": {"joints_deg": [0, 120, 220, 0, -10, 0]}, "segments": segments}
+    report = sr.Scenario(controller=law, mission=mission).fly().report()
+    assert report["duration_s"] == 4.0
+    assert report["maxima"]["attitude"] < 1e-5

@@ -1,0 +1,110 @@
+"""``space-robot plan``: what it shows, stretches, writes and refuses."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+from click.testing import CliRunner, Result
+
+from space_robot.cli.main import cli
+from space_robot_msgs_py.errors import InputError
+
+MISSION: dict[str, Any] = {
+    "mission": {
+        "start": {"joints_deg": [0, 90, 200, 20, 30, 10]},
+        "segments": [
+            {"tool": {"xyz": [0.3, 0.0, -0.4], "rpy_deg": [0, 0, 0]}, "duration": 15},
+            {"base": {"rpy_deg": [0, 0, 10]}, "duration": 20},
+            {"hold": 2},
+        ],
+    }
+}
+
+
+@pytest.fixture
+def mission(tmp_path: Path) -> Path:
+    file = tmp_path / "inspect.yaml"
+    file.write_text(yaml.safe_dump(MISSION))
+    return file
+
+
+def run(*arguments: object) -> Result:
+    return CliRunner(env={"COLUMNS": "120"}).invoke(cli, ["plan", *map(str, arguments)])
+
+
+def report(*arguments: object) -> dict[str, Any]:
+    numbers: dict[str, Any] = json.loads(run(*arguments, "--json").stdout)
+    return numbers
+
+
+def test_the_papers_mission_asks_for_what_is_known_of_it() -> None:
+    numbers = report()
+    assert numbers["base_torque"] == pytest.approx(2.4, abs=0.05)
+    assert numbers["momentum"] == pytest.approx(11.3, abs=0.05)
+    assert [s["motion"] for s in numbers["segments"]] == ["joints", "joints"]
+    assert {a["actuators"]: a["is_feasible"] for a in numbers["actuators"]}["wheels"]
+
+
+def test_segments_of_a_document(mission: Path) -> None:
+    numbers = report(mission)
+    assert [s["motion"] for s in numbers["segments"]] == ["tool", "base", "hold"]
+    assert numbers["duration_s"] == 37.0
+    assert numbers["segments"][0]["tool_travel_m"] == pytest.approx(0.5, rel=1e-3)
+    shown = run(mission).stdout
+    assert "37.00 s; largest base torque" in shown
+    assert "small_wheels" in shown
+
+
+@pytest.mark.parametrize(
+    ("option", "key"), [("--base-torque", "base_torque"), ("--momentum", "momentum")]
+)
+def test_a_stretched_mission_keeps_to_the_limit_and_flies(
+    mission: Path, tmp_path: Path, option: str, key: str
+) -> None:
+    out = tmp_path / "slow.yaml"
+    numbers = report(mission, option, 1.0, "--out", out)
+    assert numbers[key] <= 1.0 + 1e-9
+    assert numbers[key] > 0.9
+    assert numbers["before"] == report(mission)
+    again = report(out)
+    assert again[key] == numbers[key]
+    assert [s["motion"] for s in again["segments"]] == ["tool", "base", "hold"]
+
+
+def test_legs_between_waypoints_are_stretched_too(tmp_path: Path) -> None:
+    numbers = report("--base-torque", 0.5, "--out", tmp_path / "slow.yaml")
+    assert 0.45 < numbers["base_torque"] <= 0.5
+    assert report(tmp_path / "slow.yaml")["segments"] == [
+        {**segment} for segment in numbers["segments"]
+    ]
+
+
+def test_the_figure_is_drawn(mission: Path, tmp_path: Path) -> None:
+    assert run(mission, "--figure", tmp_path / "plan").exit_code == 0
+    assert (tmp_path / "plan.png").stat().st_size > 10_000
+    assert "momentum (N m s)" in (tmp_path / "plan.svg").read_text("utf-8")
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ({"start": {"joints_deg": [0, 90]}}, "waypoints_deg has 2 values"),
+        ({"segments": []}, "segments"),
+        ({"segments": [{"tool": {"xyz": [9, 9, 9]}, "duration": 5}]}, "segment 1: the tool cannot"),
+        ({"limits": {"torque": 1.0}}, "limits.torque: unknown key"),
+        ({"segment": []}, "segment: unknown key"),
+    ],
+)
+def test_bad_documents_are_refused_in_one_line(
+    tmp_path: Path, change: dict[str, Any], said: str
+) -> None:
+    file = tmp_path / "bad.yaml"
+    file.write_text(yaml.safe_dump({"mission": {**MISSION["mission"], **change}}))
+    error = run(file).exception
+    assert isinstance(error, InputError)
+    assert said in str(error)
+    assert "\n" not in str(error)
