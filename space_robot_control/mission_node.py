@@ -9,7 +9,7 @@ from space_robot_msgs_py.ros.node_host import NodeKind, run_nodes
 from .guidance.loop import MissionLoop
 from .guidance.settings import MissionNodeSettings
 
-NODE = NodeKind(MissionNodeSettings, MissionLoop)
+NODE = NodeKind(MissionNodeSettings, MissionLoop, changeable=("goto",))
 
 
 def main() -> NoReturn:

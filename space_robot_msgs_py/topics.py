@@ -146,6 +146,11 @@ BY_NAME = {topic.full_name: topic for topic in ALL}
 """By their full names in the root namespace."""
 # Shapes in the inertial frame, for viewers, while one listens; bags have transforms instead.
 MARKERS = Topic("markers", "visualization_msgs/msg/MarkerArray", 10, is_optional=True)
+JOINT_TRAJECTORY = Topic(
+    "joint_trajectory", "trajectory_msgs/msg/JointTrajectory", 10, is_event=True
+)
+"""Trajectories that others, as MoveIt, ask the mission to follow; the reference tells what came of
+it."""
 # One for all robots of a domain, as ROS has it: each status tells its node's name.
 DIAGNOSTICS = Topic("/diagnostics", "diagnostic_msgs/msg/DiagnosticArray", 100)
 SIMULATION_PAUSED = Topic(

@@ -34,6 +34,7 @@ NOT_TO_BE_SET = {
     "plant.paused": "use --paused",
     "controller.wait_for": _WAITING,
     "controller.listener_timeout": _WAITING,
+    "mission.goto": "it is for a mission in flight: use space-robot goto",
     "recorder.bag": "use --bag",
     "recorder.flight": "it is what the flight's options say",
     "recorder.robot": "use --robot",

@@ -11,6 +11,7 @@ from typing import NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from space_robot_model.elementary.quintic_spline import QuinticSpline
 from space_robot_model.elementary.sine import sines_cosines
 from space_robot_model.elementary.spline import CubicSpline
 
@@ -76,11 +77,11 @@ class QuinticLeg(NamedTuple):
 
 
 class SplineCourse(NamedTuple):
-    """Joints along a cubic spline."""
+    """Joints along a spline."""
 
     begin: float
     """s, time zero of the spline."""
-    spline: CubicSpline
+    spline: CubicSpline | QuinticSpline
 
     def at(self, time: Array) -> Array:
         """Return (T, 3, n) at times (T,), s."""
@@ -108,11 +109,38 @@ class Slew(NamedTuple):
         if self.angle == 0.0:
             return rows
         share, rate, acceleration = quintic(np.clip((time - self.begin) / self.span, 0.0, 1.0))
-        sine, cosine = sines_cosines(0.5 * self.angle * share)
-        turn = np.column_stack((cosine, sine[:, np.newaxis] * self.axis))
-        rows[:, :4] = multiplied(self.quaternion, turn)
+        rows[:, :4] = multiplied(self.quaternion, turned_by(self.axis, self.angle * share))
         rows[:, 4:7] = (self.angle * rate / self.span)[:, np.newaxis] * self.axis
         rows[:, 7:] = (self.angle * acceleration / self.span**2)[:, np.newaxis] * self.axis
+        return rows
+
+
+class BrakedTurn(NamedTuple):
+    """The base comes to rest about the axis that it turns about."""
+
+    begin: float
+    """s."""
+    span: float
+    """s until it is at rest."""
+    quaternion: Array
+    """(4,) attitude at the begin, unit."""
+    omega: Array
+    """(3,) angular velocity at the begin, rad/s, base frame."""
+    alpha: Array
+    """(3,) angular acceleration at the begin; its part along ``omega`` goes on."""
+
+    def at(self, time: Array) -> Array:
+        """Return (T, 10) at times (T,), s: quaternion, velocity and acceleration, base frame."""
+        rate = float(np.sqrt(_dot(self.omega, self.omega)[0]))
+        if rate == 0.0:
+            return Slew(self.begin, self.span, self.quaternion, self.omega, 0.0).at(time)
+        axis = self.omega / rate
+        first = [0.0, rate, float(_dot(axis, self.alpha)[0])]
+        states = np.array([first, [0.5 * self.span * rate, 0.0, 0.0]])[:, :, np.newaxis]
+        turn = QuinticSpline(np.array([0.0, self.span]), states).at(time - self.begin)
+        rows = np.empty((len(time), 10))
+        rows[:, :4] = multiplied(self.quaternion, turned_by(axis, turn[:, 0, 0]))
+        rows[:, 4:7], rows[:, 7:] = turn[:, 1] * axis, turn[:, 2] * axis
         return rows
 
 
@@ -152,6 +180,12 @@ def multiplied(first: Array, second: Array) -> Array:
         ),
         axis=-1,
     )
+
+
+def turned_by(axis: Array, angles: Array) -> Array:
+    """Return the quaternions (K, 4) of turns by angles (K,), rad, about a unit axis (3,)."""
+    sines, cosines = sines_cosines(0.5 * angles)
+    return np.column_stack((cosines, sines[:, np.newaxis] * axis))
 
 
 def turn_between(first: Array, second: Array) -> tuple[Array, float]:

@@ -17,6 +17,7 @@ from space_robot_msgs_py.wire.reference_codec import ReferenceCodec
 from space_robot_msgs_py.wire.stamp_guard import StampGuard
 
 from .mission import Mission
+from .mission_changes import MissionChanges
 from .settings import MissionNodeSettings
 
 CLOCK_DEPTH = 1_000
@@ -54,6 +55,7 @@ class MissionLoop:
         """The first tick that the stream has not reached."""
         self._invalid_stamps, self._listeners = 0, 0
         self._greet_at = 0.0
+        self._changes = MissionChanges(node, self._mission, lambda: self._next)
 
     def begin(self) -> None:
         """Begin at the end of the stream."""
@@ -64,6 +66,7 @@ class MissionLoop:
         if now >= self._greet_at:
             self._greet_at = now + GREET_S
             self._resend_pending()
+            self._changes.take()
         has_taken = self._take_clock()
         if self._next < self._stamps.last + self._settings.lead_ticks:
             self._send_chunk()
@@ -74,11 +77,13 @@ class MissionLoop:
         """Stop streaming; the controller holds the last point."""
 
     def close(self) -> None:
-        """Keep nothing."""
+        """Stop accepting changes."""
+        self._changes.close()
 
     def health(self) -> Health:
         """Report the progress of the stream."""
         values = {"tick": max(self._stamps.last, 0), "rejected: stamp": self._invalid_stamps}
+        values |= self._changes.counts
         return Health("nominal", values={**values, **self._clock.counts("rejected")})
 
     def _resend_pending(self) -> None:

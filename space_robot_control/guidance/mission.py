@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from functools import partial
 from itertools import pairwise
 from typing import Annotated
 
@@ -19,6 +21,7 @@ from space_robot_msgs_py.samples import ReferenceChunk
 from .courses import Piece, QuinticLeg, Slew
 from .durations import MissionLimits
 from .limits import check_positions
+from .live import TrajectoryPoint, braking, is_moving, joined
 from .planner import Planner
 from .segments import read_segments
 
@@ -83,9 +86,11 @@ class Mission:
             )
         ]
         """Legs between the waypoints, then the segments; at least one."""
+        self._robot = robot.nominal
+        self._new_planner = partial(Planner, robot, waypoints[0], quaternion, settings.limits)
         if segments := read_segments(settings.segments):
-            planner = Planner(robot, waypoints[0], quaternion, settings.limits)
-            self.pieces += planner.plan(float(times[-1]), waypoints[-1], segments)
+            planner = self._new_planner()
+            self.pieces += planner.plan(float(times[-1]), waypoints[-1], quaternion, segments)
         self.duration = self.pieces[-1].end if self.pieces else 0.0
         """s, until the end of the last segment."""
         if not self.pieces:
@@ -103,6 +108,53 @@ class Mission:
         """(K, n) desired positions at `times`, rad, or m of prismatic joints."""
         goals = [piece.goal for piece in self.pieces] if self.duration else []
         return np.array([self._first, *goals])
+
+    def go_to(self, tick: int, segment: str) -> Piece:
+        """Fly a segment, written as in a mission, from a tick on, in place of what was planned.
+
+        A reference that moves at that tick is brought to rest first.
+
+        Returns:
+            The planned segment.
+
+        Raises:
+            InputError: the segment is wrong or cannot be flown; the mission is as it was.
+        """
+        begin, joints, base = self._state_at(tick)
+        before = []
+        if is_moving(joints, base):
+            before = [braking(begin, joints, base)]
+            begin, joints, base = before[0].end, before[0].goal[np.newaxis], before[0].attitude
+        segments = read_segments([segment])
+        if not segments:
+            raise InputError("a segment was expected, got an empty text")
+        pieces = self._new_planner().plan(begin, joints[0], base[:4], segments)
+        self._replace([*before, *pieces])
+        return pieces[-1]
+
+    def follow(self, tick: int, names: Sequence[str], points: Sequence[TrajectoryPoint]) -> Piece:
+        """Fly a trajectory of the joints from a tick on, in place of what was planned.
+
+        Args: see `joined`.
+
+        Raises:
+            InputError: the trajectory is wrong; the mission is as it was.
+        """
+        piece = joined(self._robot, names, points, *self._state_at(tick))
+        self._replace([piece])
+        return piece
+
+    def _state_at(self, tick: int) -> tuple[float, Array, Array]:
+        """Return time, and the reference of joints (3, n) and base (10,), at a tick."""
+        chunk = self.chunk(tick, 1)
+        return tick * self._period, chunk.joints[0], chunk.base[0]
+
+    def _replace(self, pieces: list[Piece]) -> None:
+        """Put pieces in the place of all that begins later."""
+        kept = [piece for piece in self.pieces if piece.begin < pieces[0].begin]
+        self.pieces = [*kept, *pieces]
+        self._begins = np.array([piece.begin for piece in self.pieces])
+        self.duration = pieces[-1].end
 
     def chunk(self, start: int, length: int) -> ReferenceChunk:
         """The reference of ``length`` ticks from tick ``start`` on."""

@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 from space_robot_model.dynamics.attitude import rotation_matrix
 from space_robot_model.elementary.matrices import norm, product
 from space_robot_model.elementary.rotations import quaternion_of_rotation
-from space_robot_model.elementary.sine import sines_cosines
 from space_robot_model.elementary.spline import CubicSpline
 from space_robot_model.robot import Robot
 from space_robot_msgs_py.errors import InputError
@@ -27,6 +26,7 @@ from .courses import (
     multiplied,
     quintic,
     turn_between,
+    turned_by,
 )
 from .durations import MissionLimits, shortest_duration
 from .reactionless import reactionless_path
@@ -68,13 +68,15 @@ class Planner:
         self._origin = pose.position - pose.from_base
         """Origin of the inertial frame, the base's CoM at t = 0, from the robot's CoM."""
 
-    def plan(self, begin: float, joints: Array, segments: Sequence[Segment]) -> list[Piece]:
-        """Return the plan of segments that follow one another from a time and posture on.
+    def plan(
+        self, begin: float, joints: Array, quaternion: Array, segments: Sequence[Segment]
+    ) -> list[Piece]:
+        """Return the plan of segments that follow one another from a time, posture and attitude on.
 
         Raises:
             InputError: a segment cannot be flown; names it, with time, joint and amount.
         """
-        pieces, self._time, self._joints = [], begin, joints
+        pieces, self._time, self._joints, self._quaternion = [], begin, joints, quaternion
         for number, segment in enumerate(segments, 1):
             try:
                 piece = self._piece(segment)
@@ -202,6 +204,5 @@ def _turned(first: Array, last: Array, share: Array) -> Array:
     """Return rotations (K, 3, 3) on the shortest turn from ``first`` to ``last``."""
     start, goal = quaternion_of_rotation(first), quaternion_of_rotation(last)
     axis, angle = turn_between(start, goal)
-    sine, cosine = sines_cosines(0.5 * angle * share)
-    steps = multiplied(start, np.column_stack((cosine, sine[:, np.newaxis] * axis)))
+    steps = multiplied(start, turned_by(axis, angle * share))
     return np.array([_matrix(step) for step in steps])

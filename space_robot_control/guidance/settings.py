@@ -26,6 +26,11 @@ class MissionNodeSettings(MissionSettings, NodeSettings):
     mission: str = Field(
         "", description="a mission of config/missions, or a path to its YAML (empty: the robot's)"
     )
+    goto: str = Field(
+        "",
+        description="a segment to fly from now on in place of the mission, as YAML text, set in "
+        "flight; the same text again is ignored",
+    )
     chunk_ticks: Annotated[int, Field(ge=1, le=10_000)] = Field(
         100, description="ticks per message of the reference"
     )

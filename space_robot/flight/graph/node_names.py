@@ -5,3 +5,4 @@ ORDER = ("recorder", "mission", "controller", "plant")
 NODE_NAMES = tuple(f"{node}_node" for node in ORDER)
 """Names of nodes and executables, in that order."""
 PLANT = NODE_NAMES[-1]
+MISSION = NODE_NAMES[1]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+import uuid
 from typing import Any
 
 from space_robot_msgs_py.config.namespace import full_namespace
@@ -11,7 +12,7 @@ from space_robot_msgs_py.ros.locks import living_nodes
 from space_robot_sim.plant.settings import MOST_TICKS
 
 from .domain import domain_asked_for
-from .node_names import PLANT
+from .node_names import MISSION, PLANT
 from .node_services import call_trigger, set_parameters
 from .temporary_node import TemporaryNode
 
@@ -55,6 +56,31 @@ def call_simulation(action: str, domain: int | None, namespace: str, ticks: int 
     if not success:
         raise FlightError(f"{PLANT} cannot {action}: {text}")
     return text
+
+
+def go_to(segment: str, domain: int | None, namespace: str) -> None:
+    """Have the mission of a running graph fly a segment, in place of what it was to fly.
+
+    Args:
+        segment: as in a mission's file, YAML.
+        domain: see `call_simulation`.
+        namespace: see `call_simulation`.
+
+    Raises:
+        InputError: no mission is there.
+        FlightError: the segment is refused; the flight goes on as it was.
+    """
+    namespace = full_namespace(namespace)
+    domain = domain_asked_for(domain)
+    domain = domain_of_plant(namespace) if domain is None else domain
+    visitor = TemporaryNode("goto", domain, namespace)
+    try:
+        _wait_for(visitor.node, f"{MISSION}/set_parameters_atomically", domain)
+        # a text of its own: the mission ignores one that it has had
+        text = f"{segment} # {uuid.uuid4()}"
+        set_parameters(visitor.node, MISSION, {"goto": text}, lambda: None)
+    finally:
+        visitor.leave()
 
 
 def domain_of_plant(namespace: str) -> int:

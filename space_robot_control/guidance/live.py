@@ -1,0 +1,139 @@
+"""Changes of a mission in flight: a segment, or a trajectory of the joints, from now on.
+
+Position and rate of the reference do not jump. Before a segment the reference is brought to rest;
+a trajectory is joined with the reference's present rate and acceleration.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from space_robot_model.elementary.quintic_spline import QuinticSpline
+from space_robot_model.elementary.spline import CubicSpline
+from space_robot_model.robot import Robot
+from space_robot_msgs_py.config.validation import one_of
+from space_robot_msgs_py.errors import InputError
+
+from .checks import check_piece
+from .courses import BrakedTurn, Piece, SplineCourse
+
+Array = NDArray[np.float64]
+
+BRAKE_S = 2.0
+"""Time in which a moving reference is brought to rest, s."""
+AT_REST = 1e-9
+"""rad/s or m/s."""
+MOST_POINTS = 100_000
+
+
+class TrajectoryPoint(NamedTuple):
+    """A point of a `trajectory_msgs/JointTrajectory`."""
+
+    time: float
+    """s from the start."""
+    positions: Sequence[float]
+    velocities: Sequence[float]
+    """Empty: not given."""
+    accelerations: Sequence[float]
+
+
+def braking(begin: float, joints: Array, base: Array) -> Piece:
+    """Return the piece that brings a moving reference to rest.
+
+    Args:
+        begin: s.
+        joints: (3, n) reference of the joints at ``begin``.
+        base: (10,) reference of the base.
+    """
+    rest = np.zeros_like(joints)
+    rest[0] = joints[0] + 0.5 * BRAKE_S * joints[1]
+    spline = QuinticSpline(np.array([0.0, BRAKE_S]), np.array([joints, rest]))
+    turn = BrakedTurn(begin, BRAKE_S, base[:4], base[4:7], base[7:])
+    end = begin + BRAKE_S
+    attitude = turn.at(np.array([end]))[0, :4]
+    return Piece(begin, end, SplineCourse(begin, spline), turn, rest[0], attitude, "braking")
+
+
+def is_moving(joints: Array, base: Array) -> bool:
+    """Return whether a reference (3, n) and (10,) moves."""
+    return bool(max(np.abs(joints[1:]).max(), np.abs(base[4:]).max()) > AT_REST)
+
+
+def joined(
+    robot: Robot,
+    names: Sequence[str],
+    points: Sequence[TrajectoryPoint],
+    begin: float,
+    joints: Array,
+    base: Array,
+) -> Piece:
+    """Return a trajectory of the joints that begins with the present reference.
+
+    Args:
+        robot: as the flight software knows it.
+        names: of the joints, in the order of the points' numbers.
+        points: with rising times above 0; velocities and accelerations that are missing are those
+            of a cubic spline through the positions. It ends at rest unless the last point says
+            otherwise.
+        begin: s.
+        joints: (3, n) reference of the joints at ``begin``.
+        base: (10,) reference of the base, which comes to rest.
+
+    Raises:
+        InputError: a joint is missing or unknown, times do not rise, numbers are missing, or the
+            trajectory is beyond the joints' limits.
+    """
+    for name in names:
+        one_of(name, robot.joint_names, "joint", " of the trajectory")
+    if missing := [name for name in robot.joint_names if name not in names]:
+        raise InputError(f"the trajectory lacks joint {missing[0]!r}")
+    if len(set(names)) < len(names):
+        raise InputError("the trajectory has a joint twice")
+    if not 1 <= len(points) <= MOST_POINTS:
+        raise InputError(f"1 to {MOST_POINTS} points were expected, got {len(points)}")
+    times = np.array([0.0, *(point.time for point in points)])
+    if not np.all(np.diff(times) > 0.0):
+        raise InputError(
+            f"the times of points must rise from above 0, got {times[1:].tolist()[:8]} s"
+        )
+    order = [list(names).index(name) for name in robot.joint_names]
+    states = _states(times, points, order, joints)
+    course = SplineCourse(begin, QuinticSpline(times, states))
+    end = begin + float(times[-1])
+    turn = BrakedTurn(begin, BRAKE_S, base[:4], base[4:7], base[7:])
+    attitude = turn.at(np.array([begin + BRAKE_S]))[0, :4]
+    piece = Piece(begin, end, course, turn, states[-1, 0], attitude, "trajectory")
+    check_piece(robot, piece)
+    return piece
+
+
+def _states(
+    times: Array, points: Sequence[TrajectoryPoint], order: Sequence[int], joints: Array
+) -> Array:
+    """Return (K, 3, n) positions, rates and accelerations at all times, the present ones first."""
+    positions = np.array([joints[0], *(_row(p.positions, order, "positions") for p in points)])
+    last = points[-1].velocities
+    final = _row(last, order, "velocities") if len(last) else np.zeros(len(order))
+    spline = CubicSpline(times, positions, joints[1], final)
+    states = spline.at(times)
+    states[0] = joints
+    states[-1, 2] = 0.0
+    for k, point in enumerate(points, 1):
+        if len(point.velocities):
+            states[k, 1] = _row(point.velocities, order, "velocities")
+        if len(point.accelerations):
+            states[k, 2] = _row(point.accelerations, order, "accelerations")
+    return states
+
+
+def _row(values: Sequence[float], order: Sequence[int], what: str) -> Array:
+    if len(values) != len(order):
+        raise InputError(f"a point has {len(values)} {what} of {len(order)} joints")
+    row = np.array(values, dtype=np.float64)[list(order)]
+    if not np.all(np.isfinite(row)):
+        raise InputError(f"a point has {what} that are not finite")
+    return row
