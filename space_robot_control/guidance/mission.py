@@ -18,6 +18,7 @@ from space_robot_msgs_py.config.validation import StrictModel
 from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.samples import ReferenceChunk
 
+from .checks import check_piece
 from .courses import Piece, QuinticLeg, Slew
 from .durations import MissionLimits
 from .limits import check_positions
@@ -124,6 +125,7 @@ class Mission:
         before = []
         if is_moving(joints, base):
             before = [braking(begin, joints, base)]
+            check_piece(self._robot, before[0])
             begin, joints, base = before[0].end, before[0].goal[np.newaxis], before[0].attitude
         segments = read_segments([segment])
         if not segments:

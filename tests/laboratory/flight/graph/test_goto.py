@@ -1,0 +1,123 @@
+"""Segments and trajectories sent to a flight on the graph: followed without a jump, replayed."""
+
+from __future__ import annotations
+
+import json
+import signal
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import numpy as np
+import pytest
+from flights import forked_space_robot, space_robot_here, wait_for_nodes
+from forked import Forked
+
+from space_robot_model.robot.find import find_robot
+from space_robot_msgs_py import topics
+from space_robot_msgs_py.bag.flight_log import FlightLog
+from space_robot_msgs_py.bag.reader import read_flight
+from space_robot_msgs_py.ros.process_environment import set_defaults
+
+set_defaults()
+pytest.importorskip("rclpy")
+
+from space_robot.flight.graph.temporary_node import TemporaryNode  # noqa: E402
+from space_robot_msgs_py.ros.endpoints import message_type, qos  # noqa: E402
+
+TIMEOUT_S = 60.0
+STEP_TICKS = 1_000
+DURATION = "4"
+
+
+@contextmanager
+def paused(domain: int, bag: Path) -> Iterator[Forked]:
+    """A flight that has flown some ticks of its mission, and is paused."""
+    options = ("--duration", DURATION, "--domain", str(domain), "--bag", str(bag), "--json")
+    process = forked_space_robot("fly", "--paused", *options)
+    try:
+        wait_for_nodes(domain)
+        until(lambda: sim(domain, "step", "--ticks", str(STEP_TICKS)) == 0)
+        yield process
+    finally:
+        process.send_signal(signal.SIGINT)
+        process.communicate(timeout=TIMEOUT_S)
+
+
+def until(is_done: Callable[[], bool]) -> None:
+    end = time.monotonic() + TIMEOUT_S
+    while not is_done():
+        assert time.monotonic() < end
+        time.sleep(0.05)
+
+
+def sim(domain: int, *words: str) -> int:
+    return space_robot_here("sim", *words, "--domain", str(domain)).returncode
+
+
+def flown(process: Forked, domain: int, bag: Path) -> FlightLog:
+    """Let the flight go on to its end."""
+    assert sim(domain, "resume") == 0
+    output, errors = process.communicate(timeout=TIMEOUT_S)
+    assert process.returncode == 0, errors
+    assert not any(json.loads(output)["lost"].values())
+    log = read_flight(bag)
+    joints, base = log.reference_joints, log.reference_base
+    mean = 0.5 * (joints[1:, 1] + joints[:-1, 1])
+    steps = np.diff(joints[:, 0], axis=0) - mean * log.timebase.period
+    assert np.abs(steps).max() < 1e-7
+    assert np.abs(np.diff(joints[:, 1], axis=0)).max() < 1e-3
+    assert np.abs(np.diff(base[:, :4], axis=0)).max() < 1e-3
+    return log
+
+
+def test_goto_moves_joints_and_base(free_domain: int, tmp_path: Path) -> None:
+    bag = tmp_path / "bag"
+    where = ("--domain", str(free_domain))
+    goal = [1.0, 119.0, 219.0, 1.0, -9.0, 1.0]
+    with paused(free_domain, bag) as process:
+        refused = space_robot_here("goto", "--tool", "40,0,0", "--duration", "2", *where)
+        assert refused.returncode == 1
+        (line,) = refused.stderr.splitlines()
+        assert "segment 1: the tool cannot follow its path beyond t = " in line
+        words = ("--joints", ",".join(map(str, goal)), "--base", "0,0,0.5", "--duration", "0.5")
+        moved = space_robot_here("goto", *words, *where)
+        assert moved.returncode == 0, moved.stderr
+        log = flown(process, free_domain, bag)
+    robot = find_robot("paper")
+    np.testing.assert_allclose(robot.to_degrees(log.reference_joints[-1, 0]), goal, atol=1e-9)
+    assert log.reference_base[-1, 3] == pytest.approx(np.sin(np.radians(0.25)), rel=1e-12)
+    replay = space_robot_here("replay", str(bag), "--json")
+    assert replay.returncode == 0, replay.stderr
+
+
+def test_a_joint_trajectory_of_a_publisher_is_followed(free_domain: int, tmp_path: Path) -> None:
+    bag = tmp_path / "bag"
+    robot = find_robot("paper")
+    goal = np.radians([2.0, 118.0, 221.0, -2.0, -12.0, 1.0])
+    with paused(free_domain, bag) as process:
+        node = TemporaryNode("planner", free_domain)
+        try:
+            publish_trajectory(node, robot.joint_names[:4], goal[:4])  # refused
+            publish_trajectory(node, robot.joint_names[::-1], goal[::-1])
+            log = flown(process, free_domain, bag)
+        finally:
+            node.leave()
+    np.testing.assert_allclose(log.reference_joints[-1, 0], goal, atol=1e-12)
+    replay = space_robot_here("replay", str(bag), "--json")
+    assert replay.returncode == 0, replay.stderr
+
+
+def publish_trajectory(node: TemporaryNode, names: tuple[str, ...], goal: np.ndarray) -> None:
+    topic = topics.JOINT_TRAJECTORY
+    kind = message_type(topic.type)
+    point_type = message_type("trajectory_msgs/msg/JointTrajectoryPoint")
+    publisher = node.node.create_publisher(kind, topic.name, qos(topic))
+    until(lambda: publisher.get_subscription_count() > 0)
+    point = point_type(positions=goal.tolist())
+    point.time_from_start.sec = 1
+    publisher.publish(kind(joint_names=list(names), points=[point]))
+    from rclpy.duration import Duration
+
+    assert publisher.wait_for_all_acked(Duration(seconds=TIMEOUT_S))
