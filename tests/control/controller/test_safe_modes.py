@@ -164,7 +164,7 @@ def test_stopped_controller_comes_back_by_itself(hangs: Story) -> None:
 
 
 def test_stopped_mission_is_waited_for_then_followed_again(hangs: Story) -> None:
-    held = hangs.time_of("controller", "holding the reference", after=3.5)
+    held = hangs.time_of("controller", "holding the reference", after=1.0)
     assert hangs.time_of("controller", "nominal", after=held) >= held
 
 
