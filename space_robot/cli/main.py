@@ -20,7 +20,7 @@ from ..console.streams import is_of_output, standard_streams
 from ..processes.interruption import Interrupted, raising_signals
 from ..processes.node_modules import MODULES, SUFFIX
 
-COLLECTED_AT = 10_000
+COLLECTED_AT = 100_000
 """New objects after which Python looks for those that can be let go; else 700."""
 
 

@@ -118,15 +118,17 @@ def _controller(
     own.setdefault("actuators", plant.actuators)
     if plant.realtime:  # by the wall clock there is no time to wait
         own.setdefault("reference_timeout", 0.0)
-    controller = ControllerNodeSettings.resolve(own)
-    own["gains"] = gains_as_path(controller.gains, controller.robot)
+    controller, asked = ControllerNodeSettings.resolve(own), dict(own)
+    if (path := gains_as_path(controller.gains, controller.robot)) != controller.gains:
+        own["gains"] = path
     if controller.navigation == "filtered" and "navigation_sensors" not in own:
         if plant.sensors == GIVEN:
             numbers = {"navigation_filter": assumed_numbers(plant, plant.period)}
             own = merge(numbers, own)
         else:
             own["navigation_sensors"] = plant.sensors
-    controller = ControllerNodeSettings.resolve(own)
+    if own != asked:
+        controller = ControllerNodeSettings.resolve(own)
     if (filtered := controller.filter_settings) is not None:
         controller = controller.model_copy(update={"navigation_filter": filtered})
     return controller, gains

@@ -151,7 +151,7 @@ def test_a_replay_reads_no_file_that_a_bag_names(tmp_path: Path) -> None:
         ControllerChoice(lacking, tmp_path / "actuators_named")
     swapped = described(controller_node={"gains": str(secret), "swaps": ["0.1:ctc"]})
     (tmp_path / "swapped").mkdir()
-    with pytest.raises(InputError, match="read only with --trust"):
+    with pytest.raises(NotTrustedError, match=r"a file as its gains, .*: read only with --trust"):
         ControllerChoice(swapped, tmp_path / "swapped")
     swapped["parameters"]["controller"] |= {"ctc.k_p": [1e4], "ctc.k_d": [2e2]}
     assert ControllerChoice(swapped, tmp_path / "swapped").swaps == ["0.1:ctc"]
