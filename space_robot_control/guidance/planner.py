@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -18,6 +19,7 @@ from space_robot_msgs_py.errors import InputError
 
 from .checks import check_piece
 from .courses import (
+    AttitudeCourse,
     Course,
     Piece,
     QuinticLeg,
@@ -29,6 +31,7 @@ from .courses import (
     turned_by,
 )
 from .durations import MissionLimits, shortest_duration
+from .free_base import free_attitude, twists_along, with_middles
 from .reactionless import reactionless_path
 from .segments import Segment, ToolGoal
 from .tool_path import ToolFollower
@@ -39,6 +42,8 @@ Array = NDArray[np.float64]
 KNOT_S = 0.01
 """Spacing of the knots of a spline along a path, s."""
 FEWEST_KNOTS = 101
+FREE_TOLERANCE = 1e-7
+"""Largest error of a tool on its path with the base free, m and rad."""
 TRIAL_S = 10.0
 """Duration that a fast segment is tried with."""
 
@@ -107,9 +112,26 @@ class Planner:
         return Piece(self._time, self._time + span, joints, base, goal, attitude, motion)
 
     def _maker(self, segment: Segment) -> Maker:
-        turn = self._turn(segment)
-        if segment.tool is not None:
-            return lambda span: self._follow_tool(segment.tool, turn, span)  # type: ignore[arg-type]
+        turn, goal = self._turn(segment), segment.tool
+        if goal is not None:
+            if segment.is_base_free and goal.frame != "base":
+                return partial(self._follow_tool_freely, goal)
+            make = partial(self._follow_tool, goal, turn)
+        else:
+            make = self._joint_maker(segment, turn)
+        if not segment.is_base_free:
+            return make
+
+        def freed(span: float) -> tuple[Course, Course]:
+            joints, _ = make(span)
+            course = free_attitude(
+                self._robot, joints, self._quaternion, self._time, _knots(span)
+            )
+            return joints, course
+
+        return freed
+
+    def _joint_maker(self, segment: Segment, turn: Callable[[float], Slew]) -> Maker:
         if segment.reactionless_deg is not None:
             path = self._reactionless(segment.reactionless_deg)
             return lambda span: (self._along(path, span), turn(span))
@@ -134,8 +156,7 @@ class Planner:
         self, goal: ToolGoal, turn: Callable[[float], Slew], span: float
     ) -> tuple[Course, Course]:
         """Plan a straight line and the shortest turn of the tool, both quintic in time."""
-        follower = self._tools.setdefault(goal.link, ToolFollower(self._robot, goal.link))
-        times = _knots(span)
+        follower, times = self._follower(goal), _knots(span)
         slew, (share, _, _) = turn(span), quintic(times / span)
         attitudes = slew.at(self._time + times)[:, :4]
         positions, rotations = self._path(goal, follower, attitudes, share)
@@ -149,6 +170,26 @@ class Planner:
                 f"{norm(left):.3g} m from its goal: out of reach, or a singular posture"
             )
         return SplineCourse(self._time, CubicSpline(times, joints)), slew
+
+    def _follow_tool_freely(self, goal: ToolGoal, span: float) -> tuple[Course, Course]:
+        """Plan the same while the base turns freely; goals are on inertial axes."""
+        follower, times = self._follower(goal), _knots(span)
+        share = with_middles(times) / span
+        positions, rotations = self._path(goal, follower, np.empty((0, 4)), quintic(share)[0])
+        twists = twists_along(positions, rotations, share, span)
+        joints, attitudes, error = follower.follow_free(
+            positions, rotations, twists, float(times[1]), self._joints, self._quaternion
+        )
+        if not error <= FREE_TOLERANCE:
+            raise InputError(
+                f"the tool cannot follow its path with the base free: {error:.3g} m or rad beside "
+                "it; out of reach, or near a dynamic singularity"
+            )
+        base = AttitudeCourse(self._time, CubicSpline(times, attitudes))
+        return SplineCourse(self._time, CubicSpline(times, joints)), base
+
+    def _follower(self, goal: ToolGoal) -> ToolFollower:
+        return self._tools.setdefault(goal.link, ToolFollower(self._robot, goal.link))
 
     def _path(
         self, goal: ToolGoal, follower: ToolFollower, attitudes: Array, share: Array

@@ -52,19 +52,25 @@ class Segment(StrictModel):
         None, description="the columns of such a file"
     )
     base: Attitude | None = None
+    is_base_free: bool = Field(
+        False, description="the base turns as the arm's motion turns it: base: free"
+    )
     duration: Seconds | None = Field(None, description="s")
     fast: bool = Field(False, description="as fast as the limits of joints and base allow")
 
     @model_validator(mode="before")
     @classmethod
     def _as_written(cls, content: Any) -> Any:
-        """Accept ``reactionless: {joints_deg: [...]}`` and ``fast`` in place of a duration."""
+        """Accept ``reactionless: {joints_deg: [...]}``, ``base: free`` and ``duration: fast``."""
         if not isinstance(content, dict):
             return content
         content = dict(content)
         if isinstance(inner := content.get("reactionless"), dict) and set(inner) == {"joints_deg"}:
             content["reactionless_deg"] = inner["joints_deg"]
             del content["reactionless"]
+        if content.get("base") == "free":
+            content |= {"is_base_free": True}
+            del content["base"]
         if content.get("duration") == "fast":
             content |= {"fast": True}
             del content["duration"]
@@ -79,6 +85,8 @@ class Segment(StrictModel):
             raise ValueError(f"give one of {', '.join(MOTIONS)}, or base")
         if self.base is not None and motions and motions[0] in ALONE:
             raise ValueError(f"base cannot be combined with {motions[0]}")
+        if self.is_base_free and (not motions or motions[0] in ALONE):
+            raise ValueError("base: free needs joints_deg or tool")
         timed = [self.duration is not None, self.fast, self.hold is not None]
         if self.file is not None or self.trajectory is not None:
             if any(timed):
@@ -92,6 +100,8 @@ class Segment(StrictModel):
         """What the segment moves, in a word or two."""
         moved = [name for name in MOTIONS if getattr(self, name) is not None]
         words = [name.removesuffix("_deg") for name in moved]
+        if self.is_base_free:
+            words.append("free base")
         return " and ".join([*words, "base"] if self.base is not None else words)
 
 

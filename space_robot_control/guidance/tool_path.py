@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from space_robot_model.dynamics.free_base import FreeBase, follow_free_path_into
 from space_robot_model.dynamics.inverse_kinematics import follow_path_into
 from space_robot_model.dynamics.tool_kinematics import ToolKinematics, tool_kinematics_into
 from space_robot_model.robot import Robot
@@ -85,3 +86,35 @@ class ToolFollower:
             out,
         )
         return out[:, self._rows], int(reached)
+
+    def follow_free(
+        self,
+        positions: Array,
+        rotations: Array,
+        twists: Array,
+        spacing: float,
+        start: Array,
+        quaternion: Array,
+    ) -> tuple[Array, Array, float]:
+        """Return joint positions (K, N) and attitudes (K, 4) of a free base, and the largest error.
+
+        Args: see `follow_free_path_into`; ``start`` (N,) and ``quaternion`` (4,) are those at the
+            first pose.
+        """
+        count = len(positions) // 2 + 1
+        out, attitudes = np.empty((count, len(start))), np.empty((count, 4))
+        out[0, self._rows], attitudes[0] = start, quaternion
+        error = follow_free_path_into(
+            self._robot.model,
+            positions,
+            rotations,
+            twists,
+            spacing,
+            self._body,
+            self._mounting,
+            self._point,
+            FreeBase.allocate(self._robot.joint_count),
+            out,
+            attitudes,
+        )
+        return out[:, self._rows], attitudes, float(error)

@@ -95,6 +95,68 @@ def test_the_tool_keeps_its_line_while_the_base_turns() -> None:
     np.testing.assert_allclose(base[-1, :4], [np.cos(yaw), 0.0, 0.0, np.sin(yaw)], atol=1e-14)
 
 
+def momenta(mission: Mission) -> np.ndarray:
+    """Angular momentum of the reference, N m s, about the robot's centre of mass."""
+    robot = find_robot("paper")
+    piece = mission.pieces[0]
+    return demand(robot, piece.joints, piece.base, piece.begin, piece.end).stored_momentum
+
+
+@pytest.mark.parametrize("orientation", [{}, {"rpy_deg": [0.0, 10.0, -10.0]}], ids=["xyz", "pose"])
+def test_the_tool_keeps_its_line_while_the_base_is_free(orientation: dict[str, Any]) -> None:
+    goal = {"xyz": [0.3, 0.1, -0.2], **orientation}
+    mission = planned({"tool": goal, "base": "free", "duration": 10})
+    joints, base = whole(mission)
+    assert_consistent(joints, 1.0)
+    states = tool_of(find_robot("paper"), joints, base, range(0, len(joints), 1000))
+    line = np.array(goal["xyz"]) / np.linalg.norm(goal["xyz"])
+    for state in states:
+        way = state.position - states[0].position
+        np.testing.assert_allclose(way, line * (way @ line), atol=1e-9)
+    np.testing.assert_allclose(states[-1].position - states[0].position, goal["xyz"], atol=1e-9)
+    if orientation:
+        wanted = Rotation.from_euler("xyz", orientation["rpy_deg"], degrees=True).as_matrix()
+        turn = states[-1].rotation @ states[0].rotation.T
+        np.testing.assert_allclose(turn, wanted, atol=1e-9)
+    held = planned({"tool": goal, "duration": 10})
+    assert momenta(mission).max() < 1e-7 * momenta(held).max()
+
+
+def test_a_closed_path_does_not_return_the_joints_with_the_base_free() -> None:
+    sides = ([0.2, 0.0, 0.0], [0.0, 0.2, 0.0], [-0.2, 0.0, 0.0], [0.0, -0.2, 0.0])
+    orientation = {"rpy_deg": [0.0, 0.0, 0.0]}
+    square = planned(
+        *({"tool": {"xyz": side, **orientation}, "base": "free", "duration": 3} for side in sides),
+        waypoints_deg=[10.0, 100.0, 200.0, 20.0, 30.0, 10.0],
+    )
+    joints, base = whole(square)
+    assert np.abs(joints[-1, 0] - joints[0, 0]).max() > np.radians(0.1)
+    assert 2.0 * np.linalg.norm(base[-1, 1:4]) > np.radians(0.1)
+    robot = find_robot("paper")
+    first, last = (tool_state(robot, base[k, :4], joints[k, 0]) for k in (0, -1))
+    np.testing.assert_allclose(first.position, last.position, atol=1e-9)
+    np.testing.assert_allclose(first.rotation, last.rotation, atol=1e-9)
+
+
+def test_a_free_base_turns_as_the_area_rule_has_it() -> None:
+    """On a small closed path of the joints the turn grows with its area: twice the size, four times.
+
+    Vafa & Dubowsky, The kinematics and dynamics of space manipulators, 1990.
+    """
+    start = np.array(STARTS["paper"])
+
+    def turn(size: float) -> float:
+        steps = ([size, 0], [size, size], [0, size], [0, 0])
+        goals = (start + [step[0], step[1], 0, 0, 0, 0] for step in steps)
+        mission = planned(
+            *({"joints_deg": list(goal), "base": "free", "duration": 2} for goal in goals)
+        )
+        _, base = whole(mission)
+        return float(np.linalg.norm(base[-1, 1:4]))
+
+    assert turn(2.0) == pytest.approx(4.0 * turn(1.0), rel=0.1)
+
+
 def test_frames_of_a_goal() -> None:
     robot = find_robot("paper")
     start = tool_state(robot, [1.0, 0.0, 0.0, 0.0], np.radians(STARTS["paper"]))
