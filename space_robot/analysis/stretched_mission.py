@@ -1,4 +1,4 @@
-"""A mission with longer segments, so that it asks less of the base.
+"""A mission that asks less of the base: tools led with the least momentum, longer segments.
 
 With k times the duration a segment from rest to rest asks for 1/k of the momentum and 1/k^2 of the
 torque: see `space_robot_control.guidance.durations`.
@@ -50,6 +50,19 @@ def stretched_mission(
     written = [text for text in settings.segments if text.strip()]
     segments = [_of_duration(text, span) for text, span in zip(written, spans[legs:], strict=True)]
     return settings.model_copy(update={"waypoint_times": times, "segments": segments or [""]})
+
+
+def lightened_mission(settings: MissionSettings) -> MissionSettings:
+    """Return the mission with ``least: momentum`` in all segments that lead a tool."""
+    written = [text for text in settings.segments if text.strip()]
+    segments = []
+    for text, segment in zip(written, read_segments(written), strict=True):
+        if segment.tool is not None and not segment.is_base_free:
+            content = parse_yaml(text)
+            content["tool"]["least"] = "momentum"
+            text = json.dumps(content)
+        segments.append(text)
+    return settings.model_copy(update={"segments": segments or [""]})
 
 
 def _of_duration(text: str, span: float) -> str:

@@ -18,13 +18,14 @@ from .options import file_option, flight_options, plan_flight
     "--base-torque",
     type=FiniteRange(min=0.0, min_open=True),
     metavar="NM",
-    help="Stretch segments until no component of the base's torque is above this, N m.",
+    help="Lead tools with the least momentum and stretch segments until no component of the base's "
+    "torque is above this, N m.",
 )
 @click.option(
     "--momentum",
     type=FiniteRange(min=0.0, min_open=True),
     metavar="NMS",
-    help="Stretch segments until the base takes up no more angular momentum than this, N m s.",
+    help="The same until the base takes up no more angular momentum than this, N m s.",
 )
 @file_option("--out", help="Write the mission as it was planned to a file.")
 @file_option("--figure", help="Draw joints, tool, torque, momentum: FIGURE.svg and FIGURE.png.")
@@ -52,7 +53,7 @@ def plan(
     from space_robot_control.guidance.mission import Mission, MissionSettings
 
     from ..analysis.mission_plan import plan_report, planned_segments
-    from ..analysis.stretched_mission import mission_text, stretched_mission
+    from ..analysis.stretched_mission import lightened_mission, mission_text, stretched_mission
     from ..console.files import write_text
     from ..console.terminal import echo_json, terminal
     from .plan_display import print_plan
@@ -63,9 +64,13 @@ def plan(
     segments = planned_segments(robot, flight.mission)
     report = plan_report(robot, segments)
     if base_torque is not None or momentum is not None:
-        settings = stretched_mission(settings, report, base_torque, momentum)
+        before, settings = report, lightened_mission(settings)
+        lightened = plan_report(
+            robot, planned_segments(robot, Mission(robot, settings, flight.period))
+        )
+        settings = stretched_mission(settings, lightened, base_torque, momentum)
         segments = planned_segments(robot, Mission(robot, settings, flight.period))
-        report = {**plan_report(robot, segments), "before": report}
+        report = {**plan_report(robot, segments), "before": before, "lightened": lightened}
     if out is not None:
         write_text(mission_text(settings), out)
     if figure is not None:

@@ -60,12 +60,13 @@ def print_plan(report: Mapping[str, Any], console: Console) -> None:
         f"{report['duration_s']:.2f} s; largest base torque {report['base_torque']:.3g} N m, "
         f"largest momentum {report['momentum']:.3g} N m s",
     )
-    if before := report.get("before"):
-        say(
-            console,
-            f"before: {before['duration_s']:.2f} s, {before['base_torque']:.3g} N m, "
-            f"{before['momentum']:.3g} N m s",
-        )
+    for key, words in (("before", "before"), ("lightened", "tools with the least momentum")):
+        if other := report.get(key):
+            say(
+                console,
+                f"{words}: {other['duration_s']:.2f} s, {other['base_torque']:.3g} N m, "
+                f"{other['momentum']:.3g} N m s",
+            )
 
 
 def _tone(is_good: bool) -> str:

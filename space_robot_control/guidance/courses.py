@@ -6,6 +6,7 @@ after it ends it is at rest.
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple, Protocol
 
 import numpy as np
@@ -16,6 +17,11 @@ from space_robot_model.elementary.sine import sines_cosines
 from space_robot_model.elementary.spline import CubicSpline
 
 Array = NDArray[np.float64]
+
+
+KNOT_S = 0.01
+"""Spacing of the knots of a spline along a path, s."""
+FEWEST_KNOTS = 101
 
 
 class Course(Protocol):
@@ -50,6 +56,11 @@ def quintic(u: Array) -> tuple[Array, Array, Array]:
         30.0 * u * u * (1.0 - u) * (1.0 - u),
         60.0 * u * (1.0 - u) * (1.0 - 2.0 * u),
     )
+
+
+def knots(span: float) -> Array:
+    """Return the times (K,) from 0 to ``span``, s, of the knots of a spline along a path."""
+    return np.linspace(0.0, span, max(FEWEST_KNOTS, math.ceil(span / KNOT_S) + 1))
 
 
 class QuinticLeg(NamedTuple):

@@ -30,6 +30,11 @@ class ToolGoal(Orientation):
         " of the segment), or start (a displacement and a turn on inertial axes)",
     )
     link: str | None = Field(None, description="name of the tool, of a robot with several")
+    least: Literal["motion", "momentum"] = Field(
+        "motion",
+        description="what a robot with more joints than the path needs keeps least: the motion of"
+        " its joints, or the angular momentum that the base takes up",
+    )
 
     @model_validator(mode="after")
     def _something(self) -> ToolGoal:

@@ -62,8 +62,19 @@ class ToolFollower:
             work.free[:, self._rows],
         )
 
+    def coupling(self, quaternion: Array, joints: Array) -> Array:
+        """Return (3, N) ``H~_wm``: angular momentum by joint velocities, see `ToolKinematics`."""
+        self.pose(quaternion, joints)
+        return self._work.coupling[:, self._rows]
+
     def follow(
-        self, quaternions: Array, positions: Array, rotations: Array, from_base: bool, start: Array
+        self,
+        quaternions: Array,
+        positions: Array,
+        rotations: Array,
+        from_base: bool,
+        start: Array,
+        momentum_weight: float = 0.0,
     ) -> tuple[Array, int]:
         """Return joint positions (K, N), and how many of the K poses were reached.
 
@@ -80,7 +91,7 @@ class ToolFollower:
             self._body,
             self._mounting,
             self._point,
-            0.0,
+            momentum_weight,
             first,
             self._work,
             out,

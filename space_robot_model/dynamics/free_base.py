@@ -58,9 +58,7 @@ def free_attitude_into(
         for stage in range(4):
             row = 2 * (k - 1) + (0 if stage == 0 else 1 if stage < 3 else 2)
             _begin_stage(stage, spacing, out[k - 1], work)
-            tool_kinematics_into(
-                model, work.quaternion, positions[row], 0, axes, origin, work.tool
-            )
+            tool_kinematics_into(model, work.quaternion, positions[row], 0, axes, origin, work.tool)
             for j in range(rates.shape[1]):
                 work.rates[stage, j] = rates[row, j]
             _turn(stage, work)

@@ -3,7 +3,7 @@
 With zero momentum and a led attitude the tool's pose is a function of attitude and joints, so that
 inverse kinematics is a problem of positions: Newton's method with the Jacobian ``J_held`` of
 `.tool_kinematics`, from the solution at the point before. Where joints are more than the path
-asks for, each step is the smallest one.
+asks for, each step is the smallest one, or the one with the least angular momentum.
 """
 
 from __future__ import annotations
@@ -11,9 +11,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from space_robot_msgs_py.compiled.kernels import kernel
+from space_robot_msgs_py.compiled.kernels import kernel, subroutine
 
-from ..elementary.least_squares import least_squares_into
+from ..elementary.least_squares import least_squares_into, weighted_least_squares_into
 from .model import Model
 from .tool_kinematics import ToolKinematics, tool_kinematics_into
 
@@ -48,7 +48,7 @@ def follow_path_into(
     body: int,
     mounting: Array,
     point: Array,
-    damping: float,
+    momentum_weight: float,
     start: Array,
     work: ToolKinematics,
     out: Array,
@@ -64,7 +64,8 @@ def follow_path_into(
         body: see `tool_kinematics_into`, as ``mounting`` and ``point``.
         mounting: rotation of the tool on the body.
         point: position of the tool on the body.
-        damping: of the least-squares steps.
+        momentum_weight: of the squared angular momentum beside that of the squared joint
+            velocities, in the steps where joints are more than the path asks for, 1/(N m s)^2.
         start: (N,) joint positions near the first pose.
         work: scratch.
         out: solutions, in the order of ``model``.
@@ -74,7 +75,8 @@ def follow_path_into(
     """
     rows = 6 if len(rotations) else 3
     error, scratch = np.zeros(rows), np.zeros((6, 7))
-    step, posture = np.zeros(len(start)), start.copy()
+    n = len(start)
+    step, posture, weight, scaled = np.zeros(n), start.copy(), np.zeros((n, n)), np.zeros((rows, n))
     for k in range(len(positions)):
         is_reached = False
         for _ in range(MOST_STEPS):
@@ -92,10 +94,27 @@ def follow_path_into(
                 is_reached = True
                 break
             jacobian = work.joints if from_base else work.held
-            least_squares_into(jacobian[:rows], error, damping, scratch, step)
+            if momentum_weight == 0.0:
+                least_squares_into(jacobian[:rows], error, 0.0, scratch, step)
+            else:
+                _momentum_metric(work.coupling, momentum_weight, weight)
+                weighted_least_squares_into(jacobian[:rows], error, weight, scaled, scratch, step)
             for j in range(len(step)):
                 posture[j] += step[j]
         out[k] = posture
         if not is_reached:
             return k
     return len(positions)
+
+
+@subroutine
+def _momentum_metric(coupling: Array, momentum_weight: float, out: Array) -> None:
+    """Write ``E + w H~^T H~``."""
+    n = coupling.shape[1]
+    for i in range(n):
+        for j in range(n):
+            total = 0.0
+            for k in range(3):
+                total += coupling[k, i] * coupling[k, j]
+            out[i, j] = momentum_weight * total
+        out[i, i] += 1.0

@@ -57,6 +57,41 @@ def least_squares_into(
             solution[k] += matrix[i, k] * work[i, m]
 
 
+@kernel
+def weighted_least_squares_into(
+    matrix: Array, right: Array, weight: Array, scaled: Array, work: Array, solution: Array
+) -> None:
+    """Write the x with ``A x = b`` and the smallest ``x^T W x``, by Cholesky of W.
+
+    Args:
+        matrix: A (m, n) of full rank, m at most n.
+        right: b (m,).
+        weight: W (n, n), symmetric, positive definite; its lower triangle becomes its factor.
+        scaled: (m, n) scratch.
+        work: (m, m+1) scratch.
+        solution: x (n,).
+    """
+    m, n = matrix.shape
+    for i in range(n):
+        for j in range(i + 1):
+            total = weight[i, j]
+            for k in range(j):
+                total -= weight[i, k] * weight[j, k]
+            weight[i, j] = np.sqrt(total) if i == j else total / weight[j, j]
+    for row in range(m):
+        for i in range(n):
+            total = matrix[row, i]
+            for k in range(i):
+                total -= weight[i, k] * scaled[row, k]
+            scaled[row, i] = total / weight[i, i]
+    least_squares_into(scaled, right, 0.0, work, solution)
+    for i in range(n - 1, -1, -1):
+        total = solution[i]
+        for k in range(i + 1, n):
+            total -= weight[k, i] * solution[k]
+        solution[i] = total / weight[i, i]
+
+
 def singular_values(matrix: Array) -> Array:
     """Return the singular values of A (m, n), rising, m of them."""
     values, _ = principal_axes(product(matrix, matrix.T))

@@ -157,6 +157,23 @@ def test_a_free_base_turns_as_the_area_rule_has_it() -> None:
     assert turn(2.0) == pytest.approx(4.0 * turn(1.0), rel=0.1)
 
 
+@pytest.mark.parametrize(("orientation", "share"), [({}, 0.05), ({"rpy_deg": [0, 0, 0]}, 0.6)])
+def test_a_tool_is_led_with_the_least_momentum(orientation: dict[str, Any], share: float) -> None:
+    goal = {"xyz": [0.2, 0.0, -0.1], **orientation}
+    robot, torques = find_robot("seven_joint"), []
+    for least in ("motion", "momentum"):
+        segment = {"tool": {**goal, "least": least}, "duration": 15}
+        mission = planned(segment, robot="seven_joint")
+        joints, base = whole(mission)
+        states = tool_of(robot, joints, base, range(0, len(joints), 3000))
+        way = states[-1].position - states[0].position
+        np.testing.assert_allclose(way, goal["xyz"], atol=1e-10)
+        piece = mission.pieces[0]
+        asked = demand(robot, piece.joints, piece.base, piece.begin, piece.end)
+        torques.append(asked.base_torque.max())
+    assert torques[1] < share * torques[0]
+
+
 def test_frames_of_a_goal() -> None:
     robot = find_robot("paper")
     start = tool_state(robot, [1.0, 0.0, 0.0, 0.0], np.radians(STARTS["paper"]))

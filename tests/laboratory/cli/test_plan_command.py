@@ -6,6 +6,7 @@ import json
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 import yaml
 from click.testing import CliRunner, Result
@@ -78,9 +79,21 @@ def test_a_stretched_mission_keeps_to_the_limit_and_flies(
 def test_legs_between_waypoints_are_stretched_too(tmp_path: Path) -> None:
     numbers = report("--base-torque", 0.5, "--out", tmp_path / "slow.yaml")
     assert 0.45 < numbers["base_torque"] <= 0.5
-    assert report(tmp_path / "slow.yaml")["segments"] == [
-        {**segment} for segment in numbers["segments"]
-    ]
+    written = report(tmp_path / "slow.yaml")
+    for key in ("begin_s", "duration_s", "base_torque", "momentum", "goal_deg"):
+        first, second = ([s[key] for s in r["segments"]] for r in (numbers, written))
+        np.testing.assert_allclose(first, second, rtol=1e-14, err_msg=key)
+
+
+def test_redundant_joints_make_it_lighter_before_it_is_stretched(tmp_path: Path) -> None:
+    start = {"joints_deg": [10, 30, 40, 50, 60, 70, 80]}
+    segments = [{"tool": {"xyz": [0.2, 0, -0.1]}, "duration": 15}]
+    file = tmp_path / "line.yaml"
+    file.write_text(yaml.safe_dump({"mission": {"start": start, "segments": segments}}))
+    numbers = report(file, "--robot", "seven_joint", "--base-torque", 0.05)
+    assert numbers["before"]["base_torque"] > 0.1
+    assert numbers["base_torque"] == numbers["lightened"]["base_torque"] < 0.05
+    assert numbers["duration_s"] == 15.0
 
 
 def test_the_figure_is_drawn(mission: Path, tmp_path: Path) -> None:

@@ -1,0 +1,181 @@
+"""Courses of joints and base that lead a tool along a straight line and the shortest turn."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from space_robot_model.dynamics.attitude import rotation_matrix
+from space_robot_model.elementary.matrices import norm, product
+from space_robot_model.elementary.rotations import quaternion_of_rotation
+from space_robot_model.elementary.spline import CubicSpline
+from space_robot_model.robot import Robot
+from space_robot_msgs_py.errors import InputError
+
+from .courses import (
+    AttitudeCourse,
+    Course,
+    Slew,
+    SplineCourse,
+    knots,
+    multiplied,
+    quintic,
+    turn_between,
+    turned_by,
+)
+from .demand import demand
+from .free_base import twists_along, with_middles
+from .segments import ToolGoal
+from .tool_path import ToolFollower
+
+Array = NDArray[np.float64]
+
+MOMENTUM_WEIGHTS = (0.1, 1.0, 10.0, 100.0, 1000.0)
+"""Tried where the momentum is to be least: of a joint's mean momentum beside its motion."""
+FREE_TOLERANCE = 1e-7
+"""Largest error of a tool on its path with the base free, m and rad."""
+
+
+class Start(NamedTuple):
+    """Where a segment begins."""
+
+    time: float
+    """s."""
+    joints: Array
+    """(n,) rad, or m of prismatic joints."""
+    quaternion: Array
+    """(4,) of the base, unit."""
+
+
+class ToolCourses:
+    """Courses towards a goal of a tool from a start, for any duration."""
+
+    def __init__(
+        self, robot: Robot, follower: ToolFollower, goal: ToolGoal, start: Start, origin: Array
+    ) -> None:
+        """Prepare a segment.
+
+        Args:
+            robot: as the flight software knows it.
+            follower: of the tool that the goal is of.
+            goal: of the segment.
+            start: of the segment.
+            origin: (3,) origin of the inertial frame from the robot's centre of mass, m.
+        """
+        self._robot, self._follower, self._goal = robot, follower, goal
+        self._start, self._origin = start, origin
+
+    def led(self, turn: Callable[[float], Slew], span: float) -> tuple[Course, Course]:
+        """Return the courses of joints and base while the base turns as it is led.
+
+        Raises:
+            InputError: a pose cannot be reached.
+        """
+        if self._goal.least == "motion":
+            return self._led(turn(span), span, 0.0)
+        return self._least_torque(turn(span), span)
+
+    def _least_torque(self, slew: Slew, span: float) -> tuple[Course, Course]:
+        """Return those with the weight of momentum that asks for the least torque on the base."""
+        coupling = self._follower.coupling(self._start.quaternion, self._start.joints)
+        mean = float(np.sum(coupling * coupling)) / coupling.shape[1]
+        best = self._led(slew, span, 0.0)
+        least = self._largest_torque(best, span)
+        for weight in MOMENTUM_WEIGHTS:
+            try:
+                courses = self._led(slew, span, weight / mean)
+            except InputError:  # near a singular posture of tool and momentum
+                continue
+            if (torque := self._largest_torque(courses, span)) < least:
+                least, best = torque, courses
+        return best
+
+    def _largest_torque(self, courses: tuple[Course, Course], span: float) -> float:
+        begin = self._start.time
+        return float(demand(self._robot, *courses, begin, begin + span).base_torque.max())
+
+    def _led(self, slew: Slew, span: float, momentum_weight: float) -> tuple[Course, Course]:
+        begin, joints, _ = self._start
+        times, follower, goal = knots(span), self._follower, self._goal
+        share, _, _ = quintic(times / span)
+        attitudes = slew.at(begin + times)[:, :4]
+        positions, rotations = self._path(attitudes, share)
+        from_base = goal.frame == "base"
+        found, reached = follower.follow(
+            attitudes, positions, rotations, from_base, joints, momentum_weight
+        )
+        if reached < len(times):
+            pose = follower.pose(attitudes[reached], found[reached])
+            left = positions[-1] - (pose.from_base if from_base else pose.position)
+            raise InputError(
+                f"the tool cannot follow its path beyond t = {begin + times[reached]:.2f} s, "
+                f"{norm(left):.3g} m from its goal: out of reach, or a singular posture"
+            )
+        return SplineCourse(begin, CubicSpline(times, found)), slew
+
+    def free(self, span: float) -> tuple[Course, Course]:
+        """Return the courses while the base turns freely, to a goal on inertial axes.
+
+        Raises:
+            InputError: a pose cannot be reached.
+        """
+        begin, joints, quaternion = self._start
+        times = knots(span)
+        share = with_middles(times) / span
+        positions, rotations = self._path(np.empty((0, 4)), quintic(share)[0])
+        twists = twists_along(positions, rotations, share, span)
+        found, attitudes, error = self._follower.follow_free(
+            positions, rotations, twists, float(times[1]), joints, quaternion
+        )
+        if not error <= FREE_TOLERANCE:
+            raise InputError(
+                f"the tool cannot follow its path with the base free, it is {error:.3g} m or rad "
+                "off: out of reach, or near a dynamic singularity"
+            )
+        base = AttitudeCourse(begin, CubicSpline(times, attitudes))
+        return SplineCourse(begin, CubicSpline(times, found)), base
+
+    def _path(self, attitudes: Array, share: Array) -> tuple[Array, Array]:
+        """Return positions (K, 3), and orientations (K, 3, 3) on inertial axes; (0, 3, 3): free."""
+        goal = self._goal
+        here = self._follower.pose(self._start.quaternion, self._start.joints)
+        turn = _matrix(goal.unit_quaternion) if goal.is_given else None
+        xyz = None if goal.xyz is None else np.array(goal.xyz)
+        if goal.frame == "base":
+            axes = np.array([_matrix(attitude) for attitude in attitudes])
+            first = product(axes[0].T, here.from_base)
+            line = _line(first, first if xyz is None else xyz, share)
+            positions = np.array([product(a, p) for a, p in zip(axes, line, strict=True)])
+            if turn is None:
+                return positions, np.empty((0, 3, 3))
+            inner = _turned(product(axes[0].T, here.rotation), turn, share)
+            return positions, np.array([product(a, r) for a, r in zip(axes, inner, strict=True)])
+        end = here.position
+        if xyz is not None:
+            end = (here.position if goal.frame == "start" else self._origin) + xyz
+        positions = _line(here.position, end, share)
+        if turn is None:
+            return positions, np.empty((0, 3, 3))
+        last = product(turn, here.rotation) if goal.frame == "start" else turn
+        return positions, _turned(here.rotation, last, share)
+
+
+def _matrix(quaternion: Array) -> Array:
+    matrix = np.empty((3, 3))
+    rotation_matrix(quaternion, matrix)
+    return matrix
+
+
+def _line(first: Array, last: Array, share: Array) -> Array:
+    return first + (last - first) * share[:, np.newaxis]
+
+
+def _turned(first: Array, last: Array, share: Array) -> Array:
+    """Return rotations (K, 3, 3) on the shortest turn from ``first`` to ``last``."""
+    start, goal = quaternion_of_rotation(first), quaternion_of_rotation(last)
+    axis, angle = turn_between(start, goal)
+    steps = multiplied(start, turned_by(axis, angle * share))
+    return np.array([_matrix(step) for step in steps])
