@@ -27,7 +27,7 @@ def mission(**settings: Any) -> Mission:
     return Mission(ROBOT, MissionSettings.model_validate({**waypoints, **settings}), PERIOD)
 
 
-def rows_of(flown: Mission, seconds: float = 20.0) -> tuple[np.ndarray, np.ndarray]:
+def rows_of(flown: Mission, seconds: float = 21.0) -> tuple[np.ndarray, np.ndarray]:
     chunk = flown.chunk(0, round(seconds / PERIOD))
     return chunk.joints, chunk.base
 

