@@ -16,7 +16,6 @@ from space_robot_control.guidance.tool_path import ToolFollower
 from space_robot_model.elementary.least_squares import singular_values
 from space_robot_model.hardware.base_actuators import BaseActuatorSettings
 from space_robot_model.robot import Robot
-from space_robot_model.robot.base_axes import base_axes, to_base
 from space_robot_msgs_py.config.directory import config_directory
 from space_robot_msgs_py.errors import InputError
 
@@ -101,7 +100,7 @@ def _smallest(jacobian: Array, lever: Array) -> float:
 def feasibility(robot: Robot, segments: list[PlannedSegment]) -> list[Feasibility]:
     """Return for each of the shipped actuators whether they give what a mission asks for."""
     torque = np.vstack([segment.demand.torque[:, :3] for segment in segments])
-    momentum = np.vstack([_on_base_axes(segment.demand) for segment in segments])
+    momentum = np.vstack([segment.demand.base_momentum for segment in segments])
     judged = []
     for file in sorted((config_directory() / "actuators").glob("*.yaml")):
         try:
@@ -128,11 +127,6 @@ def _share(asked: Array, limit: Array) -> float:
     with np.errstate(divide="ignore", invalid="ignore"):
         shares = np.where(largest == 0.0, 0.0, largest / limit)
     return float(np.max(shares))
-
-
-def _on_base_axes(asked: Demand) -> Array:
-    axes = base_axes(asked.base[:, :4].T)
-    return to_base(np.array(axes), asked.momentum.T).T
 
 
 def plan_report(robot: Robot, segments: list[PlannedSegment]) -> dict[str, Any]:

@@ -14,6 +14,7 @@ from ..processes.software import commit, versions
 from ..scenario.options import NO_FRICTION, FlightPlan
 from ..scenario.resolve import resolve
 from ..scenario.resolved import ResolvedScenario
+from .mission_demand import check_mission_demand
 from .start_step import start_step
 
 __all__ = ["NO_FRICTION", "Flight", "FlightPlan", "resolve"]
@@ -28,6 +29,7 @@ class Flight:
         Raises:
             InputError: settings conflict.
         """
+        check_mission_demand(scenario)
         self.scenario = scenario
         self.plant_settings = scenario.plant
         self.controller_settings = scenario.controller

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from space_robot_model.robot import Robot
+from space_robot_model.robot.base_axes import base_axes, to_base
 from space_robot_model.robot.dynamics import inverse_dynamics
 from space_robot_model.robot.momentum import Motion, robot_momentum
 from space_robot_msgs_py.samples import ReferenceChunk
@@ -44,6 +45,12 @@ class Demand(NamedTuple):
         total = sum(self.momentum[:, k] * self.momentum[:, k] for k in range(3))
         length: Array = np.sqrt(total)
         return length
+
+    @property
+    def base_momentum(self) -> Array:
+        """(K, 3) N m s, the momentum on the base's axes."""
+        axes = base_axes(self.base[:, :4].T)
+        return to_base(np.array(axes), self.momentum.T).T
 
 
 def demand(robot: Robot, joints: Course, base: Course, begin: float, end: float) -> Demand:

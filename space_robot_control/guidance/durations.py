@@ -27,13 +27,16 @@ SHORTEST_S = 0.1
 
 
 class MissionLimits(StrictModel):
-    """What a fast segment may ask for, beside the limits of the robot's joints; 0: no limit."""
+    """What segments may ask for, beside the limits of the robot's joints; 0: no limit."""
 
     base_torque: Limit = Field(0.0, description="on each axis of the base, N m")
     base_momentum: Limit = Field(0.0, description="angular momentum taken up by the base, N m s")
     base_rate_deg: Limit = Field(0.0, description="angular velocity of the base, degrees/s")
     joint_acceleration_deg: Limit = Field(
         0.0, description="of each joint, degrees/s2, or m/s2 of prismatic joints"
+    )
+    check_actuators: bool = Field(
+        True, description="refuse segments that ask the base's actuators for more than they give"
     )
 
 

@@ -42,7 +42,7 @@ class MissionDocument(StrictModel):
 
     start: Start
     segments: list[dict[str, Any]] = Field(min_length=1)
-    limits: dict[str, float] = Field(default_factory=dict)
+    limits: dict[str, float | bool] = Field(default_factory=dict)
     events: list[Any] = Field(default_factory=list)
 
     def parameters(self) -> Tree:
