@@ -18,8 +18,8 @@ from .options import file_option, flight_options, plan_flight
     "--base-torque",
     type=FiniteRange(min=0.0, min_open=True),
     metavar="NM",
-    help="Lead tools with the least momentum and stretch segments until no component of the base's "
-    "torque is above this, N m.",
+    help="Bend legs of the joints, lead tools with the least momentum, and stretch segments until "
+    "no component of the base's torque is above this, N m.",
 )
 @click.option(
     "--momentum",
@@ -52,8 +52,8 @@ def plan(
     """
     from space_robot_control.guidance.mission import Mission, MissionSettings
 
+    from ..analysis.lighter_mission import lightened_mission, mission_text, stretched_mission
     from ..analysis.mission_plan import plan_report, planned_segments
-    from ..analysis.stretched_mission import lightened_mission, mission_text, stretched_mission
     from ..console.files import write_text
     from ..console.terminal import echo_json, terminal
     from .plan_display import print_plan
@@ -64,7 +64,8 @@ def plan(
     segments = planned_segments(robot, flight.mission)
     report = plan_report(robot, segments)
     if base_torque is not None or momentum is not None:
-        before, settings = report, lightened_mission(settings)
+        before = report
+        settings = lightened_mission(robot, flight.mission, settings, base_torque is not None)
         lightened = plan_report(
             robot, planned_segments(robot, Mission(robot, settings, flight.period))
         )

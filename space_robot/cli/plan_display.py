@@ -60,7 +60,7 @@ def print_plan(report: Mapping[str, Any], console: Console) -> None:
         f"{report['duration_s']:.2f} s; largest base torque {report['base_torque']:.3g} N m, "
         f"largest momentum {report['momentum']:.3g} N m s",
     )
-    for key, words in (("before", "before"), ("lightened", "tools with the least momentum")):
+    for key, words in (("before", "before"), ("lightened", "in the same time, with lighter paths")):
         if other := report.get(key):
             say(
                 console,

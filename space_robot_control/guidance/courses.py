@@ -87,6 +87,42 @@ class QuinticLeg(NamedTuple):
         return rows
 
 
+class BentLeg(NamedTuple):
+    """Joints from rest to rest on a path that is bent, with a quintic course ``s`` from 0 to 1.
+
+    ``theta(s) = theta_a + (theta_b - theta_a) s + sum_k bend_k sin(k pi s)``
+    """
+
+    begin: float
+    """s."""
+    span: float
+    """s, above 0."""
+    start: Array
+    """(n,) rad, or m of prismatic joints."""
+    rise: Array
+    """(n,) goal minus start."""
+    bends: Array
+    """(K, n) amplitudes, rad or m."""
+
+    def at(self, time: Array) -> Array:
+        """Return (T, 3, n) at times (T,), s."""
+        u = np.clip((time - self.begin)[:, np.newaxis] / self.span, 0.0, 1.0)
+        share, rate, acceleration = quintic(u)
+        rate, acceleration = rate / self.span, acceleration / (self.span * self.span)
+        rows = np.empty((len(time), 3, len(self.start)))
+        rows[:, 0] = self.start + self.rise * share
+        slope, curve = self.rise + np.zeros_like(rows[:, 0]), np.zeros_like(rows[:, 0])
+        for k, bend in enumerate(self.bends, 1):
+            frequency = k * math.pi
+            sines, cosines = sines_cosines(frequency * share)
+            rows[:, 0] += bend * sines
+            slope += frequency * bend * cosines
+            curve -= frequency * frequency * bend * sines
+        rows[:, 1] = slope * rate
+        rows[:, 2] = slope * acceleration + curve * rate * rate
+        return rows
+
+
 class SplineCourse(NamedTuple):
     """Joints along a spline."""
 

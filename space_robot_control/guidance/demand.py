@@ -53,9 +53,21 @@ class Demand(NamedTuple):
         return to_base(np.array(axes), self.momentum.T).T
 
 
-def demand(robot: Robot, joints: Course, base: Course, begin: float, end: float) -> Demand:
-    """Sample a motion and compute what it asks of a robot whose joints are all actuated."""
-    time = np.linspace(begin, end, max(101, round((end - begin) / SAMPLE_S) + 1))
+def demand(
+    robot: Robot, joints: Course, base: Course, begin: float, end: float, samples: int = 0
+) -> Demand:
+    """Sample a motion and compute what it asks of a robot whose joints are all actuated.
+
+    Args:
+        robot: the robot.
+        joints: of the motion.
+        base: of the motion.
+        begin: s.
+        end: s.
+        samples: number of samples; 0: every `SAMPLE_S`.
+    """
+    count = samples or max(101, round((end - begin) / SAMPLE_S) + 1)
+    time = np.linspace(begin, end, count)
     chunk = ReferenceChunk(0, joints.at(time), base.at(time))
     torque = inverse_dynamics(robot, chunk.references())
     motion = Motion(chunk.base[:, :4], chunk.base[:, 4:7], chunk.joints[:, 0], chunk.joints[:, 1])

@@ -14,7 +14,17 @@ from space_robot_model.robot import Robot
 from space_robot_msgs_py.errors import InputError
 
 from .checks import check_piece
-from .courses import Course, Piece, QuinticLeg, Slew, SplineCourse, knots, quintic, turn_between
+from .courses import (
+    BentLeg,
+    Course,
+    Piece,
+    QuinticLeg,
+    Slew,
+    SplineCourse,
+    knots,
+    quintic,
+    turn_between,
+)
 from .durations import MissionLimits, shortest_duration
 from .free_base import free_attitude
 from .reactionless import reactionless_path
@@ -125,6 +135,9 @@ class Planner:
         if segment.joints_deg is not None:
             goal = self._of_degrees(segment.joints_deg, "joints_deg")
         begin, start = self._time, self._joints
+        if segment.bends_deg is not None:
+            bends = np.array([self._of_degrees(bend, "bends_deg") for bend in segment.bends_deg])
+            return lambda span: (BentLeg(begin, span, start, goal - start, bends), turn(span))
         return lambda span: (QuinticLeg(begin, span, start, goal - start), turn(span))
 
     def _of_degrees(self, values: Sequence[float], key: str) -> Array:

@@ -47,6 +47,11 @@ class Segment(StrictModel):
     """A part of a mission, from rest to rest."""
 
     joints_deg: list[float] | None = Field(None, description="joints, degrees or m")
+    bends_deg: list[list[float]] | None = Field(
+        None,
+        description="amplitudes of bends on the way to joints_deg, by sin(pi s), sin(2 pi s), ...:"
+        " a list of joints each, degrees or m",
+    )
     tool: ToolGoal | None = None
     hold: Seconds | None = Field(None, description="time to stay, s")
     reactionless_deg: list[float] | None = Field(
@@ -90,6 +95,8 @@ class Segment(StrictModel):
             raise ValueError(f"give one of {', '.join(MOTIONS)}, or base")
         if self.base is not None and motions and motions[0] in ALONE:
             raise ValueError(f"base cannot be combined with {motions[0]}")
+        if self.bends_deg is not None and self.joints_deg is None:
+            raise ValueError("bends_deg needs joints_deg")
         if self.is_base_free and (not motions or motions[0] in ALONE):
             raise ValueError("base: free needs joints_deg or tool")
         timed = [self.duration is not None, self.fast, self.hold is not None]

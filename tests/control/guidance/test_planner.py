@@ -139,7 +139,7 @@ def test_a_closed_path_does_not_return_the_joints_with_the_base_free() -> None:
 
 
 def test_a_free_base_turns_as_the_area_rule_has_it() -> None:
-    """On a small closed path of the joints the turn grows with its area: twice the size, four times.
+    """On a small closed path of the joints the turn grows with its area, so twice the size: 4 times.
 
     Vafa & Dubowsky, The kinematics and dynamics of space manipulators, 1990.
     """
@@ -147,7 +147,7 @@ def test_a_free_base_turns_as_the_area_rule_has_it() -> None:
 
     def turn(size: float) -> float:
         steps = ([size, 0], [size, size], [0, size], [0, 0])
-        goals = (start + [step[0], step[1], 0, 0, 0, 0] for step in steps)
+        goals = (start + np.array([*step, 0, 0, 0, 0]) for step in steps)
         mission = planned(
             *({"joints_deg": list(goal), "base": "free", "duration": 2} for goal in goals)
         )
@@ -172,6 +172,18 @@ def test_a_tool_is_led_with_the_least_momentum(orientation: dict[str, Any], shar
         asked = demand(robot, piece.joints, piece.base, piece.begin, piece.end)
         torques.append(asked.base_torque.max())
     assert torques[1] < share * torques[0]
+
+
+def test_a_bent_leg_ends_where_a_straight_one_does() -> None:
+    goal = [15.0, 110.0, 185.0, 45.0, 10.0, -25.0]
+    bends = [[4.0, 3.0, 12.0, -6.0, 17.0, -2.0], [0.0, 0.0, 1.0, -2.0, 4.0, -1.0]]
+    bent, _ = whole(planned({"joints_deg": goal, "bends_deg": bends, "duration": 5}))
+    straight, _ = whole(planned({"joints_deg": goal, "duration": 5}))
+    assert_consistent(bent, 1.0)
+    for k in (0, -1):
+        np.testing.assert_allclose(bent[k], straight[k], rtol=0.0, atol=1e-15)
+    middle = np.degrees(bent[5_000, 0] - straight[5_000, 0])
+    np.testing.assert_allclose(middle, bends[0], atol=1e-12)
 
 
 def test_frames_of_a_goal() -> None:
@@ -258,6 +270,12 @@ def test_trajectories_of_files(tmp_path: Path) -> None:
 
 TOOL = {"xyz": [0.1, 0.0, 0.0]}
 BAD: list[tuple[dict[str, Any] | str, str]] = [
+    ({"hold": 2, "bends_deg": [[1] * 6]}, "bends_deg needs joints_deg"),
+    ({"joints_deg": [0] * 6, "bends_deg": [[1]], "duration": 5}, "bends_deg: 6 values were"),
+    ({"base": "free", "duration": 5}, "give one of joints_deg"),
+    ({"hold": 5, "base": "free"}, "base: free needs joints_deg or tool"),
+    ({"tool": {"xyz": [9, 9, 9]}, "base": "free", "duration": 5}, "with the base free"),
+    ({"tool": {"xyz": [0, 0, 0.1], "least": "time"}, "duration": 5}, "tool.least"),
     ({}, "give one of joints_deg, tool"),
     ("[1, 2]", "segment 1: "),
     ("{tool: [", "segment 1: "),

@@ -6,7 +6,6 @@ import json
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
 import yaml
 from click.testing import CliRunner, Result
@@ -76,13 +75,20 @@ def test_a_stretched_mission_keeps_to_the_limit_and_flies(
     assert [s["motion"] for s in again["segments"]] == ["tool", "base", "hold"]
 
 
-def test_legs_between_waypoints_are_stretched_too(tmp_path: Path) -> None:
+def test_legs_between_waypoints_are_bent_and_stretched(tmp_path: Path) -> None:
     numbers = report("--base-torque", 0.5, "--out", tmp_path / "slow.yaml")
     assert 0.45 < numbers["base_torque"] <= 0.5
+    assert numbers["lightened"]["duration_s"] == 30.0
+    assert numbers["lightened"]["base_torque"] < 0.7 * numbers["before"]["base_torque"]
+    assert numbers["duration_s"] < 45.0
     written = report(tmp_path / "slow.yaml")
-    for key in ("begin_s", "duration_s", "base_torque", "momentum", "goal_deg"):
-        first, second = ([s[key] for s in r["segments"]] for r in (numbers, written))
-        np.testing.assert_allclose(first, second, rtol=1e-14, err_msg=key)
+    assert written["segments"] == numbers["segments"]
+
+
+def test_momentum_falls_in_the_same_time() -> None:
+    numbers = report("--momentum", 4.0)
+    assert 3.9 < numbers["momentum"] <= 4.0
+    assert numbers["lightened"]["momentum"] < 0.6 * numbers["before"]["momentum"]
 
 
 def test_redundant_joints_make_it_lighter_before_it_is_stretched(tmp_path: Path) -> None:

@@ -1,0 +1,126 @@
+"""A mission that asks less of the base: bent legs, tools with the least momentum, longer segments.
+
+With k times the duration a segment from rest to rest asks for 1/k of the momentum and 1/k^2 of the
+torque: see `space_robot_control.guidance.durations`.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+import yaml
+
+from space_robot_control.guidance.checks import check_piece
+from space_robot_control.guidance.courses import BentLeg, Piece, QuinticLeg
+from space_robot_control.guidance.mission import Mission, MissionSettings
+from space_robot_control.guidance.segments import read_segments
+from space_robot_model.robot import Robot
+from space_robot_msgs_py.config.yaml_text import parse_yaml
+from space_robot_msgs_py.errors import InputError
+
+from .bends import best_bends
+
+WORTHWHILE = 0.98
+"""Share of the demand that is left, above which a leg stays straight."""
+DIGITS = 3
+"""Durations are rounded up to this many digits behind the point, s."""
+
+
+def stretched_mission(
+    settings: MissionSettings,
+    report: Mapping[str, Any],
+    base_torque: float | None,
+    momentum: float | None,
+) -> MissionSettings:
+    """Return the mission with every segment as long as the limits ask for, or as it is if longer.
+
+    Args:
+        settings: of the mission.
+        report: its `space_robot.analysis.mission_plan.plan_report`.
+        base_torque: limit of every component of the base's torque, N m; None: none.
+        momentum: limit of the angular momentum that the base takes up, N m s; None: none.
+    """
+    spans = []
+    for segment in report["segments"]:
+        factor = 1.0
+        if base_torque is not None:
+            factor = max(factor, float(np.sqrt(segment["base_torque"] / base_torque)))
+        if momentum is not None:
+            factor = max(factor, segment["momentum"] / momentum)
+        span = segment["duration_s"] * factor
+        spans.append(span if factor == 1.0 else float(np.ceil(span * 10**DIGITS) / 10**DIGITS))
+    legs = len(settings.waypoint_times) - 1
+    times = [0.0, *np.cumsum(spans[:legs]).tolist()]
+    written = [text for text in settings.segments if text.strip()]
+    segments = [_of_duration(text, span) for text, span in zip(written, spans[legs:], strict=True)]
+    return settings.model_copy(update={"waypoint_times": times, "segments": segments or [""]})
+
+
+def lightened_mission(
+    robot: Robot, mission: Mission, settings: MissionSettings, of_torque: bool
+) -> MissionSettings:
+    """Return a mission of segments alone that asks less of the base in the same time.
+
+    Legs of the joints get the bends of `best_bends`, tools are led with ``least: momentum``.
+
+    Args:
+        robot: as the flight software knows it.
+        mission: the plan.
+        settings: of the mission.
+        of_torque: whether the largest torque is to fall; else the largest momentum.
+    """
+    segments = []
+    for content, piece in zip(_segments(settings), mission.pieces, strict=True):
+        segments.append(json.dumps(_lightened(robot, piece, content, of_torque)))
+    first = {"waypoint_times": [0.0], "waypoints_deg": settings.waypoints_deg[: robot.n]}
+    return settings.model_copy(update={**first, "segments": segments or [""]})
+
+
+def _lightened(
+    robot: Robot, piece: Piece, content: dict[str, Any], of_torque: bool
+) -> dict[str, Any]:
+    if content.get("base") == "free":
+        return content
+    if "tool" in content:
+        return {**content, "tool": {**content["tool"], "least": "momentum"}}
+    if not isinstance(piece.joints, QuinticLeg) or "joints_deg" not in content:
+        return content
+    leg = BentLeg(*piece.joints, np.zeros((0, robot.n)))
+    bends, share = best_bends(robot, leg, piece.base, of_torque)
+    bent = leg._replace(bends=np.array([robot.from_degrees(bend) for bend in bends]))
+    try:
+        check_piece(robot, piece._replace(joints=bent))
+    except InputError:  # the bends lead beyond the limits of a joint
+        return content
+    return {**content, "bends_deg": bends} if share < WORTHWHILE else content
+
+
+def _segments(settings: MissionSettings) -> list[dict[str, Any]]:
+    """Return all parts of a mission as segments are written in a document."""
+    n = len(settings.waypoints_deg) // len(settings.waypoint_times)
+    rows = [settings.waypoints_deg[k : k + n] for k in range(0, len(settings.waypoints_deg), n)]
+    spans = [round(end - begin, 9) for begin, end in pairwise(settings.waypoint_times)]
+    legs = [{"joints_deg": row, "duration": s} for row, s in zip(rows[1:], spans, strict=True)]
+    return [*legs, *(parse_yaml(text) for text in settings.segments if text.strip())]
+
+
+def _of_duration(text: str, span: float) -> str:
+    content = parse_yaml(text)
+    (segment,) = read_segments([text])
+    if segment.hold is None:
+        content.pop("fast", None)
+        content["duration"] = span
+    return json.dumps(content)
+
+
+def mission_text(settings: MissionSettings) -> str:
+    """Return a mission as a document in YAML."""
+    n = len(settings.waypoints_deg) // len(settings.waypoint_times)
+    base = {"quaternion": settings.base_quaternion}
+    start = {"joints_deg": settings.waypoints_deg[:n], "base": base}
+    document = {"mission": {"start": start, "segments": _segments(settings)}}
+    return yaml.safe_dump(document, sort_keys=False, default_flow_style=None, width=100)
