@@ -139,7 +139,7 @@ def test_a_closed_path_does_not_return_the_joints_with_the_base_free() -> None:
 
 
 def test_a_free_base_turns_as_the_area_rule_has_it() -> None:
-    """On a small closed path of the joints the turn grows with its area, so twice the size: 4 times.
+    """On a small closed path of the joints the turn grows with its area: 4 times by twice the size.
 
     Vafa & Dubowsky, The kinematics and dynamics of space manipulators, 1990.
     """
