@@ -30,6 +30,8 @@ UNITS = {
     "base_torque": "N m",
     "torque": "N m",
     "force": "N",
+    "tool_rotation": "rad",
+    "tool": "m",
 }
 """By the beginning of a column's name; the first that fits holds."""
 

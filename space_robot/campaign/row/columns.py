@@ -20,6 +20,8 @@ Array = NDArray[np.float64]
 
 RIPPLE, FAST_RIPPLE = "ripple_", "fast_ripple_"
 """Prefixes of the names of ripple metrics; a torque column follows."""
+TOOL = ("tool", "tool_rotation")
+"""Distance of the tool from its path, m, and angle to its orientation there, rad."""
 OF_BASE = ("attitude", "base_torque")
 """Vector columns: their magnitude is the norm; of joints it is the largest absolute value."""
 
@@ -29,13 +31,17 @@ class Columns(NamedTuple):
 
     errors: dict[str, AxisIndex]
     torques: dict[str, AxisIndex]
+    tool: tuple[str, ...] = ()
+    """`TOOL` if the mission has segments: the tool's error, see `ToolError`."""
 
     @classmethod
     def of_flight(cls, flight: Flight) -> Columns:
         """Return the columns of a flight before it is flown."""
         robot = flight.robot
         kinds = robot.n + 3, flight.controls_base, tuple(robot.is_prismatic), robot.branches
-        return cls(error_columns(*kinds), torque_columns(*kinds))
+        has_path = any(map(str.strip, flight.mission_settings.segments))
+        tool = TOOL if has_path else ()
+        return cls(error_columns(*kinds), torque_columns(*kinds), tool)
 
     @classmethod
     def of_log(cls, log: FlightLog) -> Columns:
@@ -45,8 +51,8 @@ class Columns(NamedTuple):
 
     @property
     def names(self) -> tuple[str, ...]:
-        """All columns: errors, then torques."""
-        return (*self.errors, *self.torques)
+        """All columns: errors, then torques, then those of the tool."""
+        return (*self.errors, *self.torques, *self.tool)
 
     @property
     def metrics(self) -> tuple[str, ...]:

@@ -11,6 +11,7 @@ from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.errors import InputError
 
 from ...analysis.metrics import tracking_error
+from ...analysis.tool_error import ToolError
 from ...flight.plan import Flight
 from ..study import Requirement
 from .bands import Bands
@@ -25,6 +26,8 @@ class Measure:
         """Prepare the sums for a flight (not flown yet) and the requirements by name."""
         self._robot, columns = flight.robot, Columns.of_flight(flight)
         self._columns = columns
+        self._assumed = flight.scenario.robots.controller
+        self._tool: ToolError | None = None
         self._whole = WindowMetrics(Window(), columns.metrics, columns)
         self._require = {
             name: WindowMetrics(_window(demand), [demand.metric], columns)
@@ -38,6 +41,9 @@ class Measure:
         """Add the next block of the flight."""
         error = tracking_error(block)
         sizes = self._columns.sizes(block, error)
+        if self._columns.tool:
+            self._tool = self._tool or ToolError(block, self._robot, self._assumed)
+            sizes |= zip(self._columns.tool, self._tool.errors(block).T, strict=True)
         self._bands.add(block.first_tick, sizes)
         for metrics in (self._whole, *self._require.values()):
             metrics.add(block, error, sizes, self._robot)

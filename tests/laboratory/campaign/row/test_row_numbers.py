@@ -176,3 +176,21 @@ def test_ripple_is_measured_exactly_where_it_is_said_to_be(
         name = f"{kind}_base_torque"
         assert (name not in found) == (kind in missing)
         assert bool(missing_for_ripple(name, ticks, period)) == (kind in missing)
+
+
+def test_a_mission_of_segments_has_the_error_of_its_tool() -> None:
+    mission = {
+        "start": {"joints_deg": [0, 90, 200, 20, 30, 10]},
+        "segments": [{"tool": {"xyz": [0.05, 0.0, -0.05]}, "duration": 1.2}],
+    }
+    flown = Scenario(controller="ctc", mission=mission).fly()
+    measure = Measure(flown.flight, REQUIRE)
+    for start in range(0, flown.log.ticks, 700):
+        measure.add(flown.log.rows(start, min(start + 700, flown.log.ticks)))
+    found, tool = measure.metrics(), flown.metrics["tool"]
+    assert list(found) == list(Columns.of_flight(flown.flight).metrics)
+    assert found["tool_rms"] == pytest.approx(tool["rms_m"], rel=1e-12)
+    assert found["tool_max"] == tool["largest_m"] > 0.0
+    assert np.degrees(found["tool_rotation_rms"]) == pytest.approx(tool["rms_deg"], rel=1e-12)
+    assert measure.bands()["tool"].max() == np.float32(tool["largest_m"])
+    assert "tool" not in Columns.of_log(flown.log).names
