@@ -166,6 +166,25 @@ def test_the_page_on_real_spacecraft_has_what_its_commands_give(tmp_path: Path) 
         np.testing.assert_allclose(shown, medians, rtol=0.06)
 
 
+def test_the_page_on_real_spacecraft_has_the_tools_errors(tmp_path: Path) -> None:
+    """Two laws with ideal sensors, which have no seeds, by its commands."""
+    file, folder = tmp_path / "tool.yaml", tmp_path / "campaign"
+    content = yaml.safe_load((ROOT / "config/campaigns/tool_errors.yaml").read_text("utf-8"))
+    content["laws"] = ["ctc=tuned", "tde_stc"]
+    content["vary"]["scenario.sensors"] = {"grid": ["ideal"]}
+    file.write_text(yaml.safe_dump(content), "utf-8")
+    run("campaign", "run", str(file), "--runs", "1", "--out", str(folder), "--workers", "0")
+    metrics = ("--metric=tool_max", "--metric=tool_rotation_max")
+    report = json.loads(run("campaign", "report", str(folder), *metrics, "--json"))
+    page = (ROOT / "docs/explanation/real_spacecraft.md").read_text("utf-8")
+    rows = re.findall(r"^\| ideal \|(.*)\|$", page.split("## The tool")[1], re.MULTILINE)[:2]
+    for league, row in zip(report["leagues"], rows, strict=True):
+        shown = dict(zip(("ctc=tuned", "tde_stc"), row.split("|")[::4], strict=True))
+        for standing in league["standings"]:
+            median = standing["median"]["value"]
+            assert median == pytest.approx(float(shown[standing["law"]]), rel=0.02)
+
+
 def test_the_page_on_campaigns_has_what_its_commands_print(tmp_path: Path) -> None:
     """The shipped campaign of 20 runs, and one of its flights again."""
     folder = str(tmp_path / "a")
