@@ -94,14 +94,14 @@ class Messages:
         assert log.telemetry is not None
         record, flight = self.record, self._flight
         laws = [law for law in log.laws if start <= law.tick < stop]
-        measured = log.as_measured()
-        for tick in range(start, stop):
+        measured, true_states = log.as_measured(), log.states(start, stop)
+        for tick, state in enumerate(measured.states(start, stop), start):
             self.begin_tick(tick)
-            parts = self._states.encode(measured.state(tick))
+            parts = self._states.encode(state)
             for topic, data in zip(self._states.topics, parts, strict=True):
                 record(topic, data)
             if measured is not log:
-                self.update_true_state(log.state(tick))
+                self.update_true_state(next(true_states))
             self.show(tick, log.state)
             if tick >= answered:
                 continue

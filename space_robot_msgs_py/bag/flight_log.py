@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field, fields, replace
 from typing import Any
 
@@ -286,11 +286,17 @@ class FlightLog:
 
     def state(self, tick: int) -> RobotState:
         """Return the state of a tick, the true one if it is known."""
-        block = State.block(len(self.joint_names))
+        return next(self.states(tick, tick + 1))
+
+    def states(self, start: int, stop: int) -> Iterator[RobotState]:
+        """Yield the states of the ticks from ``start`` to before ``stop``, see `state`."""
+        rows = slice(start - self.first_tick, stop - self.first_tick)
+        block = np.zeros(stop - start, State.dtype(len(self.joint_names)))
         for name in ALL_FIELDS:
-            row = getattr(self, name)[tick - self.first_tick]
-            block[name][0, : len(row)] = row
-        return RobotState(tick, block)
+            column = getattr(self, name)[rows]
+            block[name][:, : column.shape[1]] = column
+        for k in range(stop - start):
+            yield RobotState(start + k, block[k : k + 1])
 
     def references(self, start: int, stop: int) -> Block:
         """(stop - start,) array of the ticks' `Reference` each, a copy."""

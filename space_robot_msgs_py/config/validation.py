@@ -22,7 +22,9 @@ class StrictModel(BaseModel):
     Only an integer may stand for a float, and a number for a name (``case: 1``).
     """
 
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False, strict=True, defer_build=True)
+    model_config = ConfigDict(
+        extra="forbid", frozen=True, allow_inf_nan=False, strict=True, defer_build=True
+    )
 
     @field_validator("*", mode="before")
     @classmethod

@@ -228,13 +228,19 @@ def test_it_waits_for_what_is_known_to_have_been_sent_but_not_for_ever(
         loop.deactivate()
         return time.monotonic() - begin
 
-    monkeypatch.setattr(recorder_node, "DRAIN_S", 0.3)
+    def times(silence_s: float, drain_s: float) -> None:
+        monkeypatch.setattr(recorder_node, "SILENCE_S", silence_s)
+        monkeypatch.setattr(recorder_node, "DRAIN_S", drain_s)
+
     node.hear_clock([0])
-    assert seconds() < 0.03, "nobody publishes any more"
+    times(silence_s=10.0, drain_s=20.0)
+    assert seconds() < 10.0, "nobody publishes any more"
     node.published.add("/sat1/clock")
-    assert 0.03 <= seconds() < 0.25
+    times(silence_s=0.03, drain_s=20.0)
+    assert 0.03 <= seconds() < 20.0
+    times(silence_s=0.03, drain_s=0.3)
     node.hear_sent("/sat1/clock", 5)
-    assert seconds() >= 0.3
+    assert 0.3 <= seconds() < 20.0
 
 
 def test_what_is_sent_in_a_pause_is_left_out_and_told(
