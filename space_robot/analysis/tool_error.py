@@ -24,6 +24,33 @@ from .pointing import rotation_angle
 Array = NDArray[np.float64]
 
 
+class ToolPath:
+    """The path that a mission leads the first tool along, on inertial axes."""
+
+    def __init__(self, log: FlightLog, assumed: Robot) -> None:
+        """Take the place where the path begins.
+
+        Args:
+            log: the first rows; the base's centre of mass is at the path's origin at the first one.
+            assumed: robot as the flight software knows it; its joints are all actuated.
+        """
+        self._robot = assumed.nominal
+        self._origin = log.base_position[:1] + self._centre(log.rows(0, 1))
+
+    def poses(self, log: FlightLog) -> tuple[Array, Array]:
+        """Return orientations (N, 3, 3) and positions (N, 3), m, that are wanted."""
+        quaternion = _unit(log.reference_base[:, :4])
+        orientation, place = tool_pose(self._robot, quaternion, log.reference_joints[:, 0])
+        return orientation, self._origin + place - self._centre(log)
+
+    def _centre(self, log: FlightLog) -> Array:
+        """Return (N, 3) m, the assumed robot's centre of mass from its base's, in the reference."""
+        base, joints = log.reference_base, log.reference_joints[:, 0]
+        still = np.zeros((len(base), 3)), np.zeros_like(joints)
+        motion = Motion(_unit(base[:, :4]), still[0], joints, still[1])
+        return robot_momentum(self._robot, motion).centre_of_mass
+
+
 class ToolError(Metric):
     """Takes RMS and maximum of the tool's error in position and rotation."""
 
@@ -35,8 +62,7 @@ class ToolError(Metric):
             robot: the true robot.
             assumed: as the flight software knows it; its joints are all actuated.
         """
-        self._robot, self._assumed = robot, assumed.nominal
-        self._origin = log.base_position[:1] + self._centre(log.rows(0, 1))
+        self._robot, self._path = robot, ToolPath(log, assumed)
         self._rms, self._maximum = AxisRms(2), AxisMaximum(2)
 
     def add(self, log: FlightLog, error: Array) -> None:
@@ -47,9 +73,7 @@ class ToolError(Metric):
 
     def errors(self, log: FlightLog) -> Array:
         """Return (N, 2): distance, m, and angle of the one rotation between both frames, rad."""
-        quaternion = _unit(log.reference_base[:, :4])
-        desired, place = tool_pose(self._assumed, quaternion, log.reference_joints[:, 0])
-        wanted = self._origin + place - self._centre(log)
+        desired, wanted = self._path.poses(log)
         actual, offset = tool_pose(self._robot, _unit(log.quaternion), log.all_positions)
         away = log.base_position + offset - wanted
         distance = np.sqrt(sum(away[:, k] * away[:, k] for k in range(3)))
@@ -64,13 +88,6 @@ class ToolError(Metric):
             "rms_deg": float(np.degrees(rms[1])),
             "largest_deg": float(np.degrees(largest[1])),
         }
-
-    def _centre(self, log: FlightLog) -> Array:
-        """Return (N, 3) m, the assumed robot's centre of mass from its base's, in the reference."""
-        base, joints = log.reference_base, log.reference_joints[:, 0]
-        still = np.zeros((len(base), 3)), np.zeros_like(joints)
-        motion = Motion(_unit(base[:, :4]), still[0], joints, still[1])
-        return robot_momentum(self._assumed, motion).centre_of_mass
 
 
 def _unit(quaternion: Array) -> Array:

@@ -20,6 +20,7 @@ from space_robot_sim.environment.grasp import Grasp
 from ..analysis.described import events_of
 from .frames import Frames
 from .free_body import FreeBody, before_capture
+from .goals import goals
 from .local_server import local_server
 from .scene import RobotScene, SceneStyle, add_shape, rgb, set_pose
 from .stage import extent, set_stage
@@ -191,6 +192,7 @@ def add_flights(
         robot = RobotScene(scene, root, flight.robot, look)
         moves.append(_moving(robot, of))
         moves += trails(scene, root, of, rgb(flight.colour), 0.0035 * size)
+        goals(scene, root, flight.log, 0.04 * size)
         moves += targets(scene, root, robot, flight.log, flight.robot, times)
     return moves
 

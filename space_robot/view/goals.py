@@ -1,0 +1,58 @@
+"""Goals of the tool in a scene: its pose wherever the mission comes to rest."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from space_robot_msgs_py.bag.flight_log import FlightLog
+from space_robot_msgs_py.errors import InputError
+
+from ..analysis.described import assumed_robot_of
+from ..analysis.tool_error import ToolPath
+from ..analysis.waypoints import waypoint_ticks
+
+if TYPE_CHECKING:
+    from viser import SceneApi
+
+MOST = 50
+"""Goals that are drawn of a flight."""
+
+
+def goals(scene: SceneApi, root: str, log: FlightLog, size: float) -> None:
+    """Draw axes at the wanted poses of the first tool; nothing for a mission of waypoints only.
+
+    Args:
+        scene: of a server.
+        root: name of the robot in the scene.
+        log: the flight.
+        size: length of the axes, m.
+    """
+    if not _has_segments(log):
+        return
+    try:
+        path = ToolPath(log, assumed_robot_of(log))
+    except InputError:  # the bag does not tell the robot
+        return
+    rows = waypoint_ticks(log)[:MOST]
+    if not len(rows):
+        return
+    orientations, positions = path.poses(log)
+    turns = Rotation.from_matrix(orientations[rows]).as_quat()
+    for number, (position, turn) in enumerate(zip(positions[rows], turns, strict=True)):
+        scene.add_frame(
+            f"{root}/goal_{number}",
+            axes_length=size,
+            axes_radius=0.04 * size,
+            wxyz=np.roll(turn, 1),
+            position=position,
+        )
+
+
+def _has_segments(log: FlightLog) -> bool:
+    scenario = log.flight.get("scenario")
+    mission = scenario.get("mission") if isinstance(scenario, dict) else None
+    segments = mission.get("segments") if isinstance(mission, dict) else None
+    return isinstance(segments, list) and any(str(text).strip() for text in segments)
