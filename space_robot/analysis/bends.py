@@ -57,9 +57,11 @@ def best_bends(
         shares = asked(bends, SAMPLES) / scale
         return float(np.mean(shares**NORM) ** (1.0 / NORM) + COST * bends @ bends)
 
-    found = minimize(
+    solution = minimize(
         cost, np.zeros(BENDS * shape[1]), method="L-BFGS-B", options={"maxiter": STEPS}
     )
-    degrees = [np.round(robot.to_degrees(bend), DIGITS).tolist() for bend in found.x.reshape(shape)]
+    degrees = [
+        np.round(robot.to_degrees(bend), DIGITS).tolist() for bend in solution.x.reshape(shape)
+    ]
     bends = np.array([robot.from_degrees(bend) for bend in degrees])
     return degrees, float(asked(bends).max()) / scale

@@ -13,12 +13,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from space_robot_model.elementary.matrices import product
+from space_robot_model.hardware.capability import ThrusterTorques, wheel_shares
 from space_robot_model.hardware.thrusters import ThrusterSettings
 from space_robot_model.hardware.wheels import WheelSettings
 from space_robot_msgs_py.bag.flight_log import FlightLog
 
 from .base_demand import Demand
-from .capability import ThrusterTorques, wheel_shares
 from .wheel_saturation import ROUNDING, WheelMotion, WheelRows
 
 Array = NDArray[np.float64]

@@ -10,16 +10,15 @@ from numpy.typing import NDArray
 
 from space_robot_control.allocation.assumed_actuators import assumed_actuators
 from space_robot_control.guidance.courses import Piece
-from space_robot_control.guidance.demand import Demand, demand
+from space_robot_control.guidance.demand import MotionDemand, demand
 from space_robot_control.guidance.mission import Mission
 from space_robot_control.guidance.tool_path import ToolFollower
 from space_robot_model.elementary.least_squares import singular_values
 from space_robot_model.hardware.base_actuators import BaseActuatorSettings
+from space_robot_model.hardware.capability import largest_momentum, largest_torque
 from space_robot_model.robot import Robot
 from space_robot_msgs_py.config.directory import config_directory
 from space_robot_msgs_py.errors import InputError
-
-from .capability import largest_momentum, largest_torque
 
 Array = NDArray[np.float64]
 
@@ -31,7 +30,7 @@ class PlannedSegment(NamedTuple):
     """A segment and what it asks for, with zero momentum and without friction."""
 
     piece: Piece
-    demand: Demand
+    demand: MotionDemand
     tool: Array
     """(K, 3) m, positions of the tool from the robot's centre of mass, inertial axes."""
     singular_value: float

@@ -9,13 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from space_robot_model.hardware.base_actuators import BaseActuatorSettings
+from space_robot_model.hardware.capability import largest_momentum, largest_torque
 from space_robot_msgs_py.bag.blocks import Metric
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.topics import BASE_AXES
 
 from .base_demand import BaseDemand
-from .capability import largest_momentum, largest_torque
 from .loads import Load, LoadRequirement, OtherThrusterLoad, OtherWheelLoad, ThrusterLoad, WheelLoad
 from .metrics import AxisMaximum, AxisRms
 

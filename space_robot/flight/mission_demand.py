@@ -6,10 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from space_robot_control.guidance.demand import demand
+from space_robot_model.hardware.capability import largest_momentum, largest_torque
 from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.topics import BASE_AXES
 
-from ..analysis.capability import largest_momentum, largest_torque
 from ..scenario.resolved import ResolvedScenario
 
 Array = NDArray[np.float64]

@@ -20,7 +20,7 @@ Array = NDArray[np.float64]
 SAMPLE_S = 0.01
 
 
-class Demand(NamedTuple):
+class MotionDemand(NamedTuple):
     """A desired motion, and what it asks for with zero momentum at the start."""
 
     time: Array
@@ -55,7 +55,7 @@ class Demand(NamedTuple):
 
 def demand(
     robot: Robot, joints: Course, base: Course, begin: float, end: float, samples: int = 0
-) -> Demand:
+) -> MotionDemand:
     """Sample a motion and compute what it asks of a robot whose joints are all actuated.
 
     Args:
@@ -71,7 +71,9 @@ def demand(
     chunk = ReferenceChunk(0, joints.at(time), base.at(time))
     torque = inverse_dynamics(robot, chunk.references())
     motion = Motion(chunk.base[:, :4], chunk.base[:, 4:7], chunk.joints[:, 0], chunk.joints[:, 1])
-    return Demand(time, chunk.joints, chunk.base, torque, robot_momentum(robot, motion).angular)
+    return MotionDemand(
+        time, chunk.joints, chunk.base, torque, robot_momentum(robot, motion).angular
+    )
 
 
 def _largest(values: Array) -> Array:

@@ -29,9 +29,9 @@ from .durations import MissionLimits, shortest_duration
 from .free_base import free_attitude
 from .reactionless import reactionless_path
 from .segments import Segment, ToolGoal
-from .tool_courses import Start, ToolCourses
+from .tool_courses import SegmentStart, ToolCourses
 from .tool_path import ToolFollower
-from .trajectory_file import Trajectory, read_columns
+from .trajectory_file import TrajectoryTable, read_columns
 
 Array = NDArray[np.float64]
 
@@ -86,7 +86,7 @@ class Planner:
         if (columns := segment.trajectory) is None and segment.file is not None:
             columns = read_columns(Path(segment.file))
         if columns is not None:
-            trajectory = Trajectory(columns, self._robot.joint_names)
+            trajectory = TrajectoryTable(columns, self._robot.joint_names)
             courses = trajectory.courses(self._time, self._joints, self._quaternion)
             return self._ended(trajectory.duration, *courses, segment.motion)
         make = self._maker(segment)
@@ -114,7 +114,7 @@ class Planner:
 
     def _tool_courses(self, goal: ToolGoal) -> ToolCourses:
         follower = self._tools.setdefault(goal.link, ToolFollower(self._robot, goal.link))
-        start = Start(self._time, self._joints, self._quaternion)
+        start = SegmentStart(self._time, self._joints, self._quaternion)
         return ToolCourses(self._robot, follower, goal, start, self._origin)
 
     def _freed(self, make: Maker) -> Maker:

@@ -39,7 +39,7 @@ FREE_TOLERANCE = 1e-7
 """Largest error of a tool on its path with the base free, m and rad."""
 
 
-class Start(NamedTuple):
+class SegmentStart(NamedTuple):
     """Where a segment begins."""
 
     time: float
@@ -54,7 +54,12 @@ class ToolCourses:
     """Courses towards a goal of a tool from a start, for any duration."""
 
     def __init__(
-        self, robot: Robot, follower: ToolFollower, goal: ToolGoal, start: Start, origin: Array
+        self,
+        robot: Robot,
+        follower: ToolFollower,
+        goal: ToolGoal,
+        start: SegmentStart,
+        origin: Array,
     ) -> None:
         """Prepare a segment.
 
@@ -104,17 +109,17 @@ class ToolCourses:
         attitudes = slew.at(begin + times)[:, :4]
         positions, rotations = self._path(attitudes, share)
         from_base = goal.frame == "base"
-        found, reached = follower.follow(
+        postures, reached = follower.follow(
             attitudes, positions, rotations, from_base, joints, momentum_weight
         )
         if reached < len(times):
-            pose = follower.pose(attitudes[reached], found[reached])
+            pose = follower.pose(attitudes[reached], postures[reached])
             left = positions[-1] - (pose.from_base if from_base else pose.position)
             raise InputError(
                 f"the tool cannot follow its path beyond t = {begin + times[reached]:.2f} s, "
                 f"{norm(left):.3g} m from its goal: out of reach, or a singular posture"
             )
-        return SplineCourse(begin, CubicSpline(times, found)), slew
+        return SplineCourse(begin, CubicSpline(times, postures)), slew
 
     def free(self, span: float) -> tuple[Course, Course]:
         """Return the courses while the base turns freely, to a goal on inertial axes.
@@ -127,7 +132,7 @@ class ToolCourses:
         share = with_middles(times) / span
         positions, rotations = self._path(np.empty((0, 4)), quintic(share)[0])
         twists = twists_along(positions, rotations, share, span)
-        found, attitudes, error = self._follower.follow_free(
+        postures, attitudes, error = self._follower.follow_free(
             positions, rotations, twists, float(times[1]), joints, quaternion
         )
         if not error <= FREE_TOLERANCE:
@@ -136,7 +141,7 @@ class ToolCourses:
                 "off: out of reach, or near a dynamic singularity"
             )
         base = AttitudeCourse(begin, CubicSpline(times, attitudes))
-        return SplineCourse(begin, CubicSpline(times, found)), base
+        return SplineCourse(begin, CubicSpline(times, postures)), base
 
     def _path(self, attitudes: Array, share: Array) -> tuple[Array, Array]:
         """Return positions (K, 3), and orientations (K, 3, 3) on inertial axes; (0, 3, 3): free."""

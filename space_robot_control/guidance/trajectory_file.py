@@ -93,7 +93,7 @@ def _number(cell: str, where: str) -> float:
     return value
 
 
-class Trajectory:
+class TrajectoryTable:
     """A trajectory of joints and base, by cubic splines through its rows."""
 
     def __init__(self, columns: Columns, joint_names: Sequence[str]) -> None:
@@ -126,10 +126,12 @@ class Trajectory:
             if rate is not None:
                 _check_rates(name, np.array(rate), self._joints.rates[:, joint], time)
         self._attitude: CubicSpline | None = None
-        given = [name for name in QUATERNION if name in columns]
-        if given and len(given) < 4:
-            raise InputError(f"trajectory: {', '.join(given)} without the rest of a quaternion")
-        if given:
+        columns_of_base = [name for name in QUATERNION if name in columns]
+        if columns_of_base and len(columns_of_base) < 4:
+            raise InputError(
+                f"trajectory: {', '.join(columns_of_base)} without the rest of a quaternion"
+            )
+        if columns_of_base:
             self._attitude = CubicSpline(self._time, _quaternions(columns))
 
     def courses(self, begin: float, joints: Array, quaternion: Array) -> tuple[Course, Course]:
@@ -166,12 +168,12 @@ def _quaternions(columns: Columns) -> Array:
     return rows
 
 
-def _check_rates(name: str, given: Array, of_positions: Array, time: Array) -> None:
+def _check_rates(name: str, rates: Array, of_positions: Array, time: Array) -> None:
     allowed = SAME_RATE * float(np.max(np.abs(of_positions))) + 1e-9
-    difference = np.abs(given - of_positions)
+    difference = np.abs(rates - of_positions)
     if difference.max() > allowed:
         row = int(np.argmax(difference))
         raise InputError(
-            f"trajectory: {name}{RATE} is {given[row]:.6g} at {time[row]:g} s, the positions of "
+            f"trajectory: {name}{RATE} is {rates[row]:.6g} at {time[row]:g} s, the positions of "
             f"{name} change at {of_positions[row]:.6g}"
         )

@@ -7,10 +7,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from space_robot_msgs_py.config.arguments import as_numbers
-from space_robot_msgs_py.config.validation import short
-from space_robot_msgs_py.errors import InputError
-
 from ..dynamics.aba import aba
 from ..dynamics.crba import crba
 from ..dynamics.free_floating import free_inverse_dynamics_along
@@ -19,7 +15,7 @@ from ..dynamics.kinematics import forward_kinematics, spatial_velocities
 from ..dynamics.model import Data
 from ..dynamics.rho_space import RhoSpaceModel
 from ..dynamics.rnea import rnea_bias
-from ..elementary.matrices import norm
+from .arguments import check_robot, unit_quaternion, vector
 
 if TYPE_CHECKING:
     from space_robot_msgs_py.compiled.records import Block
@@ -27,29 +23,6 @@ if TYPE_CHECKING:
     from .robot import Robot
 
 Array = NDArray[np.float64]
-
-
-def _vector(value: ArrayLike, size: int, name: str) -> Array:
-    array = np.ascontiguousarray(as_numbers(value, name))
-    if array.shape != (size,):
-        raise InputError(f"{name} must have shape ({size},), got {array.shape}")
-    return array
-
-
-def _quaternion(value: ArrayLike) -> Array:
-    array = _vector(value, 4, "quaternion_wxyz")
-    length = norm(array)
-    if not abs(length - 1.0) < 1e-6:
-        raise InputError(f"quaternion_wxyz must have norm 1, got {length}")
-    return array / length
-
-
-def _checked(robot: Robot) -> Robot:
-    from .robot import Robot
-
-    if not isinstance(robot, Robot):
-        raise InputError(f"robot: a Robot was expected, got {short(robot)}")
-    return robot
 
 
 def generalised_rows(robot: Robot) -> list[int]:
@@ -73,10 +46,11 @@ def mass_matrix(robot: Robot, quaternion_wxyz: ArrayLike, joint_positions: Array
     Raises:
         InputError: an argument has a wrong type or shape, or the quaternion is not unit.
     """
-    n, order, rows = _checked(robot).joint_count, list(robot.order), generalised_rows(robot)
+    check_robot(robot)
+    n, order, rows = robot.joint_count, list(robot.order), generalised_rows(robot)
     out, data = np.empty((n + 6, n + 6)), Data.allocate(n)
-    positions = _vector(joint_positions, n, "joint_positions")[order]
-    forward_kinematics(robot.model, _quaternion(quaternion_wxyz), positions, data)
+    positions = vector(joint_positions, n, "joint_positions")[order]
+    forward_kinematics(robot.model, unit_quaternion(quaternion_wxyz), positions, data)
     crba(robot.model, data, out)
     return out[np.ix_(rows, rows)]
 
@@ -103,12 +77,13 @@ def bias_force(
     Raises:
         InputError: an argument has a wrong type or shape, or the quaternion is not unit.
     """
-    n, order, rows = _checked(robot).joint_count, list(robot.order), generalised_rows(robot)
+    check_robot(robot)
+    n, order, rows = robot.joint_count, list(robot.order), generalised_rows(robot)
     out, data = np.empty(n + 6), Data.allocate(n)
-    positions = _vector(joint_positions, n, "joint_positions")[order]
-    velocities = _vector(joint_velocities, n, "joint_velocities")[order]
-    forward_kinematics(robot.model, _quaternion(quaternion_wxyz), positions, data)
-    spatial_velocities(robot.model, _vector(w0_inertial, 3, "w0_inertial"), velocities, data)
+    positions = vector(joint_positions, n, "joint_positions")[order]
+    velocities = vector(joint_velocities, n, "joint_velocities")[order]
+    forward_kinematics(robot.model, unit_quaternion(quaternion_wxyz), positions, data)
+    spatial_velocities(robot.model, vector(w0_inertial, 3, "w0_inertial"), velocities, data)
     rnea_bias(robot.model, data, out)
     return out[rows]
 
@@ -138,13 +113,14 @@ def forward_dynamics(
     Raises:
         InputError: an argument has a wrong type or shape, or the quaternion is not unit.
     """
-    n, order, rows = _checked(robot).joint_count, list(robot.order), generalised_rows(robot)
+    check_robot(robot)
+    n, order, rows = robot.joint_count, list(robot.order), generalised_rows(robot)
     out, data = np.empty(n + 6), Data.allocate(n)
-    positions = _vector(joint_positions, n, "joint_positions")[order]
-    velocities = _vector(joint_velocities, n, "joint_velocities")[order]
-    omega = _vector(w0_inertial, 3, "w0_inertial")
-    forces = _vector(force, n + 6, "force")[[*range(6), *(6 + joint for joint in order)]]
-    forward_kinematics(robot.model, _quaternion(quaternion_wxyz), positions, data)
+    positions = vector(joint_positions, n, "joint_positions")[order]
+    velocities = vector(joint_velocities, n, "joint_velocities")[order]
+    omega = vector(w0_inertial, 3, "w0_inertial")
+    forces = vector(force, n + 6, "force")[[*range(6), *(6 + joint for joint in order)]]
+    forward_kinematics(robot.model, unit_quaternion(quaternion_wxyz), positions, data)
     spatial_velocities(robot.model, omega, velocities, data)
     aba(robot.model, omega, velocities, forces, data, out)
     return out[rows]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Literal, NamedTuple
+from typing import TYPE_CHECKING, Literal, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -12,14 +12,38 @@ from space_robot_msgs_py.errors import InputError
 
 from ..dynamics.tool_kinematics import ToolKinematics, tool_kinematics_into
 from ..elementary.least_squares import null_space, singular_values
-from .dynamics import _checked, _quaternion, _vector
+from .arguments import check_robot, unit_quaternion, vector
 
 if TYPE_CHECKING:
-    from .robot import Robot
+    from ..dynamics.model import Model
     from .tree import Tool
 
 Array = NDArray[np.float64]
 Attitude = Literal["held", "free"]
+
+
+class ModelledRobot(Protocol):
+    """What is needed of a `Robot`."""
+
+    @property
+    def model(self) -> Model:
+        """Numbers for the algorithms."""
+
+    @property
+    def joint_count(self) -> int:
+        """N."""
+
+    @property
+    def order(self) -> tuple[int, ...]:
+        """Joints in the order of ``model``."""
+
+    @property
+    def tools(self) -> tuple[Tool, ...]:
+        """All tools."""
+
+    @property
+    def tool(self) -> Tool:
+        """The first tool."""
 
 
 class ToolState(NamedTuple):
@@ -52,7 +76,10 @@ class ToolState(NamedTuple):
 
 
 def tool_state(
-    robot: Robot, quaternion_wxyz: ArrayLike, joint_positions: ArrayLike, tool: str | None = None
+    robot: ModelledRobot,
+    quaternion_wxyz: ArrayLike,
+    joint_positions: ArrayLike,
+    tool: str | None = None,
 ) -> ToolState:
     """Return pose and Jacobians of a tool.
 
@@ -66,13 +93,14 @@ def tool_state(
         InputError: an argument has another type or shape, the quaternion is not unit, or there is
             no such tool.
     """
-    n, order = _checked(robot).joint_count, list(robot.order)
+    check_robot(robot)
+    n, order = robot.joint_count, list(robot.order)
     frame, model = tool_named(robot, tool), robot.model
     out = ToolKinematics.allocate(n)
-    positions = _vector(joint_positions, n, "joint_positions")[order]
+    positions = vector(joint_positions, n, "joint_positions")[order]
     tool_kinematics_into(
         model,
-        _quaternion(quaternion_wxyz),
+        unit_quaternion(quaternion_wxyz),
         positions,
         body_row(robot, frame),
         np.ascontiguousarray(frame.rotation),
@@ -95,7 +123,7 @@ def tool_state(
 
 
 def tool_jacobian(
-    robot: Robot,
+    robot: ModelledRobot,
     quaternion_wxyz: ArrayLike,
     joint_positions: ArrayLike,
     attitude: Attitude = "held",
@@ -120,7 +148,7 @@ def tool_jacobian(
 
 
 def reaction_null_space(
-    robot: Robot, quaternion_wxyz: ArrayLike, joint_positions: ArrayLike
+    robot: ModelledRobot, quaternion_wxyz: ArrayLike, joint_positions: ArrayLike
 ) -> Array:
     """Return an orthonormal basis of the joint velocities that leave the base's attitude alone.
 
@@ -141,7 +169,7 @@ def manipulability(jacobian: Array) -> float:
     return float(np.prod(singular_values(jacobian)))
 
 
-def tool_named(robot: Robot, name: str | None) -> Tool:
+def tool_named(robot: ModelledRobot, name: str | None) -> Tool:
     """Return a tool of a robot; None: the first.
 
     Raises:
@@ -155,6 +183,6 @@ def tool_named(robot: Robot, name: str | None) -> Tool:
     return tools[name]
 
 
-def body_row(robot: Robot, tool: Tool) -> int:
+def body_row(robot: ModelledRobot, tool: Tool) -> int:
     """Return the number in `Model` of the body that carries a tool."""
     return int(robot.model.row[tool.body - 1]) + 1 if tool.body else 0

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from scipy.optimize import linprog
 from scipy.spatial import ConvexHull
 
-from space_robot.analysis.capability import (
+from space_robot_model.hardware.capability import (
     ThrusterTorques,
     largest_momentum,
     largest_torque,
