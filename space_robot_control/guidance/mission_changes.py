@@ -6,12 +6,12 @@ from collections.abc import Callable
 from typing import Any
 
 from rcl_interfaces.msg import SetParametersResult
-from rclpy.serialization import deserialize_message
 
 from space_robot_msgs_py import topics
-from space_robot_msgs_py.errors import InputError
-from space_robot_msgs_py.ros.endpoints import PolledCallbackGroup, RawSubscription, message_type
+from space_robot_msgs_py.errors import InputError, MessageError
+from space_robot_msgs_py.ros.endpoints import PolledCallbackGroup, RawSubscription
 from space_robot_msgs_py.ros.managed_node import ManagedNode
+from space_robot_msgs_py.wire.definitions import decode
 
 from .courses import Piece
 from .live import TrajectoryPoint
@@ -35,7 +35,6 @@ class MissionChanges:
         """
         self._node, self._mission, self._next_tick = node, mission, next_tick
         self._subscription = RawSubscription(node, topics.JOINT_TRAJECTORY, PolledCallbackGroup())
-        self._type = message_type(topics.JOINT_TRAJECTORY.type)
         node.add_on_set_parameters_callback(self._on_set)
         self._last = ""
         """Text of the last segment."""
@@ -44,25 +43,28 @@ class MissionChanges:
     def take(self) -> None:
         """Follow the trajectory that has come last, if any."""
         while (data := self._subscription.take()) is not None:
-            message = deserialize_message(data, self._type)
-            points = [
-                TrajectoryPoint(
-                    p.time_from_start.sec + 1e-9 * p.time_from_start.nanosec,
-                    list(p.positions),
-                    list(p.velocities),
-                    list(p.accelerations),
-                )
-                for p in message.points
-            ]
             try:
-                tick = self._next_tick()
-                piece = self._mission.follow(tick, list(message.joint_names), points)
-            except InputError as error:
+                piece = self._followed(data)
+            except (InputError, MessageError) as error:
                 self.counts["trajectories refused"] += 1
                 self._node.log(f"refused a trajectory on /joint_trajectory: {error}")
                 continue
             self.counts["trajectories accepted"] += 1
             self._tell(piece)
+
+    def _followed(self, data: bytes) -> Piece:
+        """Follow a serialized trajectory_msgs/JointTrajectory; return its plan."""
+        message = decode(data, topics.JOINT_TRAJECTORY.type)
+        points = [
+            TrajectoryPoint(
+                p.time_from_start.sec + 1e-9 * p.time_from_start.nanosec,
+                list(p.positions),
+                list(p.velocities),
+                list(p.accelerations),
+            )
+            for p in message.points
+        ]
+        return self._mission.follow(self._next_tick(), list(message.joint_names), points)
 
     def close(self) -> None:
         """End the subscription, and accept no parameter."""

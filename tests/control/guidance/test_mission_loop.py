@@ -18,11 +18,12 @@ from space_robot_msgs_py.wire.reference_codec import ReferenceCodec
 
 pytest.importorskip("rclpy")
 
-from space_robot_control.guidance import loop
+from space_robot_control.guidance import loop, mission_changes
 from space_robot_control.guidance.loop import CLOCK_WAIT_S, GREET_S, MOST_AT_ONCE, MissionLoop
 from space_robot_control.guidance.mission import Mission
 
 CHUNK, LEAD = 10, 35
+NO_TRAJECTORIES = {"trajectories accepted": 0, "trajectories refused": 0}
 PERIOD_NS = 500_000
 
 
@@ -49,6 +50,10 @@ class Node:
     def __init__(self) -> None:
         self.by_name: dict[str, Topic] = {}
         self.said: list[str] = []
+        self.on_set: list[Any] = []
+
+    def add_on_set_parameters_callback(self, callback: Any) -> None:
+        self.on_set.append(callback)
 
     def log(self, text: str) -> None:
         self.said.append(text)
@@ -62,6 +67,7 @@ class Bench:
         patch.setattr(time, "monotonic", lambda: self.now)
         for name in ("RawPublisher", "TrustedSubscription"):
             patch.setattr(loop, name, Topic)
+        patch.setattr(mission_changes, "RawSubscription", Topic)
         self.settings = MissionNodeSettings.resolve({"chunk_ticks": CHUNK, "lead_ticks": LEAD})
         self.node: Any = Node()
         self.loop = MissionLoop(self.node, self.settings)
@@ -149,7 +155,7 @@ def test_a_new_time_has_a_new_stream(bench: Bench) -> None:
     assert bench.run() == [20, 30, 40, 50]
     assert bench.node.said == ["a new time begins at tick 24, after 1002: the stream too"]
     values = bench.loop.health().values
-    assert values == {"tick": 24, "rejected: stamp": 6, "rejected: another's": 3}
+    assert values == {"tick": 24, "rejected: stamp": 6, "rejected: another's": 3, **NO_TRAJECTORIES}
 
 
 def test_a_stop_of_a_minute_is_believed_and_a_longer_one_is_not(bench: Bench) -> None:
@@ -179,3 +185,13 @@ def test_the_stream_goes_on_while_the_clock_is_flooded(bench: Bench) -> None:
     assert len(bench.clock.waiting) == MOST_AT_ONCE + 1
     assert len(bench.joints.sent) == 4 + 1
     assert bench.run() == [*range(50, 2 * MOST_AT_ONCE + LEAD, CHUNK)]
+
+
+def test_junk_on_the_topic_of_trajectories_is_refused_in_one_line(bench: Bench) -> None:
+    trajectories = bench.node.by_name[topics.JOINT_TRAJECTORY.name]
+    trajectories.waiting.extend([b"", b"\0\1\0\0junk", bytes(40)])
+    bench.loop.step()
+    refused = [line for line in bench.node.said if line.startswith("refused a trajectory")]
+    assert len(refused) == 3
+    assert not any("\n" in line for line in refused)
+    assert bench.loop.health().values["trajectories refused"] == 3
