@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from conservation import momentum
 from hypothesis import given
 from hypothesis import strategies as st
 from random_robots import random_quaternion, random_robot
@@ -85,3 +86,19 @@ def test_every_law_follows_a_slew_with_the_arm_moving(law: str, most: float) -> 
     report = sr.Scenario(controller=law, mission=mission).fly().report()
     assert report["duration_s"] == 4.0
     assert report["maxima"]["attitude"] < most
+
+
+def test_a_line_is_flown_with_the_base_free_and_no_momentum_comes_in() -> None:
+    start, goal = [0, 90, 200, 20, 30, 10], {"xyz": [0.2, 0.1, -0.2], "rpy_deg": [0, 0, 0]}
+    segments = [{"tool": goal, "base": "free", "duration": 3}]
+    mission = {"start": {"joints_deg": start}, "segments": segments}
+    flown = sr.Scenario(controller="ctc", mission=mission, actuators="none", friction=False).fly()
+    tool, log = flown.report()["tool"], flown.log
+    assert tool["largest_m"] < 1e-6
+    assert tool["largest_deg"] < 1e-4
+    turned = 2.0 * np.arcsin(np.linalg.norm(log.quaternion[-1, 1:]))
+    assert np.degrees(turned) > 5.0
+    for tick in range(0, log.ticks, 500):
+        linear, angular = momentum(flown.flight.robot, log.state(tick))
+        assert np.abs(linear).max() < 1e-10
+        assert np.abs(angular).max() < 1e-10
