@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from ..errors import InputError
+from .text import printable
 
 Tree = dict[str, Any]
 
@@ -40,7 +41,8 @@ def _refuse_both(one: Tree, other: Tree, prefix: str = "") -> None:
     for key in one.keys() & other.keys():
         first, second = one[key], other[key]
         if isinstance(first, dict) is not isinstance(second, dict):
-            raise InputError(f"{prefix}{key}: given as a value, and as a group of values")
+            name = printable(f"{prefix}{key}")
+            raise InputError(f"{name}: given as a value, and as a group of values")
         if isinstance(first, dict):
             _refuse_both(first, second, f"{prefix}{key}.")
 

@@ -203,6 +203,7 @@ def test_settings_of_every_node_have_limits(name: str, value: float) -> None:
         ({"a.b": 1, "a": 2}, "a"),
         ({"a.b.c": 1, "a.b": 2}, "a.b"),
         ({"a": {"b": 1}, "a.b": {"c": 2}}, "a.b"),
+        ({"a.\x11\n": 1, "a": {"\x11\n": {"c": 2}}}, "a.??"),
     ],
 )
 def test_a_value_that_is_a_group_too_is_refused(flat: dict[str, object], name: str) -> None:
