@@ -22,7 +22,7 @@ from paths import CONFIG, DATA, DOCS
 
 SHORTER = {
     r"campaign run .*first": "--runs 12 --workers 0",  # row 11 is flown again
-    r"campaign run .*(law_league_|sensor_grades|three)": "--runs 4 --workers 0",  # a grid of four
+    r"campaign run .*(law_league_|sensor_grades|three|tool_errors)": "--runs 4 --workers 0",  # a grid of four
     r"campaign run .*base_actuators": "--runs 6 --workers 0",  # a grid of six
     r"campaign run .*noise": "--runs 2 --workers 0",  # a grid of two
     r"campaign run": "--runs 1 --workers 0",
@@ -79,6 +79,7 @@ NOT_RUN = {
     r"python tests/hostile": "half an hour",
     r"python docs/view_picture.py": "a browser: tests/laboratory/view has one",
     r"space-robot (sim|fly --paused)\b": "two terminals: test_pause_and_step.py flies and steps",
+    r"space-robot goto\b": "two terminals: test_goto.py flies and moves",
     r"space-robot analyze flights/tde_stc_case1_": "printed at a flight's end",
     r"space-robot view flights/mine": "a flight of the reader's robot: tests/laboratory/view",
     r"space-robot view (--live|.*\.webp)": "never ends; a browser: tests/laboratory/view",

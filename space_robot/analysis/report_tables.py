@@ -321,7 +321,8 @@ def _axes(key: str, kind: str) -> str:
 
 
 def _kind(key: str) -> str:
-    return "RMS" if key.startswith("rms") else "max"
+    size = "RMS" if key.startswith("rms") else "max"
+    return f"rotation, {size}" if key.endswith("deg") else size
 
 
 def _end_or_max(key: str) -> str:

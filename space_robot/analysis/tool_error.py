@@ -90,6 +90,14 @@ class ToolError(Metric):
         }
 
 
+def leads_tool(log: FlightLog) -> bool:
+    """Return whether a bag tells that its mission has segments, not waypoints only."""
+    scenario = log.flight.get("scenario")
+    mission = scenario.get("mission") if isinstance(scenario, dict) else None
+    segments = mission.get("segments") if isinstance(mission, dict) else None
+    return isinstance(segments, list) and any(str(text).strip() for text in segments)
+
+
 def _unit(quaternion: Array) -> Array:
     unit: Array = quaternion / np.linalg.norm(quaternion, axis=1, keepdims=True)
     return unit

@@ -11,7 +11,7 @@ from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.errors import InputError
 
 from ..analysis.described import assumed_robot_of
-from ..analysis.tool_error import ToolPath
+from ..analysis.tool_error import ToolPath, leads_tool
 from ..analysis.waypoints import waypoint_ticks
 
 if TYPE_CHECKING:
@@ -30,7 +30,7 @@ def goals(scene: SceneApi, root: str, log: FlightLog, size: float) -> None:
         log: the flight.
         size: length of the axes, m.
     """
-    if not _has_segments(log):
+    if not leads_tool(log):
         return
     try:
         path = ToolPath(log, assumed_robot_of(log))
@@ -49,10 +49,3 @@ def goals(scene: SceneApi, root: str, log: FlightLog, size: float) -> None:
             wxyz=np.roll(turn, 1),
             position=position,
         )
-
-
-def _has_segments(log: FlightLog) -> bool:
-    scenario = log.flight.get("scenario")
-    mission = scenario.get("mission") if isinstance(scenario, dict) else None
-    segments = mission.get("segments") if isinstance(mission, dict) else None
-    return isinstance(segments, list) and any(str(text).strip() for text in segments)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from typing import NamedTuple
 
 import numpy as np
@@ -13,9 +14,10 @@ from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.errors import InputError
 
 from ..analysis.attitude_drift import attitude_drift, controls_base
-from ..analysis.described import flown_actuators
+from ..analysis.described import assumed_robot_of, flown_actuators
 from ..analysis.figures.overlay import words
 from ..analysis.metrics import error_columns, torque_columns, tracking_error, unit_of
+from ..analysis.tool_error import ToolError, leads_tool
 
 Array = NDArray[np.float64]
 
@@ -44,6 +46,7 @@ def quantities_of(log: FlightLog, robot: Robot) -> list[PlottedQuantity]:
     """
     return [
         *_errors(log),
+        *_tool(log, robot),
         *_drift(log),
         *_passive_joints(log, robot),
         *_torques(log),
@@ -59,6 +62,15 @@ def _errors(log: FlightLog) -> Iterator[PlottedQuantity]:
         yield PlottedQuantity(
             f"{words(name)} error", unit, names[axes].tolist(), values[:, axes], True
         )
+
+
+def _tool(log: FlightLog, robot: Robot) -> Iterator[PlottedQuantity]:
+    """Yield the distance of the tool from its path, of a mission that leads it."""
+    if not leads_tool(log):
+        return
+    with suppress(InputError):  # the bag does not tell what the flight software assumed
+        errors = ToolError(log, robot, assumed_robot_of(log)).errors(log)
+        yield PlottedQuantity("tool error", "m", ["distance"], errors[:, :1], True)
 
 
 def _torques(log: FlightLog) -> Iterator[PlottedQuantity]:

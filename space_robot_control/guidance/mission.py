@@ -96,7 +96,7 @@ class Mission:
         """s, until the end of the last segment."""
         if not self.pieces:
             self.pieces = [_leg(0.0, 1.0, waypoints[0], waypoints[0], quaternion)]
-        self._first, self._begins = waypoints[0], np.array([piece.begin for piece in self.pieces])
+        self._first, self._begins = waypoints[0].copy(), np.array([piece.begin for piece in self.pieces])
 
     @property
     def times(self) -> Array:

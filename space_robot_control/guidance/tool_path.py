@@ -109,8 +109,8 @@ class ToolFollower:
     ) -> tuple[Array, Array, float]:
         """Return joint positions (K, N) and attitudes (K, 4) of a free base, and the largest error.
 
-        Args: see `follow_free_path_into`; ``start`` (N,) and ``quaternion`` (4,) are those at the
-            first pose.
+        For the arguments see `follow_free_path_into`; ``start`` (N,) and ``quaternion`` (4,) are
+        those at the first pose.
         """
         count = len(positions) // 2 + 1
         out, attitudes = np.empty((count, len(start))), np.empty((count, 4))

@@ -9,6 +9,7 @@ from scene_pages import Scene
 
 from space_robot import FlownFlight, Scenario
 from space_robot.view.film import FilmedFlight, film
+from space_robot.view.quantities import quantities_of
 from space_robot_model.robot.tool import tool_pose
 
 START = {"joints_deg": [0, 90, 200, 20, 30, 10]}
@@ -40,3 +41,13 @@ def test_the_tool_ends_at_its_goal() -> None:
 def test_a_mission_of_waypoints_has_none() -> None:
     scene, _ = shown(duration=0.1)
     assert not [name for name in scene.names() if "/goal_" in name]
+
+
+def test_the_distance_from_the_path_is_plotted() -> None:
+    flown = Scenario(controller="ctc", mission={"start": START, "segments": [LINE]}).fly()
+    quantities = quantities_of(flown.log, flown.flight.robot)
+    (tool,) = [quantity for quantity in quantities if quantity.title == "tool error"]
+    assert tool.values.max() == flown.metrics["tool"]["largest_m"]
+    plain = Scenario(controller="ctc", duration=0.1).fly()
+    titles = [quantity.title for quantity in quantities_of(plain.log, plain.flight.robot)]
+    assert "tool error" not in titles

@@ -44,6 +44,7 @@ def test_every_shipped_parameter_file_is_one() -> None:
         if (
             path.parent.name in ("campaigns", "robots", "qos", "targets")
             or path.name in NO_PARAMETERS
+            or "mission" in yaml.safe_load(path.read_text())  # a document
         ):
             continue
         for node in yaml.safe_load(path.read_text()):
@@ -163,7 +164,7 @@ def test_file_that_is_no_parameter_file(tmp_path: Path) -> None:
 
 
 def test_mission_of_another_robot_does_not_fit() -> None:
-    with pytest.raises(InputError, match="7 values, robot 'paper' has 6 joints"):
+    with pytest.raises(InputError, match="waypoints_deg has 21 values; 3 waypoint_times and 6 joints need 18"):
         Flight(resolve(FlightPlan(mission="seven_joint")))
 
 
