@@ -22,7 +22,8 @@ from paths import CONFIG, DATA, DOCS
 
 SHORTER = {
     r"campaign run .*first": "--runs 12 --workers 0",  # row 11 is flown again
-    r"campaign run .*(law_league_|sensor_grades|three|tool_errors)": "--runs 4 --workers 0",  # a grid of four
+    # a grid of four
+    r"campaign run .*(law_league_|sensor_grades|three|tool_errors)": "--runs 4 --workers 0",
     r"campaign run .*base_actuators": "--runs 6 --workers 0",  # a grid of six
     r"campaign run .*noise": "--runs 2 --workers 0",  # a grid of two
     r"campaign run": "--runs 1 --workers 0",

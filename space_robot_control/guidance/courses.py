@@ -12,10 +12,6 @@ from typing import NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from space_robot_model.elementary.quintic_spline import QuinticSpline
-from space_robot_model.elementary.sine import sines_cosines
-from space_robot_model.elementary.spline import CubicSpline
-
 Array = NDArray[np.float64]
 
 
@@ -106,6 +102,8 @@ class BentLeg(NamedTuple):
 
     def at(self, time: Array) -> Array:
         """Return (T, 3, n) at times (T,), s."""
+        from space_robot_model.elementary.sine import sines_cosines  # slow to import
+
         u = np.clip((time - self.begin)[:, np.newaxis] / self.span, 0.0, 1.0)
         share, rate, acceleration = quintic(u)
         rate, acceleration = rate / self.span, acceleration / (self.span * self.span)
@@ -121,18 +119,6 @@ class BentLeg(NamedTuple):
         rows[:, 1] = slope * rate
         rows[:, 2] = slope * acceleration + curve * rate * rate
         return rows
-
-
-class SplineCourse(NamedTuple):
-    """Joints along a spline."""
-
-    begin: float
-    """s, time zero of the spline."""
-    spline: CubicSpline | QuinticSpline
-
-    def at(self, time: Array) -> Array:
-        """Return (T, 3, n) at times (T,), s."""
-        return self.spline.at(time - self.begin)
 
 
 class Slew(NamedTuple):
@@ -162,58 +148,6 @@ class Slew(NamedTuple):
         return rows
 
 
-class BrakedTurn(NamedTuple):
-    """The base comes to rest about the axis that it turns about."""
-
-    begin: float
-    """s."""
-    span: float
-    """s until it is at rest."""
-    quaternion: Array
-    """(4,) attitude at the begin, unit."""
-    omega: Array
-    """(3,) angular velocity at the begin, rad/s, base frame."""
-    alpha: Array
-    """(3,) angular acceleration at the begin; its part along ``omega`` goes on."""
-
-    def at(self, time: Array) -> Array:
-        """Return (T, 10) at times (T,), s: quaternion, velocity and acceleration, base frame."""
-        rate = float(np.sqrt(_dot(self.omega, self.omega)[0]))
-        if rate == 0.0:
-            return Slew(self.begin, self.span, self.quaternion, self.omega, 0.0).at(time)
-        axis = self.omega / rate
-        first = [0.0, rate, float(_dot(axis, self.alpha)[0])]
-        states = np.array([first, [0.5 * self.span * rate, 0.0, 0.0]])[:, :, np.newaxis]
-        turn = QuinticSpline(np.array([0.0, self.span]), states).at(time - self.begin)
-        rows = np.empty((len(time), 10))
-        rows[:, :4] = multiplied(self.quaternion, turned_by(axis, turn[:, 0, 0]))
-        rows[:, 4:7], rows[:, 7:] = turn[:, 1] * axis, turn[:, 2] * axis
-        return rows
-
-
-class AttitudeCourse(NamedTuple):
-    """The base along a cubic spline of the components of its quaternion, then normalised."""
-
-    begin: float
-    """s, time zero of the spline."""
-    spline: CubicSpline
-    """Of quaternions in one hemisphere."""
-
-    def at(self, time: Array) -> Array:
-        """Return (T, 10) at times (T,), s: quaternion, velocity and acceleration, base frame."""
-        p, p_rate, p_second = np.moveaxis(self.spline.at(time - self.begin), 1, 0)
-        length = np.sqrt(_dot(p, p))
-        q = p / length
-        stretch = _dot(p, p_rate) / length
-        q_rate = (p_rate - q * stretch) / length
-        stretch_rate = (_dot(p_rate, p_rate) + _dot(p, p_second) - stretch * stretch) / length
-        q_second = (p_second - 2.0 * q_rate * stretch - q * stretch_rate) / length
-        back = q * np.array([1.0, -1.0, -1.0, -1.0])
-        # omega = 2 q* qdot; its derivative has |qdot|^2 in the scalar part only
-        omega, alpha = multiplied(back, 2.0 * q_rate), multiplied(back, 2.0 * q_second)
-        return np.hstack((q, omega[:, 1:], alpha[:, 1:]))
-
-
 def multiplied(first: Array, second: Array) -> Array:
     """Return the products (..., 4) of quaternions ``[w, x, y, z]``."""
     w, x, y, z = np.moveaxis(np.asarray(first), -1, 0)
@@ -231,6 +165,8 @@ def multiplied(first: Array, second: Array) -> Array:
 
 def turned_by(axis: Array, angles: Array) -> Array:
     """Return the quaternions (K, 4) of turns by angles (K,), rad, about a unit axis (3,)."""
+    from space_robot_model.elementary.sine import sines_cosines  # slow to import
+
     sines, cosines = sines_cosines(0.5 * angles)
     return np.column_stack((cosines, sines[:, np.newaxis] * axis))
 
@@ -241,13 +177,13 @@ def turn_between(first: Array, second: Array) -> tuple[Array, float]:
 
     turn = multiplied(first * np.array([1.0, -1.0, -1.0, -1.0]), second)
     turn = -turn if turn[0] < 0.0 else turn
-    sine = float(np.sqrt(_dot(turn[1:], turn[1:])[0]))
+    sine = float(np.sqrt(dot_rows(turn[1:], turn[1:])[0]))
     if sine == 0.0:
         return np.array([1.0, 0.0, 0.0]), 0.0
     return turn[1:] / sine, 2.0 * float(arctan2(sine, float(turn[0])))
 
 
-def _dot(a: Array, b: Array) -> Array:
+def dot_rows(a: Array, b: Array) -> Array:
     """Return the dot products (..., 1) of the last axis, summed in order."""
     total = a[..., 0] * b[..., 0]
     for k in range(1, a.shape[-1]):

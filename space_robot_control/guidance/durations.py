@@ -9,35 +9,18 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from typing import Annotated
 
 import numpy as np
-from pydantic import Field
 
 from space_robot_model.robot import Robot
-from space_robot_msgs_py.config.validation import StrictModel
 from space_robot_msgs_py.errors import InputError
 
 from .courses import Course
 from .demand import demand
+from .limits import MissionLimits
 
-Limit = Annotated[float, Field(ge=0.0, le=1e9)]
 SHORTEST_S = 0.1
 """Duration of a segment in which nothing moves, s."""
-
-
-class MissionLimits(StrictModel):
-    """What segments may ask for, beside the limits of the robot's joints; 0: no limit."""
-
-    base_torque: Limit = Field(0.0, description="on each axis of the base, N m")
-    base_momentum: Limit = Field(0.0, description="angular momentum taken up by the base, N m s")
-    base_rate_deg: Limit = Field(0.0, description="angular velocity of the base, degrees/s")
-    joint_acceleration_deg: Limit = Field(
-        0.0, description="of each joint, degrees/s2, or m/s2 of prismatic joints"
-    )
-    check_actuators: bool = Field(
-        True, description="refuse segments that ask the base's actuators for more than they give"
-    )
 
 
 def shortest_duration(

@@ -11,7 +11,8 @@ from space_robot_model.elementary.rotations import quaternion_of_rotation
 from space_robot_model.elementary.spline import CubicSpline
 from space_robot_model.robot import Robot
 
-from .courses import AttitudeCourse, Course, quintic, turn_between
+from .courses import Course, quintic, turn_between
+from .spline_courses import AttitudeCourse
 
 Array = NDArray[np.float64]
 

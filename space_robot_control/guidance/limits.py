@@ -6,12 +6,14 @@ the waypoints are. The desired velocity is largest halfway, ``15/8`` of the mean
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import Field
 
 from space_robot_model.robot import Robot
+from space_robot_msgs_py.config.validation import StrictModel
 from space_robot_msgs_py.errors import InputError
 
 Array = NDArray[np.float64]
@@ -20,6 +22,23 @@ ROUNDING = 1e-9
 """rad or m, by which a waypoint may be beyond a limit: both were written in degrees, maybe."""
 HALFWAY = 15.0 / 8.0
 """Largest velocity of a quintic leg from rest to rest, as a share of its mean velocity."""
+
+
+Limit = Annotated[float, Field(ge=0.0, le=1e9)]
+
+
+class MissionLimits(StrictModel):
+    """What segments may ask for, beside the limits of the robot's joints; 0: no limit."""
+
+    base_torque: Limit = Field(0.0, description="on each axis of the base, N m")
+    base_momentum: Limit = Field(0.0, description="angular momentum taken up by the base, N m s")
+    base_rate_deg: Limit = Field(0.0, description="angular velocity of the base, degrees/s")
+    joint_acceleration_deg: Limit = Field(
+        0.0, description="of each joint, degrees/s2, or m/s2 of prismatic joints"
+    )
+    check_actuators: bool = Field(
+        True, description="refuse segments that ask the base's actuators for more than they give"
+    )
 
 
 class Beyond(NamedTuple):

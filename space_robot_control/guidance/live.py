@@ -19,7 +19,8 @@ from space_robot_msgs_py.config.validation import one_of
 from space_robot_msgs_py.errors import InputError
 
 from .checks import check_piece
-from .courses import BrakedTurn, Piece, SplineCourse
+from .courses import Piece
+from .spline_courses import BrakedTurn, SplineCourse
 
 Array = NDArray[np.float64]
 

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import partial
 from itertools import pairwise
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,11 +19,12 @@ from space_robot_msgs_py.samples import ReferenceChunk
 
 from .checks import check_piece
 from .courses import Piece, QuinticLeg, Slew
-from .durations import MissionLimits
-from .limits import check_positions
-from .live import TrajectoryPoint, braking, is_moving, joined
-from .planner import Planner
+from .limits import MissionLimits, check_positions
 from .segments import read_segments
+
+if TYPE_CHECKING:
+    from .live import TrajectoryPoint
+    from .planner import Planner
 
 Array = NDArray[np.float64]
 
@@ -88,7 +88,7 @@ class Mission:
         ]
         """Legs between the waypoints, then the segments; at least one."""
         self._robot = robot.nominal
-        self._new_planner = partial(Planner, robot, waypoints[0], quaternion, settings.limits)
+        self._start, self._limits = (waypoints[0].copy(), quaternion), settings.limits
         if segments := read_segments(settings.segments):
             planner = self._new_planner()
             self.pieces += planner.plan(float(times[-1]), waypoints[-1], quaternion, segments)
@@ -96,7 +96,15 @@ class Mission:
         """s, until the end of the last segment."""
         if not self.pieces:
             self.pieces = [_leg(0.0, 1.0, waypoints[0], waypoints[0], quaternion)]
-        self._first, self._begins = waypoints[0].copy(), np.array([piece.begin for piece in self.pieces])
+        self._first, self._begins = (
+            waypoints[0].copy(),
+            np.array([piece.begin for piece in self.pieces]),
+        )
+
+    def _new_planner(self) -> Planner:
+        from .planner import Planner  # slow to import, and a mission of waypoints needs none
+
+        return Planner(self._robot, *self._start, self._limits)
 
     @property
     def times(self) -> Array:
@@ -121,6 +129,8 @@ class Mission:
         Raises:
             InputError: the segment is wrong or cannot be flown; the mission is as it was.
         """
+        from .live import braking, is_moving
+
         begin, joints, base = self._state_at(tick)
         before = []
         if is_moving(joints, base):
@@ -142,6 +152,8 @@ class Mission:
         Raises:
             InputError: the trajectory is wrong; the mission is as it was.
         """
+        from .live import joined
+
         piece = joined(self._robot, names, points, *self._state_at(tick))
         self._replace([piece])
         return piece

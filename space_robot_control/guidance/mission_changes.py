@@ -14,7 +14,6 @@ from space_robot_msgs_py.ros.managed_node import ManagedNode
 from space_robot_msgs_py.wire.definitions import decode
 
 from .courses import Piece
-from .live import TrajectoryPoint
 from .mission import Mission
 
 NAME = "goto"
@@ -54,6 +53,8 @@ class MissionChanges:
 
     def _followed(self, data: bytes) -> Piece:
         """Follow a serialized trajectory_msgs/JointTrajectory; return its plan."""
+        from .live import TrajectoryPoint  # slow to import, and most flights need none
+
         message = decode(data, topics.JOINT_TRAJECTORY.type)
         points = [
             TrajectoryPoint(

@@ -14,24 +14,17 @@ from space_robot_model.robot import Robot
 from space_robot_msgs_py.errors import InputError
 
 from .checks import check_piece
-from .courses import (
-    BentLeg,
-    Course,
-    Piece,
-    QuinticLeg,
-    Slew,
-    SplineCourse,
-    knots,
-    quintic,
-    turn_between,
-)
-from .durations import MissionLimits, shortest_duration
+from .courses import BentLeg, Course, Piece, QuinticLeg, Slew, knots, quintic, turn_between
+from .durations import shortest_duration
 from .free_base import free_attitude
+from .limits import MissionLimits
 from .reactionless import reactionless_path
 from .segments import Segment, ToolGoal
+from .spline_courses import SplineCourse
 from .tool_courses import SegmentStart, ToolCourses
 from .tool_path import ToolFollower
-from .trajectory_file import TrajectoryTable, read_columns
+from .trajectory_file import read_columns
+from .trajectory_table import TrajectoryTable
 
 Array = NDArray[np.float64]
 

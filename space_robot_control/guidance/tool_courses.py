@@ -15,20 +15,11 @@ from space_robot_model.elementary.spline import CubicSpline
 from space_robot_model.robot import Robot
 from space_robot_msgs_py.errors import InputError
 
-from .courses import (
-    AttitudeCourse,
-    Course,
-    Slew,
-    SplineCourse,
-    knots,
-    multiplied,
-    quintic,
-    turn_between,
-    turned_by,
-)
+from .courses import Course, Slew, knots, multiplied, quintic, turn_between, turned_by
 from .demand import demand
 from .free_base import twists_along, with_middles
 from .segments import ToolGoal
+from .spline_courses import AttitudeCourse, SplineCourse
 from .tool_path import ToolFollower
 
 Array = NDArray[np.float64]

@@ -207,6 +207,7 @@ _SPECIAL: dict[str, st.SearchStrategy[Any]] = {
     "case": st.sampled_from(["1", 2, "4-1"]),
     "faults": st.lists(st.sampled_from(["nan_state@1", "drop_command@2-3:0.5"]), max_size=1),
     "events": st.lists(st.sampled_from(["", "capture@0.1:small_satellite"]), max_size=1),
+    "segments": st.sampled_from([[""], ["{hold: 1}"]]),
     "payload.inertia": st.just([1, 1, 1.5, 0, 0, 0]),
     "initial_joints_deg": st.lists(st.integers(-90, 90) | st.floats(-9, 9), min_size=6, max_size=6),
     "initial_quaternion": _QUATERNION,

@@ -164,7 +164,7 @@ def test_file_that_is_no_parameter_file(tmp_path: Path) -> None:
 
 
 def test_mission_of_another_robot_does_not_fit() -> None:
-    with pytest.raises(InputError, match="waypoints_deg has 21 values; 3 waypoint_times and 6 joints need 18"):
+    with pytest.raises(InputError, match="has 21 values; 3 waypoint_times and 6 joints"):
         Flight(resolve(FlightPlan(mission="seven_joint")))
 
 
