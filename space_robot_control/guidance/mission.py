@@ -152,10 +152,15 @@ class Mission:
         Raises:
             InputError: the trajectory is wrong; the mission is as it was.
         """
-        from .live import joined
+        from .live import braking, is_moving, joined
 
         piece = joined(self._robot, names, points, *self._state_at(tick))
-        self._replace([piece])
+        end = np.array([piece.end])
+        joints, base = piece.joints.at(end)[0], piece.base.at(end)[0]
+        after = [braking(piece.end, joints, base)] if is_moving(joints, base) else []
+        for part in after:
+            check_piece(self._robot, part)
+        self._replace([piece, *after])
         return piece
 
     def _state_at(self, tick: int) -> tuple[float, Array, Array]:

@@ -124,6 +124,17 @@ def test_given_velocities_are_flown() -> None:
     np.testing.assert_allclose(joints[4_000, 1], rate, atol=1e-14)
 
 
+def test_a_trajectory_that_ends_in_motion_is_brought_to_rest() -> None:
+    flown, rate = mission(), [0.01] * 6
+    goal = (np.radians(START) + 0.02).tolist()
+    flown.follow(0, ROBOT.joint_names, [TrajectoryPoint(2.0, goal, rate, [])])
+    joints, base = rows_of(flown, 6.0)
+    assert_smooth(joints, base)
+    np.testing.assert_allclose(joints[4_000, 1], rate, atol=1e-14)
+    np.testing.assert_array_equal(joints[-1, 1:], 0.0)
+    np.testing.assert_allclose(joints[-1, 0], np.array(goal) + 0.5 * BRAKE_S * 0.01, atol=1e-12)
+
+
 NEAR = np.radians(START).tolist()
 
 
