@@ -18,10 +18,8 @@ from space_robot_msgs_py.ros.lifeline import hold_to_standard_input
 
 from ..console.streams import is_of_output, standard_streams
 from ..processes.interruption import Interrupted, raising_signals
+from ..processes.memory import COLLECTED_AT
 from ..processes.node_modules import MODULES, SUFFIX
-
-COLLECTED_AT = 100_000
-"""New objects after which Python looks for those that can be let go; else 700."""
 
 
 @click.group(context_settings={"help_option_names": ["-h", "--help"]})

@@ -1,9 +1,12 @@
-"""Available memory."""
+"""Available memory, and how often what is not used any more is searched for."""
 
 from __future__ import annotations
 
 import math
 from pathlib import Path
+
+COLLECTED_AT = 100_000
+"""New objects after which Python searches for those that can be let go; by default 700."""
 
 
 def available_bytes() -> float:

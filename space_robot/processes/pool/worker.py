@@ -15,6 +15,7 @@ from typing import Any
 from space_robot_msgs_py.config.text import one_line_of
 
 from ..fork_server import Target, accept_signals
+from ..memory import COLLECTED_AT
 
 IGNORED = (signal.SIGINT, signal.SIGHUP, signal.SIGQUIT)
 """Terminal signals, which only the parent process handles."""
@@ -51,7 +52,7 @@ def work(function: Callable[[Any], Any], connection: Connection) -> None:
     """
     # to look through what the modules hold, and a figure half drawn, costs a tenth of the time
     gc.freeze()
-    gc.set_threshold(100_000)
+    gc.set_threshold(COLLECTED_AT)
     while True:
         try:
             item = connection.recv_bytes()

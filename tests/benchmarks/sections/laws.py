@@ -51,7 +51,7 @@ class Recorded:
         log = simulate(flight)
         law, period = flight.controller.law, flight.period
         controller = Controller(flight.robot, law, period)
-        states = np.concatenate([log.state(tick).block for tick in range(ticks)])
+        states = np.concatenate([state.block for state in log.states(0, ticks)])
         references, signals = (
             log.references(0, ticks),
             np.zeros(SIGNALS, Signals.dtype(log.axes - 3)),

@@ -243,7 +243,7 @@ def test_markup_in_names_is_drawn_as_it_is(bag: Path, tmp_path: Path, name: str)
     log.joint_names = (name, *log.joint_names[1:])
     figure_set = FigureSet()
     figure_set.add(name, log)
-    figure_set.save(tmp_path)
+    assert figure_set.save(tmp_path)
 
 
 def test_markup_in_names_that_lie_over_one_another_is_drawn_as_it_is(
