@@ -22,6 +22,7 @@ from pathlib import Path
 
 import numpy as np
 import rclpy
+from rclpy.context import Context
 from rclpy.duration import Duration
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
@@ -34,7 +35,7 @@ DOMAIN = "61"
 
 def send_trajectory() -> None:
     """Publish one point that is to be reached in a second."""
-    context = rclpy.Context()
+    context = Context()
     rclpy.init(context=context, domain_id=int(DOMAIN))
     node = rclpy.create_node("planner", context=context)
     publisher = node.create_publisher(JointTrajectory, "joint_trajectory", 1)
