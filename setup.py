@@ -83,6 +83,7 @@ setup(
         ],
         "test": [
             "cvxpy",
+            "catkin_pkg",  # ROS's generators of interfaces
             "distributed>=2024.1",
             "gymnasium>=1.0",
             "hypothesis",

@@ -30,6 +30,7 @@ from space_robot import load_bag
 from space_robot_msgs_py.ros.process_environment import set_defaults
 
 GOAL = np.radians([2.0, 118.0, 221.0, -2.0, -12.0, 1.0])
+NAMES = [f"joint{k}" for k in range(1, 7)]
 DOMAIN = "61"
 
 
@@ -43,8 +44,7 @@ def send_trajectory() -> None:
         time.sleep(0.05)
     in_time = Duration(seconds=1).to_msg()
     point = JointTrajectoryPoint(positions=GOAL.tolist(), time_from_start=in_time)
-    names = [f"joint{k}" for k in range(1, 7)]
-    publisher.publish(JointTrajectory(joint_names=names, points=[point]))
+    publisher.publish(JointTrajectory(joint_names=NAMES, points=[point]))
     publisher.wait_for_all_acked(Duration(seconds=10))
     context.shutdown()
 
@@ -57,8 +57,8 @@ def sim(*words: str) -> int:
 
 def main(bag: Path) -> None:
     """Fly, send the trajectory, and read its effect from the bag."""
-    options = ["--duration", "3", "--domain", DOMAIN, "--bag", str(bag)]
-    command = ["space-robot", "fly", "--paused", *options]
+    command = ["space-robot", "fly", "--paused", "--duration", "3", "--domain", DOMAIN]
+    command += ["--bag", str(bag)]
     with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as flight:
         try:
             while sim("step", "--ticks", "500"):  # not before all nodes are there

@@ -55,7 +55,12 @@ class MissionLoop:
         """The first tick that the stream has not reached."""
         self._invalid_stamps, self._listeners = 0, 0
         self._greet_at = 0.0
-        self._changes = MissionChanges(node, self._mission, lambda: self._next)
+        self._changes = MissionChanges(
+            node,
+            self._mission,
+            lambda: (max(self._stamps.last, 0), self._next),
+            list(robot.joint_names),
+        )
 
     def begin(self) -> None:
         """Begin at the end of the stream."""

@@ -79,7 +79,8 @@ class Mission:
         waypoints = robot.from_degrees(np.reshape(settings.waypoints_deg, (len(times), n)))
         check_positions(robot, waypoints)
         quaternion = np.array(settings.base_quaternion) / length
-        self._period = period
+        self.period = period
+        """s, of a tick."""
         self.pieces = [
             _leg(begin, end, start, goal, quaternion)
             for (begin, end), (start, goal) in zip(
@@ -166,7 +167,7 @@ class Mission:
     def _state_at(self, tick: int) -> tuple[float, Array, Array]:
         """Return time, and the reference of joints (3, n) and base (10,), at a tick."""
         chunk = self.chunk(tick, 1)
-        return tick * self._period, chunk.joints[0], chunk.base[0]
+        return tick * self.period, chunk.joints[0], chunk.base[0]
 
     def _replace(self, pieces: list[Piece]) -> None:
         """Put pieces in the place of all that begins later."""
@@ -177,7 +178,7 @@ class Mission:
 
     def chunk(self, start: int, length: int) -> ReferenceChunk:
         """The reference of ``length`` ticks from tick ``start`` on."""
-        time = np.arange(start, start + length, dtype=np.float64) * self._period
+        time = np.arange(start, start + length, dtype=np.float64) * self.period
         parts = np.split(time, np.searchsorted(time, self._begins[1:]))  # a piece has its begin
         flown = [pair for pair in zip(self.pieces, parts, strict=True) if len(pair[1])]
         flown = flown or [(self.pieces[0], time)]

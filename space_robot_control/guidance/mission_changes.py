@@ -1,10 +1,12 @@
-"""Changes of the mission in flight: the parameter ``goto``, and the topic /joint_trajectory."""
+"""Changes of the mission in flight: the parameter ``goto``, trajectories by topic and by action."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
+import numpy as np
+from numpy.typing import NDArray
 from rcl_interfaces.msg import SetParametersResult
 
 from space_robot_msgs_py import topics
@@ -16,6 +18,11 @@ from space_robot_msgs_py.wire.definitions import decode
 from .courses import Piece
 from .mission import Mission
 
+if TYPE_CHECKING:
+    from .trajectory_action import TrajectoryAction
+
+Array = NDArray[np.float64]
+
 NAME = "goto"
 
 
@@ -23,39 +30,67 @@ class MissionChanges:
     """Applies segments and trajectories to a mission, from the end of what has been sent on."""
 
     def __init__(
-        self, node: ManagedNode[Any], mission: Mission, next_tick: Callable[[], int]
+        self,
+        node: ManagedNode[Any],
+        mission: Mission,
+        ticks: Callable[[], tuple[int, int]],
+        joint_names: list[str],
     ) -> None:
-        """Subscribe, and accept the parameter.
+        """Subscribe, accept the parameter, and offer the action if its package is there.
 
         Args:
             node: of the mission.
             mission: to be changed.
-            next_tick: returns the first tick whose reference has not been sent.
+            ticks: returns the present tick, and the first one whose reference has not been sent.
+            joint_names: of the joints with motors.
         """
-        self._node, self._mission, self._next_tick = node, mission, next_tick
+        self._node, self._mission, self._ticks = node, mission, ticks
+        self.joint_names = joint_names
         self._subscription = RawSubscription(node, topics.JOINT_TRAJECTORY, PolledCallbackGroup())
         node.add_on_set_parameters_callback(self._on_set)
-        self._last = ""
-        """Text of the last segment."""
+        self._last_text = ""
+        self.latest: Piece | None = None
+        """The last motion that was asked for in flight."""
         self.counts = {"trajectories accepted": 0, "trajectories refused": 0}
+        self._action = self._offer_action()
+
+    def _offer_action(self) -> TrajectoryAction | None:
+        try:
+            from control_msgs.action import FollowJointTrajectory
+        except ImportError:
+            return None
+        from .trajectory_action import TrajectoryAction
+
+        return TrajectoryAction(self._node, FollowJointTrajectory, self)
+
+    @property
+    def time(self) -> float:
+        """Simulated time, s."""
+        return self._ticks()[0] * self._mission.period
+
+    def joints(self) -> Array:
+        """Return the reference (3, n) of the joints at this time."""
+        joints: Array = self._mission.chunk(self._ticks()[0], 1).joints[0]
+        return joints
 
     def take(self) -> None:
         """Follow the trajectory that has come last, if any."""
         while (data := self._subscription.take()) is not None:
             try:
-                piece = self._followed(data)
-            except (InputError, MessageError) as error:
-                self.counts["trajectories refused"] += 1
-                self._node.log(f"refused a trajectory on /joint_trajectory: {error}")
-                continue
-            self.counts["trajectories accepted"] += 1
-            self._tell(piece)
+                self.follow(decode(data, topics.JOINT_TRAJECTORY.type))
+            except MessageError as error:
+                self._refuse(str(error))
+            except InputError:
+                pass  # is in the log
 
-    def _followed(self, data: bytes) -> Piece:
-        """Follow a serialized trajectory_msgs/JointTrajectory; return its plan."""
+    def follow(self, trajectory: Any) -> None:
+        """Follow a trajectory_msgs/JointTrajectory.
+
+        Raises:
+            InputError: it is wrong; the mission is as it was.
+        """
         from .live import TrajectoryPoint  # slow to import, and most flights need none
 
-        message = decode(data, topics.JOINT_TRAJECTORY.type)
         points = [
             TrajectoryPoint(
                 p.time_from_start.sec + 1e-9 * p.time_from_start.nanosec,
@@ -63,25 +98,42 @@ class MissionChanges:
                 list(p.velocities),
                 list(p.accelerations),
             )
-            for p in message.points
+            for p in trajectory.points
         ]
-        return self._mission.follow(self._next_tick(), list(message.joint_names), points)
+        try:
+            names = list(trajectory.joint_names)
+            self._change(self._mission.follow(self._ticks()[1], names, points))
+        except InputError as error:
+            self._refuse(str(error))
+            raise
+        self.counts["trajectories accepted"] += 1
+
+    def stop(self) -> None:
+        """Bring the reference to rest."""
+        self._change(self._mission.go_to(self._ticks()[1], "{hold: 1}"))
 
     def close(self) -> None:
-        """End the subscription, and accept no parameter."""
+        """End the subscription and the action, and accept no parameter."""
+        if self._action:
+            self._action.close()
         self._node.remove_on_set_parameters_callback(self._on_set)
         self._subscription.close()
 
     def _on_set(self, parameters: list[Any]) -> SetParametersResult:
         for parameter in parameters:
-            if parameter.name != NAME or parameter.value in ("", self._last):
+            if parameter.name != NAME or parameter.value in ("", self._last_text):
                 continue  # a call may be repeated if its answer was lost
             try:
-                self._tell(self._mission.go_to(self._next_tick(), parameter.value))
-                self._last = parameter.value
+                self._change(self._mission.go_to(self._ticks()[1], parameter.value))
+                self._last_text = parameter.value
             except InputError as error:
                 return SetParametersResult(successful=False, reason=str(error))
         return SetParametersResult(successful=True)
 
-    def _tell(self, piece: Piece) -> None:
+    def _change(self, piece: Piece) -> None:
+        self.latest = piece
         self._node.log(f"{piece.motion} from t = {piece.begin:.4f} s to {piece.end:.4f} s")
+
+    def _refuse(self, reason: str) -> None:
+        self.counts["trajectories refused"] += 1
+        self._node.log(f"refused a trajectory: {reason}")

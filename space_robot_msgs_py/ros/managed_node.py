@@ -204,6 +204,7 @@ class ManagedNode(LifecycleNode, Generic[Schema]):
 
     def on_error(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Finalize the node after an unexpected error in a transition."""
+        self.is_shut_down = True
         return TransitionCallbackReturn.FAILURE
 
     def _foreign_publishers(self) -> str:

@@ -1,0 +1,165 @@
+"""The action follow_joint_trajectory on a flight's graph, with control_msgs built here."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import ros_interfaces
+from flights import COMMAND, ros_environment, space_robot_here, wait_for_nodes
+
+from space_robot_model.robot.find import find_robot
+from space_robot_msgs_py.bag.reader import read_flight
+from space_robot_msgs_py.ros.process_environment import set_defaults
+
+set_defaults()
+pytest.importorskip("rclpy")
+if not ros_interfaces.has_compilers():
+    pytest.skip("no gcc and g++ here", allow_module_level=True)
+
+from action_msgs.msg import GoalStatus  # noqa: E402
+from rclpy.action import ActionClient  # noqa: E402
+from rclpy.executors import SingleThreadedExecutor  # noqa: E402
+from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint  # noqa: E402
+
+from space_robot.flight.graph.temporary_node import TemporaryNode  # noqa: E402
+
+TIMEOUT_S = 60.0
+NAMES = find_robot("paper").joint_names
+HOME = np.radians([0.0, 120.0, 220.0, 0.0, -10.0, 0.0])
+GOAL = np.radians([2.0, 118.0, 221.0, -2.0, -12.0, 1.0])
+
+
+@pytest.fixture(scope="module")
+def control_msgs(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
+    """The folder with the package, which is on Python's path."""
+    folder = tmp_path_factory.mktemp("interfaces")
+    ros_interfaces.build(
+        "control_msgs",
+        ["builtin_interfaces", "geometry_msgs", "std_msgs", "trajectory_msgs"],
+        folder,
+    )
+    sys.path.insert(0, str(folder))
+    yield folder
+    sys.path.remove(str(folder))
+    for name in [name for name in sys.modules if name.split(".")[0] == "control_msgs"]:
+        del sys.modules[name]
+
+
+class Client:
+    """A client of the action, in the flight's domain."""
+
+    def __init__(self, domain: int) -> None:
+        from control_msgs.action import FollowJointTrajectory
+
+        self.action = FollowJointTrajectory
+        self.node = TemporaryNode("moveit", domain)
+        self.executor = SingleThreadedExecutor(context=self.node.node.context)
+        self.executor.add_node(self.node.node)
+        self.client = ActionClient(
+            self.node.node, FollowJointTrajectory, "/mission_node/follow_joint_trajectory"
+        )
+        self.feedback: list[Any] = []
+
+    def send(self, seconds: int, goal: np.ndarray | None = None, **settings: Any) -> Any:
+        """Send a goal; return its handle."""
+        point = JointTrajectoryPoint(positions=(GOAL if goal is None else goal).tolist())
+        point.time_from_start.sec = seconds
+        trajectory = JointTrajectory(joint_names=list(NAMES), points=[point])
+        request = self.action.Goal(trajectory=trajectory, **settings)
+        return self.answer(self.client.send_goal_async(request, self.feedback.append))
+
+    def end(self, goal: Any) -> tuple[int, str]:
+        """Return status and text of a goal's end."""
+        answer = self.answer(goal.get_result_async())
+        return answer.status, answer.result.error_string
+
+    def answer(self, future: Any) -> Any:
+        """Wait for an answer."""
+        until(lambda: self.spin() or future.done())
+        return future.result()
+
+    def spin(self) -> None:
+        """Receive what has come."""
+        self.executor.spin_once(timeout_sec=0.05)
+
+
+def until(is_done: Callable[[], bool]) -> None:
+    end = time.monotonic() + TIMEOUT_S
+    while not is_done():
+        assert time.monotonic() < end
+        time.sleep(0.01)
+
+
+def sim(domain: int, *words: str) -> int:
+    return space_robot_here("sim", *words, "--domain", str(domain)).returncode
+
+
+@pytest.fixture
+def flight(control_msgs: Path, free_domain: int, tmp_path: Path) -> Iterator[subprocess.Popen[str]]:
+    """A paused flight of 6 s, some ticks after its start."""
+    paths = [str(control_msgs), os.environ.get("PYTHONPATH", "")]
+    options = ["--duration", "6", "--domain", str(free_domain), "--bag", str(tmp_path / "bag")]
+    with subprocess.Popen(
+        [*COMMAND, "fly", "--paused", *options],
+        env={**ros_environment(), "PYTHONPATH": os.pathsep.join(filter(None, paths))},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+    ) as process:
+        try:
+            wait_for_nodes(free_domain)
+            until(lambda: sim(free_domain, "step", "--ticks", "500") == 0)
+            yield process
+        finally:
+            if process.poll() is None:
+                process.send_signal(signal.SIGINT)
+
+
+def test_goals_are_followed_superseded_and_cancelled(
+    flight: subprocess.Popen[str], free_domain: int, tmp_path: Path
+) -> None:
+    client = Client(free_domain)
+    try:
+        from control_msgs.msg import JointTolerance
+
+        assert client.client.wait_for_server(timeout_sec=TIMEOUT_S)
+        tolerance = JointTolerance(name=NAMES[0], position=0.1)
+        assert not client.send(1, goal_tolerance=[tolerance]).accepted
+        assert not client.send(0).accepted
+
+        followed = client.send(1)
+        assert followed.accepted
+        until(lambda: client.spin() or bool(client.feedback))
+        desired = client.feedback[-1].feedback
+        assert desired.joint_names == list(NAMES)
+        assert len(desired.desired.positions) == len(NAMES)
+        assert sim(free_domain, "step", "--ticks", "3500") == 0
+        assert client.end(followed) == (GoalStatus.STATUS_SUCCEEDED, "")
+
+        superseded, cancelled = client.send(2, HOME), client.send(4, GOAL + 0.1)
+        expected = (GoalStatus.STATUS_ABORTED, "another motion took its place")
+        assert client.end(superseded) == expected
+        assert sim(free_domain, "step", "--ticks", "1500") == 0
+        client.answer(cancelled.cancel_goal_async())
+        expected = (GoalStatus.STATUS_CANCELED, "the reference is brought to rest")
+        assert client.end(cancelled) == expected
+    finally:
+        client.node.leave()
+    assert sim(free_domain, "resume") == 0
+    output = flight.communicate(timeout=TIMEOUT_S)[0]
+    assert flight.returncode == 0, output
+    reference = read_flight(tmp_path / "bag").reference_joints
+    assert np.abs(reference[:, 0] - GOAL).max(axis=1).min() < 1e-12
+    assert 1e-3 < np.abs(reference[-1, 0] - GOAL).max() < 0.09
+    np.testing.assert_array_equal(reference[-1, 1], 0.0)
+    assert np.abs(np.diff(reference[:, 1], axis=0)).max() < 1e-3
+    assert space_robot_here("replay", str(tmp_path / "bag")).returncode == 0
