@@ -23,7 +23,6 @@ from pathlib import Path
 import numpy as np
 import rclpy
 from rclpy.context import Context
-from rclpy.duration import Duration
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
 from space_robot import load_bag
@@ -42,10 +41,10 @@ def send_trajectory() -> None:
     publisher = node.create_publisher(JointTrajectory, "joint_trajectory", 1)
     while not publisher.get_subscription_count():
         time.sleep(0.05)
-    in_time = Duration(seconds=1).to_msg()
-    point = JointTrajectoryPoint(positions=GOAL.tolist(), time_from_start=in_time)
+    point = JointTrajectoryPoint(positions=GOAL.tolist())
+    point.time_from_start.sec = 1
     publisher.publish(JointTrajectory(joint_names=NAMES, points=[point]))
-    publisher.wait_for_all_acked(Duration(seconds=10))
+    publisher.wait_for_all_acked()
     context.shutdown()
 
 

@@ -102,8 +102,8 @@ class TrajectoryAction:
 
     def _accept(self, request: Any) -> GoalResponse:
         """Check a goal and follow it; the action has no field for a reason."""
-        if given := [name for name in TOLERANCES if getattr(request, name)]:
-            self._node.log(f"refused a goal: {given[0]} is not checked here, leave it empty")
+        if tolerances := [name for name in TOLERANCES if getattr(request, name)]:
+            self._node.log(f"refused a goal: {tolerances[0]} is not checked here, leave it empty")
             return GoalResponse.REJECT
         if request.multi_dof_trajectory.joint_names:
             self._node.log("refused a goal: multi_dof_trajectory is not for this robot")
