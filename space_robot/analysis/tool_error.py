@@ -2,9 +2,9 @@
 
 The wanted path follows from the reference: with zero momentum the robot's centre of mass does not
 move, so attitude and joints give the pose of the tool by the masses that the flight software
-assumes. The true pose follows from the base's true position
-and attitude and the true joints. So it includes what the flight software does not know: a payload,
-and momentum that something else has brought in.
+assumes. The true pose follows from the base's true position and attitude and the true joints. So it
+includes what the flight software does not know: a payload, and momentum that something else has
+brought in.
 """
 
 from __future__ import annotations
@@ -12,16 +12,25 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from space_robot_control.guidance.mission import Mission, MissionSettings
 from space_robot_model.robot import Robot
 from space_robot_model.robot.momentum import Motion, robot_momentum
 from space_robot_model.robot.tool import tool_pose
 from space_robot_msgs_py.bag.blocks import Metric
 from space_robot_msgs_py.bag.flight_log import FlightLog
+from space_robot_msgs_py.config.validation import validate
+from space_robot_msgs_py.errors import InputError
 
+from .described import assumed_robot_of
 from .metrics import AxisMaximum, AxisRms
+from .plot_series import tick_times
 from .pointing import rotation_angle
 
 Array = NDArray[np.float64]
+
+CHANGED = 1e-9
+"""Difference of a reference from that of its mission, rad, m or 1, that has another cause than
+rounding."""
 
 
 class ToolPath:
@@ -91,11 +100,40 @@ class ToolError(Metric):
 
 
 def leads_tool(log: FlightLog) -> bool:
-    """Return whether a bag tells that its mission has segments, not waypoints only."""
+    """Return whether the mission of a bag has segments, or was changed in flight.
+
+    A mission of waypoints only does not lead the tool; the bag tells whether it was flown as
+    planned.
+    """
     scenario = log.flight.get("scenario")
-    mission = scenario.get("mission") if isinstance(scenario, dict) else None
-    segments = mission.get("segments") if isinstance(mission, dict) else None
-    return isinstance(segments, list) and any(str(text).strip() for text in segments)
+    planned = scenario.get("mission") if isinstance(scenario, dict) else None
+    if not isinstance(planned, dict) or not log.ticks:
+        return False
+    try:
+        own = {key: planned[key] for key in MissionSettings.model_fields if key in planned}
+        settings = validate(MissionSettings, own, "mission of the bag")
+        if any(text.strip() for text in settings.segments):
+            return True
+        period, last = log.timebase.period, float(tick_times(log)[-1])
+        reference = Mission(assumed_robot_of(log), settings, period).chunk(round(last / period), 1)
+    except InputError:
+        return False
+    away = np.abs(log.reference_joints[-1, 0] - reference.joints[0, 0])
+    turned = np.abs(log.reference_base[-1, :4] - reference.base[0, :4])
+    return bool(max(away.max(), turned.max()) > CHANGED)
+
+
+def wanted_poses(log: FlightLog) -> tuple[Array, Array] | None:
+    """Return orientations (N, 3, 3) and positions (N, 3), m, that the tool was led through.
+
+    None: see `leads_tool`, or the bag does not tell the robot.
+    """
+    if not leads_tool(log):
+        return None
+    try:
+        return ToolPath(log, assumed_robot_of(log)).poses(log)
+    except InputError:
+        return None
 
 
 def _unit(quaternion: Array) -> Array:

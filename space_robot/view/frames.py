@@ -16,6 +16,7 @@ from space_robot_msgs_py.errors import InputError
 
 from ..analysis.attitude_drift import controls_base
 from ..analysis.plot_series import tick_times
+from ..analysis.tool_error import wanted_poses
 
 Array = NDArray[np.float64]
 
@@ -44,7 +45,8 @@ class Frames:
     tools: dict[str, Array]
     """(K, 3) position of each tool, m, inertial frame."""
     desired: Array | None
-    """(K, 3) desired position of the first tool, for the true base position, m; or None."""
+    """(K, 3) desired position of the first tool, m, inertial frame; or None. For a mission of
+    waypoints it is that for the true base position."""
 
     @classmethod
     def of(cls, log: FlightLog, robot: Robot, times: Array) -> Frames:
@@ -111,6 +113,8 @@ def shown_times(logs: Sequence[FlightLog], rate: float) -> Array:
 
 def _desired(log: FlightLog, robot: Robot, rows: NDArray[np.intp]) -> Array | None:
     """Return the first tool's desired positions, (K, 3) m, with passive joints at rest."""
+    if (poses := wanted_poses(log)) is not None:
+        return poses[1][rows]
     if not controls_base(log):
         return None
     reference, joints = log.reference_base[rows, :4], log.reference_joints[rows, 0]

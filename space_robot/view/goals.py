@@ -8,10 +8,8 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from space_robot_msgs_py.bag.flight_log import FlightLog
-from space_robot_msgs_py.errors import InputError
 
-from ..analysis.described import assumed_robot_of
-from ..analysis.tool_error import ToolPath, leads_tool
+from ..analysis.tool_error import wanted_poses
 from ..analysis.waypoints import waypoint_ticks
 
 if TYPE_CHECKING:
@@ -30,16 +28,11 @@ def goals(scene: SceneApi, root: str, log: FlightLog, size: float) -> None:
         log: the flight.
         size: length of the axes, m.
     """
-    if not leads_tool(log):
-        return
-    try:
-        path = ToolPath(log, assumed_robot_of(log))
-    except InputError:  # the bag does not tell the robot
-        return
+    poses = wanted_poses(log)
     rows = waypoint_ticks(log)[:MOST]
-    if not len(rows):
+    if poses is None or not len(rows):
         return
-    orientations, positions = path.poses(log)
+    orientations, positions = poses
     turns = Rotation.from_matrix(orientations[rows]).as_quat()
     for number, (position, turn) in enumerate(zip(positions[rows], turns, strict=True)):
         scene.add_frame(

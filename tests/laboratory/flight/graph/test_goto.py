@@ -23,6 +23,7 @@ from space_robot_msgs_py.ros.process_environment import set_defaults
 set_defaults()
 pytest.importorskip("rclpy")
 
+from space_robot.analysis.tool_error import leads_tool  # noqa: E402
 from space_robot.flight.graph.temporary_node import TemporaryNode  # noqa: E402
 from space_robot_msgs_py.ros.endpoints import message_type, qos  # noqa: E402
 
@@ -87,6 +88,7 @@ def test_goto_moves_joints_and_base(free_domain: int, tmp_path: Path) -> None:
         log = flown(process, free_domain, bag)
     robot = find_robot("paper")
     np.testing.assert_allclose(robot.to_degrees(log.reference_joints[-1, 0]), goal, atol=1e-9)
+    assert leads_tool(log)
     assert log.reference_base[-1, 3] == pytest.approx(np.sin(np.radians(0.25)), rel=1e-12)
     replay = space_robot_here("replay", str(bag), "--json")
     assert replay.returncode == 0, replay.stderr
