@@ -20,6 +20,8 @@ from space_robot_model.robot import Robot
 from space_robot_msgs_py.config.directory import config_directory
 from space_robot_msgs_py.errors import InputError
 
+from .joint_margins import joint_margins
+
 Array = NDArray[np.float64]
 
 POSTURES = 51
@@ -129,12 +131,13 @@ def _share(asked: Array, limit: Array) -> float:
 
 
 def plan_report(robot: Robot, segments: list[PlannedSegment]) -> dict[str, Any]:
-    """Return the plan as numbers and texts: segments, largest demands, feasible actuators."""
+    """Return the plan as numbers and texts: segments, demands, limits, actuators."""
     return {
         "duration_s": segments[-1].piece.end,
         "base_torque": max(segment.base_torque for segment in segments),
         "momentum": max(segment.momentum for segment in segments),
         "segments": [_row(robot, number, s) for number, s in enumerate(segments, 1)],
+        "joints": joint_margins(robot, [segment.demand for segment in segments]),
         "actuators": [judged._asdict() for judged in feasibility(robot, segments)],
     }
 

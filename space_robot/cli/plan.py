@@ -41,12 +41,14 @@ def plan(
     """Plan a mission without flying it: duration, tool, torque and momentum of the base.
 
     MISSION is a name of config/missions or a path; without it, the robot's own. Demands are those
-    of the nominal robot without friction, with zero momentum at the start.
+    of the nominal robot without friction, with zero momentum at the start. σ is the smallest
+    singular value of the tool's Jacobian, with the base's attitude held and with a free base: near
+    zero the posture is singular.
 
     \b
     Examples:
       space-robot plan
-      space-robot plan line.yaml --figure line.png
+      space-robot plan line.yaml --figure line
       space-robot plan line.yaml --base-torque 0.5 --out slow.yaml
       space-robot plan --robot seven_joint --json
     """

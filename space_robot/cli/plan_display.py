@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 from rich.console import Console
@@ -13,13 +13,12 @@ from ..console.terminal_tables import print_table
 
 SEGMENTS = (
     Column("segment", is_label=True),
-    Column("begin", "s", ".2f"),
-    Column("length", "s", ".2f"),
+    Column("end", "s", ".2f"),
     Column("tool", "m", ".3f"),
     Column("torque", "N m", ".3g"),
     Column("momentum", "N m s", ".3g"),
-    Column("singular", "", ".2g"),
-    Column("base free", "", ".2g"),
+    Column("σ held", "", ".2g"),
+    Column("σ free", "", ".2g"),
 )
 ACTUATORS = (
     Column("actuators", is_label=True),
@@ -34,8 +33,7 @@ def print_plan(report: Mapping[str, Any], console: Console) -> None:
     rows = [
         (
             f"{s['segment']} {s['motion']}",
-            s["begin_s"],
-            s["duration_s"],
+            s["begin_s"] + s["duration_s"],
             s["tool_travel_m"],
             s["base_torque"],
             s["momentum"],
@@ -60,6 +58,8 @@ def print_plan(report: Mapping[str, Any], console: Console) -> None:
         f"{report['duration_s']:.2f} s; largest base torque {report['base_torque']:.3g} N m, "
         f"largest momentum {report['momentum']:.3g} N m s",
     )
+    if margins := report["joints"]:
+        say(console, f"joints nearest to their limits: {', '.join(_margins(margins))}")
     for key, words in (("before", "before"), ("lightened", "in the same time, with lighter paths")):
         if other := report.get(key):
             say(
@@ -67,6 +67,12 @@ def print_plan(report: Mapping[str, Any], console: Console) -> None:
                 f"{words}: {other['duration_s']:.2f} s, {other['base_torque']:.3g} N m, "
                 f"{other['momentum']:.3g} N m s",
             )
+
+
+def _margins(margins: Mapping[str, Mapping[str, Any]]) -> Iterator[str]:
+    for kind, margin in margins.items():
+        where = f"{margin['joint']} at {margin['time_s']:.2f} s"
+        yield f"{kind} {100.0 * margin['share']:.0f} % ({where})"
 
 
 def _tone(is_good: bool) -> str:

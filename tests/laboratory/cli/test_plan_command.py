@@ -6,11 +6,15 @@ import json
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 import yaml
 from click.testing import CliRunner, Result
 
 from space_robot.cli.main import cli
+from space_robot_control.guidance.mission import Mission
+from space_robot_control.guidance.settings import MissionNodeSettings
+from space_robot_model.robot.find import find_robot
 from space_robot_msgs_py.errors import InputError
 
 MISSION: dict[str, Any] = {
@@ -47,6 +51,27 @@ def test_the_papers_mission_asks_for_what_is_known_of_it() -> None:
     assert numbers["momentum"] == pytest.approx(11.3, abs=0.05)
     assert [s["motion"] for s in numbers["segments"]] == ["joints", "joints"]
     assert {a["actuators"]: a["is_feasible"] for a in numbers["actuators"]}["wheels"]
+
+
+def test_the_joints_nearest_to_their_limits() -> None:
+    assert report()["joints"] == {}
+    margins = report("--robot", "dual_arm")["joints"]
+    robot = find_robot("dual_arm")
+    sampled = Mission(robot, MissionNodeSettings.resolve({"robot": "dual_arm"}), 0.01).chunk(
+        0, 3001
+    )
+    rates = np.abs(sampled.joints[:, 1]) / [limits.velocity for limits in robot.limits]
+    k, joint = np.unravel_index(rates.argmax(), rates.shape)
+    assert margins["velocity"]["joint"] == robot.joint_names[joint]
+    assert margins["velocity"]["time_s"] == pytest.approx(0.01 * k)
+    assert margins["velocity"]["share"] == pytest.approx(rates[k, joint], rel=1e-6)
+    lower, upper = (
+        np.array([getattr(x, name) for x in robot.limits]) for name in ("lower", "upper")
+    )
+    ranges = np.abs(2.0 * sampled.joints[:, 0] - lower - upper) / (upper - lower)
+    assert margins["position"]["share"] == pytest.approx(ranges.max(), rel=1e-9)
+    assert 0.0 < margins["effort"]["share"] < 1.0
+    assert "joints nearest to their limits: position " in run("--robot", "dual_arm").stdout
 
 
 def test_segments_of_a_document(mission: Path) -> None:
