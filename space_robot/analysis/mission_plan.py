@@ -15,7 +15,7 @@ from space_robot_control.guidance.mission import Mission
 from space_robot_control.guidance.tool_path import ToolFollower
 from space_robot_model.elementary.least_squares import singular_values
 from space_robot_model.hardware.base_actuators import BaseActuatorSettings
-from space_robot_model.hardware.capability import largest_momentum, largest_torque
+from space_robot_model.hardware.capability import limits_of, shares_of
 from space_robot_model.robot import Robot
 from space_robot_msgs_py.config.directory import config_directory
 from space_robot_msgs_py.errors import InputError
@@ -116,18 +116,11 @@ def feasibility(robot: Robot, segments: list[PlannedSegment]) -> list[Feasibilit
 def _judged(
     name: str, hardware: BaseActuatorSettings, torque: Array, momentum: Array
 ) -> Feasibility:
-    share = _share(torque, largest_torque(hardware))
-    held = 0.0
-    if hardware.wheel_count and not hardware.thruster_count:
-        held = _share(momentum, largest_momentum(hardware.wheels))
-    return Feasibility(name, share <= 1.0 and held <= 1.0, share, held)
-
-
-def _share(asked: Array, limit: Array) -> float:
-    largest = np.max(np.abs(asked), axis=0)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        shares = np.where(largest == 0.0, 0.0, largest / limit)
-    return float(np.max(shares))
+    of_torque, of_momentum = (
+        float(shares_of(limit, asked).max())
+        for limit, asked in zip(limits_of(hardware), (torque, momentum), strict=True)
+    )
+    return Feasibility(name, max(of_torque, of_momentum) <= 1.0, of_torque, of_momentum)
 
 
 def plan_report(robot: Robot, segments: list[PlannedSegment]) -> dict[str, Any]:

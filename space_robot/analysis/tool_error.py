@@ -28,6 +28,8 @@ from .pointing import rotation_angle
 
 Array = NDArray[np.float64]
 
+Poses = tuple[Array, Array]
+"""Orientations (N, 3, 3) and positions (N, 3), m, inertial axes."""
 CHANGED = 1e-9
 """Difference of a reference from that of its mission, rad, m or 1, that has another cause than
 rounding."""
@@ -46,8 +48,8 @@ class ToolPath:
         self._robot = assumed.nominal
         self._origin = log.base_position[:1] + self._centre(log.rows(0, 1))
 
-    def poses(self, log: FlightLog) -> tuple[Array, Array]:
-        """Return orientations (N, 3, 3) and positions (N, 3), m, that are wanted."""
+    def poses(self, log: FlightLog) -> Poses:
+        """Return the poses that are wanted."""
         quaternion = _unit(log.reference_base[:, :4])
         orientation, place = tool_pose(self._robot, quaternion, log.reference_joints[:, 0])
         return orientation, self._origin + place - self._centre(log)
@@ -112,7 +114,7 @@ def leads_tool(log: FlightLog) -> bool:
     try:
         own = {key: planned[key] for key in MissionSettings.model_fields if key in planned}
         settings = validate(MissionSettings, own, "mission of the bag")
-        if any(text.strip() for text in settings.segments):
+        if settings.has_segments:
             return True
         period, last = log.timebase.period, float(tick_times(log)[-1])
         reference = Mission(assumed_robot_of(log), settings, period).chunk(round(last / period), 1)
@@ -123,8 +125,8 @@ def leads_tool(log: FlightLog) -> bool:
     return bool(max(away.max(), turned.max()) > CHANGED)
 
 
-def wanted_poses(log: FlightLog) -> tuple[Array, Array] | None:
-    """Return orientations (N, 3, 3) and positions (N, 3), m, that the tool was led through.
+def wanted_poses(log: FlightLog) -> Poses | None:
+    """Return the poses that the tool was led through.
 
     None: see `leads_tool`, or the bag does not tell the robot.
     """

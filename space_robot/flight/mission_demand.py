@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from space_robot_control.guidance.demand import demand
-from space_robot_model.hardware.capability import largest_momentum, largest_torque
+from space_robot_model.hardware.capability import limits_of, shares_of
 from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.topics import BASE_AXES
 
@@ -25,12 +25,10 @@ def check_mission_demand(scenario: ResolvedScenario) -> None:
         InputError: a torque or momentum is too large; names segment, axis, time and amounts.
     """
     mission, hardware = scenario.mission, scenario.assumed_actuators
-    is_checked = mission.limits.check_actuators and any(map(str.strip, mission.segments))
+    is_checked = mission.limits.check_actuators and mission.has_segments
     if not is_checked or hardware.base_actuation != "hardware":
         return
-    torque = largest_torque(hardware)
-    has_only_wheels = hardware.wheel_count and not hardware.thruster_count
-    momentum = largest_momentum(hardware.wheels) if has_only_wheels else np.full(3, np.inf)
+    torque, momentum = limits_of(hardware)
     robot = scenario.robots.controller.nominal
     for number, piece in enumerate(scenario.reference.pieces, 1):
         asked = demand(robot, piece.joints, piece.base, piece.begin, piece.end)
@@ -40,8 +38,7 @@ def check_mission_demand(scenario: ResolvedScenario) -> None:
 
 
 def _check(name: str, time: Array, asked: Array, limit: Array, unit: str) -> None:
-    with np.errstate(divide="ignore", invalid="ignore"):
-        shares = np.where(asked == 0.0, 0.0, np.abs(asked) / limit)
+    shares = shares_of(limit, asked)
     k, axis = np.unravel_index(int(np.argmax(shares)), shares.shape)
     if shares[k, axis] > 1.0:
         raise InputError(

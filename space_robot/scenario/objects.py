@@ -58,9 +58,6 @@ def _settings(schema: type[StrictModel], more: tuple[str, ...] = ()) -> Callable
         if not isinstance(value, (Mapping, BaseModel)):
             return _name(value, f"{schema.__name__} (an object or a mapping)")
         tree = nest(_plain(value))
-        if schema is MissionSettings and "start" in tree:
-            document_settings(tree, "mission")
-            return tree
         if isinstance(value, BaseModel):  # one of more, as the plant's settings, holds these
             tree = {key: tree[key] for key in (*schema.model_fields, *more) if key in tree}
         own = {key: inner for key, inner in tree.items() if key not in more}
@@ -68,6 +65,15 @@ def _settings(schema: type[StrictModel], more: tuple[str, ...] = ()) -> Callable
         return tree
 
     return check
+
+
+def _mission(value: Any) -> str | Tree:
+    """Accept a name, settings of a mission, or the content of its document."""
+    if isinstance(value, Mapping) and "start" in (tree := nest(_plain(value))):
+        document_settings(tree, "mission")
+        return tree
+    checked: str | Tree = _settings(MissionSettings, OF_PLANT)(value)
+    return checked
 
 
 def _robot(value: Any) -> str | Robot | Tree:
@@ -111,7 +117,7 @@ def _listed(gains: Tree) -> Tree:
 RobotGiven = Annotated[Any, PlainValidator(_robot)]
 LawGiven = Annotated[Any, PlainValidator(_law)]
 Gains = Annotated[Any, PlainValidator(_gains)]
-MissionGiven = Annotated[Any, PlainValidator(_settings(MissionSettings, OF_PLANT))]
+MissionGiven = Annotated[Any, PlainValidator(_mission)]
 Case = Annotated[Any, PlainValidator(_settings(EnvironmentSettings))]
 Sensors = Annotated[Any, PlainValidator(_settings(SensorSettings))]
 Actuators = Annotated[Any, PlainValidator(_settings(ActuatorSettings))]

@@ -18,6 +18,7 @@ from space_robot_sim.environment.events import Capture
 from space_robot_sim.environment.grasp import Grasp
 
 from ..analysis.described import events_of
+from ..analysis.tool_error import wanted_poses
 from .frames import Frames
 from .free_body import FreeBody, before_capture
 from .goals import goals
@@ -176,7 +177,11 @@ def add_flights(
     Raises:
         InputError: a flight has no state.
     """
-    frames = [Frames.of(flight.log, flight.robot, times) for flight in flights]
+    wanted = [wanted_poses(flight.log) for flight in flights]
+    frames = [
+        Frames.of(flight.log, flight.robot, times, poses and poses[1])
+        for flight, poses in zip(flights, wanted, strict=True)
+    ]
     seen = [_seen(flight.robot, of) for flight, of in zip(flights, frames, strict=True)]
     places = _places(seen) if side_by_side else [np.zeros(3)] * len(flights)
     scene = server.scene
@@ -192,7 +197,8 @@ def add_flights(
         robot = RobotScene(scene, root, flight.robot, look)
         moves.append(_moving(robot, of))
         moves += trails(scene, root, of, rgb(flight.colour), 0.0035 * size)
-        goals(scene, root, flight.log, 0.04 * size)
+        if (poses := wanted[index]) is not None:
+            goals(scene, root, flight.log, poses, 0.04 * size)
         moves += targets(scene, root, robot, flight.log, flight.robot, times)
     return moves
 

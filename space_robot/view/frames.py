@@ -16,7 +16,6 @@ from space_robot_msgs_py.errors import InputError
 
 from ..analysis.attitude_drift import controls_base
 from ..analysis.plot_series import tick_times
-from ..analysis.tool_error import wanted_poses
 
 Array = NDArray[np.float64]
 
@@ -49,13 +48,15 @@ class Frames:
     waypoints it is that for the true base position."""
 
     @classmethod
-    def of(cls, log: FlightLog, robot: Robot, times: Array) -> Frames:
+    def of(cls, log: FlightLog, robot: Robot, times: Array, wanted: Array | None = None) -> Frames:
         """Sample a flight; between ticks, and after its end, the last state is held.
 
         Args:
             log: the flight, with true states.
             robot: that flew.
             times: (K,) s.
+            wanted: (N, 3) m, places of the first tool that the mission leads it through; None: it
+                does not.
 
         Raises:
             InputError: no tick of the flight has a complete state.
@@ -86,7 +87,7 @@ class Frames:
             angles,
             joints,
             tools,
-            _desired(log, robot, rows),
+            _desired(log, robot, rows) if wanted is None else wanted[rows],
         )
 
     def move_to(self, k: int) -> tuple[Array, Array, list[Transform], int]:
@@ -113,8 +114,6 @@ def shown_times(logs: Sequence[FlightLog], rate: float) -> Array:
 
 def _desired(log: FlightLog, robot: Robot, rows: NDArray[np.intp]) -> Array | None:
     """Return the first tool's desired positions, (K, 3) m, with passive joints at rest."""
-    if (poses := wanted_poses(log)) is not None:
-        return poses[1][rows]
     if not controls_base(log):
         return None
     reference, joints = log.reference_base[rows, :4], log.reference_joints[rows, 0]

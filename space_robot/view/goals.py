@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 
 from space_robot_msgs_py.bag.flight_log import FlightLog
 
-from ..analysis.tool_error import wanted_poses
+from ..analysis.tool_error import Poses
 from ..analysis.waypoints import waypoint_ticks
 
 if TYPE_CHECKING:
@@ -19,20 +19,19 @@ MOST = 50
 """Goals that are drawn of a flight."""
 
 
-def goals(scene: SceneApi, root: str, log: FlightLog, size: float) -> None:
-    """Draw axes at the wanted poses of the first tool; nothing for a mission of waypoints only.
+def goals(scene: SceneApi, root: str, log: FlightLog, wanted: Poses, size: float) -> None:
+    """Draw axes at the wanted poses of the first tool where the mission comes to rest.
 
     Args:
         scene: of a server.
         root: name of the robot in the scene.
         log: the flight.
+        wanted: its poses, see `wanted_poses`.
         size: length of the axes, m.
     """
-    poses = wanted_poses(log)
-    rows = waypoint_ticks(log)[:MOST]
-    if poses is None or not len(rows):
+    rows, (orientations, positions) = waypoint_ticks(log)[:MOST], wanted
+    if not len(rows):
         return
-    orientations, positions = poses
     turns = Rotation.from_matrix(orientations[rows]).as_quat()
     for number, (position, turn) in enumerate(zip(positions[rows], turns, strict=True)):
         scene.add_frame(

@@ -37,7 +37,8 @@ class MotionDemand(NamedTuple):
     @property
     def base_torque(self) -> Array:
         """(K,) N m, the largest component on the base's axes."""
-        return _largest(self.torque[:, :3])
+        largest: Array = np.max(np.abs(self.torque[:, :3]), axis=1)
+        return largest
 
     @property
     def stored_momentum(self) -> Array:
@@ -74,8 +75,3 @@ def demand(
     return MotionDemand(
         time, chunk.joints, chunk.base, torque, robot_momentum(robot, motion).angular
     )
-
-
-def _largest(values: Array) -> Array:
-    largest: Array = np.max(np.abs(values), axis=1)
-    return largest

@@ -29,7 +29,7 @@ def free_attitude(
         begin: s, of the motion.
         times: (K,) s from there to the end, equally far apart.
     """
-    row = [int(robot.model.row[joint]) for joint in range(robot.joint_count)]
+    row = list(robot.model_rows)
     motion = joints.at(begin + with_middles(times))
     positions, rates = np.empty((2, len(motion), len(row)))
     positions[:, row], rates[:, row] = motion[:, 0], motion[:, 1]

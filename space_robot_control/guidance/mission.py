@@ -50,6 +50,11 @@ class MissionSettings(StrictModel):
     )
     limits: MissionLimits = MissionLimits()
 
+    @property
+    def has_segments(self) -> bool:
+        """Whether there are segments, not waypoints only."""
+        return any(text.strip() for text in self.segments)
+
 
 class Mission:
     """The desired motion of joints and base, sampled at ticks.

@@ -11,6 +11,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from space_robot_model.dynamics.free_base import halves
 from space_robot_model.dynamics.model import Model
 from space_robot_model.dynamics.tool_kinematics import ToolKinematics, tool_kinematics_into
 from space_robot_model.elementary.least_squares import least_squares_into
@@ -39,7 +40,7 @@ def reactionless_path(robot: Robot, quaternion: Array, start: Array, goal: Array
         start: (N,) joint positions, rad or m.
         goal: (N,) joint positions to approach.
     """
-    row = [int(robot.model.row[joint]) for joint in range(robot.joint_count)]
+    row = list(robot.model_rows)
     steps, ordered = np.empty((round(END / STEP) + 1, len(start))), np.empty((2, len(start)))
     ordered[:, row] = start, goal
     work = ToolKinematics.allocate(robot.joint_count)
@@ -89,7 +90,7 @@ def integrate_into(
     out[0] = start
     for s in range(1, len(out)):
         for stage in range(4):
-            part = 0.0 if stage == 0 else 0.5 * STEP if stage < 3 else STEP
+            part = 0.5 * STEP * halves(stage)
             for j in range(n):
                 posture[j] = out[s - 1, j]
                 if stage:
@@ -100,7 +101,7 @@ def integrate_into(
                 momentum[k] = 0.0
                 for j in range(n):
                     momentum[k] += work.coupling[k, j] * slopes[stage, j]
-            least_squares_into(work.coupling, momentum, 0.0, scratch, direction)
+            least_squares_into(work.coupling, momentum, scratch, direction)
             for j in range(n):
                 slopes[stage, j] -= direction[j]
         for j in range(n):

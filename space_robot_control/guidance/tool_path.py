@@ -11,7 +11,7 @@ from space_robot_model.dynamics.free_base import FreeBase, follow_free_path_into
 from space_robot_model.dynamics.inverse_kinematics import follow_path_into
 from space_robot_model.dynamics.tool_kinematics import ToolKinematics, tool_kinematics_into
 from space_robot_model.robot import Robot
-from space_robot_model.robot.kinematics import body_row, tool_named
+from space_robot_model.robot.kinematics import mounted_tool
 
 Array = NDArray[np.float64]
 
@@ -40,20 +40,15 @@ class ToolFollower:
         Raises:
             InputError: there is no such tool.
         """
-        frame = tool_named(robot, tool)
-        self._robot, self._body = robot, body_row(robot, frame)
-        self._mounting = np.ascontiguousarray(frame.rotation)
-        self._point = np.ascontiguousarray(frame.position)
+        self._robot, self._mounted = robot, mounted_tool(robot, tool)
         self._work = ToolKinematics.allocate(robot.joint_count)
-        self._rows = [int(robot.model.row[joint]) for joint in range(robot.joint_count)]
+        self._rows = list(robot.model_rows)
 
     def pose(self, quaternion: Array, joints: Array) -> ToolPose:
         """Return the pose of the tool at an attitude (4,) and joint positions (N,)."""
         columns, work = np.empty(len(joints)), self._work
         columns[self._rows] = joints
-        tool_kinematics_into(
-            self._robot.model, quaternion, columns, self._body, self._mounting, self._point, work
-        )
+        tool_kinematics_into(self._robot.model, quaternion, columns, *self._mounted, work)
         return ToolPose(
             work.position.copy(),
             work.position + work.centre_of_mass,
@@ -88,9 +83,7 @@ class ToolFollower:
             positions,
             rotations,
             from_base,
-            self._body,
-            self._mounting,
-            self._point,
+            *self._mounted,
             momentum_weight,
             first,
             self._work,
@@ -121,9 +114,7 @@ class ToolFollower:
             rotations,
             twists,
             spacing,
-            self._body,
-            self._mounting,
-            self._point,
+            *self._mounted,
             FreeBase.allocate(self._robot.joint_count),
             out,
             attitudes,

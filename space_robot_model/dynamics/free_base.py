@@ -39,6 +39,12 @@ class FreeBase(Record):
     tool: ToolKinematics = nested(ToolKinematics)
 
 
+@subroutine
+def halves(stage: int) -> int:
+    """Return how many half steps a stage of Runge and Kutta's method is ahead."""
+    return (stage + 1) // 2
+
+
 @kernel
 def free_attitude_into(
     model: Model, positions: Array, rates: Array, spacing: float, work: FreeBase, out: Array
@@ -56,7 +62,7 @@ def free_attitude_into(
     axes, origin = np.eye(3), np.zeros(3)
     for k in range(1, len(out)):
         for stage in range(4):
-            row = 2 * (k - 1) + (0 if stage == 0 else 1 if stage < 3 else 2)
+            row = 2 * (k - 1) + halves(stage)
             _begin_stage(stage, spacing, out[k - 1], work)
             tool_kinematics_into(model, work.quaternion, positions[row], 0, axes, origin, work.tool)
             for j in range(rates.shape[1]):
@@ -103,8 +109,8 @@ def follow_free_path_into(
     wanted, scratch, largest = np.zeros(rows), np.zeros((6, 7)), 0.0
     for k in range(1, len(joints)):
         for stage in range(4):
-            row = 2 * (k - 1) + (0 if stage == 0 else 1 if stage < 3 else 2)
-            part = 0.0 if stage == 0 else 0.5 * spacing if stage < 3 else spacing
+            row = 2 * (k - 1) + halves(stage)
+            part = 0.5 * spacing * halves(stage)
             for j in range(n):
                 work.joints[j] = joints[k - 1, j]
                 if stage:
@@ -120,7 +126,7 @@ def follow_free_path_into(
                 if stage == 0 and not abs(wanted[i]) <= largest:
                     largest = abs(wanted[i])
                 wanted[i] = twists[row, i] + GAIN * wanted[i]
-            least_squares_into(tool.free[:rows], wanted, 0.0, scratch, work.rates[stage])
+            least_squares_into(tool.free[:rows], wanted, scratch, work.rates[stage])
             _turn(stage, work)
         for j in range(n):
             total = work.rates[0, j] + 2.0 * work.rates[1, j]
@@ -133,7 +139,7 @@ def follow_free_path_into(
 @subroutine
 def _begin_stage(stage: int, spacing: float, before: Array, work: FreeBase) -> None:
     """Fill the attitude of a stage."""
-    part = 0.0 if stage == 0 else 0.5 * spacing if stage < 3 else spacing
+    part = 0.5 * spacing * halves(stage)
     for i in range(4):
         work.quaternion[i] = before[i]
         if stage:

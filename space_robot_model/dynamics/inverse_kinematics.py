@@ -95,7 +95,7 @@ def follow_path_into(
                 break
             jacobian = work.joints if from_base else work.held
             if momentum_weight == 0.0:
-                least_squares_into(jacobian[:rows], error, 0.0, scratch, step)
+                least_squares_into(jacobian[:rows], error, scratch, step)
             else:
                 _momentum_metric(work.coupling, momentum_weight, weight)
                 weighted_least_squares_into(jacobian[:rows], error, weight, scaled, scratch, step)

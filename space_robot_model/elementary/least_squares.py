@@ -20,22 +20,19 @@ RANK_TOLERANCE = 1e-7
 
 
 @kernel
-def least_squares_into(
-    matrix: Array, right: Array, damping: float, work: Array, solution: Array
-) -> None:
-    """Write ``A^T (A A^T + damping^2 E)^-1 b``, the smallest x with ``A x = b``, by Cholesky.
+def least_squares_into(matrix: Array, right: Array, work: Array, solution: Array) -> None:
+    """Write ``A^T (A A^T)^-1 b``, the smallest x with ``A x = b``, by Cholesky.
 
     Args:
         matrix: A (m, n), m at most n.
         right: b (m,).
-        damping: 0 for full rank; above 0 for the damped solution (Nakamura & Hanafusa 1986).
-        work: (m, n) scratch, at least (m, m+1).
-        solution: x (n,). It is not finite if A has not full rank and ``damping`` is 0.
+        work: (m, m+1) scratch.
+        solution: x (n,). It is not finite if A has not full rank.
     """
     m, n = matrix.shape
     for i in range(m):
         for j in range(i + 1):
-            total = damping * damping if i == j else 0.0
+            total = 0.0
             for k in range(n):
                 total += matrix[i, k] * matrix[j, k]
             for k in range(j):
@@ -84,7 +81,7 @@ def weighted_least_squares_into(
             for k in range(i):
                 total -= weight[i, k] * scaled[row, k]
             scaled[row, i] = total / weight[i, i]
-    least_squares_into(scaled, right, 0.0, work, solution)
+    least_squares_into(scaled, right, work, solution)
     for i in range(n - 1, -1, -1):
         total = solution[i]
         for k in range(i + 1, n):

@@ -42,6 +42,23 @@ def largest_momentum(wheels: WheelSettings) -> Array:
     return _largest(wheels.unit_axes.T, -limit, limit)
 
 
+def limits_of(hardware: BaseActuatorSettings) -> tuple[Array, Array]:
+    """(3,) N m and (3,) N m s: the largest torque and momentum about each axis.
+
+    Where thrusters can unload the wheels, momentum has no limit.
+    """
+    momentum = np.full(3, np.inf)
+    if hardware.wheel_count and not hardware.thruster_count:
+        momentum = largest_momentum(hardware.wheels)
+    return largest_torque(hardware), momentum
+
+
+def shares_of(limit: Array, asked: Array) -> Array:
+    """(K, 3) what is ``asked`` (K, 3) about each axis, as shares of a limit (3,), maybe 0."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.where(asked == 0.0, 0.0, np.abs(asked) / limit)
+
+
 def wheel_shares(wheels: WheelSettings) -> Array:
     """(W, 3) what each wheel has of a torque or momentum by least squares of the loads.
 

@@ -27,8 +27,7 @@ Array = NDArray[np.float64]
 
 def generalised_rows(robot: Robot) -> list[int]:
     """Return the index in the algorithms of each of ``[v0, w0, joints]``, see `Model.row`."""
-    row = robot.model.row
-    return [*range(6), *(6 + int(row[joint]) for joint in range(robot.joint_count))]
+    return [*range(6), *(6 + row for row in robot.model_rows)]
 
 
 def mass_matrix(robot: Robot, quaternion_wxyz: ArrayLike, joint_positions: ArrayLike) -> Array:

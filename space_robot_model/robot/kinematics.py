@@ -38,6 +38,10 @@ class ModelledRobot(Protocol):
         """Joints in the order of ``model``."""
 
     @property
+    def model_rows(self) -> tuple[int, ...]:
+        """Row in ``model`` of each joint."""
+
+    @property
     def tools(self) -> tuple[Tool, ...]:
         """All tools."""
 
@@ -94,20 +98,11 @@ def tool_state(
             no such tool.
     """
     check_robot(robot)
-    n, order = robot.joint_count, list(robot.order)
-    frame, model = tool_named(robot, tool), robot.model
-    out = ToolKinematics.allocate(n)
+    n, order, columns = robot.joint_count, list(robot.order), list(robot.model_rows)
+    mounted, out = mounted_tool(robot, tool), ToolKinematics.allocate(n)
     positions = vector(joint_positions, n, "joint_positions")[order]
-    tool_kinematics_into(
-        model,
-        unit_quaternion(quaternion_wxyz),
-        positions,
-        body_row(robot, frame),
-        np.ascontiguousarray(frame.rotation),
-        np.ascontiguousarray(frame.position),
-        out,
-    )
-    columns = [int(model.row[joint]) for joint in range(n)]
+    quaternion = unit_quaternion(quaternion_wxyz)
+    tool_kinematics_into(robot.model, quaternion, positions, *mounted, out)
     return ToolState(
         out.position.copy(),
         out.centre_of_mass.copy(),
@@ -169,20 +164,28 @@ def manipulability(jacobian: Array) -> float:
     return float(np.prod(singular_values(jacobian)))
 
 
-def tool_named(robot: ModelledRobot, name: str | None) -> Tool:
+class MountedTool(NamedTuple):
+    """A tool as the algorithms take it, see `tool_kinematics_into`."""
+
+    body: int
+    mounting: Array
+    point: Array
+
+
+def mounted_tool(robot: ModelledRobot, name: str | None) -> MountedTool:
     """Return a tool of a robot; None: the first.
 
     Raises:
         InputError: there is no tool of that name.
     """
-    if name is None:
-        return robot.tool
-    tools = {tool.name: tool for tool in robot.tools}
-    if name not in tools:
-        raise InputError(f"tool: {name!r}: choose one of {', '.join(tools)}")
-    return tools[name]
-
-
-def body_row(robot: ModelledRobot, tool: Tool) -> int:
-    """Return the number in `Model` of the body that carries a tool."""
-    return int(robot.model.row[tool.body - 1]) + 1 if tool.body else 0
+    tool = robot.tool
+    if name is not None:
+        tools = {tool.name: tool for tool in robot.tools}
+        if name not in tools:
+            raise InputError(f"tool: {name!r}: choose one of {', '.join(tools)}")
+        tool = tools[name]
+    return MountedTool(
+        robot.model_rows[tool.body - 1] + 1 if tool.body else 0,
+        np.ascontiguousarray(tool.rotation),
+        np.ascontiguousarray(tool.position),
+    )

@@ -142,6 +142,11 @@ class Robot(TreeArrays):
             )
         return numbers
 
+    @cached_property
+    def model_rows(self) -> tuple[int, ...]:
+        """Row in `model` of each joint, see `Model.row`."""
+        return tuple(int(row) for row in self.model.row[: self.joint_count])
+
     def tool_jacobian(
         self,
         joint_positions: ArrayLike,

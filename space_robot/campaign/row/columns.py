@@ -39,8 +39,7 @@ class Columns(NamedTuple):
         """Return the columns of a flight before it is flown."""
         robot = flight.robot
         kinds = robot.n + 3, flight.controls_base, tuple(robot.is_prismatic), robot.branches
-        has_path = any(map(str.strip, flight.mission_settings.segments))
-        tool = TOOL if has_path else ()
+        tool = TOOL if flight.mission_settings.has_segments else ()
         return cls(error_columns(*kinds), torque_columns(*kinds), tool)
 
     @classmethod
