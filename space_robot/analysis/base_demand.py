@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from space_robot_model.elementary.matrices import product
+from space_robot_model.elementary.matrices import product, unit_rows
 from space_robot_model.hardware.base_actuators import BaseActuatorSettings
 from space_robot_model.robot.base_axes import base_axes, to_base, to_inertial
 from space_robot_msgs_py.bag.flight_log import FlightLog
@@ -87,5 +87,4 @@ class BaseDemand:
 
 def axes_of(log: FlightLog) -> Array:
     """Return the base's axes on inertial ones, (3, 3, N), see `base_axes`."""
-    quaternion = log.quaternion / np.linalg.norm(log.quaternion, axis=1, keepdims=True)
-    return base_axes(quaternion.T)
+    return base_axes(unit_rows(log.quaternion).T)

@@ -55,8 +55,10 @@ def stretched_mission(
         spans.append(span if factor == 1.0 else float(np.ceil(span * 10**DIGITS) / 10**DIGITS))
     legs = len(settings.waypoint_times) - 1
     times = [0.0, *np.cumsum(spans[:legs]).tolist()]
-    written = [text for text in settings.segments if text.strip()]
-    segments = [_of_duration(text, span) for text, span in zip(written, spans[legs:], strict=True)]
+    segments = [
+        _of_duration(text, span)
+        for text, span in zip(settings.written_segments, spans[legs:], strict=True)
+    ]
     return settings.model_copy(update={"waypoint_times": times, "segments": segments or [""]})
 
 
@@ -105,7 +107,7 @@ def _segments(settings: MissionSettings) -> list[dict[str, Any]]:
     rows = [settings.waypoints_deg[k : k + n] for k in range(0, len(settings.waypoints_deg), n)]
     spans = [round(end - begin, 9) for begin, end in pairwise(settings.waypoint_times)]
     legs = [{"joints_deg": row, "duration": s} for row, s in zip(rows[1:], spans, strict=True)]
-    return [*legs, *(parse_yaml(text) for text in settings.segments if text.strip())]
+    return [*legs, *(parse_yaml(text) for text in settings.written_segments)]
 
 
 def _of_duration(text: str, span: float) -> str:

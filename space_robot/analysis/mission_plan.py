@@ -14,6 +14,7 @@ from space_robot_control.guidance.demand import MotionDemand, demand
 from space_robot_control.guidance.mission import Mission
 from space_robot_control.guidance.tool_path import ToolFollower
 from space_robot_model.elementary.least_squares import singular_values
+from space_robot_model.elementary.matrices import norms
 from space_robot_model.hardware.base_actuators import BaseActuatorSettings
 from space_robot_model.hardware.capability import limits_of, shares_of
 from space_robot_model.robot import Robot
@@ -148,7 +149,7 @@ def _row(robot: Robot, number: int, segment: PlannedSegment) -> dict[str, Any]:
         "joint_rates": dict(zip(robot.joint_names, rates.tolist(), strict=True)),
         "goal_deg": robot.to_degrees(piece.goal).tolist(),
         "attitude": piece.attitude.tolist(),
-        "tool_travel_m": float(np.sum(np.sqrt(np.sum(np.diff(segment.tool, axis=0) ** 2, axis=1)))),
+        "tool_travel_m": float(np.sum(norms(np.diff(segment.tool, axis=0)))),
         "singular_value": segment.singular_value,
         "free_singular_value": segment.free_singular_value,
     }

@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from space_robot_model.elementary.matrices import norm, product
+from space_robot_model.elementary.matrices import norm, product, unit_rows
 from space_robot_model.elementary.sine import sines_cosines
 from space_robot_model.hardware.base_actuators import BaseActuatorSettings
 from space_robot_model.hardware.wheels import WheelSettings
@@ -153,10 +153,7 @@ class _OfOneRobot:
         rows = joined(self._before, log)
         axes, skipped = axes_of(rows), rows.ticks - log.ticks
         motion = Motion(
-            rows.quaternion / np.linalg.norm(rows.quaternion, axis=1, keepdims=True),
-            rows.omega_base,
-            rows.all_positions,
-            rows.all_velocities,
+            unit_rows(rows.quaternion), rows.omega_base, rows.all_positions, rows.all_velocities
         )
         momentum = robot_momentum(self._robot, motion)
         wheels = self._flown.wheels

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from space_robot_model.elementary.arctangent import arctan2
+from space_robot_model.elementary.matrices import unit_rows
 from space_robot_model.robot import Robot
 from space_robot_model.robot.tool import tool_pose
 from space_robot_msgs_py.bag.blocks import Metric
@@ -73,10 +74,10 @@ def pointing_error(log: FlightLog, robot: Robot, start: Array | None = None) -> 
     ``start``: (1, 3) m, where the base was when the flight began (None: at the first tick here).
     """
     start = log.base_position[:1] if start is None else start
-    actual, place = tool_pose(robot, _unit(log.quaternion), log.all_positions)
+    actual, place = tool_pose(robot, unit_rows(log.quaternion), log.all_positions)
     rest = np.broadcast_to([spring.rest for spring in robot.springs], log.passive_positions.shape)
     joints = np.hstack([log.reference_joints[:, 0], rest])
-    desired, wanted = tool_pose(robot, _unit(log.reference_base[:, :4]), joints)
+    desired, wanted = tool_pose(robot, unit_rows(log.reference_base[:, :4]), joints)
     return PointingError(
         boresight=angle_between(actual[:, :, 2], desired[:, :, 2]),
         rotation=rotation_angle(actual, desired),
@@ -101,8 +102,3 @@ def rotation_angle(first: Array, second: Array) -> Array:
     sine = 0.5 * np.linalg.norm(sum(np.cross(b, a) for a, b in axes), axis=1)
     cosine = 0.5 * (sum(np.sum(a * b, axis=1) for a, b in axes) - 1.0)
     return arctan2(sine, cosine)
-
-
-def _unit(quaternion: Array) -> Array:
-    unit: Array = quaternion / np.linalg.norm(quaternion, axis=1, keepdims=True)
-    return unit

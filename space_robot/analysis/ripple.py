@@ -15,6 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from space_robot_model.elementary.matrices import unit_rows
 from space_robot_model.robot import Robot
 from space_robot_model.robot.dynamics import free_inverse_dynamics, inverse_dynamics
 from space_robot_msgs_py.bag.blocks import Metric, blocks_of
@@ -147,8 +148,7 @@ def desired_torque(log: FlightLog, robot: Robot) -> Array:
     Prismatic joints have N; joints without motors are locked.
     """
     references = log.references(log.first_tick, log.first_tick + log.ticks)
-    quaternion = references["quaternion"]
-    quaternion /= np.linalg.norm(quaternion, axis=1, keepdims=True)
+    references["quaternion"] = unit_rows(references["quaternion"])
     return (inverse_dynamics if controls_base(log) else free_inverse_dynamics)(
         robot.nominal, references
     )

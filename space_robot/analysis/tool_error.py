@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from space_robot_control.guidance.mission import Mission, MissionSettings
+from space_robot_model.elementary.matrices import norms, unit_rows
 from space_robot_model.robot import Robot
 from space_robot_model.robot.momentum import Motion, robot_momentum
 from space_robot_model.robot.tool import tool_pose
@@ -50,7 +51,7 @@ class ToolPath:
 
     def poses(self, log: FlightLog) -> Poses:
         """Return the poses that are wanted."""
-        quaternion = _unit(log.reference_base[:, :4])
+        quaternion = unit_rows(log.reference_base[:, :4])
         orientation, place = tool_pose(self._robot, quaternion, log.reference_joints[:, 0])
         return orientation, self._origin + place - self._centre(log)
 
@@ -58,7 +59,7 @@ class ToolPath:
         """Return (N, 3) m, the assumed robot's centre of mass from its base's, in the reference."""
         base, joints = log.reference_base, log.reference_joints[:, 0]
         still = np.zeros((len(base), 3)), np.zeros_like(joints)
-        motion = Motion(_unit(base[:, :4]), still[0], joints, still[1])
+        motion = Motion(unit_rows(base[:, :4]), still[0], joints, still[1])
         return robot_momentum(self._robot, motion).centre_of_mass
 
 
@@ -85,10 +86,9 @@ class ToolError(Metric):
     def errors(self, log: FlightLog) -> Array:
         """Return (N, 2): distance, m, and angle of the one rotation between both frames, rad."""
         desired, wanted = self._path.poses(log)
-        actual, offset = tool_pose(self._robot, _unit(log.quaternion), log.all_positions)
+        actual, offset = tool_pose(self._robot, unit_rows(log.quaternion), log.all_positions)
         away = log.base_position + offset - wanted
-        distance = np.sqrt(sum(away[:, k] * away[:, k] for k in range(3)))
-        return np.column_stack((distance, rotation_angle(actual, desired)))
+        return np.column_stack((norms(away), rotation_angle(actual, desired)))
 
     def result(self) -> dict[str, float]:
         """``rms_m``, ``largest_m``, ``rms_deg`` and ``largest_deg``."""
@@ -136,8 +136,3 @@ def wanted_poses(log: FlightLog) -> Poses | None:
         return ToolPath(log, assumed_robot_of(log)).poses(log)
     except InputError:
         return None
-
-
-def _unit(quaternion: Array) -> Array:
-    unit: Array = quaternion / np.linalg.norm(quaternion, axis=1, keepdims=True)
-    return unit

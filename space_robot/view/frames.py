@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from space_robot_model.elementary.matrices import unit_rows
 from space_robot_model.robot import Robot
 from space_robot_model.robot.tool import tool_pose
 from space_robot_model.robot.transforms import Transform, joint_transforms
@@ -70,7 +71,7 @@ class Frames:
         due = times + 0.5 * log.timebase.period
         at = np.searchsorted(tick_times(log)[known], due, side="right") - 1
         rows = known[np.maximum(at, 0)]
-        position, quaternion = log.base_position[rows], _unit(log.quaternion[rows])
+        position, quaternion = log.base_position[rows], unit_rows(log.quaternion[rows])
         angles = log.all_positions[rows]
         tools = {
             tool.name: position + tool_pose(replace(robot, tools=(tool,)), quaternion, angles)[1]
@@ -122,15 +123,9 @@ def _desired(log: FlightLog, robot: Robot, rows: NDArray[np.intp]) -> Array | No
     )
     if not (np.isfinite(reference).all() and np.isfinite(joints).all()):
         return None
-    return (
-        log.base_position[rows] + tool_pose(robot, _unit(reference), np.hstack([joints, rest]))[1]
-    )
+    _, offset = tool_pose(robot, unit_rows(reference), np.hstack([joints, rest]))
+    return log.base_position[rows] + offset
 
 
 def _rounded(values: Array) -> Array:
     return np.round(values / STEP) * STEP
-
-
-def _unit(quaternion: Array) -> Array:
-    unit: Array = quaternion / np.linalg.norm(quaternion, axis=1, keepdims=True)
-    return unit

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
+from space_robot_model.elementary.matrices import unit_rows
 from space_robot_model.robot import Robot
 from space_robot_model.robot.base_axes import base_axes
 from space_robot_model.robot.frames import body_frames
@@ -76,8 +77,7 @@ class FreeBody(NamedTuple):
             )
             assert solved.sol is not None  # dense output
             quaternions = solved.sol(times).T
-        quaternions /= np.linalg.norm(quaternions, axis=1, keepdims=True)
-        return quaternions[:, [3, 0, 1, 2]]
+        return unit_rows(quaternions)[:, [3, 0, 1, 2]]
 
 
 def before_capture(capture: Capture, log: FlightLog, robot: Robot) -> FreeBody | None:

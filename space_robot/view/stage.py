@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from space_robot_model.elementary.matrices import unit_rows
 from space_robot_model.robot import Robot
 from space_robot_model.robot.base_axes import base_axes
 from space_robot_model.robot.frames import body_frames
@@ -81,8 +82,7 @@ def _surround(scene: SceneApi, middle: Array, size: float, low: Array, dark: boo
         position=low - 0.05 * size,
     )
     scene.add_label("/inertial/length", f"{length:g} m", position=(length, 0.0, 0.0))
-    directions = np.random.default_rng(STAR_SEED).normal(size=(STARS, 3))
-    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+    directions = unit_rows(np.random.default_rng(STAR_SEED).normal(size=(STARS, 3)))
     scene.add_point_cloud(
         "/stars",
         middle + STARS_AT * size * directions,

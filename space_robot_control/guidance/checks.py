@@ -8,12 +8,10 @@ from numpy.typing import NDArray
 from space_robot_model.robot import Robot
 from space_robot_msgs_py.errors import InputError
 
-from .courses import Piece
-from .limits import ROUNDING
+from .courses import Piece, sample_times
+from .limits import ROUNDING, shown_unit
 
 Array = NDArray[np.float64]
-
-SAMPLE_S = 0.01
 
 
 def check_piece(robot: Robot, piece: Piece) -> None:
@@ -22,12 +20,10 @@ def check_piece(robot: Robot, piece: Piece) -> None:
     Raises:
         InputError: naming joint, time, value and limit.
     """
-    span = piece.end - piece.begin
-    time = np.linspace(piece.begin, piece.end, max(101, round(span / SAMPLE_S) + 1))
+    time = sample_times(piece.begin, piece.end)
     rows = piece.joints.at(time)
     for joint, (name, limits) in enumerate(zip(robot.joint_names, robot.limits, strict=True)):
-        is_prismatic = bool(robot.is_prismatic[joint])
-        scale, unit = (1.0, "m") if is_prismatic else (180.0 / np.pi, "degrees")
+        scale, unit = shown_unit(robot, joint)
         position, rate = rows[:, 0, joint], rows[:, 1, joint]
         beyond = np.maximum(limits.lower - position, position - limits.upper)
         if beyond.max() > ROUNDING:

@@ -12,11 +12,13 @@ from typing import NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from space_robot_model.elementary.matrices import norm
+
 Array = NDArray[np.float64]
 
 
 KNOT_S = 0.01
-"""Spacing of the knots of a spline along a path, s."""
+"""Spacing of the knots of a spline along a path, and of the samples of a segment, s."""
 FEWEST_KNOTS = 101
 
 
@@ -57,6 +59,11 @@ def quintic(u: Array) -> tuple[Array, Array, Array]:
 def knots(span: float) -> Array:
     """Return the times (K,) from 0 to ``span``, s, of the knots of a spline along a path."""
     return np.linspace(0.0, span, max(FEWEST_KNOTS, math.ceil(span / KNOT_S) + 1))
+
+
+def sample_times(begin: float, end: float) -> Array:
+    """Return the times (K,), s, at which a planned segment is checked."""
+    return np.linspace(begin, end, max(FEWEST_KNOTS, round((end - begin) / KNOT_S) + 1))
 
 
 class QuinticLeg(NamedTuple):
@@ -177,15 +184,7 @@ def turn_between(first: Array, second: Array) -> tuple[Array, float]:
 
     turn = multiplied(first * np.array([1.0, -1.0, -1.0, -1.0]), second)
     turn = -turn if turn[0] < 0.0 else turn
-    sine = float(np.sqrt(dot_rows(turn[1:], turn[1:])[0]))
+    sine = norm(turn[1:])
     if sine == 0.0:
         return np.array([1.0, 0.0, 0.0]), 0.0
     return turn[1:] / sine, 2.0 * float(arctan2(sine, float(turn[0])))
-
-
-def dot_rows(a: Array, b: Array) -> Array:
-    """Return the dot products (..., 1) of the last axis, summed in order."""
-    total = a[..., 0] * b[..., 0]
-    for k in range(1, a.shape[-1]):
-        total = total + a[..., k] * b[..., k]
-    return total[..., np.newaxis]

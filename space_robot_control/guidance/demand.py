@@ -7,17 +7,16 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from space_robot_model.elementary.matrices import norms
 from space_robot_model.robot import Robot
 from space_robot_model.robot.base_axes import base_axes, to_base
 from space_robot_model.robot.dynamics import inverse_dynamics
 from space_robot_model.robot.momentum import Motion, robot_momentum
 from space_robot_msgs_py.samples import ReferenceChunk
 
-from .courses import Course
+from .courses import Course, sample_times
 
 Array = NDArray[np.float64]
-
-SAMPLE_S = 0.01
 
 
 class MotionDemand(NamedTuple):
@@ -43,9 +42,7 @@ class MotionDemand(NamedTuple):
     @property
     def stored_momentum(self) -> Array:
         """(K,) N m s, length of the momentum."""
-        total = sum(self.momentum[:, k] * self.momentum[:, k] for k in range(3))
-        length: Array = np.sqrt(total)
-        return length
+        return norms(self.momentum)
 
     @property
     def base_momentum(self) -> Array:
@@ -65,10 +62,9 @@ def demand(
         base: of the motion.
         begin: s.
         end: s.
-        samples: number of samples; 0: every `SAMPLE_S`.
+        samples: number of samples; 0: see `sample_times`.
     """
-    count = samples or max(101, round((end - begin) / SAMPLE_S) + 1)
-    time = np.linspace(begin, end, count)
+    time = np.linspace(begin, end, samples) if samples else sample_times(begin, end)
     chunk = ReferenceChunk(0, joints.at(time), base.at(time))
     torque = inverse_dynamics(robot, chunk.references())
     motion = Motion(chunk.base[:, :4], chunk.base[:, 4:7], chunk.joints[:, 0], chunk.joints[:, 1])

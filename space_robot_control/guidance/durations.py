@@ -12,6 +12,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from space_robot_model.elementary.matrices import norms
 from space_robot_model.robot import Robot
 from space_robot_msgs_py.errors import InputError
 
@@ -71,5 +72,4 @@ def _shares(
     if limits.base_momentum:
         yield float(np.max(asked.stored_momentum)) / limits.base_momentum
     if limits.base_rate_deg:
-        turn = np.sqrt(sum(asked.base[:, k] * asked.base[:, k] for k in (4, 5, 6)))
-        yield float(np.max(turn)) / math.radians(limits.base_rate_deg)
+        yield float(np.max(norms(asked.base[:, 4:7]))) / math.radians(limits.base_rate_deg)

@@ -50,6 +50,14 @@ class Beyond(NamedTuple):
     unit: str
 
 
+def shown_unit(robot: Robot, joint: int) -> tuple[float, str]:
+    """Return how many of the unit that a joint is written in make 1 rad or m, and that unit.
+
+    ``joint`` is counted from 0.
+    """
+    return (1.0, "m") if robot.is_prismatic[joint] else (180.0 / np.pi, "degrees")
+
+
 def check_positions(robot: Robot, waypoints: Array) -> None:
     """Check that all ``waypoints`` (K, n), rad or m, are within the joints' limits.
 
@@ -61,8 +69,7 @@ def check_positions(robot: Robot, waypoints: Array) -> None:
             low, high, position = limits.lower, limits.upper, float(waypoint[joint])
             if low - ROUNDING <= position <= high + ROUNDING:
                 continue
-            is_prismatic = bool(robot.is_prismatic[joint])
-            scale, unit = (1.0, "m") if is_prismatic else (180.0 / np.pi, "degrees")
+            scale, unit = shown_unit(robot, joint)
             raise InputError(
                 f"waypoints_deg: waypoint {number + 1} has joint {name!r} at "
                 f"{position * scale:.6g} {unit}, its limits are {low * scale:.6g} to "

@@ -53,7 +53,12 @@ class MissionSettings(StrictModel):
     @property
     def has_segments(self) -> bool:
         """Whether there are segments, not waypoints only."""
-        return any(text.strip() for text in self.segments)
+        return bool(self.written_segments)
+
+    @property
+    def written_segments(self) -> list[str]:
+        """The segments without empty texts."""
+        return [text for text in self.segments if text.strip()]
 
 
 class Mission:

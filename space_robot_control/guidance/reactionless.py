@@ -15,6 +15,7 @@ from space_robot_model.dynamics.free_base import halves
 from space_robot_model.dynamics.model import Model
 from space_robot_model.dynamics.tool_kinematics import ToolKinematics, tool_kinematics_into
 from space_robot_model.elementary.least_squares import least_squares_into
+from space_robot_model.elementary.matrices import norms
 from space_robot_model.elementary.spline import CubicSpline
 from space_robot_model.robot import Robot
 from space_robot_msgs_py.compiled.kernels import kernel
@@ -46,10 +47,7 @@ def reactionless_path(robot: Robot, quaternion: Array, start: Array, goal: Array
     work = ToolKinematics.allocate(robot.joint_count)
     integrate_into(robot.model, quaternion, ordered[0], ordered[1], np.eye(3), work, steps)
     path = steps[:, row]
-    moves, squares = np.diff(path, axis=0), np.zeros(len(path) - 1)
-    for column in moves.T:
-        squares += column * column
-    lengths = np.concatenate(([0.0], np.cumsum(np.sqrt(squares))))
+    lengths = np.concatenate(([0.0], np.cumsum(norms(np.diff(path, axis=0)))))
     if lengths[-1] < SHORTEST:
         return CubicSpline(np.array([0.0, 1.0]), np.array([start, start]))
     shares = lengths / lengths[-1]

@@ -7,10 +7,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from space_robot_model.elementary.matrices import dot_rows, norm
 from space_robot_model.elementary.quintic_spline import QuinticSpline
 from space_robot_model.elementary.spline import CubicSpline
 
-from .courses import Slew, dot_rows, multiplied, turned_by
+from .courses import Slew, multiplied, turned_by
 
 Array = NDArray[np.float64]
 
@@ -43,7 +44,7 @@ class BrakedTurn(NamedTuple):
 
     def at(self, time: Array) -> Array:
         """Return (T, 10) at times (T,), s: quaternion, velocity and acceleration, base frame."""
-        rate = float(np.sqrt(dot_rows(self.omega, self.omega)[0]))
+        rate = norm(self.omega)
         if rate == 0.0:
             return Slew(self.begin, self.span, self.quaternion, self.omega, 0.0).at(time)
         axis = self.omega / rate

@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from space_robot_model.elementary.matrices import dot_rows, norms, unit_rows
 from space_robot_model.elementary.spline import CubicSpline
 from space_robot_msgs_py.config.validation import short
 from space_robot_msgs_py.errors import InputError
@@ -92,12 +93,11 @@ class TrajectoryTable:
 def _quaternions(columns: Columns) -> Array:
     """Return unit quaternions (K, 4), each in the hemisphere of the one before."""
     rows = np.column_stack([np.array(columns[name], float) for name in QUATERNION])
-    lengths = np.sqrt(sum(rows[:, k] * rows[:, k] for k in range(4)))
-    if np.any(np.abs(lengths - 1.0) > 1e-3):
+    if np.any(np.abs(norms(rows) - 1.0) > 1e-3):
         raise InputError("trajectory: quaternions must have norm 1")
-    rows /= lengths[:, np.newaxis]
-    products = sum(rows[1:, k] * rows[:-1, k] for k in range(4))
-    rows[1:] *= np.cumprod(np.where(products < 0.0, -1.0, 1.0))[:, np.newaxis]
+    rows = unit_rows(rows)
+    products = dot_rows(rows[1:], rows[:-1])
+    rows[1:] *= np.cumprod(np.where(products < 0.0, -1.0, 1.0), axis=0)
     return rows
 
 

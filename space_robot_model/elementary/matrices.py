@@ -33,6 +33,26 @@ def norm(vector: ArrayLike) -> float:
     return math.sqrt(product(np.ravel(vector), np.ravel(vector)))
 
 
+def dot_rows(a: Array, b: Array) -> Array:
+    """Return the dot products (..., 1) of the last axis."""
+    total = a[..., 0] * b[..., 0]
+    for k in range(1, a.shape[-1]):
+        total = total + a[..., k] * b[..., k]
+    return total[..., np.newaxis]
+
+
+def norms(rows: Array) -> Array:
+    """Return the Euclidean norms (...) of the last axis."""
+    lengths: Array = np.sqrt(dot_rows(rows, rows)[..., 0])
+    return lengths
+
+
+def unit_rows(rows: Array) -> Array:
+    """Return ``rows`` divided by their norms along the last axis."""
+    unit: Array = rows / norms(rows)[..., np.newaxis]
+    return unit
+
+
 def solve(matrix: Array, right: Array) -> Array:
     """Solve ``matrix x = right`` by Gaussian elimination with partial pivoting.
 

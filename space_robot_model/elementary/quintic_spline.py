@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from .spline import places
+
 Array = NDArray[np.float64]
 
 
@@ -25,10 +27,7 @@ class QuinticSpline:
 
         Outside its times the spline is at rest at the nearer end.
         """
-        inside = np.clip(time, self.times[0], self.times[-1])
-        k = np.clip(np.searchsorted(self.times, inside, side="right") - 1, 0, len(self.times) - 2)
-        h = (self.times[k + 1] - self.times[k])[:, np.newaxis]
-        u = (inside - self.times[k])[:, np.newaxis] / h
+        k, h, u, is_outside = places(self.times, time)
         first, last = self.states[k], self.states[k + 1]
         c0, c1, c2 = first[:, 0], first[:, 1] * h, 0.5 * first[:, 2] * h * h
         # what is left of the values at the end, and of h times and h^2 times their derivatives
@@ -42,6 +41,5 @@ class QuinticSpline:
         rows[:, 0] = c0 + u * (c1 + u * (c2 + u * (c3 + u * (c4 + u * c5))))
         rows[:, 1] = (c1 + u * (2.0 * c2 + u * (3.0 * c3 + u * (4.0 * c4 + u * 5.0 * c5)))) / h
         rows[:, 2] = (2.0 * c2 + u * (6.0 * c3 + u * (12.0 * c4 + u * 20.0 * c5))) / (h * h)
-        is_outside = (time < self.times[0]) | (time > self.times[-1])
         rows[is_outside, 1:] = 0.0
         return rows

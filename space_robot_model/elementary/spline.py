@@ -5,6 +5,8 @@ SciPy solves for the rates with LAPACK, whose sums differ between processors.
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -39,6 +41,28 @@ def spline_rates_into(times: Array, values: Array, rates: Array, work: Array) ->
             rates[k, d] -= work[k] * rates[k + 1, d]
 
 
+class Places(NamedTuple):
+    """Where times (T,) are among the knots of a spline; outside of them: at the nearer end."""
+
+    piece: NDArray[np.intp]
+    """(T,) number of the knot before."""
+    span: Array
+    """(T, 1) s, between the knots before and after."""
+    share: Array
+    """(T, 1) of the span that has passed."""
+    is_outside: NDArray[np.bool_]
+    """(T,) whether the time is before the first knot or after the last."""
+
+
+def places(knots: Array, time: Array) -> Places:
+    """Return where times (T,) are among ``knots`` (K,), rising, at least two."""
+    inside = np.clip(time, knots[0], knots[-1])
+    k = np.clip(np.searchsorted(knots, inside, side="right") - 1, 0, len(knots) - 2)
+    span = (knots[k + 1] - knots[k])[:, np.newaxis]
+    share = (inside - knots[k])[:, np.newaxis] / span
+    return Places(k, span, share, (time < knots[0]) | (time > knots[-1]))
+
+
 class CubicSpline:
     """A cubic spline through values at given times, at given rates at both ends."""
 
@@ -67,10 +91,7 @@ class CubicSpline:
 
         Outside its times the spline is at rest at the nearer end.
         """
-        inside = np.clip(time, self.times[0], self.times[-1])
-        k = np.clip(np.searchsorted(self.times, inside, side="right") - 1, 0, len(self.times) - 2)
-        span = (self.times[k + 1] - self.times[k])[:, np.newaxis]
-        u = (inside - self.times[k])[:, np.newaxis] / span
+        k, span, u, is_outside = places(self.times, time)
         first, rise = self.values[k], self.values[k + 1] - self.values[k]
         m0, m1 = self.rates[k] * span, self.rates[k + 1] * span
         square, cube = 3.0 * rise - 2.0 * m0 - m1, m0 + m1 - 2.0 * rise
@@ -78,6 +99,5 @@ class CubicSpline:
         rows[:, 0] = first + u * (m0 + u * (square + u * cube))
         rows[:, 1] = (m0 + u * (2.0 * square + u * 3.0 * cube)) / span
         rows[:, 2] = (2.0 * square + u * 6.0 * cube) / (span * span)
-        is_outside = (time < self.times[0]) | (time > self.times[-1])
         rows[is_outside, 1:] = 0.0
         return rows

@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from space_robot_model.elementary.matrices import unit_rows
 from space_robot_model.hardware.base_actuators import BaseActuatorSettings
 from space_robot_model.hardware.thrusters import ThrusterSettings
 from space_robot_model.hardware.wheels import WheelSettings
@@ -136,7 +137,7 @@ class ThrusterTorques(NamedTuple):
 
 def _unlike(vectors: Array) -> Array:
     """Return vectors (K, 3) as unit vectors, of equal ones the first."""
-    unit = vectors / np.linalg.norm(vectors, axis=1, keepdims=True)
+    unit = unit_rows(vectors)
     _, first = np.unique(np.round(unit, 9), axis=0, return_index=True)
     kept: Array = unit[first]
     return kept

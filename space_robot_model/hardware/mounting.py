@@ -10,6 +10,8 @@ from pydantic import Field
 
 from space_robot_msgs_py.errors import InputError
 
+from ..elementary.matrices import unit_rows
+
 Array = NDArray[np.float64]
 
 NO_VECTORS = [0.0]
@@ -55,9 +57,7 @@ def vectors(flat: list[float]) -> Array:
 
 def directions(flat: list[float]) -> Array:
     """Return the vectors (k, 3) of a flat list, normalised."""
-    rows = vectors(flat)
-    units: Array = rows / np.linalg.norm(rows, axis=1, keepdims=True)
-    return units
+    return unit_rows(vectors(flat))
 
 
 def values_of(numbers: list[float], key: str, count: int, what: str) -> Array:

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from functools import reduce
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from space_robot_model.elementary.matrices import norms
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.config.validation import one_of
 
@@ -91,7 +91,7 @@ class Columns(NamedTuple):
             error: (N, n+3) tracking error.
         """
         return {
-            name: (_norms if name in OF_BASE else largest_of_columns)(values[:, axes])
+            name: (norms if name in OF_BASE else largest_of_columns)(values[:, axes])
             for values, columns in ((error, self.errors), (log.applied_torque, self.torques))
             for name, axes in columns.items()
         }
@@ -113,9 +113,3 @@ def missing_for_ripple(metric: str, ticks: int, period: float) -> str:
     if ticks * period < SHORTEST_S * (1.0 - 1e-9):
         return f"needs {SHORTEST_S:g} s of flight, got {ticks * period:g} s"
     return ""
-
-
-def _norms(values: Array) -> Array:
-    """Return the norms (N,) of rows (N, 3), by plain sums: the same bits on every machine."""
-    norms: Array = np.sqrt(reduce(np.add, (values * values).T))
-    return norms

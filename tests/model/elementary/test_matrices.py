@@ -15,7 +15,15 @@ from scipy.spatial.transform import Rotation
 
 from space_robot_model.elementary.arctangent import angle_of, arctan2
 from space_robot_model.elementary.fourier import squared_spectrum
-from space_robot_model.elementary.matrices import norm, product, rotate_tensor, solve
+from space_robot_model.elementary.matrices import (
+    dot_rows,
+    norm,
+    norms,
+    product,
+    rotate_tensor,
+    solve,
+    unit_rows,
+)
 from space_robot_model.elementary.rotations import (
     exact_sines_cosines,
     rotation_of_rpy,
@@ -114,6 +122,16 @@ def decimal_arctangent(t: float) -> Decimal:
             term *= angle / (k + 1)
         angle -= (sine - slope * cosine) / (cosine + slope * sine)
     return angle
+
+
+@given(seeds, st.integers(1, 7))
+def test_rows_have_the_norms_of_vectors(rng: np.random.Generator, size: int) -> None:
+    """Each row's is that of the vector alone, bit for bit; a row divided by it has length 1."""
+    rows, others = rng.normal(size=(2, 5, size))
+    assert norms(rows).tolist() == [norm(row) for row in rows]
+    np.testing.assert_allclose(norms(unit_rows(rows)), 1.0, rtol=1e-15)
+    expected = np.einsum("ij,ij->i", rows, others)
+    np.testing.assert_allclose(dot_rows(rows, others)[:, 0], expected, rtol=0.0, atol=1e-13)
 
 
 @given(st.floats(0.0, 1.0))
