@@ -10,6 +10,7 @@ from space_robot_model.dynamics.free_floating import eliminate_rotation
 from space_robot_model.dynamics.model import Model
 from space_robot_model.dynamics.rho_space import semi_floating_into, to_rho_space
 from space_robot_msgs_py.compiled.kernels import RecordFunction, kernel
+from space_robot_msgs_py.compiled.lanes import all_lanes, uniform, where
 from space_robot_msgs_py.compiled.records import Block, Record, nested, shaped
 from space_robot_msgs_py.samples import MOST_WHEELS, State
 
@@ -131,22 +132,22 @@ def compute_signals(
         a measured state that was usable.
     """
     memory, measured = block[0], state[0]
-    signals, rate, controls_base = memory.signals, memory.rate, memory.controls_base == 1.0
+    signals, rate, controls_base = memory.signals, memory.rate, uniform(memory.controls_base) == 1.0
     status: int = status_of(measured, controls_base)
-    if status != USABLE:
+    if all_lanes(status != USABLE):
         return status
     memory.allocation.reported_speeds[:] = measured.wheel_velocities
     memory.allocation.reported_torques[:] = measured.wheel_torques
-    if memory.navigation.is_filtered == 1.0:
+    if uniform(memory.navigation.is_filtered) == 1.0:
         navigate(memory.navigation, tick, measured, period)
         measured = memory.navigation.estimate
-        status = status_of(measured, controls_base)
-        if status != USABLE:
+        status = where(status == USABLE, status_of(measured, controls_base), status)
+        if all_lanes(status != USABLE):
             return status
     near, dot = memory.quaternion, 0.0
     for k in range(4):
         dot += measured.quaternion[k] * near[k]
-    side = -1.0 if dot < 0.0 else 1.0
+    side = where(dot < 0.0, -1.0, 1.0)
     for k in range(4):
         near[k] = side * measured.quaternion[k]
     measured_rate(measured, near, memory.jacobian, rate)
@@ -179,7 +180,7 @@ def compute_signals(
             to_rho_space(near, signals.nominal)
         else:
             eliminate_rotation(signals.nominal)
-    return USABLE
+    return status
 
 
 @kernel
@@ -197,13 +198,13 @@ def status_of(state: State, controls_base: bool) -> int:
         total += abs(state.applied_torque[i])
     for k in range(MOST_WHEELS):
         total += abs(state.wheel_velocities[k]) + abs(state.wheel_torques[k])
-    if not np.isfinite(total):  # any number that is not makes the sum so
-        return NOT_FINITE
-    if total > LARGEST:
-        return TOO_LARGE
-    if abs(square - 1.0) > NORM_TOLERANCE:
-        return NOT_UNIT
-    return SINGULAR if controls_base and abs(quaternion[0]) <= SINGULAR_ETA else USABLE
+    status = USABLE
+    if controls_base:
+        status = where(abs(quaternion[0]) <= SINGULAR_ETA, SINGULAR, USABLE)
+    status = where(abs(square - 1.0) > NORM_TOLERANCE, NOT_UNIT, status)
+    status = where(total > LARGEST, TOO_LARGE, status)
+    # any number that is not finite makes the sum so
+    return where(np.isfinite(total), status, NOT_FINITE)
 
 
 @kernel
@@ -215,11 +216,11 @@ def apply_transfer(block: Block, tick: int, force: Array, torque: Array) -> None
     The base's part is what its actuators are asked for.
     """
     memory = block[0]
-    if memory.transfer_left < 0.0:
-        memory.transfer_left = memory.transfer_ticks if tick > 0 else 0.0
+    if uniform(memory.transfer_left) < 0.0:
+        memory.transfer_left = uniform(memory.transfer_ticks) if tick > 0 else 0.0
         for i in range(force.size):
             memory.transfer[i] = memory.applied_force[i] - force[i]
-    fade = memory.transfer_left / memory.transfer_ticks
+    fade = uniform(memory.transfer_left) / uniform(memory.transfer_ticks)
     for i in range(force.size):
         memory.force[i] = force[i]
         if fade > 0.0:
@@ -227,7 +228,7 @@ def apply_transfer(block: Block, tick: int, force: Array, torque: Array) -> None
     if fade > 0.0:
         memory.transfer_left -= 1.0
     torque_from_force(memory.jacobian, memory.force, torque)
-    if memory.controls_base == 0.0:
+    if uniform(memory.controls_base) == 0.0:
         for k in range(3):
             memory.force[k] = torque[k] = 0.0
     memory.allocation.demand[:] = torque[:3]

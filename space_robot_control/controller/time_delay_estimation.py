@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from space_robot_msgs_py.compiled.kernels import kernel
+from space_robot_msgs_py.compiled.lanes import any_lane, uniform, where, whole
 from space_robot_msgs_py.compiled.records import Record, shaped
 
 Array = NDArray[np.float64]
@@ -42,8 +43,8 @@ class TimeDelayPair(Record):
 @kernel
 def follows(pair: TimeDelayPair, tick: int) -> bool:
     """Return whether ``tick`` makes a pair with the last tick observed."""
-    elapsed = tick - pair.tick
-    return bool(pair.seen == 1.0 and 1.0 <= elapsed <= LONGEST_GAP)
+    elapsed = tick - whole(pair.tick)
+    return bool(uniform(pair.seen) == 1.0 and 1 <= elapsed <= LONGEST_GAP)
 
 
 @kernel
@@ -60,15 +61,17 @@ def observe(
     The first tick, and one after a longer gap, has no acceleration: the desired one is taken.
     A low-pass takes force and acceleration alike, so that they stay a pair.
     """
-    known, elapsed = follows(pair, tick), tick - pair.tick
-    weight = pair.smoothing if known and pair.smoothing > 0.0 else 1.0
+    known, elapsed = follows(pair, tick), tick - whole(pair.tick)
+    weight = where(pair.smoothing > 0.0, pair.smoothing, 1.0) if known else 1.0
     for i in range(rate.size):
         force, acceleration = applied_force[i], acceleration_desired[i]
         if known:
             acceleration = (rate[i] - pair.rate[i]) / (elapsed * period)
-        if weight < 1.0:
-            force = pair.applied_force[i] + weight * (force - pair.applied_force[i])
-            acceleration = pair.acceleration[i] + weight * (acceleration - pair.acceleration[i])
+        if any_lane(weight < 1.0):
+            smooth_force = pair.applied_force[i] + weight * (force - pair.applied_force[i])
+            smooth = pair.acceleration[i] + weight * (acceleration - pair.acceleration[i])
+            force = where(weight < 1.0, smooth_force, force)
+            acceleration = where(weight < 1.0, smooth, acceleration)
         pair.applied_force[i] = force
         pair.acceleration[i] = acceleration
     pair.seen = 1.0

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from space_robot_model.dynamics.attitude import attitude_jacobian, rotate, rotate_back
 from space_robot_msgs_py.compiled.kernels import kernel
+from space_robot_msgs_py.compiled.lanes import where
 from space_robot_msgs_py.samples import Reference, State
 
 from ..laws import Signals
@@ -48,7 +49,7 @@ def tracking_errors(
     dot = 0.0
     for k in range(4):
         dot += quaternion[k] * desired[k]
-    side = 1.0 if dot >= 0.0 else -1.0
+    side = where(dot >= 0.0, 1.0, -1.0)
     attitude_jacobian(desired, jacobian)
     rotate(jacobian, omega, error_rate[:3])
     rotate(jacobian, reference.alpha_base, acceleration[:3])

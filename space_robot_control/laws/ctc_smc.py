@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from space_robot_msgs_py.compiled.kernels import kernel
+from space_robot_msgs_py.compiled.lanes import where
 
 from .base import Array, LawGains, LawMemory, Signals, per_axis
 from .compiled import CompiledLaw
@@ -37,7 +38,7 @@ def computed_torque_sliding_mode(
 @kernel
 def saturation(s: float, delta: float) -> float:
     """Return (58): the sign outside the boundary layer of half-width ``delta``, linear inside."""
-    return np.sign(s) if abs(s) > delta else s / delta
+    return where(abs(s) > delta, np.sign(s), s / delta)
 
 
 class ComputedTorqueSlidingMode(CompiledLaw):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from space_robot_msgs_py.compiled.kernels import kernel
+from space_robot_msgs_py.compiled.lanes import where
 
 from .base import Array, LawGains, LawMemory, Signals, per_axis
 from .compiled import CompiledLaw
@@ -33,8 +34,9 @@ def time_delay_terminal_sliding_mode(
     e, edot, rhodd_d = signals.error, signals.error_rate, signals.acceleration_desired
     k_p, k_d, s, u, last_edot = gains.k_p, gains.k_d, memory.s, memory.u, memory.last_edot
     for i in range(e.size):
-        if not np.isnan(last_edot[i]):  # the integral of edd is the change of edot
-            s[i] += edot[i] - last_edot[i] + (k_d[i] * edot[i] + k_p[i] * e[i]) * period
+        change = edot[i] - last_edot[i]  # the integral of edd is the change of edot
+        change += (k_d[i] * edot[i] + k_p[i] * e[i]) * period
+        s[i] += where(np.isnan(last_edot[i]), 0.0, change)
         last_edot[i] = edot[i]
         u_pd = rhodd_d[i] + k_d[i] * edot[i] + k_p[i] * e[i]
         u[i] = u_pd + gains.k_1[i] * np.sqrt(abs(s[i])) * np.sign(s[i])

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from space_robot_model.dynamics.algebra import inverse_symmetric
 from space_robot_msgs_py.compiled.kernels import kernel
+from space_robot_msgs_py.compiled.lanes import any_lane, negated, where, whole
 from space_robot_msgs_py.compiled.records import Record, nested, shaped
 
 from .quaternions import is_same, multiply, small_angle, turn
@@ -41,6 +42,7 @@ class Scratch(Record):
     """Matrices of one call."""
 
     quaternion: Array = shaped(lambda n: (4,))
+    present: Array = shaped(lambda n: (4,))
     rotation: Array = shaped(lambda n: (3,))
     transition: Array = shaped(lambda n: (3, 6))
     """Upper half of the transition matrix."""
@@ -96,21 +98,22 @@ def start(filter: AttitudeFilter, tick: int, quaternion: Array, gyro: Array, per
     A bias known from before is kept, see `forget`. Before ``tick`` the gyro is taken to have
     measured what it measures now.
     """
-    for past in range(int(filter.delay) + 2):
+    for past in range(whole(filter.delay) + 2):
         _store(filter, tick - past, gyro, period)
-    if filter.stage == NOT_STARTED:
-        forget(filter)
+    forget(filter, filter.stage == NOT_STARTED)
     filter.stage = STARTED
-    _restart(filter, tick, quaternion, period)
+    _restart(filter, tick, quaternion, period, True)
 
 
 @kernel
-def forget(filter: AttitudeFilter) -> None:
-    """Reset the bias estimate to its initial variance."""
-    filter.covariance[:] = 0.0
-    filter.bias[:] = 0.0
+def forget(filter: AttitudeFilter, is_forgotten: bool) -> None:
+    """Reset the bias estimate to its initial variance, where ``is_forgotten``."""
     for i in range(3):
-        filter.covariance[3 + i, 3 + i] = filter.initial_bias_variance
+        filter.bias[i] = where(is_forgotten, 0.0, filter.bias[i])
+    for i in range(6):
+        for j in range(6):
+            initial = filter.initial_bias_variance if i == j and i >= 3 else 0.0
+            filter.covariance[i, j] = where(is_forgotten, initial, filter.covariance[i, j])
 
 
 @kernel
@@ -124,7 +127,7 @@ def drift(filter: AttitudeFilter, duration: float) -> None:
 def propagate(filter: AttitudeFilter, tick: int, gyro: Array, period: float) -> None:
     """Go from the last tick to ``tick``, at which the gyro reports ``gyro`` (3,) rad/s."""
     _store(filter, tick, gyro, period)
-    delayed, scratch = tick - int(filter.delay), filter.scratch
+    delayed, scratch = tick - whole(filter.delay), filter.scratch
     _increment(filter, tick, period)
     multiply(filter.present, scratch.quaternion, filter.present)
     _increment(filter, delayed, period)
@@ -206,35 +209,40 @@ def observe_tracker(
     ``is_timed``: the tick before was seen as well, so a new measurement is D ticks old; else it
     may be older, and it is not used.
     """
-    if is_same(quaternion, filter.reported):
+    is_new = negated(is_same(quaternion, filter.reported))
+    if not any_lane(is_new):
         return
-    filter.reported[:] = quaternion
+    for i in range(4):
+        filter.reported[i] = where(is_new, quaternion[i], filter.reported[i])
     if not is_timed:
         return
-    if filter.stage == STARTED:  # the first of known age
-        filter.stage = FILTERING
-        _restart(filter, tick, quaternion, period)
-        return
-    if update(filter, quaternion):
-        filter.updates += 1.0
-        filter.rejected_in_a_row = 0.0
-    else:
-        filter.rejected += 1.0
-        filter.rejected_in_a_row += 1.0
-        if filter.rejected_in_a_row < MOST_REJECTED:
-            return
-        forget(filter)
-        _restart(filter, tick, quaternion, period)
-    recompute(filter, tick, period)
+    is_first = is_new & (filter.stage == STARTED)  # of known age
+    filter.stage = where(is_first, FILTERING, filter.stage)
+    is_next = is_new & negated(is_first)
+    is_used = update(filter, quaternion, is_next)
+    is_rejected = is_next & negated(is_used)
+    filter.updates += where(is_used, 1.0, 0.0)
+    filter.rejected += where(is_rejected, 1.0, 0.0)
+    in_a_row = where(is_rejected, filter.rejected_in_a_row + 1.0, filter.rejected_in_a_row)
+    filter.rejected_in_a_row = where(is_used, 0.0, in_a_row)
+    is_lost = is_rejected & (filter.rejected_in_a_row >= MOST_REJECTED)
+    if any_lane(is_lost):
+        forget(filter, is_lost)
+    if any_lane(is_first | is_lost):
+        _restart(filter, tick, quaternion, period, is_first | is_lost)
+    if any_lane(is_used):
+        recompute(filter, tick, period, is_used)
 
 
 @kernel
-def update(filter: AttitudeFilter, quaternion: Array) -> bool:
+def update(filter: AttitudeFilter, quaternion: Array, is_asked: bool) -> bool:
     """Update attitude, bias and covariance (Joseph's form) with a measurement of tick k - D.
 
     Returns:
-        False if it is beyond the gate: then nothing was changed.
+        Whether it was asked and is within the gate: where not, nothing was changed.
     """
+    if not any_lane(is_asked):
+        return is_asked
     p, noise, scratch = filter.covariance, filter.noise, filter.scratch
     innovation, gain, weighted, rest = (
         filter.innovation,
@@ -255,8 +263,10 @@ def update(filter: AttitudeFilter, quaternion: Array) -> bool:
     )
     a, b, c = innovation[0], innovation[1], innovation[2]
     distance = xx * a * a + yy * b * b + zz * c * c + 2.0 * (xy * a * b + xz * a * c + yz * b * c)
-    if filter.gate > 0.0 and not (cosine > 0.0 and distance <= filter.gate):
-        return False
+    is_within = (filter.gate <= 0.0) | ((cosine > 0.0) & (distance <= filter.gate))
+    is_used = is_asked & is_within
+    if not any_lane(is_used):
+        return is_used
     for i in range(6):  # K = P H^T S^-1, H = [E 0]
         gain[i, 0] = p[i, 0] * xx + p[i, 1] * xy + p[i, 2] * xz
         gain[i, 1] = p[i, 0] * xy + p[i, 1] * yy + p[i, 2] * yz
@@ -273,38 +283,49 @@ def update(filter: AttitudeFilter, quaternion: Array) -> bool:
             ) - rest[i, j]
     for i in range(6):  # (E - K H) P (E - K H)^T + K R K^T, whose upper triangle is as good
         for j in range(i, 6):
-            p[i, j] = rest[i, j] + (
+            updated = rest[i, j] + (
                 weighted[i, 0] * gain[j, 0]
                 + weighted[i, 1] * gain[j, 1]
                 + weighted[i, 2] * gain[j, 2]
             )
+            p[i, j] = where(is_used, updated, p[i, j])
             p[j, i] = p[i, j]
     for i in range(3):
         scratch.rotation[i] = gain[i, 0] * a + gain[i, 1] * b + gain[i, 2] * c
-        filter.bias[i] += gain[3 + i, 0] * a + gain[3 + i, 1] * b + gain[3 + i, 2] * c
+        error = gain[3 + i, 0] * a + gain[3 + i, 1] * b + gain[3 + i, 2] * c
+        filter.bias[i] = where(is_used, filter.bias[i] + error, filter.bias[i])
     turn(scratch.rotation, scratch.quaternion)
-    multiply(filter.quaternion, scratch.quaternion, filter.quaternion)
-    return True
+    multiply(filter.quaternion, scratch.quaternion, scratch.quaternion)
+    for i in range(4):
+        filter.quaternion[i] = where(is_used, scratch.quaternion[i], filter.quaternion[i])
+    return is_used
 
 
 @kernel
-def _restart(filter: AttitudeFilter, tick: int, quaternion: Array, period: float) -> None:
-    """Restart from a measurement of the attitude at k - D, keeping the bias."""
-    filter.reported[:] = quaternion
-    filter.quaternion[:] = quaternion
-    filter.rejected_in_a_row = 0.0
+def _restart(
+    filter: AttitudeFilter, tick: int, quaternion: Array, period: float, is_asked: bool
+) -> None:
+    """Restart from a measurement of the attitude at k - D, keeping the bias, where asked."""
+    for i in range(4):
+        filter.reported[i] = where(is_asked, quaternion[i], filter.reported[i])
+        filter.quaternion[i] = where(is_asked, quaternion[i], filter.quaternion[i])
+    filter.rejected_in_a_row = where(is_asked, 0.0, filter.rejected_in_a_row)
+    p = filter.covariance
     for i in range(3):
         for j in range(3):
-            filter.covariance[i, j] = filter.noise[i, j]
-            filter.covariance[i, 3 + j] = 0.0
-            filter.covariance[3 + i, j] = 0.0
-    recompute(filter, tick, period)
+            p[i, j] = where(is_asked, filter.noise[i, j], p[i, j])
+            p[i, 3 + j] = where(is_asked, 0.0, p[i, 3 + j])
+            p[3 + i, j] = where(is_asked, 0.0, p[3 + i, j])
+    recompute(filter, tick, period, is_asked)
 
 
 @kernel
-def recompute(filter: AttitudeFilter, tick: int, period: float) -> None:
+def recompute(filter: AttitudeFilter, tick: int, period: float, is_asked: bool) -> None:
     """Turn the attitude of k - D by the increments since, with the bias as it is now."""
-    filter.present[:] = filter.quaternion
-    for past in range(tick - int(filter.delay) + 1, tick + 1):
+    scratch = filter.scratch
+    scratch.present[:] = filter.quaternion
+    for past in range(tick - whole(filter.delay) + 1, tick + 1):
         _increment(filter, past, period)
-        multiply(filter.present, filter.scratch.quaternion, filter.present)
+        multiply(scratch.present, scratch.quaternion, scratch.present)
+    for i in range(4):
+        filter.present[i] = where(is_asked, scratch.present[i], filter.present[i])

@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from space_robot_msgs_py.compiled.kernels import kernel
+from space_robot_msgs_py.compiled.lanes import uniform
 from space_robot_msgs_py.compiled.records import Record, shaped
 
 Array = NDArray[np.float64]
@@ -171,7 +172,7 @@ def filter_joints(
     The torque passes through what the filter makes of an acceleration, so that torque and
     differenced rate stay a pair for the time-delay estimate.
     """
-    if filter.is_on == 0.0:
+    if uniform(filter.is_on) == 0.0:
         begin_joints(filter, angle, rate, torque)
         return
     t, of_angle, of_rate = duration, filter.angle_gain, filter.rate_gain

@@ -13,7 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from space_robot_model.elementary.exponential import exp
-from space_robot_msgs_py.compiled.kernels import kernel
+from space_robot_msgs_py.compiled.kernels import kernel, subroutine
+from space_robot_msgs_py.compiled.lanes import where
 from space_robot_msgs_py.compiled.records import Record, shaped
 
 Array = NDArray[np.float64]
@@ -50,12 +51,15 @@ def begin_low_pass(low_pass: LowPass, rate: Array, torque: Array) -> None:
 @kernel
 def pass_low(low_pass: LowPass, rate: Array, torque: Array) -> None:
     """Filter rate and torque (at least 3,) of one tick."""
-    weight = low_pass.weight if low_pass.weight > 0.0 else 1.0
-    if weight == 1.0:
-        begin_low_pass(low_pass, rate, torque)
-        return
+    weight = where(low_pass.weight > 0.0, low_pass.weight, 1.0)
     for i in range(3):
-        low_pass.rate_stage[i] += weight * (rate[i] - low_pass.rate_stage[i])
-        low_pass.rate[i] += weight * (low_pass.rate_stage[i] - low_pass.rate[i])
-        low_pass.torque_stage[i] += weight * (torque[i] - low_pass.torque_stage[i])
-        low_pass.torque[i] += weight * (low_pass.torque_stage[i] - low_pass.torque[i])
+        low_pass.rate_stage[i] = _stepped(low_pass.rate_stage[i], rate[i], weight)
+        low_pass.rate[i] = _stepped(low_pass.rate[i], low_pass.rate_stage[i], weight)
+        low_pass.torque_stage[i] = _stepped(low_pass.torque_stage[i], torque[i], weight)
+        low_pass.torque[i] = _stepped(low_pass.torque[i], low_pass.torque_stage[i], weight)
+
+
+@subroutine
+def _stepped(last: float, new: float, weight: float) -> float:
+    """Return a stage's next value; with a weight of 1 the new sample itself."""
+    return where(weight == 1.0, new, last + weight * (new - last))

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from space_robot_model.elementary.matrices import norm
 from space_robot_msgs_py.compiled.kernels import kernel
+from space_robot_msgs_py.compiled.lanes import uniform, whole
 from space_robot_msgs_py.compiled.records import Record, assign, nested, shaped
 from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.samples import State
@@ -103,8 +104,8 @@ def navigate(navigation: Navigation, tick: int, measured: State, period: float) 
     attitude begins anew, and after a jump back in time everything does.
     """
     attitude, estimate = navigation.attitude, navigation.estimate
-    elapsed = tick - int(navigation.tick)
-    if navigation.is_active == 0.0 or elapsed < 1:
+    elapsed = tick - whole(navigation.tick)
+    if uniform(navigation.is_active) == 0.0 or elapsed < 1:
         attitude.stage = NOT_STARTED
         _begin(navigation, tick, measured, period)
     elif elapsed > LONGEST_BRIDGE:

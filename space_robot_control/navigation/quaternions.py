@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from space_robot_msgs_py.compiled.kernels import kernel
+from space_robot_msgs_py.compiled.lanes import where
 
 Array = NDArray[np.float64]
 
@@ -53,7 +54,7 @@ def small_angle(origin: Array, other: Array, out: Array) -> float:
     a, b, c, d = origin[0], origin[1], origin[2], origin[3]
     w, x, y, z = other[0], other[1], other[2], other[3]
     cosine: float = a * w + b * x + c * y + d * z
-    factor = 2.0 / cosine if cosine != 0.0 else 0.0
+    factor = where(cosine != 0.0, 2.0 / where(cosine != 0.0, cosine, 1.0), 0.0)
     out[0] = factor * (a * x - b * w - c * z + d * y)
     out[1] = factor * (a * y + b * z - c * w - d * x)
     out[2] = factor * (a * z - b * y + c * x - d * w)
@@ -65,6 +66,6 @@ def is_same(one: Array, other: Array) -> bool:
     """Return True if two quaternions are equal up to sign."""
     as_is, negative = True, True
     for k in range(4):
-        as_is = as_is and one[k] == other[k]
-        negative = negative and one[k] == -other[k]
-    return as_is or negative
+        as_is = as_is & (one[k] == other[k])
+        negative = negative & (one[k] == -other[k])
+    return as_is | negative

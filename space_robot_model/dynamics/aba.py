@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from space_robot_msgs_py.compiled.kernels import kernel
+from space_robot_msgs_py.compiled.lanes import uniform, whole
 
 from .algebra import (
     Matrix,
@@ -56,16 +57,16 @@ def aba(
     Call it after `forward_kinematics` and `spatial_velocities`. ``force`` (N+6,) is
     ``[f0, tau0, tau]``, the base's part in inertial axes, N and N m. Joints locked in ``data`` do
     not accelerate; the required torque is in ``data.holding``. Wheels come after the joints in
-    velocities, force and ``out``.
+    velocities, force and ``out``. In lanes the same joints are locked in all of them.
     """
     # inwards: the articulated-body inertia and bias force of each link, free about its joint
     inertia = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     coupling = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     mass = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     bias_moment, bias_force = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
-    for j in range(int(model.joint_count) - 1, -1, -1):
+    for j in range(whole(model.joint_count) - 1, -1, -1):
         i = j + 1
-        if model.branches[i] != 0.0:
+        if uniform(model.branches[i]) != 0.0:
             inertia, coupling, mass, bias_moment, bias_force = collect_children(
                 data.inwards[i], inertia, coupling, mass, bias_moment, bias_force
             )
@@ -81,7 +82,7 @@ def aba(
         U_linear = add(transform_transposed(coupling, angular), transform_symmetric(mass, linear))
         u = force[6 + j] - dot(angular, bias_moment) - dot(linear, bias_force)
         inverse = 1.0 / (dot(angular, U_angular) + dot(linear, U_linear))
-        if data.locked[j] != 0.0:
+        if uniform(data.locked[j]) != 0.0:
             inverse = 1.0  # not divided by D, as `holding` needs
         u_over_d = u * inverse
         U_over_D_angular, U_over_D_linear = scale(U_angular, inverse), scale(U_linear, inverse)
@@ -89,7 +90,7 @@ def aba(
         store(U_over_D_linear, data.U_over_D[i], 3)
         data.u_over_d[i] = u_over_d
         # I^a = I^A - U U^T / D,  p^a = p^A + I^a c + U u / D; for a locked joint only p^A + I^A c
-        if data.locked[j] == 0.0:
+        if uniform(data.locked[j]) == 0.0:
             inertia = outer_subtracted(inertia, U_over_D_angular, U_angular)
             coupling = outer_subtracted_general(coupling, U_over_D_angular, U_linear)
             mass = outer_subtracted(mass, U_over_D_linear, U_linear)
@@ -100,13 +101,13 @@ def aba(
         bias_moment = add(bias_moment, transform(coupling, linear))
         bias_force = add(bias_force, transform_transposed(coupling, angular))
         bias_force = add(bias_force, transform_symmetric(mass, linear))
-        if model.continues[j] == 0.0:
-            row = data.inwards[int(model.parent[j])]
+        if uniform(model.continues[j]) == 0.0:
+            row = data.inwards[whole(model.parent[j])]
             accumulate(row, inertia, coupling, mass, bias_moment, bias_force)
             inertia = mass = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
             coupling = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
             bias_moment = bias_force = (0.0, 0.0, 0.0)
-    if model.branches[0] != 0.0:
+    if uniform(model.branches[0]) != 0.0:
         inertia, coupling, mass, bias_moment, bias_force = collect_children(
             data.inwards[0], inertia, coupling, mass, bias_moment, bias_force
         )
@@ -116,7 +117,7 @@ def aba(
     mass = (mass[0] + m, mass[1] + m, mass[2] + m, mass[3], mass[4], mass[5])
     bias_moment = add(bias_moment, vector(data.bias[0], 0))
     bias_force = add(bias_force, vector(data.bias[0], 3))
-    if model.wheel_count > 0.0:
+    if uniform(model.wheel_count) > 0.0:
         inertia, bias_moment = take_wheels(
             model, omega_inertial, joint_velocities, force, data, inertia, bias_moment
         )
@@ -132,23 +133,23 @@ def aba(
     store(angular, out, 3)
     # outwards: the accelerations
     turn_wheels(model, angular, force, data, out)
-    if model.branches[0] != 0.0:
+    if uniform(model.branches[0]) != 0.0:
         keep_motion(angular, linear, data.outwards[0])
-    for j in range(int(model.joint_count)):
+    for j in range(whole(model.joint_count)):
         i = j + 1
-        if model.continues[j] == 0.0:
-            angular, linear = kept_motion(data.outwards[int(model.parent[j])])
+        if uniform(model.continues[j]) == 0.0:
+            angular, linear = kept_motion(data.outwards[whole(model.parent[j])])
         angular = add(angular, vector(data.coriolis[i], 0))
         linear = add(linear, vector(data.coriolis[i], 3))
         acceleration = data.u_over_d[i] - dot(vector(data.U_over_D[i], 0), angular)
         acceleration -= dot(vector(data.U_over_D[i], 3), linear)
-        if data.locked[j] != 0.0:
+        if uniform(data.locked[j]) != 0.0:
             data.holding[j] = acceleration  # u - U^T a, not divided by D
             acceleration = 0.0
         out[6 + j] = acceleration
         angular = add(angular, scale(vector(data.motion[i], 0), acceleration))
         linear = add(linear, scale(vector(data.motion[i], 3), acceleration))
-        if model.branches[i] != 0.0:
+        if uniform(model.branches[i]) != 0.0:
             keep_motion(angular, linear, data.outwards[i])
 
 

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from space_robot_msgs_py.compiled.kernels import kernel, subroutine
+from space_robot_msgs_py.compiled.lanes import uniform, whole
 
 from .algebra import (
     Symmetric,
@@ -43,8 +44,8 @@ def crba(model: Model, data: Data, out: Array) -> None:
     for r in range(out.shape[0]):
         for c in range(out.shape[1]):
             out[r, c] = 0.0
-    for j in range(int(model.joint_count) - 1, -1, -1):
-        if model.branches[j + 1] != 0.0:
+    for j in range(whole(model.joint_count) - 1, -1, -1):
+        if uniform(model.branches[j + 1]) != 0.0:
             mass, moment, inertia = _taken_in(data.inwards[j + 1], mass, moment, inertia)
         mass += model.mass[j + 1]
         moment = add(moment, vector(data.first_moment[j + 1], 0))
@@ -62,12 +63,12 @@ def crba(model: Model, data: Data, out: Array) -> None:
             angular, linear = vector(data.motion[i], 0), vector(data.motion[i], 3)
             element = dot(angular, angular_momentum) + dot(linear, linear_momentum)
             column[5 + i] = out[5 + i, 6 + j] = element
-            i = int(model.parent[i - 1])
-        if model.continues[j] == 0.0:
-            _hand_in(data.inwards[int(model.parent[j])], mass, moment, inertia)
+            i = whole(model.parent[i - 1])
+        if uniform(model.continues[j]) == 0.0:
+            _hand_in(data.inwards[whole(model.parent[j])], mass, moment, inertia)
             mass, moment = 0.0, (0.0, 0.0, 0.0)
             inertia = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-    if model.branches[0] != 0.0:
+    if uniform(model.branches[0]) != 0.0:
         mass, moment, inertia = _taken_in(data.inwards[0], mass, moment, inertia)
     mass += model.mass[0]
     moment = add(moment, vector(data.first_moment[0], 0))

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from space_robot_msgs_py.compiled.kernels import kernel, subroutine
+from space_robot_msgs_py.compiled.lanes import uniform, whole
 from space_robot_msgs_py.samples import Reference
 
 from .algebra import Vector, add, cross, dot, scale, store, vector
@@ -54,18 +55,18 @@ def inverse_dynamics(
     angular = vector(vectors[1], 0)
     linear = (0.0, 0.0, 0.0)
     force_of_body(model, 0, angular, linear, data)
-    if model.branches[0] != 0.0:
+    if uniform(model.branches[0]) != 0.0:
         keep_motion(angular, linear, data.outwards[0])
-    count = int(model.joint_count)
+    count = whole(model.joint_count)
     for j in range(count):
-        if model.continues[j] == 0.0:
-            angular, linear = kept_motion(data.outwards[int(model.parent[j])])
+        if uniform(model.continues[j]) == 0.0:
+            angular, linear = kept_motion(data.outwards[whole(model.parent[j])])
         coriolis, motion = data.coriolis[j + 1], data.motion[j + 1]
         acceleration = reference.joint_accelerations[j]
         angular = add(add(angular, vector(coriolis, 0)), scale(vector(motion, 0), acceleration))
         linear = add(add(linear, vector(coriolis, 3)), scale(vector(motion, 3), acceleration))
         force_of_body(model, j + 1, angular, linear, data)
-        if model.branches[j + 1] != 0.0:
+        if uniform(model.branches[j + 1]) != 0.0:
             keep_motion(angular, linear, data.outwards[j + 1])
     mass, force = model.mass[0], vector(data.bias[0], 3)
     for i in range(1, count + 1):
@@ -73,15 +74,15 @@ def inverse_dynamics(
     drift = scale(force, -1.0 / mass)  # v0dot
     moment = force = (0.0, 0.0, 0.0)
     for j in range(count - 1, -1, -1):
-        if model.branches[j + 1] != 0.0:
+        if uniform(model.branches[j + 1]) != 0.0:
             moment, force = taken_in_wrench(data.inwards[j + 1], moment, force)
         moment, force = _moved_along(model, j + 1, drift, moment, force, data)
         angular, linear = vector(data.motion[j + 1], 0), vector(data.motion[j + 1], 3)
         out[3 + j] = dot(angular, moment) + dot(linear, force)
-        if model.continues[j] == 0.0:
-            hand_in_wrench(data.inwards[int(model.parent[j])], moment, force)
+        if uniform(model.continues[j]) == 0.0:
+            hand_in_wrench(data.inwards[whole(model.parent[j])], moment, force)
             moment = force = (0.0, 0.0, 0.0)
-    if model.branches[0] != 0.0:
+    if uniform(model.branches[0]) != 0.0:
         moment, force = taken_in_wrench(data.inwards[0], moment, force)
     moment, force = _moved_along(model, 0, drift, moment, force, data)
     store(moment, vectors[0], 0)

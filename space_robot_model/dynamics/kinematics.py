@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from space_robot_msgs_py.compiled.kernels import kernel, subroutine
+from space_robot_msgs_py.compiled.lanes import uniform, whole
 
 from ..elementary.sine import sin_cos
 from .algebra import (
@@ -46,11 +47,11 @@ def forward_kinematics(model: Model, quaternion: Array, joint_positions: Array, 
     joint = (0.0, 0.0, 0.0)
     keep_frame(axes, joint, data.frame[0])
     # separate loops: a call within the long one would spill its registers
-    for j in range(int(model.joint_count)):
+    for j in range(whole(model.joint_count)):
         data.turn[j, 1], data.turn[j, 0] = sin_cos(joint_positions[j])
-    for j in range(int(model.joint_count)):
-        if model.continues[j] == 0.0:
-            axes, joint = kept_frame(data.frame[int(model.parent[j])])
+    for j in range(whole(model.joint_count)):
+        if uniform(model.continues[j]) == 0.0:
+            axes, joint = kept_frame(data.frame[whole(model.parent[j])])
         x = (axes[0], axes[3], axes[6])
         y = (axes[1], axes[4], axes[7])
         z = (axes[2], axes[5], axes[8])
@@ -61,7 +62,7 @@ def forward_kinematics(model: Model, quaternion: Array, joint_positions: Array, 
             _combined(x, y, z, e[2], e[5], e[8]),
         )
         joint = add(joint, _combined(x, y, z, offset[0], offset[1], offset[2]))
-        if model.is_prismatic[j] == 0.0:
+        if uniform(model.is_prismatic[j]) == 0.0:
             ct, st = data.turn[j, 0], data.turn[j, 1]
             x, y = add(scale(x, ct), scale(y, st)), subtract(scale(y, ct), scale(x, st))
             store(z, motion, 0)
@@ -84,7 +85,7 @@ def _combined(x: Vector, y: Vector, z: Vector, a: float, b: float, c: float) -> 
 @subroutine
 def _place(model: Model, data: Data) -> None:
     """Compute first moment and inertia of every body about the origin, from its frame."""
-    for i in range(int(model.joint_count) + 1):
+    for i in range(whole(model.joint_count) + 1):
         axes, joint = kept_frame(data.frame[i])
         com = add(joint, transform(axes, vector(model.com[i], 0)))
         moment = scale(com, model.mass[i])
@@ -125,11 +126,11 @@ def spatial_velocities(
     w = vector(omega_inertial, 0)
     v = (0.0, 0.0, 0.0)
     _momentum_rate(model, 0, w, v, data)
-    if model.branches[0] != 0.0:
+    if uniform(model.branches[0]) != 0.0:
         keep_motion(w, v, data.outwards[0])
-    for j in range(int(model.joint_count)):
-        if model.continues[j] == 0.0:
-            w, v = kept_motion(data.outwards[int(model.parent[j])])
+    for j in range(whole(model.joint_count)):
+        if uniform(model.continues[j]) == 0.0:
+            w, v = kept_motion(data.outwards[whole(model.parent[j])])
         motion, coriolis = data.motion[j + 1], data.coriolis[j + 1]
         angular = scale(vector(motion, 0), joint_velocities[j])
         linear = scale(vector(motion, 3), joint_velocities[j])
@@ -138,7 +139,7 @@ def spatial_velocities(
         store(add(cross(v, angular), cross(w, linear)), coriolis, 3)
         w, v = add(w, angular), add(v, linear)
         _momentum_rate(model, j + 1, w, v, data)
-        if model.branches[j + 1] != 0.0:
+        if uniform(model.branches[j + 1]) != 0.0:
             keep_motion(w, v, data.outwards[j + 1])
 
 

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from space_robot_msgs_py.compiled.kernels import kernel, subroutine
+from space_robot_msgs_py.compiled.lanes import uniform, whole
 
 from .algebra import Vector, add, cross, dot, scale, store, symmetric, transform_symmetric, vector
 from .branches import hand_in_wrench, keep_motion, kept_motion, taken_in_wrench
@@ -24,31 +25,31 @@ def rnea_bias(model: Model, data: Data, out: Array) -> None:
     """
     angular = (0.0, 0.0, 0.0)
     linear = (0.0, 0.0, 0.0)
-    if model.branches[0] != 0.0:
+    if uniform(model.branches[0]) != 0.0:
         keep_motion(angular, linear, data.outwards[0])
-    for j in range(int(model.joint_count)):
+    for j in range(whole(model.joint_count)):
         i = j + 1
-        if model.continues[j] == 0.0:
-            angular, linear = kept_motion(data.outwards[int(model.parent[j])])
+        if uniform(model.continues[j]) == 0.0:
+            angular, linear = kept_motion(data.outwards[whole(model.parent[j])])
         angular = add(angular, vector(data.coriolis[i], 0))
         linear = add(linear, vector(data.coriolis[i], 3))
         force_of_body(model, i, angular, linear, data)
-        if model.branches[i] != 0.0:
+        if uniform(model.branches[i]) != 0.0:
             keep_motion(angular, linear, data.outwards[i])
     moment = (0.0, 0.0, 0.0)
     force = (0.0, 0.0, 0.0)
-    for j in range(int(model.joint_count) - 1, -1, -1):
+    for j in range(whole(model.joint_count) - 1, -1, -1):
         i = j + 1
-        if model.branches[i] != 0.0:
+        if uniform(model.branches[i]) != 0.0:
             moment, force = taken_in_wrench(data.inwards[i], moment, force)
         moment = add(moment, vector(data.bias[i], 0))
         force = add(force, vector(data.bias[i], 3))
         angular, linear = vector(data.motion[i], 0), vector(data.motion[i], 3)
         out[6 + j] = dot(angular, moment) + dot(linear, force)
-        if model.continues[j] == 0.0:
-            hand_in_wrench(data.inwards[int(model.parent[j])], moment, force)
+        if uniform(model.continues[j]) == 0.0:
+            hand_in_wrench(data.inwards[whole(model.parent[j])], moment, force)
             moment = force = (0.0, 0.0, 0.0)
-    if model.branches[0] != 0.0:
+    if uniform(model.branches[0]) != 0.0:
         moment, force = taken_in_wrench(data.inwards[0], moment, force)
     store(add(force, vector(data.bias[0], 3)), out, 0)
     store(add(moment, vector(data.bias[0], 0)), out, 3)

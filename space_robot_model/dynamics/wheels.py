@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from space_robot_msgs_py.compiled.kernels import kernel
+from space_robot_msgs_py.compiled.lanes import uniform, whole
 
 from .algebra import Symmetric, Vector, add, cross, dot, outer_subtracted, scale, store, vector
 from .model import Data, Model
@@ -48,9 +49,9 @@ def take_wheels(
         inertia: of the base and its links about the base's CoM, kg m2.
         bias_moment: of the same, N m.
     """
-    n, r = int(model.joint_count), data.rotation
+    n, r = whole(model.joint_count), data.rotation
     momentum = (0.0, 0.0, 0.0)
-    for k in range(int(model.wheel_count)):
+    for k in range(whole(model.wheel_count)):
         a = vector(model.wheel_axis[k], 0)
         axis = (
             r[0, 0] * a[0] + r[0, 1] * a[1] + r[0, 2] * a[2],
@@ -60,7 +61,7 @@ def take_wheels(
         store(axis, data.wheel_axis[k], 0)
         spin_inertia = model.wheel_inertia[k]
         momentum = add(momentum, scale(axis, spin_inertia * velocities[n + k]))
-        if data.locked[n + k] == 0.0:
+        if uniform(data.locked[n + k]) == 0.0:
             inertia = outer_subtracted(inertia, axis, scale(axis, spin_inertia))
             bias_moment = add(bias_moment, scale(axis, force[6 + n + k]))
     return inertia, add(bias_moment, cross(vector(omega_inertial, 0), momentum))
@@ -73,10 +74,10 @@ def turn_wheels(model: Model, angular: Vector, force: Array, data: Data, out: Ar
     ``angular`` is the base's angular acceleration, rad/s2. The torque that holds a locked wheel,
     N m, is written into ``data.holding``.
     """
-    n = int(model.joint_count)
-    for k in range(int(model.wheel_count)):
+    n = whole(model.joint_count)
+    for k in range(whole(model.wheel_count)):
         of_base = dot(vector(data.wheel_axis[k], 0), angular)
-        if data.locked[n + k] == 0.0:
+        if uniform(data.locked[n + k]) == 0.0:
             out[6 + n + k] = force[6 + n + k] / model.wheel_inertia[k] - of_base
         else:
             out[6 + n + k] = 0.0

@@ -9,6 +9,8 @@ import math
 
 import numpy as np
 
+from space_robot_msgs_py.compiled.lanes import any_lane, where
+
 TURNS = 2.0 / math.pi
 """Quarter turns per radian."""
 QUARTER = (1.5707963267341256, 6.077100506303966e-11, 2.0222662487111665e-21, 8.4784276603689e-32)
@@ -27,14 +29,15 @@ def plain_sin_cos(angle: float) -> tuple[float, float]:
     The error is below 0.8 units in the last place up to 1.6 million radians. Beyond, they are
     exact for an angle that differs from ``angle`` by less than the spacing of floats.
     """
-    if abs(angle) > EXACT_LIMIT:
-        if not math.isfinite(angle):
-            return math.nan, math.nan
-        angle = np.fmod(angle, 2.0 * math.pi)  # exact, by IEEE 754
+    if any_lane(abs(angle) > EXACT_LIMIT):  # exact, by IEEE 754
+        nearest = np.fmod(where(np.isfinite(angle), angle, 0.0), 2.0 * math.pi)
+        nearest = where(np.isfinite(angle), nearest, math.nan)
+        angle = where(abs(angle) > EXACT_LIMIT, nearest, angle)
     x, rest, quarter = angle, 0.0, 0.0
-    if abs(angle) > 0.25 * math.pi:
+    is_large = abs(angle) > 0.25 * math.pi
+    if any_lane(is_large):
         # subtract quarter turns, part by part, with exact rounding errors (Knuth's two-sum)
-        turns = np.floor(angle * TURNS + 0.5)
+        turns = where(is_large, np.floor(angle * TURNS + 0.5), 0.0)
         a, b = angle - turns * QUARTER[0], turns * QUARTER[1]
         x = a - b
         other = x - a
@@ -52,10 +55,7 @@ def plain_sin_cos(angle: float) -> tuple[float, float]:
     large = 1.0 - half
     series = z * z * (C4 + z * (C6 + z * (C8 + z * (C10 + z * (C12 + z * (C14 + z * C16))))))
     cosine = large + (((1.0 - large) - half) + (series - x * rest))
-    if quarter == 0.0:
-        return sine, cosine
-    if quarter == 1.0:
-        return cosine, -sine
-    if quarter == 2.0:
-        return -sine, -cosine
-    return -cosine, sine
+    is_odd = (quarter == 1.0) | (quarter == 3.0)
+    first, second = where(is_odd, cosine, sine), where(is_odd, sine, cosine)
+    is_behind = (quarter == 1.0) | (quarter == 2.0)
+    return where(quarter >= 2.0, -first, first), where(is_behind, -second, second)

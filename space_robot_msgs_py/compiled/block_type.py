@@ -7,6 +7,7 @@ copies it. For a block from Python, n follows from the size of its items.
 from __future__ import annotations
 
 import operator
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -23,7 +24,7 @@ from numba.core.typing.typeof import typeof_impl
 from numba.extending import models, register_model, unbox
 
 from .layouts import Layout
-from .record_type import BYTES, RecordType, digest, joints, value_of
+from .record_type import RecordType, joints, record_type, value_of
 from .records import layout_of
 
 _typeof_array = typeof_impl.dispatch(np.ndarray)
@@ -32,14 +33,20 @@ _typeof_array = typeof_impl.dispatch(np.ndarray)
 class BlockType(types.Type):
     """Numba type of a block of records with a layout."""
 
-    def __init__(self, layout: Layout) -> None:
-        self.record = RecordType(layout)
-        super().__init__(f"Block{digest(layout)}")
+    def __init__(self, layout: Layout, width: int = 1) -> None:
+        self.record = record_type(layout, width)
+        super().__init__(f"Block{self.record.name}")
 
     @property
     def key(self) -> Any:
         """Identity of the type, for Numba."""
-        return self.record.layout
+        return self.record.key
+
+
+@cache
+def block_type(layout: Layout, width: int) -> BlockType:
+    """Return the `BlockType`, always the same one."""
+    return BlockType(layout, width)
 
 
 @register_model(BlockType)
@@ -51,8 +58,8 @@ class _BlockModel(models.StructModel):
 
 @typeof_impl.register(np.ndarray)
 def _typeof_block(value: Any, context: Any) -> Any:
-    layout = layout_of(value.dtype) if value.dtype.names and value.ndim == 1 else None
-    return BlockType(layout) if layout else _typeof_array(value, context)
+    known = layout_of(value.dtype) if value.dtype.names and value.ndim == 1 else None
+    return block_type(*known) if known else _typeof_array(value, context)
 
 
 @unbox(BlockType)
@@ -65,7 +72,7 @@ def _unbox_block(kind: BlockType, array: Any, c: Any) -> Any:
     error = cgutils.is_not_null(c.builder, c.pyapi.nrt_adapt_ndarray_from_python(array, pointer))
     block = cgutils.create_struct_proxy(kind)(c.context, c.builder)
     block.data = c.builder.bitcast(native.data, cgutils.voidptr_t)
-    block.n = joints(c.builder, kind.record.layout.size, native.itemsize)
+    block.n = joints(c.builder, kind.record, native.itemsize)
     (block.size,) = cgutils.unpack_tuple(c.builder, native.shape)
     (block.step,) = cgutils.unpack_tuple(c.builder, native.strides)
     # the caller holds the reference to the array
@@ -140,5 +147,5 @@ def _set_item(context: Any, builder: Any, sig: Any, args: Any) -> Any:
     block = cgutils.create_struct_proxy(kind)(context, builder, value=args[0])
     record = cgutils.create_struct_proxy(record_type)(context, builder, value=args[2])
     numbers = value_of(builder, kind.record.layout.size, block.n)
-    cgutils.raw_memcpy(builder, _item(builder, block, args[1]), record.data, numbers, BYTES)
+    cgutils.raw_memcpy(builder, _item(builder, block, args[1]), record.data, numbers, kind.record.bytes)
     return context.get_dummy_value()

@@ -1,5 +1,7 @@
 """Records in compiled code: a pointer and the number of joints n, one type for all n.
 
+The same layout is read with plain numbers, or with lanes in their place (`lane_type`).
+
 Numba's type of a record has constant field offsets, so that functions of the record are compiled
 again for every n. Here offsets and shapes are computed from the formulas of `Layout` when a field
 is read. Kernels see the same: numbers, arrays and nested records as attributes. For a record from
@@ -9,6 +11,7 @@ Python, n follows from its size.
 from __future__ import annotations
 
 import hashlib
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -19,6 +22,7 @@ from numba.core.typing.templates import AttributeTemplate, infer_getattr
 from numba.core.typing.typeof import typeof_impl
 from numba.extending import models, register_model, unbox
 
+from .lane_type import LANE, array_of_lanes
 from .layouts import Dimension, Layout, Polynomial
 from .records import layout_of
 
@@ -30,18 +34,36 @@ _typeof_scalar = typeof_impl.dispatch(np.generic)
 
 
 class RecordType(types.Type):
-    """Numba type of a record with a layout."""
+    """Numba type of a record with a layout, of numbers ``width`` flights wide (1 or 8)."""
 
-    def __init__(self, layout: Layout) -> None:
-        self.layout = layout
-        super().__init__(f"Record{digest(layout)}")
+    def __init__(self, layout: Layout, width: int = 1) -> None:
+        self.layout, self.width = layout, width
+        super().__init__(f"Record{digest(layout)}x{width}")
 
     @property
     def key(self) -> Any:
         """Identity of the type, for Numba."""
-        return self.layout
+        return self.layout, self.width
+
+    @property
+    def bytes(self) -> int:
+        """Size of one of its numbers."""
+        return BYTES * self.width
+
+    def array(self, ndim: int) -> Any:
+        """Return the type of a field with so many dimensions."""
+        if self.width == 1:
+            return types.Array(types.float64, ndim, "C") if ndim else types.float64
+        return array_of_lanes(ndim) if ndim else LANE
 
 
+@cache
+def record_type(layout: Layout, width: int) -> RecordType:
+    """Return the `RecordType`, always the same one."""
+    return RecordType(layout, width)
+
+
+@cache
 def digest(layout: Layout) -> str:
     """Return a short name of a layout, for the keys of Numba's cache."""
     return hashlib.sha256(repr(layout).encode()).hexdigest()[:16]
@@ -55,8 +77,8 @@ class _RecordModel(models.StructModel):
 
 @typeof_impl.register(np.record)
 def _typeof_record(value: Any, context: Any) -> Any:
-    layout = layout_of(value.dtype)
-    return RecordType(layout) if layout else _typeof_scalar(value, context)
+    known = layout_of(value.dtype)
+    return record_type(*known) if known else _typeof_scalar(value, context)
 
 
 @unbox(RecordType)
@@ -67,7 +89,7 @@ def _unbox_record(kind: RecordType, scalar: Any, c: Any) -> Any:
     record.data = pointer
     words = c.builder.bitcast(buffer, _INT.as_pointer())
     length = c.builder.load(c.builder.gep(words, [_INT(2)]))  # Py_buffer.len
-    record.n = joints(c.builder, kind.layout.size, length)
+    record.n = joints(c.builder, kind, length)
     return NativeValue(
         record._getvalue(),
         is_error=cgutils.is_null(c.builder, pointer),
@@ -75,10 +97,10 @@ def _unbox_record(kind: RecordType, scalar: Any, c: Any) -> Any:
     )
 
 
-def joints(builder: Any, size: Polynomial, itemsize: Any) -> Any:
+def joints(builder: Any, kind: RecordType, itemsize: Any) -> Any:
     """Emit n from a record's size in bytes and its polynomial; 0 if the size is constant."""
-    a, b, c = size
-    numbers = builder.sub(builder.sdiv(itemsize, _INT(BYTES)), _INT(a))
+    a, b, c = kind.layout.size
+    numbers = builder.sub(builder.sdiv(itemsize, _INT(kind.bytes)), _INT(a))
     if c == 0:
         return builder.sdiv(numbers, _INT(b)) if b else _INT(0)
     # b n + c n^2 = numbers, with an integer root
@@ -99,28 +121,28 @@ class _RecordAttributes(AttributeTemplate):
             return None
         kind = place[1]
         if isinstance(kind, Layout):
-            return RecordType(kind)
-        return types.Array(types.float64, len(kind), "C") if kind else types.float64
+            return record_type(kind, record.width)
+        return record.array(len(kind))
 
 
 @imputils.lower_getattr_generic(RecordType)
 def _get_field(context: Any, builder: Any, kind: RecordType, value: Any, name: str) -> Any:
     record = cgutils.create_struct_proxy(kind)(context, builder, value=value)
     offset, field = _found(kind, name)
-    place = _place(builder, record.data, offset, record.n)
+    place = _place(builder, kind, record.data, offset, record.n)
     if isinstance(field, Layout):
-        inner = cgutils.create_struct_proxy(RecordType(field))(context, builder)
+        inner = cgutils.create_struct_proxy(record_type(field, kind.width))(context, builder)
         inner.data, inner.n = place, record.n
         return inner._getvalue()
-    numbers = builder.bitcast(place, _FLOAT.as_pointer())
+    numbers = builder.bitcast(place, context.get_value_type(kind.array(0)).as_pointer())
     if not field:
-        return builder.load(numbers)
+        return builder.load(numbers, align=BYTES)
     from numba.np import arrayobj  # only the compiler needs it
 
-    array = arrayobj.make_array(types.Array(types.float64, len(field), "C"))(context, builder)
+    array = arrayobj.make_array(kind.array(len(field)))(context, builder)
     shape = [value_of(builder, Polynomial(*dimension), record.n) for dimension in field]
     strides: list[Any] = []
-    step: Any = _INT(BYTES)
+    step: Any = _INT(kind.bytes)
     for k, length in enumerate(reversed(shape)):
         strides.insert(0, step)
         step = builder.mul(step, length, flags=["nsw"]) if k + 1 < len(shape) else step
@@ -129,7 +151,7 @@ def _get_field(context: Any, builder: Any, kind: RecordType, value: Any, name: s
         data=numbers,
         shape=cgutils.pack_array(builder, shape),
         strides=cgutils.pack_array(builder, strides),
-        itemsize=_INT(BYTES),
+        itemsize=_INT(kind.bytes),
         meminfo=None,
         parent=None,
     )
@@ -143,9 +165,9 @@ def _set_field(context: Any, builder: Any, sig: Any, args: Any, name: str) -> No
     if field != ():
         raise TypeError(f"write {name}[:] = ...")
     record = cgutils.create_struct_proxy(kind)(context, builder, value=args[0])
-    number = context.cast(builder, args[1], value_type, types.float64)
-    place = _place(builder, record.data, offset, record.n)
-    builder.store(number, builder.bitcast(place, number.type.as_pointer()))
+    number = context.cast(builder, args[1], value_type, kind.array(0))
+    place = _place(builder, kind, record.data, offset, record.n)
+    builder.store(number, builder.bitcast(place, number.type.as_pointer()), align=BYTES)
 
 
 def _found(kind: RecordType, name: str) -> tuple[Polynomial, tuple[Dimension, ...] | Layout]:
@@ -154,8 +176,8 @@ def _found(kind: RecordType, name: str) -> tuple[Polynomial, tuple[Dimension, ..
     return place
 
 
-def _place(builder: Any, data: Any, offset: Polynomial, n: Any) -> Any:
-    factors = Polynomial(*(BYTES * factor for factor in offset))
+def _place(builder: Any, kind: RecordType, data: Any, offset: Polynomial, n: Any) -> Any:
+    factors = Polynomial(*(kind.bytes * factor for factor in offset))
     return cgutils.pointer_add(builder, data, value_of(builder, factors, n))
 
 

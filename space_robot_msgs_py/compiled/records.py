@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 from typing_extensions import Self
 
+from .lanes import WIDTH
 from .layouts import Layout, dimensions_of
 
 Block = NDArray[Any]
@@ -83,6 +84,18 @@ class Record:
     def block(cls, n: int) -> Block:
         """Return a block of zeros; ``block[0]`` is the record."""
         return np.zeros(1, cls.dtype(n))
+
+    @classmethod
+    def lanes(cls, n: int) -> Block:
+        """Return a block of zeros in lanes: each number of the record is (8,) numbers.
+
+        It begins at a multiple of a vector's size, for the processor's sake.
+        """
+        record: Any = cls
+        dtype = _dtype(record, n, WIDTH)
+        room = np.zeros(dtype.itemsize // 8 + WIDTH)
+        start = -room.ctypes.data // 8 % WIDTH
+        return np.ndarray((1,), dtype, buffer=room, offset=8 * start)
 
     @classmethod
     def allocate(cls, n: int) -> Self:
@@ -183,24 +196,39 @@ def _layout(record: Any) -> Layout:
     return Layout(tuple(fields))
 
 
-@lru_cache(maxsize=256)
-def _dtype(record: Any, n: int) -> np.dtype[Any]:
+@lru_cache(maxsize=512)
+def _dtype(record: Any, n: int, width: int = 1) -> np.dtype[Any]:
     fields: list[Any] = []
+    lanes = (width,) if width > 1 else ()
     for name, value in record.fields().items():
         if isinstance(value, Field):
-            fields.append((name, np.float64, value.shape(n)))
+            fields.append((name, np.float64, value.shape(n) + lanes))
         else:
-            fields.append((name, value.dtype(n)))
+            fields.append((name, _dtype(value, n, width)))
     dtype = np.dtype((np.record, np.dtype(fields, align=True)))
-    layout = record.layout()
-    if _LAYOUTS.setdefault(dtype, layout) != layout:
+    known = record.layout(), width
+    if _LAYOUTS.setdefault(dtype, known) != known:
         raise TypeError(f"{record.__name__} cannot be told from another record of equal names")
     return dtype
 
 
-_LAYOUTS: dict[np.dtype[Any], Layout] = {}
+_LAYOUTS: dict[np.dtype[Any], tuple[Layout, int]] = {}
+_FOUND: dict[int, tuple[np.dtype[Any], tuple[Layout, int]]] = {}
+"""Results of `layout_of` by the identity of the dtype: its hash takes longer than a tick."""
+MOST_FOUND = 1024
 
 
-def layout_of(dtype: np.dtype[Any]) -> Layout | None:
-    """Return the layout of a record's dtype; None if it is not that of a record."""
-    return _LAYOUTS.get(dtype)
+def layout_of(dtype: np.dtype[Any]) -> tuple[Layout, int] | None:
+    """Return the layout of a record's dtype, and the width of its numbers.
+
+    None if it is not that of a record.
+    """
+    found = _FOUND.get(id(dtype))
+    if found is not None and found[0] is dtype:
+        return found[1]
+    known = _LAYOUTS.get(dtype)
+    if known is not None:
+        if len(_FOUND) >= MOST_FOUND:
+            _FOUND.clear()
+        _FOUND[id(dtype)] = dtype, known
+    return known

@@ -29,6 +29,7 @@ from space_robot_model.hardware.base_actuators import BaseActuatorSettings
 from space_robot_model.hardware.drives import DriveSettings
 from space_robot_model.robot import Robot
 from space_robot_msgs_py.compiled.kernels import kernel
+from space_robot_msgs_py.compiled.lanes import uniform, whole
 from space_robot_msgs_py.compiled.records import Record, assign, nested, shaped
 from space_robot_msgs_py.config.validation import StrictModel
 from space_robot_msgs_py.errors import InputError
@@ -79,7 +80,7 @@ def delay_command(latency: Array, ring: Array, command: Array, tick: int, out: A
         due = command[i]
         if rows > 0:
             ring[tick % rows, i] = command[i]
-            due = ring[(tick - int(latency[i])) % rows, i]
+            due = ring[(tick - whole(latency[i])) % rows, i]
         out[i] = due
 
 
@@ -211,13 +212,13 @@ def actuate(
     due, wrench = actuators.due, actuators.base_wrench
     delay_command(actuators.latency, command_delay_buffer, command, tick, due)
     reported[:] = due[: reported.size]
-    if actuators.base_is_ideal == 0.0:
+    if uniform(actuators.base_is_ideal) == 0.0:
         reported[:3] = 0.0
     saturated = limit_torque(actuators.torque_limit, reported)
     drive_torque(actuators.drive, reported, applied)
-    if actuators.base_is_ideal == 0.0:
+    if uniform(actuators.base_is_ideal) == 0.0:
         wrench[:] = 0.0
-        wheels, axes = int(actuators.wheels.count), applied.size
+        wheels, axes = whole(actuators.wheels.count), applied.size
         fire(actuators.thrusters, due[axes + wheels :], period, truth.thrusts, wrench)
         applied[:3] = wrench[3:]
         saturated += drive_wheels(

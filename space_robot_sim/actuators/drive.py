@@ -25,6 +25,7 @@ from numpy.typing import NDArray
 from space_robot_model.hardware.drives import DriveSettings
 from space_robot_model.hardware.per_axis import per_axis
 from space_robot_msgs_py.compiled.kernels import kernel
+from space_robot_msgs_py.compiled.lanes import all_lanes, any_lane, where
 from space_robot_msgs_py.compiled.records import Record, assign, shaped
 
 from ..faults.axes import About
@@ -97,20 +98,21 @@ def lag_decays(lag: float, period: float) -> tuple[float, float]:
 def drive_torque(drive: Drive, asked: Array, applied: Array) -> None:
     """Write into ``applied`` (n+3,) what the drives make of ``asked`` (n+3,) over a tick, N m."""
     is_exact = drive.is_exact != 0.0
+    if all_lanes(is_exact):
+        applied[:] = asked
+        return
     for i in range(asked.size):
         u = asked[i]
-        if is_exact:
-            applied[i] = u
-            continue
-        if drive.step[i] > 0.0:
-            u = drive.step[i] * np.floor(u / drive.step[i] + 0.5)
-        if abs(u) < drive.dead_band[i]:
-            u = 0.0
-        if drive.mean_decay[i] > 0.0:
+        step, mean_decay = drive.step[i], drive.mean_decay[i]
+        if any_lane(step > 0.0):
+            spacing = where(step > 0.0, step, 1.0)
+            u = where(step > 0.0, spacing * np.floor(u / spacing + 0.5), u)
+        u = where(abs(u) < drive.dead_band[i], 0.0, u)
+        if any_lane(mean_decay > 0.0):
             behind = drive.lagging[i] - u
-            drive.lagging[i] = u + behind * drive.decay[i]
-            u += behind * drive.mean_decay[i]
-        applied[i] = drive.scale[i] * u + drive.bias[i]
+            drive.lagging[i] = where(mean_decay > 0.0, u + behind * drive.decay[i], 0.0)
+            u = where(mean_decay > 0.0, u + behind * mean_decay, u)
+        applied[i] = where(is_exact, asked[i], drive.scale[i] * u + drive.bias[i])
 
 
 DRIVE_SCALE = Kind(

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from space_robot_model.hardware.thrusters import ThrusterSettings
 from space_robot_msgs_py.compiled.kernels import kernel
+from space_robot_msgs_py.compiled.lanes import where, whole
 from space_robot_msgs_py.compiled.records import Record, assign, shaped
 from space_robot_msgs_py.samples import MOST_THRUSTERS
 
@@ -89,21 +90,20 @@ def fire(
         base_wrench: (6,) force, N, and torque about the CoM, N m, on base axes; theirs is added.
     """
     flow = 0.0
-    for k in range(int(thrusters.count)):
-        wanted = asked[k] > 0.5 * thrusters.force[k] or thrusters.remaining[k] > 0.0
-        is_open = (wanted or thrusters.stuck_on[k] != 0.0) and thrusters.stuck_off[k] == 0.0
-        if is_open and thrusters.open[k] == 0.0:
-            thrusters.pulses[k] += 1.0
-            thrusters.remaining[k] = thrusters.shortest_pulse[k]
-        left = thrusters.remaining[k] - 1.0
-        thrusters.remaining[k] = left if is_open and left > 0.0 else 0.0
-        thrusters.open[k] = 1.0 if is_open else 0.0
+    for k in range(whole(thrusters.count)):
+        wanted = (asked[k] > 0.5 * thrusters.force[k]) | (thrusters.remaining[k] > 0.0)
+        is_open = (wanted | (thrusters.stuck_on[k] != 0.0)) & (thrusters.stuck_off[k] == 0.0)
+        opens = is_open & (thrusters.open[k] == 0.0)
+        thrusters.pulses[k] += where(opens, 1.0, 0.0)
+        left = where(opens, thrusters.shortest_pulse[k], thrusters.remaining[k]) - 1.0
+        thrusters.remaining[k] = where(is_open & (left > 0.0), left, 0.0)
+        thrusters.open[k] = where(is_open, 1.0, 0.0)
         flow += thrusters.open[k] * thrusters.flow[k]
     burnt = min(flow * period, thrusters.propellant)
-    share = burnt / (flow * period) if flow > 0.0 else 0.0
+    share = where(flow > 0.0, burnt / where(flow > 0.0, flow * period, 1.0), 0.0)
     thrusters.burnt += burnt
     thrusters.propellant -= burnt
-    for k in range(int(thrusters.count)):
+    for k in range(whole(thrusters.count)):
         thrust = share * thrusters.open[k] * thrusters.force[k]
         thrusts[k] = thrust
         for i in range(3):

@@ -19,6 +19,7 @@ from pydantic import Field
 
 from space_robot_model.hardware.per_axis import PER_AXIS, Numbers, per_axis
 from space_robot_msgs_py.compiled.kernels import kernel
+from space_robot_msgs_py.compiled.lanes import all_lanes, uniform, where
 from space_robot_msgs_py.compiled.records import Record, assign, shaped
 from space_robot_msgs_py.config.validation import StrictModel
 
@@ -84,11 +85,12 @@ def report_torque(echo: TorqueEcho, applied: Array, reported: Array) -> None:
 
     ``reported`` holds the command within its limits before.
     """
-    if echo.is_of_given == 0.0 and echo.is_exact != 0.0:
+    is_exact, is_of_command = echo.is_exact != 0.0, uniform(echo.is_of_given) == 0.0
+    if is_of_command and all_lanes(is_exact):
         return
     for i in range(applied.size):
-        source = reported[i] if echo.is_of_given == 0.0 else applied[i]
-        reported[i] = source if echo.is_exact != 0.0 else echo.scale[i] * source + echo.bias[i]
+        source = reported[i] if is_of_command else applied[i]
+        reported[i] = where(is_exact, source, echo.scale[i] * source + echo.bias[i])
 
 
 TORQUE_SCALE = Kind(

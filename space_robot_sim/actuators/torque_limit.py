@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from space_robot_msgs_py.compiled.kernels import kernel
+from space_robot_msgs_py.compiled.lanes import where
 from space_robot_msgs_py.compiled.records import Record, shaped
 from space_robot_msgs_py.config.validation import StrictModel
 
@@ -56,8 +57,7 @@ def limit_torque(limits: TorqueLimit, torque: Array) -> float:
     for i in range(torque.size):
         wanted = torque[i]
         torque[i] = min(max(wanted, -limit[i]), limit[i])
-        if torque[i] != wanted:
-            saturated = 1.0
+        saturated = where(torque[i] != wanted, 1.0, saturated)
     return saturated
 
 

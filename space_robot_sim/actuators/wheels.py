@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from space_robot_model.hardware.wheels import WheelSettings
 from space_robot_msgs_py.compiled.kernels import kernel
+from space_robot_msgs_py.compiled.lanes import where, whole
 from space_robot_msgs_py.compiled.records import Record, assign, shaped
 from space_robot_msgs_py.samples import MOST_WHEELS
 
@@ -79,15 +80,15 @@ def drive_wheels(
         1 if a wheel is saturated, else 0.
     """
     any_saturated = 0.0
-    for k in range(int(wheels.count)):
+    for k in range(whole(wheels.count)):
         momentum, limit = wheels.inertia[k] * velocities[k], wheels.max_momentum[k]
         upper = min(wheels.max_torque[k], max(0.0, limit - momentum) / period)
         lower = -min(wheels.max_torque[k], max(0.0, limit + momentum) / period)
         torque = min(max(asked[k], lower), upper)
-        at_limit = asked[k] >= upper if asked[k] > 0.0 else asked[k] <= lower
-        saturated = 1.0 if at_limit and asked[k] != 0.0 else 0.0
-        if wheels.failed[k] != 0.0:
-            torque = saturated = 0.0
+        at_limit = where(asked[k] > 0.0, asked[k] >= upper, asked[k] <= lower)
+        works = wheels.failed[k] == 0.0
+        saturated = where(at_limit & (asked[k] != 0.0) & works, 1.0, 0.0)
+        torque = where(works, torque, 0.0)
         wheels.saturated[k] = saturated
         wheels.saturated_ticks[k] += saturated
         any_saturated = max(any_saturated, saturated)

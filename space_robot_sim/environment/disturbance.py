@@ -10,6 +10,7 @@ from pydantic import Field
 
 from space_robot_model.elementary.sine import sin_cos
 from space_robot_msgs_py.compiled.kernels import kernel
+from space_robot_msgs_py.compiled.lanes import any_lane, where
 from space_robot_msgs_py.compiled.records import Record, assign, shaped
 from space_robot_msgs_py.config.validation import StrictModel
 
@@ -69,9 +70,10 @@ def disturbance_torque(disturbance: Disturbance, time: float, out: Array) -> Non
     frequency = disturbance.angular_frequency
     for group in range(3):
         first, last = 3 * group, out.size if group == 2 else min(3 * group + 3, out.size)
-        amplitude, torque = disturbance.amplitude[group], 0.0
-        if amplitude != 0.0:
+        amplitude = disturbance.amplitude[group]
+        torque = amplitude
+        if any_lane(amplitude != 0.0):
             wave = sin_cos(frequency[group, 0] * time)[0] + sin_cos(frequency[group, 1] * time)[0]
-            torque = amplitude * wave
+            torque = where(amplitude != 0.0, amplitude * wave, 0.0)
         for i in range(first, last):
             out[i] = torque

@@ -16,6 +16,7 @@ from pydantic import Field
 from space_robot_model.dynamics.model import MOST_JOINTS
 from space_robot_model.robot import Robot
 from space_robot_msgs_py.compiled.kernels import kernel
+from space_robot_msgs_py.compiled.lanes import uniform, whole
 from space_robot_msgs_py.compiled.records import Record, assign, shaped
 from space_robot_msgs_py.config.validation import StrictModel
 from space_robot_msgs_py.samples import MOST_WHEELS
@@ -99,9 +100,9 @@ def friction_torque(friction: Friction, velocities: Array, directions: Array, ou
             the holding torque is not computed.
         out: as long as they are.
     """
-    for i in range(int(friction.count)):
+    for i in range(whole(friction.count)):
         rate = velocities[i]
-        direction = directions[i] if friction.set_valued != 0.0 else np.sign(rate)
+        direction = directions[i] if uniform(friction.set_valued) != 0.0 else np.sign(rate)
         out[i] = friction.coulomb[i] * direction + friction.viscous[i] * rate
 
 

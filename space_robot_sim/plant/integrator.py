@@ -10,6 +10,7 @@ from space_robot_model.dynamics.attitude import quaternion_rate, rotate
 from space_robot_model.dynamics.kinematics import forward_kinematics, spatial_velocities
 from space_robot_model.dynamics.model import MOST_JOINTS, Data, Model
 from space_robot_msgs_py.compiled.kernels import kernel, subroutine
+from space_robot_msgs_py.compiled.lanes import whole
 from space_robot_msgs_py.compiled.records import Record, nested, shaped
 from space_robot_msgs_py.samples import MOST_WHEELS
 
@@ -60,13 +61,13 @@ class Stages(Record):
 @subroutine
 def first_velocity(model: Model) -> int:
     """Return where in a state the velocity of the first joint stands."""
-    return 13 + int(model.joint_count)
+    return 13 + whole(model.joint_count)
 
 
 @subroutine
 def state_size(model: Model) -> int:
     """Return how many numbers a state of the robot has, its wheels included."""
-    return 13 + 2 * int(model.joint_count) + int(model.wheel_count)
+    return 13 + 2 * whole(model.joint_count) + whole(model.wheel_count)
 
 
 @kernel
@@ -84,7 +85,7 @@ def state_derivative(
             scratch.
         out: as ``x``.
     """
-    n, friction, data = int(model.joint_count), environment.friction, stages.data
+    n, friction, data = whole(model.joint_count), environment.friction, stages.data
     quaternion, theta = x[3:7], x[7 : 7 + n]
     v0, w0, velocities = x[7 + n : 10 + n], x[10 + n : 13 + n], x[13 + n :]
     force, actuation, resisting = stages.force, stages.actuation, stages.friction
@@ -96,13 +97,13 @@ def state_derivative(
         force[3 + k] -= disturbance[k]
     friction_torque(friction, velocities, stages.directions, resisting)
     for i in range(n):
-        j = int(model.row[i])
-        if i < model.actuated_count:
+        j = whole(model.row[i])
+        if i < whole(model.actuated_count):
             force[6 + j] = actuation[6 + i] - disturbance[3 + i] - resisting[j]
         else:
             spring = model.stiffness[j] * (theta[j] - model.rest[j])
             force[6 + j] = -spring - model.damping[j] * velocities[j] - resisting[j]
-    for k in range(n, int(friction.count)):  # the wheels
+    for k in range(n, whole(friction.count)):  # the wheels
         force[6 + k] = actuation[6 + k] - resisting[k]
     for k in range(3):
         out[k] = v0[k]
@@ -122,7 +123,7 @@ def rk4_step(
     """
     size, end = state_size(model), stages.end
     slope, stage = stages.slope, stages.stage
-    disturbance = stages.disturbance[: 3 + int(model.actuated_count)]
+    disturbance = stages.disturbance[: 3 + whole(model.actuated_count)]
     for k in range(1, 4):
         step = period if k == 3 else 0.5 * period
         if k != 2:  # the two stages in the middle are at one time

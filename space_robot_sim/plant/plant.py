@@ -15,6 +15,7 @@ from space_robot_model.elementary.matrices import norm
 from space_robot_model.hardware.sensors import SensorSettings
 from space_robot_model.robot import Robot
 from space_robot_msgs_py.compiled.kernels import kernel
+from space_robot_msgs_py.compiled.lanes import where, whole
 from space_robot_msgs_py.compiled.records import Record, RecordOwner, assign, nested, shaped
 from space_robot_msgs_py.errors import DivergedError, InputError
 from space_robot_msgs_py.samples import MOST_WHEELS, Command, RobotState, State
@@ -317,16 +318,9 @@ def advance(
     Returns:
         The fastest rate then, see `fastest_rate`.
     """
-    truth, measured = memory.truth, memory.measured
-    joints, wheels = int(memory.model.joint_count), int(memory.model.wheel_count)
-    n, actuation = truth.joint_positions.size, memory.stages.actuation
-    actuate(memory.actuators, command_delay_buffer, torque, tick, period, truth, measured)
-    substeps = int(memory.substeps)
+    begin_interval(memory, command_delay_buffer, torque, tick, period)
+    substeps = whole(memory.substeps)
     step = period / substeps
-    actuation[:6] = memory.actuators.base_wrench
-    actuation[6 : 6 + n] = truth.applied_torque[3:]
-    for k in range(wheels):
-        actuation[6 + joints + k] = truth.wheel_torques[k]
     for k in range(substeps):
         integrate(
             memory.model,
@@ -336,7 +330,30 @@ def advance(
             step,
             memory.stages,
         )
-    write_truth(memory.model, memory.x, memory.rotation, truth)
+    fastest: float = end_interval(memory)
+    return fastest
+
+
+@kernel
+def begin_interval(
+    memory: PlantMemory, command_delay_buffer: Array, torque: Array, tick: int, period: float
+) -> None:
+    """Let the actuators answer a command given at ``tick``, see `advance`."""
+    truth, actuation = memory.truth, memory.stages.actuation
+    actuate(
+        memory.actuators, command_delay_buffer, torque, tick, period, truth, memory.measured
+    )
+    n, joints = truth.joint_positions.size, whole(memory.model.joint_count)
+    actuation[:6] = memory.actuators.base_wrench
+    actuation[6 : 6 + n] = truth.applied_torque[3:]
+    for k in range(whole(memory.model.wheel_count)):
+        actuation[6 + joints + k] = truth.wheel_torques[k]
+
+
+@kernel
+def end_interval(memory: PlantMemory) -> float:
+    """Write the true state reached, and return its `fastest_rate`."""
+    write_truth(memory.model, memory.x, memory.rotation, memory.truth)
     fastest: float = fastest_rate(memory.model, memory.x)
     return fastest
 
@@ -345,9 +362,7 @@ def advance(
 def fastest_rate(model: Model, x: Array) -> float:
     """Return the fastest velocity of base axes, joints and wheels, rad/s (NaN if any is)."""
     fastest = 0.0
-    for i in range(10 + int(model.joint_count), state_size(model)):
-        if not abs(x[i]) <= fastest:  # also true of NaN
-            fastest = abs(x[i])
-            if np.isnan(fastest):
-                break
+    for i in range(10 + whole(model.joint_count), state_size(model)):
+        speed = abs(x[i])  # NaN stays
+        fastest = where((speed <= fastest) | np.isnan(fastest), fastest, speed)
     return fastest

@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 
 from space_robot_model.dynamics.model import Model
 from space_robot_msgs_py.compiled.kernels import kernel, subroutine
+from space_robot_msgs_py.compiled.lanes import negated, uniform, where, whole
 
 from ..environment.disturbance import disturbance_torque
 from ..environment.environment import Environment
@@ -43,7 +44,7 @@ def integrate(
 ) -> None:
     """Advance ``x`` in place from ``time`` by ``period``, s; ``stages.actuation`` is held."""
     left = period
-    stages.held[: int(environment.friction.count)] = 0.0
+    stages.held[: whole(environment.friction.count)] = 0.0
     for _ in range(MOST_CUTS):
         slip_or_stick(model, environment, x, time, stages)
         rk4_step(model, environment, x, time, left, stages)
@@ -62,7 +63,7 @@ def integrate(
             stages.end[velocity] = 0.0
             joint = first_at_rest(model, environment, x, stages)
         _take(model, stages, x)
-        stages.held[: int(environment.friction.count)] = 0.0
+        stages.held[: whole(environment.friction.count)] = 0.0
         time += length
         left -= length
     slip_or_stick(model, environment, x, time, stages)
@@ -85,9 +86,9 @@ def slip_or_stick(
     They are written into ``stages.directions``, ``stages.data.locked`` and ``stages.slope[0]``.
     """
     directions, data, coulomb = stages.directions, stages.data, environment.friction.coulomb
-    n, derivative = int(environment.friction.count), stages.slope[0]
+    n, derivative = whole(environment.friction.count), stages.slope[0]
     first, sticks = first_velocity(model), environment.friction.set_valued
-    disturbance = stages.disturbance[: 3 + int(model.actuated_count)]
+    disturbance = stages.disturbance[: 3 + whole(model.actuated_count)]
     for i in range(n):
         directions[i] = sticks * np.sign(x[first + i]) if coulomb[i] > 0.0 else 0.0
         data.locked[i] = sticks if x[first + i] == 0.0 and coulomb[i] > 0.0 else 0.0
@@ -112,11 +113,39 @@ def slip_or_stick(
 
 
 @kernel
+def glide(
+    model: Model, environment: Environment, x: Array, time: float, period: float, stages: Stages
+) -> bool:
+    """Write into ``stages.end`` the state after ``x`` if no joint stands, stops or breaks away.
+
+    In lanes, where those of the others must be found by `integrate`, flight by flight.
+
+    Returns:
+        In which lanes that is so.
+    """
+    directions, coulomb, end = stages.directions, environment.friction.coulomb, stages.end
+    first, sticks = first_velocity(model), uniform(environment.friction.set_valued)
+    slides = True
+    for i in range(whole(environment.friction.count)):
+        has_friction = coulomb[i] * sticks > 0.0
+        directions[i] = where(has_friction, np.sign(x[first + i]), 0.0)
+        stages.data.locked[i] = 0.0
+        slides = slides & negated(has_friction & (x[first + i] == 0.0))
+    disturbance = stages.disturbance[: 3 + whole(model.actuated_count)]
+    disturbance_torque(environment.disturbance, time, disturbance)
+    state_derivative(model, environment, x, disturbance, stages, stages.slope[0])
+    rk4_step(model, environment, x, time, period, stages)
+    for i in range(whole(environment.friction.count)):
+        slides = slides & negated(end[first + i] * directions[i] < 0.0)
+    return slides
+
+
+@kernel
 def first_at_rest(model: Model, environment: Environment, x: Array, stages: Stages) -> int:
     """Return the joint that came to rest first between ``x`` and ``stages.end``, or `NONE`."""
     directions, end = stages.directions, stages.end
     first, earliest, joint = first_velocity(model), 2.0, NONE
-    for i in range(int(environment.friction.count)):
+    for i in range(whole(environment.friction.count)):
         before, after = x[first + i], end[first + i]
         if after * directions[i] < 0.0:
             share = before / (before - after)

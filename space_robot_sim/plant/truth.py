@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from space_robot_model.dynamics.attitude import rotate_back, rotation_matrix
 from space_robot_model.dynamics.model import Model
 from space_robot_msgs_py.compiled.kernels import kernel
+from space_robot_msgs_py.compiled.lanes import whole
 from space_robot_msgs_py.samples import State
 
 Array = NDArray[np.float64]
@@ -23,7 +24,7 @@ def write_truth(model: Model, x: Array, rotation: Array, truth: State) -> None:
         rotation: (3, 3) scratch.
         truth: angular velocity on base axes.
     """
-    n, actuated = int(model.joint_count), truth.joint_positions.size
+    n, actuated = whole(model.joint_count), truth.joint_positions.size
     truth.base_position[:] = x[:3]
     truth.quaternion[:] = x[3:7]
     truth.base_velocity[:] = x[7 + n : 10 + n]
@@ -31,10 +32,10 @@ def write_truth(model: Model, x: Array, rotation: Array, truth: State) -> None:
     rotate_back(rotation, x[10 + n : 13 + n], truth.omega_base)
     positions, velocities = x[7 : 7 + n], x[13 + n : 13 + 2 * n]
     for i in range(actuated):
-        j = int(model.row[i])
+        j = whole(model.row[i])
         truth.joint_positions[i], truth.joint_velocities[i] = positions[j], velocities[j]
     for i in range(actuated, n):
-        j, k = int(model.row[i]), i - actuated
+        j, k = whole(model.row[i]), i - actuated
         truth.passive_positions[k], truth.passive_velocities[k] = positions[j], velocities[j]
-    for k in range(int(model.wheel_count)):
+    for k in range(whole(model.wheel_count)):
         truth.wheel_velocities[k] = x[13 + 2 * n + k]

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from space_robot_model.hardware.encoders import MOST_DIFFERENCED, EncoderSettings
 from space_robot_msgs_py.compiled.kernels import kernel
+from space_robot_msgs_py.compiled.lanes import where, whole
 from space_robot_msgs_py.compiled.records import Record, assign, shaped
 from space_robot_msgs_py.samples import State
 from space_robot_msgs_py.topics import BASE_AXES
@@ -97,7 +98,7 @@ def read_encoders(
 
     A stuck encoder reports the angle of the tick before, and rate zero.
     """
-    draws, lag = encoders.draws[row_of(tick)], int(encoders.difference_ticks)
+    draws, lag = encoders.draws[row_of(tick)], whole(encoders.difference_ticks)
     before = encoders.history[(tick - 1) % MOST_DIFFERENCED]
     then = encoders.history[(tick - lag) % MOST_DIFFERENCED]
     now = encoders.history[tick % MOST_DIFFERENCED]
@@ -106,8 +107,8 @@ def read_encoders(
         angle = in_steps(angle, encoders.step[i])
         rate = (angle - then[i]) / (lag * period) if lag > 0 else truth.joint_velocities[i]
         rate = in_steps(rate + encoders.velocity_sigma[i] * draws[1, i], encoders.velocity_step[i])
-        if encoders.stuck[i] == 1.0:
-            angle, rate = before[i], 0.0
+        is_stuck = encoders.stuck[i] == 1.0
+        angle, rate = where(is_stuck, before[i], angle), where(is_stuck, 0.0, rate)
         now[i] = angle
         measured.joint_positions[i] = angle
         measured.joint_velocities[i] = rate

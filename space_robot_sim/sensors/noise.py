@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from space_robot_model.elementary.normal import normal_numbers
 from space_robot_msgs_py.compiled.kernels import kernel
+from space_robot_msgs_py.compiled.lanes import any_lane, where
 
 from ..faults.schedule import BLOCK_TICKS
 
@@ -49,4 +50,7 @@ def row_of(tick: int) -> int:
 @kernel
 def in_steps(value: float, step: float) -> float:
     """Round ``value`` to the nearest whole multiple of ``step``; a step of 0 is none."""
-    return step * np.floor(value / step + 0.5) if step > 0.0 else value
+    if not any_lane(step > 0.0):
+        return value
+    spacing = where(step > 0.0, step, 1.0)
+    return where(step > 0.0, spacing * np.floor(value / spacing + 0.5), value)

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from space_robot_model.hardware.sensors import SensorSettings
 from space_robot_msgs_py.compiled.kernels import kernel
+from space_robot_msgs_py.compiled.lanes import uniform
 from space_robot_msgs_py.compiled.records import Record, assign, nested, shaped
 from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.samples import State
@@ -89,7 +90,7 @@ def sense(sensors: Sensors, truth: State, tick: int, period: float, measured: St
     measured.wheel_velocities[:] = truth.wheel_velocities
     measured.passive_positions[:] = truth.passive_positions
     measured.passive_velocities[:] = truth.passive_velocities
-    if sensors.are_ideal == 1.0:
+    if uniform(sensors.are_ideal) == 1.0:
         measured.quaternion[:] = truth.quaternion
         measured.omega_base[:] = truth.omega_base
         measured.joint_positions[:] = truth.joint_positions

@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from space_robot_model.elementary.matrices import norm
 from space_robot_model.elementary.sine import sin_cos
 from space_robot_model.hardware.star_tracker import LEAST_RATE, MOST_UNDER_WAY, StarTrackerSettings
-from space_robot_msgs_py.compiled.kernels import kernel
+from space_robot_msgs_py.compiled.kernels import kernel, subroutine
+from space_robot_msgs_py.compiled.lanes import any_lane, where, whole
 from space_robot_msgs_py.compiled.records import Record, assign, shaped
 from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.samples import State
@@ -100,19 +101,24 @@ def track_stars(tracker: StarTracker, truth: State, tick: int, measured: State) 
     held until the next one; while the tracker is blind, none is taken. The robot was at rest
     before tick 0, so the first is there at once.
     """
-    interval, delay = int(tracker.interval), int(tracker.delay)
+    interval, delay = whole(tracker.interval), whole(tracker.delay)
     if tick % interval == 0:
         place = (tick // interval) % MOST_UNDER_WAY
         tracker.taken[place] = 1.0 - tracker.blind[0]
         expose(tracker, truth.quaternion, tracker.draws[row_of(tick)], tracker.under_way[place])
-        if tick == 0 and tracker.taken[place] == 1.0:
-            tracker.held[:] = tracker.under_way[place]
+        if tick == 0:
+            _release(tracker, place)
     exposed = tick - delay
     if exposed >= 0 and exposed % interval == 0:
-        place = (exposed // interval) % MOST_UNDER_WAY
-        if tracker.taken[place] == 1.0:
-            tracker.held[:] = tracker.under_way[place]
+        _release(tracker, (exposed // interval) % MOST_UNDER_WAY)
     measured.quaternion[:] = tracker.held
+
+
+@subroutine
+def _release(tracker: StarTracker, place: int) -> None:
+    is_taken = tracker.taken[place] == 1.0
+    for i in range(4):
+        tracker.held[i] = where(is_taken, tracker.under_way[place, i], tracker.held[i])
 
 
 @kernel
@@ -123,24 +129,23 @@ def expose(tracker: StarTracker, quaternion: Array, draws: Array, out: Array) ->
     x = across * draws[0] + (about - across) * along * boresight[0]
     y = across * draws[1] + (about - across) * along * boresight[1]
     z = across * draws[2] + (about - across) * along * boresight[2]
-    out[:] = quaternion
+    a, b, c, d = quaternion[0], quaternion[1], quaternion[2], quaternion[3]
     angle = np.sqrt(x * x + y * y + z * z)
-    if angle > 0.0:  # times the quaternion of the rotation x, y, z
-        sine, cosine = sin_cos(0.5 * angle)
-        sine /= angle
-        x, y, z = sine * x, sine * y, sine * z
-        a, b, c, d = quaternion[0], quaternion[1], quaternion[2], quaternion[3]
-        out[0] = a * cosine - b * x - c * y - d * z
-        out[1] = a * x + b * cosine + c * z - d * y
-        out[2] = a * y + c * cosine + d * x - b * z
-        out[3] = a * z + d * cosine + b * y - c * x
+    is_turned = angle > 0.0  # by the quaternion of the rotation x, y, z
+    sine, cosine = sin_cos(0.5 * angle)
+    sine /= where(is_turned, angle, 1.0)
+    x, y, z = sine * x, sine * y, sine * z
+    out[0] = where(is_turned, a * cosine - b * x - c * y - d * z, a)
+    out[1] = where(is_turned, a * x + b * cosine + c * z - d * y, b)
+    out[2] = where(is_turned, a * y + c * cosine + d * x - b * z, c)
+    out[3] = where(is_turned, a * z + d * cosine + b * y - c * x, d)
     step = 0.5 * tracker.step[0]
-    if step > 0.0:
+    if any_lane(step > 0.0):
         for i in range(4):
             out[i] = in_steps(out[i], step)
         length = np.sqrt(out[0] * out[0] + out[1] * out[1] + out[2] * out[2] + out[3] * out[3])
         for i in range(4):
-            out[i] /= length
+            out[i] /= where(step > 0.0, length, 1.0)
 
 
 def _blind(blind: Array, fault: ScheduledFault) -> None:
