@@ -12,11 +12,12 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from space_robot_control.controller.law_changes import LawChanges
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.bag.blocks import block_bounds, blocks_of
-from space_robot_msgs_py.bag.flight_log import FlightLog
+from space_robot_msgs_py.bag.flight_log import FlightLog, of_nan
 from space_robot_msgs_py.bag.reader import read_flight
 from space_robot_msgs_py.bag.recorder import BagRecorder
 from space_robot_msgs_py.errors import FlightError, InputError
@@ -33,6 +34,8 @@ from ..processes.scratch_folder import ScratchFolder
 from .closed_loop import close_loop, measured_ticks
 from .message_loop import MessageLoop
 from .plan import Flight
+
+Array = NDArray[np.float64]
 
 STRETCH_TICKS, STRETCH_OF_MESSAGES = 10_000, 1_000
 """Ticks flown between two looks at the world outside: in compiled code, message by message."""
@@ -133,24 +136,29 @@ def _recording(flight: Flight, bag: Path | None) -> Iterator[Messages | None]:
         recorder.close()
 
 
-def empty_log(flight: Flight, start: int = 0, stop: int | None = None) -> FlightLog:
+def empty_log(
+    flight: Flight,
+    start: int = 0,
+    stop: int | None = None,
+    new: Callable[[tuple[int, ...]], Array] = of_nan,
+) -> FlightLog:
     """Return the log of the ticks ``start`` to ``stop`` (None: the last) before the flight.
 
-    The reference alone is known.
+    The reference alone is known. ``new`` makes the columns that the flight fills.
     """
     ticks = (flight.ticks if stop is None else stop) - start
     names = flight.plant.names
     counts = len(names.wheels), len(names.thrusters)
-    log = FlightLog.allocate(ticks, names.joints, flight.timebase, *counts, names.passive)
+    log = FlightLog.allocate(ticks, names.joints, flight.timebase, *counts, names.passive, new)
     log.first_tick = start
     log.flight = flight.description
     log.lost = {topic.full_name: 0 for topic in topics.ALL}
-    log.commanded_torque = np.empty_like(log.applied_torque)
-    log.telemetry = np.empty((log.ticks, 4, log.axes))
+    log.commanded_torque = new(log.applied_torque.shape)
+    log.telemetry = new((log.ticks, 4, log.axes))
     reference = flight.mission.chunk(start, log.ticks)
     log.reference_joints, log.reference_base = reference.joints, reference.base
     if not flight.plant.measures_truth:
-        log.record_measured()
+        log.record_measured(new)
     return log
 
 
@@ -194,7 +202,7 @@ def fly_blocks(
                 _fly_block(flight, block, changes, messages, progress)
             except Exception as error:
                 measured = measured_ticks(flight.plant, error)
-                yield _ended_early(block, measured - start, flight.plant.tick - start)
+                yield ended_early(block, measured - start, flight.plant.tick - start)
                 raise
             yield block
             laws = block.laws
@@ -279,16 +287,16 @@ def _fly_block(
         try:
             close_loop(plant, controller, block, start, stop)
         except Exception as error:
-            _note_beliefs(flight, block, start, plant.tick)
+            note_beliefs(flight, block, start, plant.tick)
             if messages:
                 messages.stretch(block, start, measured_ticks(plant, error), plant.tick)
             raise
-        _note_beliefs(flight, block, start, stop)
+        note_beliefs(flight, block, start, stop)
         if messages:
             messages.stretch(block, start, stop, stop)
 
 
-def _note_beliefs(flight: Flight, block: FlightLog, start: int, stop: int) -> None:
+def note_beliefs(flight: Flight, block: FlightLog, start: int, stop: int) -> None:
     """Copy the errors in the law's telemetry of the ticks ``start`` to ``stop``."""
     if block.believed_error is None:
         return
@@ -298,7 +306,7 @@ def _note_beliefs(flight: Flight, block: FlightLog, start: int, stop: int) -> No
     block.believed_error[rows] = block.telemetry[rows, SIGNALS.index("e")]
 
 
-def _ended_early(block: FlightLog, measured: int, answered: int) -> FlightLog:
+def ended_early(block: FlightLog, measured: int, answered: int) -> FlightLog:
     """The first ``measured`` rows; those from ``answered`` on have no command."""
     assert block.commanded_torque is not None
     assert block.telemetry is not None

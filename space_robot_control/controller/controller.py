@@ -143,6 +143,12 @@ class Controller(RecordOwner):
         self.signals.n_hat[:] = 0.0
         assign(self._memory, transfer_left=-1.0)
 
+    def move_to(self, block: Block) -> None:
+        """Keep the memory in another ``block`` from now on, beside that of other flights."""
+        block[:] = self.block
+        self.block = block
+        self._look_into_blocks()
+
     def save(self) -> ControllerSnapshot:
         """Save the state of the controller and its law."""
         command = self.last_command

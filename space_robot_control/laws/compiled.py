@@ -48,11 +48,15 @@ class CompiledLaw(ControlLaw):
             period: of the controller, s.
         """
 
-    @property
-    def function(self) -> RecordFunction:
-        """The kernel, compiled for this law's records."""
-        own: list[Any] = [self.gains_type, self.memory_type]  # classes are hashable
-        return _compiled(type(self).kernel, *own)
+    @classmethod
+    def function(cls, width: int = 1) -> RecordFunction:
+        """Return the kernel, compiled for this law's records of numbers of a width.
+
+        Raises:
+            InputError: it cannot be compiled for that width.
+        """
+        own: list[Any] = [cls.gains_type, cls.memory_type]  # classes are hashable
+        return _compiled(cls.kernel, *own, width)
 
     @property
     def code(self) -> LawCode:
@@ -60,12 +64,12 @@ class CompiledLaw(ControlLaw):
         n = len(self.memory.s) - 3
         gains = prefix(self.gains_block, SomeGains.dtype(n))
         memory = prefix(self.memory_block, LawMemory.dtype(n))
-        return LawCode(self.function, gains, memory, self.h_bar, self.uses_model)
+        return LawCode(self.function(), gains, memory, self.h_bar, self.uses_model)
 
     def force(self, signals: Signals) -> Array:
         """Run the kernel; ``signals`` is a `Signals.view`."""
         n = len(self.memory.s) - 3
-        self.function.call(
+        self.function().call(
             signals.address, n, self.gains.address, n, self.memory.address, n, self.period
         )
         force: Array = self.memory.force
@@ -73,5 +77,8 @@ class CompiledLaw(ControlLaw):
 
 
 @cache
-def _compiled(kernel: Callable[..., None], gains: Any, memory: Any) -> RecordFunction:
-    return RecordFunction(kernel, (Signals, gains, memory), (Signals, SomeGains, LawMemory))
+def _compiled(
+    kernel: Callable[..., None], gains: Any, memory: Any, width: int
+) -> RecordFunction:
+    own, seen = (Signals, gains, memory), (Signals, SomeGains, LawMemory)
+    return RecordFunction(kernel, own, seen, width)

@@ -29,6 +29,11 @@ MEASURED_COLUMNS = STATE_FIELDS + PASSIVE_FIELDS
 """Columns that `FlightLog` and `MeasuredStates` have in common."""
 
 
+def of_nan(shape: tuple[int, ...]) -> Array:
+    """Return an array of NaN."""
+    return np.full(shape, np.nan)
+
+
 @dataclass(slots=True)
 class MeasuredStates:
     """Measured states: the state columns of a `FlightLog` as the sensors report them."""
@@ -58,9 +63,11 @@ class MeasuredStates:
         return cls(*(getattr(log, name) for name in MEASURED_COLUMNS))
 
     @classmethod
-    def unknown(cls, log: FlightLog) -> MeasuredStates:
-        """Return columns of NaN, as many rows as ``log`` has."""
-        return cls.of(log).each(lambda _, column: np.full_like(column, np.nan))
+    def unknown(
+        cls, log: FlightLog, new: Callable[[tuple[int, ...]], Array] = of_nan
+    ) -> MeasuredStates:
+        """Return columns of NaN, as many rows as ``log`` has; ``new`` as in `allocate`."""
+        return cls.of(log).each(lambda _, column: new(column.shape))
 
     @property
     def angular_velocity(self) -> Array:
@@ -168,15 +175,19 @@ class FlightLog:
         wheels: int = 0,
         thrusters: int = 0,
         passive_names: tuple[str, ...] = (),
+        new: Callable[[tuple[int, ...]], Array] = of_nan,
     ) -> FlightLog:
-        """A log of ``ticks`` rows of NaN, for a base with so many wheels and thrusters."""
+        """A log of ``ticks`` rows of NaN, for a base with so many wheels and thrusters.
+
+        ``new`` makes a column of a shape; it may be one of other numbers, to be written later.
+        """
         n, passive = len(joint_names), len(passive_names)
         shapes = [
             *((3,), (4,), (3,), (3,), (n,), (n,), (n + 3,), (3, n), (10,)),
             *((wheels,), (wheels,), (thrusters,), (wheels + thrusters,)),
             *((passive,), (passive,)),
         ]
-        columns: list[Any] = [np.full((ticks, *shape), np.nan) for shape in shapes]
+        columns: list[Any] = [new((ticks, *shape)) for shape in shapes]
         log = cls(timebase, joint_names, *columns)
         log.passive_names = passive_names
         return log
@@ -272,9 +283,9 @@ class FlightLog:
         self.commanded_torque[rows] = torques[:, : self.axes]
         self.actuator_commands[rows] = torques[:, self.axes :]
 
-    def record_measured(self) -> None:
+    def record_measured(self, new: Callable[[tuple[int, ...]], Array] = of_nan) -> None:
         """Allocate columns of NaN for measured states and the law's error."""
-        self.measured = MeasuredStates.unknown(self)
+        self.measured = MeasuredStates.unknown(self, new)
         self.believed_error = np.full_like(self.applied_torque, np.nan)
 
     def as_measured(self) -> FlightLog:

@@ -24,7 +24,7 @@ from numba.experimental import function_type  # noqa: F401  (what Numba makes of
 from ..errors import InputError
 from . import block_type  # noqa: F401  (registers the type of blocks)
 from .cache import cache_directory
-from .record_type import RecordType
+from .record_type import record_type
 from .records import Record
 
 _OPTIONS = {"nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True}
@@ -95,6 +95,7 @@ class RecordFunction(_FunctionType):  # type: ignore[misc]
         function: Callable[..., Any],
         records: Iterable[type[Record]],
         seen_as: Iterable[type[Record]],
+        width: int = 1,
     ) -> None:
         """Compile a kernel.
 
@@ -102,12 +103,13 @@ class RecordFunction(_FunctionType):  # type: ignore[misc]
             function: the kernel.
             records: types of its arguments.
             seen_as: types of the arguments as seen by a loop.
+            width: of a number in them, see `lanes`.
 
         Raises:
             InputError: the kernel cannot be compiled; has reason and line number.
         """
         compiled: Any = function
-        own, self._signature = _signature(records), _signature(seen_as)
+        own, self._signature = _signature(records, width), _signature(seen_as, width)
         whole = own.args, own.return_type
         self._code = _Callback(compiled.py_func, whole, {}, {"error_model": "numpy"})
         self._code.enable_caching()
@@ -139,8 +141,8 @@ def _reason(error: NumbaError) -> str:
     return f"{reasons[0] if reasons else type(error).__name__}{where}"
 
 
-def _signature(records: Iterable[type[Record]]) -> Any:
-    return numba.void(*(RecordType(record.layout()) for record in records), numba.float64)
+def _signature(records: Iterable[type[Record]], width: int) -> Any:
+    return numba.void(*(record_type(record.layout(), width) for record in records), numba.float64)
 
 
 @contextmanager

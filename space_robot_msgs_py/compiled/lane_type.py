@@ -20,7 +20,17 @@ from numba.core.typeconv import Conversion
 from numba.core.typing.templates import AbstractTemplate, infer_global, signature
 from numba.extending import models, register_model
 
-from .lanes import WIDTH, all_lanes, any_lane, negated, uniform, where, whole
+from .lanes import (
+    WIDTH,
+    all_lanes,
+    any_lane,
+    lane_of,
+    negated,
+    uniform,
+    where,
+    whole,
+    with_lane,
+)
 
 _DOUBLE, _BIT = ir.DoubleType(), ir.IntType(1)
 _LANES, _MASK = ir.VectorType(_DOUBLE, WIDTH), ir.VectorType(_BIT, WIDTH)
@@ -329,6 +339,33 @@ def _reduces(function: Any, name: str) -> None:
 
 _reduces(any_lane, "or")
 _reduces(all_lanes, "and")
+
+
+@infer_global(lane_of)
+class _LaneOf(AbstractTemplate):
+    def generic(self, args: Any, kws: Any) -> Any:
+        kind, _ = args
+        if kind not in (LANE, MASK):
+            return None
+        return signature(types.float64 if kind == LANE else types.boolean, kind, types.intp)
+
+
+@lower_builtin(lane_of, LaneType, types.Integer)
+@lower_builtin(lane_of, MaskType, types.Integer)
+def _lane_of(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+    return builder.extract_element(*args)
+
+
+@infer_global(with_lane)
+class _WithLane(AbstractTemplate):
+    def generic(self, args: Any, kws: Any) -> Any:
+        return signature(LANE, LANE, types.intp, types.float64) if args[0] == LANE else None
+
+
+@lower_builtin(with_lane, LaneType, types.Integer, types.Float)
+def _with_lane(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+    value, lane, number = args
+    return builder.insert_element(value, number, lane)
 
 
 def as_lanes(array: Any) -> Any:

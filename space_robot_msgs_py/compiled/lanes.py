@@ -42,3 +42,13 @@ def all_lanes(condition: Any) -> bool:
 def negated(condition: Any) -> Any:
     """Return ``not condition``, lane by lane."""
     return not condition
+
+
+def lane_of(value: Any, lane: int) -> Any:
+    """Return the value of one lane as a plain number."""
+    return value
+
+
+def with_lane(value: Any, lane: int, number: float) -> Any:
+    """Return ``value`` with another number in one lane."""
+    return number

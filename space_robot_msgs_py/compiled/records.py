@@ -75,10 +75,10 @@ class Record:
         return _layout(record)
 
     @classmethod
-    def dtype(cls, n: int) -> np.dtype[Any]:
-        """Return the memory layout for a robot with ``n`` joints."""
+    def dtype(cls, n: int, width: int = 1) -> np.dtype[Any]:
+        """Return the memory layout for a robot with ``n`` joints, of numbers of a width."""
         record: Any = cls
-        return _dtype(record, n)
+        return _dtype(record, n, width)
 
     @classmethod
     def block(cls, n: int) -> Block:
@@ -91,8 +91,7 @@ class Record:
 
         It begins at a multiple of a vector's size, for the processor's sake.
         """
-        record: Any = cls
-        dtype = _dtype(record, n, WIDTH)
+        dtype = cls.dtype(n, WIDTH)
         room = np.zeros(dtype.itemsize // 8 + WIDTH)
         start = -room.ctypes.data // 8 % WIDTH
         return np.ndarray((1,), dtype, buffer=room, offset=8 * start)

@@ -89,6 +89,7 @@ class PlantSnapshot(NamedTuple):
     """Record of a `PlantMemory`."""
     command_delay_buffer: Array
     next_change: float
+    next_event: float
     drawn: tuple[int, int]
     """Seed and block of the random numbers, see `NoiseDraws`."""
     part_faults: PartFaults
@@ -175,6 +176,8 @@ class Plant(RecordOwner):
         self._draws.drawn = settings.fault_seed, -1
         self.next_change = math.inf
         """The first tick to come that needs `begin_tick`: compiled code may fly up to there."""
+        self.next_event = math.inf
+        """The first tick to come at which an event happens, or a fault begins or ends."""
         self.begin_tick(0)
 
     def _look_into_blocks(self) -> None:
@@ -193,6 +196,15 @@ class Plant(RecordOwner):
         PlantMemory.dtype(len(state["names"].joints))  # that compiled code knows the block's layout
         super().__setstate__({k: v for k, v in state.items() if k != "_tick_and_drawn"})
         tick, drawn = state["_tick_and_drawn"]
+        self.state.tick = self.truth.tick = tick
+        self._draws.drawn = drawn
+
+    def move_to(self, block: Block) -> None:
+        """Keep the memory in another ``block`` from now on, beside that of other flights."""
+        block[:] = self.block
+        drawn = self._draws.drawn
+        tick, self.block = self.tick, block
+        self._look_into_blocks()
         self.state.tick = self.truth.tick = tick
         self._draws.drawn = drawn
 
@@ -239,17 +251,29 @@ class Plant(RecordOwner):
 
         Events happen; faults begin and end.
         """
-        self.state.tick = self.truth.tick = tick
-        memory = self.memory
-        if self.captures.apply(tick, memory.model, memory.x):
-            update_true_state(self.block)
-        self.next_change = min(self._part_faults.apply(tick, memory), self.captures.next_tick(tick))
-        if not self._is_ideal:
-            self.next_change = min(self.next_change, self._draws.refill(tick))
+        self.change(tick)
+        self.draw(tick)
         if self.measures_truth and tick == 0:  # what `sense` would say, without compiled code
             self.state.block[:] = self.truth.block
         else:
             measure(self.block, tick, self.period)
+
+    def change(self, tick: int) -> None:
+        """Let the events of ``tick`` happen, and faults begin and end; see `begin_tick`."""
+        self.state.tick = self.truth.tick = tick
+        memory = self.memory
+        if self.captures.apply(tick, memory.model, memory.x):
+            update_true_state(self.block)
+        self.next_event = min(self._part_faults.apply(tick, memory), self.captures.next_tick(tick))
+        self.next_change = self.next_event
+
+    def draw(self, tick: int) -> bool:
+        """Draw the random numbers of ``tick`` if needed; return whether there are new ones."""
+        if self._is_ideal:
+            return False
+        before = self._draws.drawn
+        self.next_change = min(self.next_event, self._draws.refill(tick))
+        return self._draws.drawn != before
 
     def save(self) -> PlantSnapshot:
         """Copy all that the rest of the flight depends on, but the commands to come."""
@@ -258,6 +282,7 @@ class Plant(RecordOwner):
             self.block.copy(),
             self.command_delay_buffer.copy(),
             self.next_change,
+            self.next_event,
             self._draws.drawn,
             copy.deepcopy(self._part_faults),
         )
@@ -267,7 +292,8 @@ class Plant(RecordOwner):
         self.block[:] = snapshot.block
         self.command_delay_buffer[:] = snapshot.command_delay_buffer
         self.state.tick = self.truth.tick = snapshot.tick
-        self.next_change, self._draws.drawn = snapshot.next_change, snapshot.drawn
+        self.next_change, self.next_event = snapshot.next_change, snapshot.next_event
+        self._draws.drawn = snapshot.drawn
         self._part_faults = copy.deepcopy(snapshot.part_faults)
 
     def diverged(self, fastest: float) -> DivergedError:

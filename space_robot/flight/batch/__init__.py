@@ -1,0 +1,1 @@
+"""Eight flights flown together, each with the bits that it has alone."""

@@ -1,0 +1,229 @@
+"""The compiled loop of plants and controllers in lanes, eight flights at a time."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from space_robot_control.controller.kernels import USABLE, apply_transfer, compute_signals
+from space_robot_control.laws.compiled import LawCode
+from space_robot_msgs_py.compiled.kernels import RecordFunction, kernel, subroutine
+from space_robot_msgs_py.compiled.lane_type import as_lanes
+from space_robot_msgs_py.compiled.lanes import (
+    WIDTH,
+    all_lanes,
+    any_lane,
+    lane_of,
+    negated,
+    where,
+    with_lane,
+)
+from space_robot_msgs_py.compiled.records import Block
+from space_robot_msgs_py.samples import State
+from space_robot_sim.plant.lanes import advance_lanes
+from space_robot_sim.plant.plant import RATE_LIMIT
+from space_robot_sim.sensors.sensors import sense
+
+Array = NDArray[np.float64]
+
+
+class InLanes(NamedTuple):
+    """One kind of record of eight flights, in lanes and each by itself."""
+
+    block: Block
+    """(1,) in lanes."""
+    numbers: Array
+    """(N, 8): the same memory."""
+    alone: Block
+    """(8,): a record of each flight."""
+    numbers_alone: Array
+    """(8, N): the same memory."""
+
+
+class LaneMemory(NamedTuple):
+    """Memory of eight flights."""
+
+    plants: InLanes
+    """`PlantMemory`."""
+    controllers: InLanes
+    """`ControllerMemory`; the allocations in use are those of the flights by themselves."""
+    measured: Block
+    """(1,) `State` in lanes, of ``plants``."""
+    command_delay_buffer: Array
+    """(ticks, m+A, 8)."""
+    torque: Array
+    """(m+A, 8) last command of each flight, N m."""
+    flies: Array
+    """(1, 8): 1 for a lane whose flight goes on."""
+    tick: Array
+    """(1, 8): the tick that each flight has reached."""
+    status: Array
+    """(1, 8): of the last state of each flight, see `compute_signals`."""
+    fastest: Array
+    """(1, 8): `fastest_rate` of each flight, rad/s."""
+
+
+class LaneLog(NamedTuple):
+    """Columns of a log of eight flights, (8, N, ...) each; see `FlightLog`."""
+
+    truth: Any
+    """Columns of true states, (8, N, c) each, in the order of `State`."""
+    measured: Any
+    """The same of measured states; without rows if they are the true ones."""
+    commanded_torque: Array
+    actuator_commands: Array
+    telemetry: Array
+
+
+@kernel
+def fly_lanes(
+    law: LawCode,
+    allocate: RecordFunction,
+    memory: LaneMemory,
+    log: LaneLog,
+    row: int,
+    references: Block,
+    start: int,
+    period: float,
+) -> int:
+    """Fly from the tick ``start`` on, a tick for each reference, or until no flight goes on.
+
+    The sensors have measured ``start``, and not yet the tick reached. The memory of a flight that
+    ends is left in its record by itself, as it was then.
+
+    Args:
+        law: gains and memory in lanes; ``h_bar`` (m, 8).
+        allocate: an `allocation_code`.
+        memory: of the flights.
+        log: to be filled.
+        row: of ``start`` in the log.
+        references: block of `Reference` in lanes.
+        start: first tick.
+        period: s.
+
+    Returns:
+        The tick reached.
+    """
+    plant, controllers = memory.plants.block[0], memory.controllers.block
+    buffer, torque = as_lanes(memory.command_delay_buffer), as_lanes(memory.torque)
+    flies, ticks = as_lanes(memory.flies), as_lanes(memory.tick)
+    statuses, rates = as_lanes(memory.status), as_lanes(memory.fastest)
+    h_bar, signals, of_law = as_lanes(law.h_bar), controllers[0].signals, law.memory[0]
+    for k in range(references.size):
+        tick = start + k
+        if k > 0:
+            sense(plant.sensors, plant.truth, tick, period, plant.measured)
+        _log_state(log.truth, row + k, plant.truth)
+        if log.measured[0].shape[1] > 0:
+            _log_state(log.measured, row + k, plant.measured)
+        status = compute_signals(
+            controllers, tick, memory.measured, references[k : k + 1], h_bar, law.uses_model, period
+        )
+        is_flying = flies[0] == 1.0
+        statuses[0] = where(is_flying, status, statuses[0])
+        _end(memory, is_flying & (status != USABLE), tick)
+        is_flying = flies[0] == 1.0
+        if not any_lane(is_flying):
+            return tick
+        law.run(signals, law.gains[0], of_law, period)
+        apply_transfer(controllers, tick, of_law.force, torque)
+        if torque.size > of_law.force.size:
+            _allocate(allocate, memory, is_flying, torque, of_law.force.size, tick)
+        _log_command(log, row + k, torque, of_law.force.size)
+        _spread(of_law.s, log.telemetry[:, row + k, 0])
+        _spread(of_law.u, log.telemetry[:, row + k, 1])
+        _spread(signals.n_hat, log.telemetry[:, row + k, 2])
+        _spread(signals.error, log.telemetry[:, row + k, 3])
+        fastest = advance_lanes(
+            plant, memory.plants.alone, buffer, torque, tick, period, is_flying
+        )
+        rates[0] = where(is_flying, fastest, rates[0])
+        ticks[0] = where(is_flying, tick + 1.0, ticks[0])
+        _end(memory, is_flying & negated(fastest <= RATE_LIMIT), tick + 1)
+        if not any_lane(flies[0] == 1.0):
+            return tick + 1
+    return start + references.size
+
+
+@kernel
+def measure_lanes(plants: Block, tick: int, period: float) -> None:
+    """Let the sensors measure ``tick``."""
+    memory = plants[0]
+    sense(memory.sensors, memory.truth, tick, period, memory.measured)
+
+
+@kernel
+def _end(memory: LaneMemory, ends: bool, tick: int) -> None:
+    """End the flights of some lanes, and keep their memory."""
+    if not any_lane(ends):
+        return
+    for lane in range(WIDTH):
+        if lane_of(ends, lane):
+            memory.flies[0, lane] = 0.0
+            take_out(memory.plants, lane)
+            take_out(memory.controllers, lane)
+
+
+@kernel
+def take_out(records: InLanes, lane: int) -> None:
+    """Copy the record of one lane into that of the flight by itself."""
+    numbers, alone = records.numbers, records.numbers_alone
+    for i in range(len(numbers)):
+        alone[lane, i] = numbers[i, lane]
+
+
+@subroutine
+def _spread(values: Array, rows: Array) -> None:
+    """Write values in lanes into the rows (8, c) of the flights."""
+    for i in range(rows.shape[1]):
+        value = values[i]
+        for lane in range(WIDTH):
+            rows[lane, i] = lane_of(value, lane)
+
+
+@kernel
+def _log_state(columns: Any, row: int, state: State) -> None:
+    _spread(state.base_position, columns[0][:, row])
+    _spread(state.quaternion, columns[1][:, row])
+    _spread(state.base_velocity, columns[2][:, row])
+    _spread(state.omega_base, columns[3][:, row])
+    _spread(state.joint_positions, columns[4][:, row])
+    _spread(state.joint_velocities, columns[5][:, row])
+    _spread(state.applied_torque, columns[6][:, row])
+    _spread(state.wheel_velocities, columns[7][:, row])
+    _spread(state.wheel_torques, columns[8][:, row])
+    _spread(state.thrusts, columns[9][:, row])
+    _spread(state.passive_positions, columns[10][:, row])
+    _spread(state.passive_velocities, columns[11][:, row])
+
+
+@kernel
+def _log_command(log: LaneLog, row: int, torque: Array, axes: int) -> None:
+    _spread(torque, log.commanded_torque[:, row])
+    _spread(torque[axes:], log.actuator_commands[:, row])
+
+
+@kernel
+def _allocate(
+    allocate: RecordFunction,
+    memory: LaneMemory,
+    is_flying: bool,
+    torque: Array,
+    axes: int,
+    tick: int,
+) -> None:
+    """Allocate the torque on the base, flight by flight: its branches differ too much."""
+    given = memory.controllers.block[0].allocation
+    for lane in range(WIDTH):
+        if lane_of(is_flying, lane):
+            allocation = memory.controllers.alone[lane].allocation
+            for i in range(3):
+                allocation.demand[i] = lane_of(given.demand[i], lane)
+            for i in range(given.reported_speeds.size):
+                allocation.reported_speeds[i] = lane_of(given.reported_speeds[i], lane)
+                allocation.reported_torques[i] = lane_of(given.reported_torques[i], lane)
+            allocate(allocation, float(tick))
+            for i in range(axes, torque.size):
+                torque[i] = with_lane(torque[i], lane, allocation.command[i - axes])

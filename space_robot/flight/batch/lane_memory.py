@@ -1,0 +1,134 @@
+"""Records of eight flights in lanes, filled from the flights' own records and copied back."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from space_robot_control.controller.kernels import ControllerMemory
+from space_robot_control.laws import ControlLaw
+from space_robot_control.laws.base import LawMemory
+from space_robot_control.laws.compiled import CompiledLaw, LawCode, SomeGains
+from space_robot_msgs_py.compiled.lanes import WIDTH
+from space_robot_msgs_py.compiled.records import Block, Record, prefix
+from space_robot_msgs_py.samples import Reference
+from space_robot_sim.plant.plant import PlantMemory
+
+from ..plan import Flight
+from .lane_loop import InLanes, LaneMemory, take_out
+
+Array = NDArray[np.float64]
+
+
+def numbers_of(block: Block) -> Array:
+    """Return a block's numbers: (N, 8) of one in lanes, (k, N) of k records."""
+    numbers: Array = block.view(np.float64)
+    return numbers.reshape(-1, WIDTH) if len(block) == 1 else numbers.reshape(len(block), -1)
+
+
+def in_lanes(record: type[Record], n: int) -> InLanes:
+    """Return memory for eight records of a robot of ``n`` joints."""
+    block, alone = record.lanes(n), np.zeros(WIDTH, record.dtype(n))
+    return InLanes(block, numbers_of(block), alone, numbers_of(alone))
+
+
+def put_in(records: InLanes, lane: int) -> None:
+    """Copy the record of a flight by itself into a lane."""
+    records.numbers[:, lane] = records.numbers_alone[lane]
+
+
+def memory_of(flights: Sequence[Flight]) -> LaneMemory:
+    """Return the memory of up to eight flights; from now on their own records are in it.
+
+    A lane without a flight has the numbers of the first, and does not fly.
+    """
+    n = flights[0].robot.n
+    plants, controllers = in_lanes(PlantMemory, n), in_lanes(ControllerMemory, n)
+    for lane, flight in enumerate(flights):
+        flight.plant.move_to(plants.alone[lane : lane + 1])
+        flight.controller.move_to(controllers.alone[lane : lane + 1])
+    for records in (plants, controllers):
+        records.numbers_alone[len(flights) :] = records.numbers_alone[0]
+        records.numbers[:] = records.numbers_alone.T
+    buffers = [flight.plant.command_delay_buffer for flight in flights]
+    buffers += [buffers[0]] * (WIDTH - len(flights))
+    torque = np.zeros((len(flights[0].controller.names.commanded), WIDTH))
+    flies = np.zeros((1, WIDTH))
+    flies[0, : len(flights)] = 1.0
+    rates = np.zeros((3, 1, WIDTH))
+    return LaneMemory(
+        plants,
+        controllers,
+        plants.block["measured"],
+        np.ascontiguousarray(np.stack(buffers, axis=-1)),
+        torque,
+        flies,
+        *rates,
+    )
+
+
+def copy_back(memory: LaneMemory, flights: Sequence[Flight], lane: int) -> None:
+    """Copy the memory of a flight that has not ended into its own records."""
+    take_out(memory.plants, lane)
+    take_out(memory.controllers, lane)
+    copy_command(memory, flights, lane)
+
+
+def copy_command(memory: LaneMemory, flights: Sequence[Flight], lane: int) -> None:
+    """Copy the commands of a flight into its plant's and controller's memory."""
+    flight = flights[lane]
+    flight.plant.command_delay_buffer[:] = memory.command_delay_buffer[..., lane]
+    flight.controller.last_command.torque[:] = memory.torque[:, lane]
+    flight.controller.last_command.tick = flight.plant.tick - 1
+
+
+class LawInLanes:
+    """Gains and memory of the law in force, of up to eight flights."""
+
+    def __init__(self, laws: Sequence[ControlLaw], n: int) -> None:
+        """Copy gains and memory of ``laws`` of one class for a robot of ``n`` joints.
+
+        Raises:
+            InputError: the kernel cannot be compiled in lanes.
+        """
+        first = laws[0]
+        assert isinstance(first, CompiledLaw)
+        gains, self._memory = first.gains_type.lanes(n), first.memory_type.lanes(n)
+        of_lanes = [*laws, *[first] * (WIDTH - len(laws))]
+        for lane, law in enumerate(of_lanes):
+            numbers_of(gains)[:, lane] = law.gains_block.view(np.float64)
+            numbers_of(self._memory)[:, lane] = law.memory_block.view(np.float64)
+        self._laws = laws
+        self.code = LawCode(
+            first.function(WIDTH),
+            prefix(gains, SomeGains.dtype(n, WIDTH)),
+            prefix(self._memory, LawMemory.dtype(n, WIDTH)),
+            np.ascontiguousarray(np.stack([law.h_bar for law in of_lanes], axis=-1)),
+            first.uses_model,
+        )
+        """The law for `fly_lanes`."""
+
+    def copy_back(self, lane: int) -> None:
+        """Copy the memory of one lane into its law."""
+        self._laws[lane].memory_block.view(np.float64)[:] = numbers_of(self._memory)[:, lane]
+
+
+def references_of(flights: Sequence[Flight], start: int, stop: int) -> Block:
+    """Return the references of the ticks ``start`` to ``stop`` in lanes."""
+    block: Block = np.empty(stop - start, Reference.dtype(flights[0].robot.n, WIDTH))
+    numbers = block.view(np.float64).reshape(stop - start, -1, WIDTH)
+    first = flights[0].mission
+    if all(flight.mission is first for flight in flights):
+        numbers[:] = _reference_numbers(flights[0], start, stop)[:, :, np.newaxis]
+        return block
+    for lane, flight in enumerate(flights):
+        numbers[:, :, lane] = _reference_numbers(flight, start, stop)
+    numbers[:, :, len(flights) :] = numbers[:, :, :1]
+    return block
+
+
+def _reference_numbers(flight: Flight, start: int, stop: int) -> Array:
+    references = flight.mission.chunk(start, stop - start).references()
+    return references.view(np.float64).reshape(stop - start, -1)

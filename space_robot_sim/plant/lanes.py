@@ -1,0 +1,75 @@
+"""Plants of eight flights, stepped together.
+
+Over most steps every joint slides, so that all flights take the same course (`stick_slip.glide`).
+A flight in which a joint stands, stops or breaks away is integrated by itself over that step.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from space_robot_msgs_py.compiled.kernels import kernel
+from space_robot_msgs_py.compiled.lanes import WIDTH, all_lanes, lane_of, negated, where, whole
+from space_robot_msgs_py.compiled.lanes import with_lane
+from space_robot_msgs_py.compiled.records import Block
+from .plant import PlantMemory, begin_interval, end_interval
+
+from .integrator import state_size
+from .stick_slip import glide, integrate
+
+Array = NDArray[np.float64]
+
+
+@kernel
+def advance_lanes(
+    memory: PlantMemory,
+    alone: Block,
+    command_delay_buffer: Array,
+    torque: Array,
+    tick: int,
+    period: float,
+    flies: bool,
+) -> float:
+    """Fly eight plants from ``tick`` to the next, see `advance`.
+
+    Args:
+        memory: in lanes.
+        alone: (8,) block of `PlantMemory`, in which a flight is integrated by itself.
+        command_delay_buffer: in lanes, as ``torque``.
+        torque: the command of each flight.
+        tick: at which it is given.
+        period: s.
+        flies: mask of the lanes that count.
+    """
+    begin_interval(memory, command_delay_buffer, torque, tick, period)
+    model, x, stages = memory.model, memory.x, memory.stages
+    substeps = whole(memory.substeps)
+    step = period / substeps
+    for k in range(substeps):
+        time = tick * period + k * step
+        slides = glide(model, memory.environment, x, time, step, stages)
+        for i in range(state_size(model)):
+            x[i] = where(slides, stages.end[i], x[i])
+        if not all_lanes(slides | negated(flies)):
+            for lane in range(WIDTH):
+                if lane_of(flies, lane) and not lane_of(slides, lane):
+                    _move_alone(memory, alone[lane], lane, time, step)
+    fastest: float = end_interval(memory)
+    return fastest
+
+
+@kernel
+def _move_alone(
+    memory: PlantMemory, alone: PlantMemory, lane: int, time: float, step: float
+) -> None:
+    """Integrate the flight of one lane over a step."""
+    x, stages = memory.x, alone.stages
+    actuation = memory.stages.actuation
+    for i in range(state_size(alone.model)):
+        alone.x[i] = lane_of(x[i], lane)
+    for i in range(6 + whole(alone.environment.friction.count)):
+        stages.actuation[i] = lane_of(actuation[i], lane)
+    integrate(alone.model, alone.environment, alone.x, time, step, stages)
+    for i in range(state_size(alone.model)):
+        x[i] = with_lane(x[i], lane, alone.x[i])
