@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import subprocess
+import time
 from contextlib import AbstractContextManager
 from typing import Any
 
@@ -23,7 +24,7 @@ from ..processes.child_process import child_process
 from .closed_loop import fly_ticks
 from .plan import Flight, FlightPlan, resolve
 
-MARK, ALLOCATION_MARK = "complete", "allocation"
+MARK, ALLOCATION_MARK, LANES_MARK = "complete", "allocation", "lanes"
 
 
 def compile_kernels(with_allocation: bool = False) -> None:
@@ -62,13 +63,34 @@ def _compile_flights() -> None:
     mark.touch()
 
 
-def _progress(what: str, *kernels: Any) -> AbstractContextManager[None]:
-    """Show the progress of compilation, including other processes."""
+def compile_lanes() -> None:
+    """Compile the kernels of flights that fly together, see `space_robot.flight.batch`."""
+    compile_kernels()
+    mark = cache_directory() / LANES_MARK
+    if mark.exists():
+        return
+    from .batch.compilation import LANE_KERNELS, compile_controllers, compile_plants, fly_all_laws
+
+    own = [law.kernel for law in laws().values() if issubclass(law, CompiledLaw)]
+    with _progress("flights that fly together", *LANE_KERNELS, *own, again=True):
+        with child_process(module_command(compile_plants.__module__)) as helper:
+            compile_controllers()
+            helper.wait()
+        fly_all_laws()
+    mark.touch()
+
+
+def _progress(what: str, *kernels: Any, again: bool = False) -> AbstractContextManager[None]:
+    """Show the progress of compilation, including other processes.
+
+    ``again``: the kernels have been compiled for other types before.
+    """
     from ..console.progress import watching_progress  # only once an installation
 
     click.echo(f"compiling {what} (once an installation, a minute or two) ...", err=True)
     files = index_files(kernels)
-    return watching_progress("kernels", len(files), lambda: count_compiled(files))
+    since = time.time_ns() if again else 0
+    return watching_progress("kernels", len(files), lambda: count_compiled(files, since))
 
 
 def load_kernels() -> None:

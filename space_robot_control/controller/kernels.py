@@ -44,7 +44,7 @@ class ControllerMemory(Record):
 
     model: Model = nested(Model)
     """The nominal robot."""
-    controls_base: float = shaped(lambda n: ())
+    controls_base: float = shaped(lambda n: (), uniform=True)
     """1; 0: nothing turns the base, so its axes have no signals and no force."""
     signals: Signals = nested(Signals)
     """Signals of the last tick."""
@@ -65,7 +65,7 @@ class ControllerMemory(Record):
     """F_S commanded."""
     transfer: Array = shaped(lambda n: (n + 3,))
     """Applied force minus force of the law in force when it took over."""
-    transfer_ticks: float = shaped(lambda n: ())
+    transfer_ticks: float = shaped(lambda n: (), uniform=True)
     """Length of a transfer."""
     transfer_left: float = shaped(lambda n: ())
     """Ticks until ``transfer`` has faded; -1: the law takes over at this tick."""

@@ -65,7 +65,7 @@ class AttitudeFilter(Record):
     """rad2/s2."""
     gate: float = shaped(lambda n: ())
     """Square of the largest accepted innovation, in standard deviations."""
-    delay: float = shaped(lambda n: ())
+    delay: float = shaped(lambda n: (), uniform=True)
     """D, ticks."""
     stage: float = shaped(lambda n: ())
     """`NOT_STARTED`, `STARTED` or `FILTERING`."""

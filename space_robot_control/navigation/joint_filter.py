@@ -32,7 +32,7 @@ MOST_STEPS = 1_000_000
 class JointFilter(Record):
     """Gains of the filter, the same for all joints, and the state of each joint."""
 
-    is_on: float = shaped(lambda n: ())
+    is_on: float = shaped(lambda n: (), uniform=True)
     """0: angles and rates are handed on as they are measured."""
     angle_gain: Array = shaped(lambda n: (3,))
     """Of an angle's innovation on angle, rate and acceleration: 1, 1/s, 1/s2."""

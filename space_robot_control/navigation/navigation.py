@@ -35,7 +35,7 @@ attitude begins anew."""
 class Navigation(Record):
     """Filters, and the estimated state."""
 
-    is_filtered: float = shaped(lambda n: ())
+    is_filtered: float = shaped(lambda n: (), uniform=True)
     """0: the laws see the measured state itself."""
     is_active: float = shaped(lambda n: ())
     """1 from the first state on."""

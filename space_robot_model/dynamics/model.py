@@ -29,7 +29,7 @@ class Model(Record):
     moves body j + 1. Only the rows of the robot's joints are used in each array.
     """
 
-    joint_count: float = shaped(lambda n: ())
+    joint_count: float = shaped(lambda n: (), uniform=True)
     """Number N of moving joints, actuated and passive."""
     mass: Array = shaped(lambda n: (MOST_JOINTS + 1,))
     """Body masses, kg, base first."""
@@ -43,17 +43,17 @@ class Model(Record):
     offset: Array = shaped(lambda n: (MOST_JOINTS, 3))
     """From the parent's frame to the joint's at zero, m, in the joint's axes at zero; for modified
     Denavit-Hartenberg parameters ``(a_{i-1}, 0, d_i)``."""
-    is_prismatic: Array = shaped(lambda n: (MOST_JOINTS,))
+    is_prismatic: Array = shaped(lambda n: (MOST_JOINTS,), uniform=True)
     """1 for a prismatic joint, 0 for a revolute one."""
-    parent: Array = shaped(lambda n: (MOST_JOINTS,))
+    parent: Array = shaped(lambda n: (MOST_JOINTS,), uniform=True)
     """Number of the parent body of each joint."""
-    row: Array = shaped(lambda n: (MOST_JOINTS,))
+    row: Array = shaped(lambda n: (MOST_JOINTS,), uniform=True)
     """Index in this model of each joint of the robot's arrays (actuated joints first)."""
-    continues: Array = shaped(lambda n: (MOST_JOINTS,))
+    continues: Array = shaped(lambda n: (MOST_JOINTS,), uniform=True)
     """1 for a joint whose parent is the previous body; 0 at the start of a branch."""
-    branches: Array = shaped(lambda n: (MOST_JOINTS + 1,))
+    branches: Array = shaped(lambda n: (MOST_JOINTS + 1,), uniform=True)
     """1 for a body at which a further branch starts."""
-    actuated_count: float = shaped(lambda n: ())
+    actuated_count: float = shaped(lambda n: (), uniform=True)
     """Number of actuated joints; the passive ones come after them."""
     stiffness: Array = shaped(lambda n: (MOST_JOINTS,))
     """Stiffness of the passive joints' springs, N m/rad, or N/m for prismatic joints."""
@@ -61,7 +61,7 @@ class Model(Record):
     """Damping of the passive joints, N m s/rad or N s/m."""
     rest: Array = shaped(lambda n: (MOST_JOINTS,))
     """Rest position of each spring, rad or m."""
-    wheel_count: float = shaped(lambda n: ())
+    wheel_count: float = shaped(lambda n: (), uniform=True)
     """Number of reaction wheels (`space_robot_model.dynamics.wheels`), at most MOST_WHEELS."""
     wheel_axis: Array = shaped(lambda n: (MOST_WHEELS, 3))
     """Spin axes of the wheels, unit vectors in the base frame."""

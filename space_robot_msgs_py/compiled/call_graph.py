@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import os.path
+import os
 from collections.abc import Iterable, Iterator
 from types import CodeType
 from typing import Any
@@ -28,9 +28,16 @@ def index_files(functions: Iterable[Any]) -> set[str]:
     return files
 
 
-def count_compiled(files: Iterable[str]) -> int:
-    """Return the number of existing `index_files`."""
-    return sum(map(os.path.exists, files))
+def count_compiled(files: Iterable[str], since_ns: int = 0) -> int:
+    """Return the number of `index_files` that have been written since a time, ns."""
+    return sum(_written_ns(file) > since_ns for file in files)
+
+
+def _written_ns(file: str) -> int:
+    try:
+        return os.stat(file).st_mtime_ns
+    except OSError:
+        return 0
 
 
 def _called(function: Any) -> Iterator[Any]:

@@ -34,11 +34,13 @@ class Field:
     """Shape for a robot with n joints."""
     description: str
     """Meaning and unit, for users."""
+    uniform: bool = False
+    """True if kernels need the same numbers in all lanes, see `lanes`."""
 
 
-def shaped(shape: Shape, description: str = "") -> Any:
+def shaped(shape: Shape, description: str = "", *, uniform: bool = False) -> Any:
     """Declare a `Field`."""
-    return Field(shape, description)
+    return Field(shape, description, uniform)
 
 
 def nested(record: type[Record]) -> Any:
@@ -95,6 +97,13 @@ class Record:
         room = np.zeros(dtype.itemsize // 8 + WIDTH)
         start = -room.ctypes.data // 8 % WIDTH
         return np.ndarray((1,), dtype, buffer=room, offset=8 * start)
+
+    @classmethod
+    def uniform_numbers(cls, block: Block) -> bytes:
+        """Return the numbers of a block (1,) that must be the same in all lanes."""
+        record: Any = cls
+        numbers: NDArray[np.float64] = block.view(np.float64)
+        return numbers[_uniform_places(record, block.dtype)].tobytes()
 
     @classmethod
     def allocate(cls, n: int) -> Self:
@@ -209,6 +218,20 @@ def _dtype(record: Any, n: int, width: int = 1) -> np.dtype[Any]:
     if _LAYOUTS.setdefault(dtype, known) != known:
         raise TypeError(f"{record.__name__} cannot be told from another record of equal names")
     return dtype
+
+
+@lru_cache(maxsize=256)
+def _uniform_places(record: Any, dtype: np.dtype[Any]) -> NDArray[np.intp]:
+    """Return the places of the numbers of uniform fields in a record of a layout."""
+    places: list[NDArray[np.intp]] = [np.empty(0, np.intp)]
+    for name, value in record.fields().items():
+        assert dtype.fields is not None
+        kind, offset = dtype.fields[name][:2]
+        if not isinstance(value, Field):
+            places.append(offset // 8 + _uniform_places(value, kind))
+        elif value.uniform:
+            places.append(offset // 8 + np.arange(kind.itemsize // 8))
+    return np.concatenate(places)
 
 
 _LAYOUTS: dict[np.dtype[Any], tuple[Layout, int]] = {}

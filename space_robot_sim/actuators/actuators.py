@@ -115,11 +115,11 @@ class Actuators(Record):
     torque_echo: TorqueEcho = nested(TorqueEcho)
     wheels: Wheels = nested(Wheels)
     thrusters: Thrusters = nested(Thrusters)
-    base_is_ideal: float = shaped(lambda n: ())
+    base_is_ideal: float = shaped(lambda n: (), uniform=True)
     """1 if the base receives the commanded torque; 0 if it has hardware or no actuators."""
     saturated_ticks: float = shaped(lambda n: ())
     """Number of ticks in which a torque was at its limit."""
-    latency: Array = shaped(lambda n: (n + 3 + MOST_WHEELS + MOST_THRUSTERS,))
+    latency: Array = shaped(lambda n: (n + 3 + MOST_WHEELS + MOST_THRUSTERS,), uniform=True)
     """Ticks by which each number of a command is late."""
     due: Array = shaped(lambda n: (n + 3 + MOST_WHEELS + MOST_THRUSTERS,))
     """The command due at the current tick."""

@@ -28,7 +28,7 @@ Array = NDArray[np.float64]
 class Thrusters(Record):
     """Thrusters of one base; entries beyond the last thruster are zero."""
 
-    count: float = shaped(lambda n: ())
+    count: float = shaped(lambda n: (), uniform=True)
     force: Array = shaped(lambda n: (MOST_THRUSTERS,))
     """Force of an open thruster, N."""
     direction: Array = shaped(lambda n: (MOST_THRUSTERS, 3))

@@ -47,7 +47,7 @@ class TorqueEchoSettings(StrictModel):
 class TorqueEcho(Record):
     """Report of torques, one per axis: base x, y, z (base frame), then joints."""
 
-    is_of_given: float = shaped(lambda n: ())
+    is_of_given: float = shaped(lambda n: (), uniform=True)
     """1 if the torque given is reported, 0 if the command within its limits is."""
     scale: Array = shaped(lambda n: (n + 3,))
     """Reported torque per torque of the source."""

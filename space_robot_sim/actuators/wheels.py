@@ -33,7 +33,7 @@ Array = NDArray[np.float64]
 class Wheels(Record):
     """Wheel motors of one base; entries beyond the last wheel are zero."""
 
-    count: float = shaped(lambda n: ())
+    count: float = shaped(lambda n: (), uniform=True)
     axis: Array = shaped(lambda n: (MOST_WHEELS, 3))
     """Unit vectors in the base frame."""
     inertia: Array = shaped(lambda n: (MOST_WHEELS,))

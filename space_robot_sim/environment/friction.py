@@ -58,7 +58,7 @@ def coefficients(robot: Robot, settings: FrictionSettings) -> Array:
 class Friction(Record):
     """Friction of a robot's joints, then of its wheels."""
 
-    count: float = shaped(lambda n: ())
+    count: float = shaped(lambda n: (), uniform=True)
     """Number of joints and wheels; the rest of the arrays is unused."""
     row: Array = shaped(lambda n: (MOST_JOINTS,))
     """Row of each joint in the other arrays, which are in the order of `Model`."""
@@ -66,7 +66,7 @@ class Friction(Record):
     """f_C, N m."""
     viscous: Array = shaped(lambda n: (MOST_JOINTS + MOST_WHEELS,))
     """f_V, N m s/rad."""
-    set_valued: float = shaped(lambda n: ())
+    set_valued: float = shaped(lambda n: (), uniform=True)
     """0 for the sign alone, 1 for friction that holds joints at rest."""
 
     @classmethod

@@ -69,7 +69,7 @@ class PlantMemory(Record):
     actuators: Actuators = nested(Actuators)
     sensors: Sensors = nested(Sensors)
     stages: Stages = nested(Stages)
-    substeps: float = shaped(lambda n: ())
+    substeps: float = shaped(lambda n: (), uniform=True)
     """Integration steps in a tick."""
     x: Array = shaped(lambda n: (MOST_NUMBERS,))
     """State vector, see `Stages`."""

@@ -47,7 +47,7 @@ class Encoders(Record):
     """White noise of each angle, rad."""
     step: Array = shaped(lambda n: (n,))
     """Distance of two angles, rad (0: none)."""
-    difference_ticks: float = shaped(lambda n: ())
+    difference_ticks: float = shaped(lambda n: (), uniform=True)
     """N; 0: rates are measured."""
     velocity_sigma: Array = shaped(lambda n: (n,))
     """White noise of each rate, rad/s."""

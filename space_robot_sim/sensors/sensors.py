@@ -28,7 +28,7 @@ class Sensors(Record):
     star_tracker: StarTracker = nested(StarTracker)
     gyro: Gyro = nested(Gyro)
     encoders: Encoders = nested(Encoders)
-    are_ideal: float = shaped(lambda n: ())
+    are_ideal: float = shaped(lambda n: (), uniform=True)
     """1 if all sensors are without error."""
 
     @classmethod

@@ -37,9 +37,9 @@ class StarTracker(Record):
     """rad: across the boresight, about it."""
     boresight: Array = shaped(lambda n: (3,))
     """Unit vector on base axes."""
-    interval: float = shaped(lambda n: ())
+    interval: float = shaped(lambda n: (), uniform=True)
     """Ticks between two measurements; the first is taken at tick 0."""
-    delay: float = shaped(lambda n: ())
+    delay: float = shaped(lambda n: (), uniform=True)
     """Ticks from a measurement to its release."""
     step: Array = shaped(lambda n: (1,))
     """The quaternion's numbers come in steps of half of it, rad (0: none)."""

@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections import deque
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import closing
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from space_robot_msgs_py.compiled.lanes import WIDTH
 from space_robot_msgs_py.config.text import one_line_of
 
 from ...flight.ending import FAILED
 from ...processes.pool import OutOfTimeError, WorkerDiedError, run_many
-from ..row.fly import RowFlyer
+from ..row.fly import BatchFlyer, RowFlyer
 from ..row.row import KILLED, OUT_OF_TIME, Row, Task
 from ..store.journal import Journal
 from .precision import Precision
@@ -29,6 +31,33 @@ class Progress(NamedTuple):
     """Number of done flights that an earlier call had flown."""
     failed: int
     """Number of done flights that ended early or were not flown."""
+
+
+class TaskBatches(Iterator[tuple[Task, ...]]):
+    """Tasks in groups of one law, to be flown together; it may go on after its end."""
+
+    def __init__(self, tasks: Iterator[Task], size: int) -> None:
+        """Take up to ``size`` tasks into a group."""
+        self._tasks, self._size = tasks, size
+        self._waiting: dict[str, list[Task]] = {}
+        self._single: deque[Task] = deque()
+
+    def split(self, batch: Sequence[Task]) -> None:
+        """Give out the tasks of a group again, one by one."""
+        self._single.extend(batch)
+
+    def __next__(self) -> tuple[Task, ...]:
+        """Return the next group."""
+        if self._single:
+            return (self._single.popleft(),)
+        for task in self._tasks:
+            group = self._waiting.setdefault(task.law, [])
+            group.append(task)
+            if len(group) == self._size:
+                return tuple(self._waiting.pop(task.law))
+        if self._waiting:
+            return tuple(self._waiting.pop(next(iter(self._waiting))))
+        raise StopIteration
 
 
 class Flights:
@@ -81,14 +110,20 @@ class Flights:
         Raises:
             InputError: the journal cannot be written, or the scheduler does not answer.
         """
-        done = run_many(self._flyer, self.missing(), **options)
+        # a time limit is that of a flight, so flights with one are flown one by one
+        size = WIDTH if options.get("timeout_s") is None else 1
+        tasks = TaskBatches(self.missing(), size)
+        done = run_many(BatchFlyer(self._flyer), tasks, **options)
         with closing(done):
             on_progress(self._progress)
             for result in done:
-                row = result.result or self._unflown(result.item, result.error)
-                self._journal.add(row)
-                self._count(row)
-                on_progress(self._progress)
+                if result.result is None and len(result.item) > 1:
+                    tasks.split(result.item)  # so that only the guilty flight has no row
+                    continue
+                for row in result.result or [self._unflown(result.item[0], result.error)]:
+                    self._journal.add(row)
+                    self._count(row)
+                    on_progress(self._progress)
                 if self.precision.is_reached and self.are_complete:
                     return
 

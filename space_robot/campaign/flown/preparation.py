@@ -7,7 +7,7 @@ from functools import cached_property
 
 from space_robot_msgs_py.errors import InputError
 
-from ...flight.compilation import compile_kernels
+from ...flight.compilation import compile_kernels, compile_lanes
 from ...flight.plan import Flight
 from ...processes.software import commit
 from ..row.bands import BINS
@@ -88,6 +88,7 @@ class Preparation:
         has_hardware = any(flight.plant.names.actuators for flight in self.flights.values())
         is_varied = any(name.endswith(ACTUATORS) for name in self.flyer.draws.names)
         compile_kernels(has_hardware or is_varied)
+        compile_lanes()
 
     def _schema(self) -> Schema:
         nominal = next(iter(self.flights.values()))

@@ -1,8 +1,8 @@
-"""Flies one run of a campaign under one law in this process, and returns its row."""
+"""Flies runs of a campaign in this process, one or several together, and returns their rows."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from contextlib import closing
 from dataclasses import dataclass
 from functools import lru_cache
@@ -11,6 +11,7 @@ from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.config.text import one_line_of
 from space_robot_msgs_py.errors import FlightError, InputError, SpaceRobotError
 
+from ...flight.batch.fly import batches, fly_group
 from ...flight.ending import FAILED, Ending
 from ...flight.plan import Flight
 from ...flight.simulate import fly_blocks
@@ -61,12 +62,44 @@ class RowFlyer:
         try:
             vary = self.draws.values(task.run)
             return self.row_of(task, vary, self.draws.scenario(task.run, task.law).check())
-        except InputError as error:
-            return Row(task, REFUSED, str(error), vary=vary).digested()
-        except SpaceRobotError as error:  # such as a mistake in a user's law
-            return Row(task, FAILED, str(error), vary=vary).digested()
         except Exception as error:  # a defect of this package must not end a campaign either
-            return Row(task, FAILED, one_line_of(error), vary=vary).digested()
+            return _unflown(task, vary, error)
+
+    def together(self, tasks: Sequence[Task]) -> list[Row]:
+        """Fly tasks and return their rows, in any order.
+
+        Those that can share a batch fly in lanes; each row is the one of the task alone.
+        """
+        rows: list[Row] = []
+        flights: list[Flight] = []
+        flown: list[Task] = []
+        for task in tasks:
+            try:
+                flights.append(self.draws.scenario(task.run, task.law).check())
+                flown.append(task)
+            except Exception as error:
+                rows.append(_unflown(task, self.draws.values(task.run), error))
+        for group in batches(enumerate(flights)):
+            numbers = [number for number, _ in group]
+            try:
+                rows += self._rows_of([flown[k] for k in numbers], [flights[k] for k in numbers])
+            except Exception:  # of one of them, which tells it by itself
+                rows += [self(flown[k]) for k in numbers]
+        return rows
+
+    def _rows_of(self, tasks: Sequence[Task], flights: Sequence[Flight]) -> list[Row]:
+        """Fly flights that can share a batch."""
+        measures = [Measure(flight, self.study.require) for flight in flights]
+        endings = [Ending.complete(flight.ticks, flight.period) for flight in flights]
+        with closing(fly_group(flights)) as blocks:
+            for block in blocks:
+                measures[block.flight].add(block.log)
+                if block.error is not None:
+                    endings[block.flight] = Ending.early(block.error, flights[block.flight].period)
+        return [
+            _row(task, self.draws.values(task.run), *of_task)
+            for task, *of_task in zip(tasks, flights, endings, measures, strict=True)
+        ]
 
     def row_of(self, task: Task, vary: dict[str, Value], flight: Flight) -> Row:
         """Fly a flight block by block and return its row; memory holds one block."""
@@ -116,6 +149,26 @@ def _row(
             measure.bands(),
         )
     return row.digested(state)
+
+
+def _unflown(task: Task, vary: dict[str, Value], error: Exception) -> Row:
+    """Return the row of a task that raised an error."""
+    if isinstance(error, InputError):
+        return Row(task, REFUSED, str(error), vary=vary).digested()
+    if isinstance(error, SpaceRobotError):  # such as a mistake in a user's law
+        return Row(task, FAILED, str(error), vary=vary).digested()
+    return Row(task, FAILED, one_line_of(error), vary=vary).digested()
+
+
+@dataclass(frozen=True)
+class BatchFlyer:
+    """Flies several tasks of a campaign at once, see `RowFlyer.together`."""
+
+    flyer: RowFlyer
+
+    def __call__(self, tasks: tuple[Task, ...]) -> list[Row]:
+        """Fly the tasks and return their rows."""
+        return [self.flyer(tasks[0])] if len(tasks) == 1 else self.flyer.together(tasks)
 
 
 @lru_cache(maxsize=4)

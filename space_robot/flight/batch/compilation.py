@@ -1,0 +1,66 @@
+"""Compilation of the kernels of batches, in two processes."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from numba import types
+
+from space_robot_control.controller.kernels import (
+    ControllerMemory,
+    apply_transfer,
+    compute_signals,
+)
+from space_robot_control.laws import CompiledLaw, laws
+from space_robot_msgs_py.compiled.block_type import block_type
+from space_robot_msgs_py.compiled.lane_type import MASK, array_of_lanes
+from space_robot_msgs_py.compiled.lanes import WIDTH
+from space_robot_msgs_py.compiled.record_type import record_type
+from space_robot_msgs_py.ros.lifeline import hold_to_standard_input
+from space_robot_msgs_py.samples import Reference, State
+from space_robot_sim.plant.lanes import advance_lanes
+from space_robot_sim.plant.plant import PlantMemory
+
+from ..plan import Flight, FlightPlan, resolve
+from .batch import Batch
+from .lane_loop import fly_lanes, measure_lanes
+
+LANE_KERNELS = (fly_lanes, measure_lanes)
+
+
+def _block(record: Any, width: int = WIDTH) -> Any:
+    return block_type(record.layout(), width)
+
+
+def compile_plants() -> None:
+    """Compile the plant's kernels in lanes."""
+    plant, row = record_type(PlantMemory.layout(), WIDTH), array_of_lanes(1)
+    alone, numbers = _block(PlantMemory, 1), (types.intp, types.float64)
+    advance: Any = advance_lanes
+    advance.compile((plant, alone, array_of_lanes(2), row, *numbers, MASK))
+    measure: Any = measure_lanes
+    measure.compile((_block(PlantMemory), *numbers))
+
+
+def compile_controllers() -> None:
+    """Compile the controller's kernels in lanes."""
+    controller, row = _block(ControllerMemory), array_of_lanes(1)
+    signals: Any = compute_signals
+    inputs = _block(State), _block(Reference)
+    signals.compile((controller, types.intp, *inputs, row, types.boolean, types.float64))
+    transfer: Any = apply_transfer
+    transfer.compile((controller, types.intp, row, row))
+
+
+def fly_all_laws() -> None:
+    """Fly a few ticks under every law with a kernel."""
+    for name, law in laws().items():
+        if issubclass(law, CompiledLaw):
+            plan = FlightPlan(controller=name, duration=0.002)
+            for _ in Batch([Flight(resolve(plan)) for _ in range(2)]).fly():
+                pass
+
+
+if __name__ == "__main__":
+    hold_to_standard_input()
+    compile_plants()
