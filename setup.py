@@ -41,6 +41,7 @@ setup(
         "lz4>=4",
         "matplotlib>=3.8",
         "mcap>=1.5",
+        "llvmlite>=0.41",  # numba has the versions that fit
         "numba>=0.58.1",
         "numpy>=1.26,<3",
         "pillow>=8",

@@ -77,8 +77,6 @@ class CompiledLaw(ControlLaw):
 
 
 @cache
-def _compiled(
-    kernel: Callable[..., None], gains: Any, memory: Any, width: int
-) -> RecordFunction:
+def _compiled(kernel: Callable[..., None], gains: Any, memory: Any, width: int) -> RecordFunction:
     own, seen = (Signals, gains, memory), (Signals, SomeGains, LawMemory)
     return RecordFunction(kernel, own, seen, width)

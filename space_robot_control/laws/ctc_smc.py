@@ -38,7 +38,8 @@ def computed_torque_sliding_mode(
 @kernel
 def saturation(s: float, delta: float) -> float:
     """Return (58): the sign outside the boundary layer of half-width ``delta``, linear inside."""
-    return where(abs(s) > delta, np.sign(s), s / delta)
+    sign: float = np.sign(s)
+    return where(abs(s) > delta, sign, s / delta)
 
 
 class ComputedTorqueSlidingMode(CompiledLaw):

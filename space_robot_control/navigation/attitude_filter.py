@@ -264,7 +264,7 @@ def update(filter: AttitudeFilter, quaternion: Array, is_asked: bool) -> bool:
     a, b, c = innovation[0], innovation[1], innovation[2]
     distance = xx * a * a + yy * b * b + zz * c * c + 2.0 * (xy * a * b + xz * a * c + yz * b * c)
     is_within = (filter.gate <= 0.0) | ((cosine > 0.0) & (distance <= filter.gate))
-    is_used = is_asked & is_within
+    is_used: bool = is_asked & is_within
     if not any_lane(is_used):
         return is_used
     for i in range(6):  # K = P H^T S^-1, H = [E 0]

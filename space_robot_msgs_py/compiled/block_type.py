@@ -147,5 +147,7 @@ def _set_item(context: Any, builder: Any, sig: Any, args: Any) -> Any:
     block = cgutils.create_struct_proxy(kind)(context, builder, value=args[0])
     record = cgutils.create_struct_proxy(record_type)(context, builder, value=args[2])
     numbers = value_of(builder, kind.record.layout.size, block.n)
-    cgutils.raw_memcpy(builder, _item(builder, block, args[1]), record.data, numbers, kind.record.bytes)
+    cgutils.raw_memcpy(
+        builder, _item(builder, block, args[1]), record.data, numbers, kind.record.bytes
+    )
     return context.get_dummy_value()

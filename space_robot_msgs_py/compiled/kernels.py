@@ -22,7 +22,7 @@ from numba.core.runtime.nrt import rtsys
 from numba.experimental import function_type  # noqa: F401  (what Numba makes of a RecordFunction)
 
 from ..errors import InputError
-from . import block_type  # noqa: F401  (registers the type of blocks)
+from . import block_type, lane_functions  # noqa: F401  (both register with Numba)
 from .cache import cache_directory
 from .record_type import record_type
 from .records import Record

@@ -2,40 +2,24 @@
 
 Its value is a vector of LLVM, ``<8 x double>``, which the compiler turns into the instructions of
 the processor. IEEE arithmetic of a vector is that of its elements, so a lane has the bits of a
-plain number. A comparison gives a mask, ``<8 x i1>``; it has no truth value.
+plain number. A comparison gives a mask, ``<8 x i1>``; it has no truth value. What can be done with
+both is in `lane_functions`.
 """
 
 from __future__ import annotations
 
-import math
-import operator
-from collections.abc import Callable
 from typing import Any
 
-import numpy as np
 from llvmlite import ir
 from numba.core import cgutils, types
-from numba.core.imputils import lower_builtin, lower_cast
-from numba.core.typeconv import Conversion
-from numba.core.typing.templates import AbstractTemplate, infer_global, signature
+from numba.core.imputils import lower_cast
+from numba.core.typeconv.castgraph import Conversion
 from numba.extending import models, register_model
 
-from .lanes import (
-    WIDTH,
-    all_lanes,
-    any_lane,
-    lane_of,
-    negated,
-    uniform,
-    where,
-    whole,
-    with_lane,
-)
+from .lanes import WIDTH
 
-_DOUBLE, _BIT = ir.DoubleType(), ir.IntType(1)
-_LANES, _MASK = ir.VectorType(_DOUBLE, WIDTH), ir.VectorType(_BIT, WIDTH)
-_INDEX = ir.IntType(32)
-_Build = Callable[..., Any]
+DOUBLE, BIT, INDEX = ir.DoubleType(), ir.IntType(1), ir.IntType(32)
+LANE_VECTOR, MASK_VECTOR = ir.VectorType(DOUBLE, WIDTH), ir.VectorType(BIT, WIDTH)
 
 
 class LaneType(types.Type):
@@ -79,326 +63,29 @@ def array_of_lanes(ndim: int) -> Any:
 @register_model(LaneType)
 class _LaneModel(models.PrimitiveModel):
     def __init__(self, manager: Any, kind: Any) -> None:
-        super().__init__(manager, kind, _LANES)
+        super().__init__(manager, kind, LANE_VECTOR)
 
 
 @register_model(MaskType)
 class _MaskModel(models.PrimitiveModel):
     def __init__(self, manager: Any, kind: Any) -> None:
-        super().__init__(manager, kind, _MASK)
-
-
-def _spread(builder: Any, value: Any, vector: Any) -> Any:
-    """Emit a vector with ``value`` in each lane."""
-    first = builder.insert_element(ir.Constant(vector, ir.Undefined), value, _INDEX(0))
-    zeros = ir.Constant(ir.VectorType(_INDEX, WIDTH), [0] * WIDTH)
-    return builder.shuffle_vector(first, ir.Constant(vector, ir.Undefined), zeros)
+        super().__init__(manager, kind, MASK_VECTOR)
 
 
 @lower_cast(types.Number, LaneType)
 def _number_to_lanes(context: Any, builder: Any, fromty: Any, toty: Any, value: Any) -> Any:
     number = context.cast(builder, value, types.unliteral(fromty), types.float64)
-    return _spread(builder, number, _LANES)
+    return _spread(builder, number, LANE_VECTOR)
 
 
 @lower_cast(types.Boolean, MaskType)
 def _boolean_to_mask(context: Any, builder: Any, fromty: Any, toty: Any, value: Any) -> Any:
-    return _spread(builder, cgutils.as_bool_bit(builder, value), _MASK)
-
-
-def _is_number(kind: Any) -> bool:
-    return isinstance(kind, (types.Float, types.Integer, types.Literal))
-
-
-def _some_lanes(args: Any) -> bool:
-    return LANE in args and all(kind == LANE or _is_number(kind) for kind in args)
-
-
-def _some_masks(args: Any) -> bool:
-    return MASK in args and all(isinstance(kind, (MaskType, types.Boolean)) for kind in args)
-
-
-def _define(function: Any, arity: int, result: Any, build: _Build, of: Any = LANE) -> None:
-    """Define ``function`` of lanes, or masks, with the instructions emitted by ``build``."""
-    accepts = _some_lanes if of is LANE else _some_masks
-
-    class Template(AbstractTemplate):
-        key = function
-
-        def generic(self, args: Any, kws: Any) -> Any:
-            if len(args) == arity and not kws and accepts(args):
-                return signature(result, *[of] * arity)
-            return None
-
-    def lower(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-        return build(builder, *args)
-
-    infer_global(function)(Template)
-    lower_builtin(function, *[type(of)] * arity)(lower)
-
-
-def _intrinsic(name: str, arity: int = 1) -> _Build:
-    """Return an emitter of a vector function of LLVM."""
-
-    def build(builder: Any, *args: Any) -> Any:
-        kind = ir.FunctionType(_LANES, [_LANES] * arity)
-        whole_name = f"llvm.{name}.v{WIDTH}f64"
-        return builder.call(cgutils.get_or_insert_function(builder.module, kind, whole_name), args)
-
-    return build
-
-
-def _arithmetic(name: str) -> _Build:
-    return lambda builder, a, b: getattr(builder, name)(a, b)
-
-
-def _comparison(sign: str) -> _Build:
-    if sign == "!=":
-        return lambda builder, a, b: builder.fcmp_unordered(sign, a, b)
-    return lambda builder, a, b: builder.fcmp_ordered(sign, a, b)
-
-
-def _constant(value: float) -> Any:
-    return ir.Constant(_LANES, [_DOUBLE(value)] * WIDTH)
-
-
-def _second_if(sign: str) -> _Build:
-    """Return an emitter of Python's ``min`` or ``max``: the second argument if it compares so."""
-    return lambda builder, a, b: builder.select(builder.fcmp_ordered(sign, b, a), b, a)
-
-
-def _sign(builder: Any, x: Any) -> Any:
-    zero = _constant(0.0)  # zeros and NaN stay what they are
-    below = builder.select(builder.fcmp_ordered("<", x, zero), _constant(-1.0), x)
-    return builder.select(builder.fcmp_ordered(">", x, zero), _constant(1.0), below)
-
-
-def _is_finite(builder: Any, x: Any) -> Any:
-    return builder.fcmp_ordered("<", _intrinsic("fabs")(builder, x), _constant(math.inf))
-
-
-def _is_nan(builder: Any, x: Any) -> Any:
-    return builder.fcmp_unordered("uno", x, x)
-
-
-for _names, _build in {
-    (operator.add, operator.iadd): _arithmetic("fadd"),
-    (operator.sub, operator.isub): _arithmetic("fsub"),
-    (operator.mul, operator.imul): _arithmetic("fmul"),
-    (operator.truediv, operator.itruediv): _arithmetic("fdiv"),
-    (min,): _second_if("<"),
-    (max,): _second_if(">"),
-    (math.copysign, np.copysign): _intrinsic("copysign", 2),
-}.items():
-    for _name in _names:
-        _define(_name, 2, LANE, _build)
-for _name, _sign_text in {
-    operator.lt: "<",
-    operator.le: "<=",
-    operator.gt: ">",
-    operator.ge: ">=",
-    operator.eq: "==",
-    operator.ne: "!=",
-}.items():
-    _define(_name, 2, MASK, _comparison(_sign_text))
-for _names, _build in {
-    (operator.neg,): lambda builder, x: builder.fneg(x),
-    (operator.pos,): lambda builder, x: x,
-    (abs, np.abs, math.fabs): _intrinsic("fabs"),
-    (np.sqrt, math.sqrt): _intrinsic("sqrt"),
-    (np.floor,): _intrinsic("floor"),
-    (np.sign,): _sign,
-}.items():
-    for _name in _names:
-        _define(_name, 1, LANE, _build)
-for _names, _build in {
-    (np.isnan, math.isnan): _is_nan,
-    (np.isfinite, math.isfinite): _is_finite,
-}.items():
-    for _name in _names:
-        _define(_name, 1, MASK, _build)
-for _name, _word in ((operator.and_, "and_"), (operator.or_, "or_"), (operator.xor, "xor")):
-    _define(_name, 2, MASK, _arithmetic(_word), MASK)
-_define(negated, 1, MASK, lambda builder, mask: builder.not_(mask), MASK)
-
-
-@infer_global(negated)
-class _Negated(AbstractTemplate):
-    def generic(self, args: Any, kws: Any) -> Any:
-        return signature(types.boolean, types.boolean) if args == (types.boolean,) else None
-
-
-@lower_builtin(negated, types.Boolean)
-def _negated(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-    return builder.not_(args[0])
-
-
-@infer_global(np.fmod)
-class _Remainder(AbstractTemplate):
-    def generic(self, args: Any, kws: Any) -> Any:
-        return signature(LANE, LANE, LANE) if _some_lanes(args) else None
-
-
-@lower_builtin(np.fmod, LaneType, LaneType)
-def _remainder(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-    """Emit the function of plain numbers lane by lane: it is rare."""
-    plain = signature(types.float64, types.float64, types.float64)
-    function = context.get_function(np.fmod, plain)
-    total = ir.Constant(_LANES, ir.Undefined)
-    for k in range(WIDTH):
-        one = function(builder, [builder.extract_element(value, _INDEX(k)) for value in args])
-        total = builder.insert_element(total, one, _INDEX(k))
-    return total
-
-
-@infer_global(where)
-class _Where(AbstractTemplate):
-    def generic(self, args: Any, kws: Any) -> Any:
-        if len(args) != 3 or kws:
-            return None
-        condition, *values = args
-        result = self.context.unify_types(*(types.unliteral(value) for value in values))
-        if condition == MASK:
-            result = MASK if result == types.boolean else result
-            result = LANE if isinstance(result, types.Number) else result
-            return signature(result, MASK, result, result) if result in (LANE, MASK) else None
-        if not isinstance(condition, types.Boolean):
-            return None
-        scalars = (types.Number, types.Boolean, LaneType, MaskType)
-        return signature(result, condition, result, result) if isinstance(result, scalars) else None
-
-
-@lower_builtin(where, MaskType, types.Any, types.Any)
-@lower_builtin(where, types.Boolean, types.Any, types.Any)
-def _where(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-    return builder.select(*args)
-
-
-def _reads_one(function: Any, of_number: Any, of_lane: Any, emit: _Build) -> None:
-    """Define a function of the first lane, or of a plain number."""
-
-    class Template(AbstractTemplate):
-        key = function
-
-        def generic(self, args: Any, kws: Any) -> Any:
-            (kind,) = args
-            if kind in (LANE, MASK):
-                return signature(of_lane(kind), kind)
-            if isinstance(kind, (types.Number, types.Boolean)):
-                return signature(of_number(kind), kind)
-            return None
-
-    def lower(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-        value, kind = args[0], sig.args[0]
-        if kind in (LANE, MASK):
-            value = builder.extract_element(value, _INDEX(0))
-            kind = types.float64 if kind == LANE else types.boolean
-        return emit(context, builder, value, kind, sig.return_type)
-
-    infer_global(function)(Template)
-    for kind in (LaneType, MaskType, types.Number, types.Boolean):
-        lower_builtin(function, kind)(lower)
-
-
-_reads_one(
-    uniform,
-    types.unliteral,
-    lambda kind: types.float64 if kind == LANE else types.boolean,
-    lambda context, builder, value, kind, result: value,
-)
-_reads_one(
-    whole,
-    lambda kind: types.intp,
-    lambda kind: types.intp,
-    lambda context, builder, value, kind, result: context.cast(builder, value, kind, result),
-)
-
-
-def _reduces(function: Any, name: str) -> None:
-    """Define a function of all lanes of a mask, or of a plain truth value."""
-
-    class Template(AbstractTemplate):
-        key = function
-
-        def generic(self, args: Any, kws: Any) -> Any:
-            (kind,) = args
-            is_condition = isinstance(kind, (MaskType, types.Boolean))
-            return signature(types.boolean, kind) if is_condition else None
-
-    def lower(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-        if sig.args[0] != MASK:
-            return args[0]
-        kind = ir.FunctionType(_BIT, [_MASK])
-        whole_name = f"llvm.vector.reduce.{name}.v{WIDTH}i1"
-        return builder.call(cgutils.get_or_insert_function(builder.module, kind, whole_name), args)
-
-    infer_global(function)(Template)
-    for kind in (MaskType, types.Boolean):
-        lower_builtin(function, kind)(lower)
-
-
-_reduces(any_lane, "or")
-_reduces(all_lanes, "and")
-
-
-@infer_global(lane_of)
-class _LaneOf(AbstractTemplate):
-    def generic(self, args: Any, kws: Any) -> Any:
-        kind, _ = args
-        if kind not in (LANE, MASK):
-            return None
-        return signature(types.float64 if kind == LANE else types.boolean, kind, types.intp)
-
-
-@lower_builtin(lane_of, LaneType, types.Integer)
-@lower_builtin(lane_of, MaskType, types.Integer)
-def _lane_of(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-    return builder.extract_element(*args)
-
-
-@infer_global(with_lane)
-class _WithLane(AbstractTemplate):
-    def generic(self, args: Any, kws: Any) -> Any:
-        return signature(LANE, LANE, types.intp, types.float64) if args[0] == LANE else None
-
-
-@lower_builtin(with_lane, LaneType, types.Integer, types.Float)
-def _with_lane(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-    value, lane, number = args
-    return builder.insert_element(value, number, lane)
-
-
-def as_lanes(array: Any) -> Any:
-    """Return a contiguous array (..., 8) of floats as an array (...) of lanes, in kernels."""
-    raise TypeError("only kernels see an array as lanes")
-
-
-@infer_global(as_lanes)
-class _AsLanes(AbstractTemplate):
-    def generic(self, args: Any, kws: Any) -> Any:
-        (kind,) = args
-        is_array = isinstance(kind, types.Array) and kind.dtype == types.float64
-        if not is_array or kind.layout != "C" or kind.ndim < 1:
-            return None
-        return signature(array_of_lanes(kind.ndim - 1) if kind.ndim > 1 else LANE, kind)
-
-
-@lower_builtin(as_lanes, types.Array)
-def _as_lanes(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-    from numba.np import arrayobj  # only the compiler needs it
-
-    given = arrayobj.make_array(sig.args[0])(context, builder, value=args[0])
-    data = builder.bitcast(given.data, _LANES.as_pointer())
-    if sig.return_type == LANE:
-        return builder.load(data, align=1)
-    array = arrayobj.make_array(sig.return_type)(context, builder)
-    arrayobj.populate_array(
-        array,
-        data=data,
-        shape=cgutils.pack_array(builder, cgutils.unpack_tuple(builder, given.shape)[:-1]),
-        strides=cgutils.pack_array(builder, cgutils.unpack_tuple(builder, given.strides)[:-1]),
-        itemsize=cgutils.intp_t(8 * WIDTH),
-        meminfo=None,
-        parent=None,
-    )
-    return array._getvalue()
+    return _spread(builder, cgutils.as_bool_bit(builder, value), MASK_VECTOR)
+
+
+def _spread(builder: Any, value: Any, vector: Any) -> Any:
+    """Emit a vector with ``value`` in each lane."""
+    unknown = ir.Constant(vector, ir.Undefined)
+    first = builder.insert_element(unknown, value, INDEX(0))
+    zeros = ir.Constant(ir.VectorType(INDEX, WIDTH), [0] * WIDTH)
+    return builder.shuffle_vector(first, unknown, zeros)

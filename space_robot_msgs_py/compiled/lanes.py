@@ -8,47 +8,48 @@ of all lanes together. For plain numbers these functions do what they do for one
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TypeVar
 
+_Value = TypeVar("_Value")
 WIDTH = 8
 """Number of lanes."""
 
 
-def where(condition: Any, then: Any, otherwise: Any) -> Any:
+def where(condition: bool, then: _Value, otherwise: _Value) -> _Value:
     """Return ``then if condition else otherwise``, lane by lane; both have been computed."""
     return then if condition else otherwise
 
 
-def uniform(value: Any) -> Any:
+def uniform(value: _Value) -> _Value:
     """Return a value that is the same in all lanes, as a plain float or bool."""
     return value
 
 
-def whole(value: Any) -> int:
+def whole(value: float) -> int:
     """Return the integer in a number that is the same in all lanes."""
     return int(value)
 
 
-def any_lane(condition: Any) -> bool:
+def any_lane(condition: bool) -> bool:
     """Return whether a condition is true in any lane."""
     return bool(condition)
 
 
-def all_lanes(condition: Any) -> bool:
+def all_lanes(condition: bool) -> bool:
     """Return whether a condition is true in all lanes."""
     return bool(condition)
 
 
-def negated(condition: Any) -> Any:
+def negated(condition: bool) -> bool:
     """Return ``not condition``, lane by lane."""
     return not condition
 
 
-def lane_of(value: Any, lane: int) -> Any:
+def lane_of(value: _Value, lane: int) -> _Value:
     """Return the value of one lane as a plain number."""
     return value
 
 
-def with_lane(value: Any, lane: int, number: float) -> Any:
+def with_lane(value: float, lane: int, number: float) -> float:
     """Return ``value`` with another number in one lane."""
     return number

@@ -10,12 +10,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from space_robot_msgs_py.compiled.kernels import kernel
-from space_robot_msgs_py.compiled.lanes import WIDTH, all_lanes, lane_of, negated, where, whole
-from space_robot_msgs_py.compiled.lanes import with_lane
+from space_robot_msgs_py.compiled.lanes import (
+    WIDTH,
+    all_lanes,
+    lane_of,
+    negated,
+    where,
+    whole,
+    with_lane,
+)
 from space_robot_msgs_py.compiled.records import Block
-from .plant import PlantMemory, begin_interval, end_interval
 
 from .integrator import state_size
+from .plant import PlantMemory, begin_interval, end_interval
 from .stick_slip import glide, integrate
 
 Array = NDArray[np.float64]

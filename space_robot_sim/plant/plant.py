@@ -366,9 +366,7 @@ def begin_interval(
 ) -> None:
     """Let the actuators answer a command given at ``tick``, see `advance`."""
     truth, actuation = memory.truth, memory.stages.actuation
-    actuate(
-        memory.actuators, command_delay_buffer, torque, tick, period, truth, memory.measured
-    )
+    actuate(memory.actuators, command_delay_buffer, torque, tick, period, truth, memory.measured)
     n, joints = truth.joint_positions.size, whole(memory.model.joint_count)
     actuation[:6] = memory.actuators.base_wrench
     actuation[6 : 6 + n] = truth.applied_torque[3:]

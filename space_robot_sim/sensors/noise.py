@@ -53,4 +53,5 @@ def in_steps(value: float, step: float) -> float:
     if not any_lane(step > 0.0):
         return value
     spacing = where(step > 0.0, step, 1.0)
-    return where(step > 0.0, spacing * np.floor(value / spacing + 0.5), value)
+    rounded: float = spacing * np.floor(value / spacing + 0.5)
+    return where(step > 0.0, rounded, value)

@@ -97,8 +97,8 @@ class RowFlyer:
                 if block.error is not None:
                     endings[block.flight] = Ending.early(block.error, flights[block.flight].period)
         return [
-            _row(task, self.draws.values(task.run), *of_task)
-            for task, *of_task in zip(tasks, flights, endings, measures, strict=True)
+            _row(task, self.draws.values(task.run), flights[k], endings[k], measures[k])
+            for k, task in enumerate(tasks)
         ]
 
     def row_of(self, task: Task, vary: dict[str, Value], flight: Flight) -> Row:

@@ -23,14 +23,7 @@ from ..plan import Flight
 from ..simulate import ended_early, note_beliefs
 from .lane_log import LogsInLanes
 from .lane_loop import fly_lanes, measure_lanes, take_out
-from .lane_memory import (
-    LawInLanes,
-    copy_back,
-    copy_command,
-    memory_of,
-    put_in,
-    references_of,
-)
+from .lane_memory import LawInLanes, copy_back, copy_command, memory_of, put_in, references_of
 
 Array = NDArray[np.float64]
 

@@ -6,11 +6,7 @@ from typing import Any
 
 from numba import types
 
-from space_robot_control.controller.kernels import (
-    ControllerMemory,
-    apply_transfer,
-    compute_signals,
-)
+from space_robot_control.controller.kernels import ControllerMemory, apply_transfer, compute_signals
 from space_robot_control.laws import CompiledLaw, laws
 from space_robot_msgs_py.compiled.block_type import block_type
 from space_robot_msgs_py.compiled.lane_type import MASK, array_of_lanes

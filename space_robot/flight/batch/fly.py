@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Generator, Hashable, Iterable, Iterator, Sequence
 from contextlib import closing
 
 from space_robot_msgs_py.bag.flight_log import FlightLog
@@ -34,7 +34,7 @@ def batches(flights: Iterable[tuple[int, Flight]]) -> Iterator[list[tuple[int, F
 
 def fly_group(
     flights: Sequence[Flight], progress: Callable[[int], None] = lambda tick: None
-) -> Iterator[FlownBlock]:
+) -> Generator[FlownBlock, None, None]:
     """Fly checked flights of one group of `batches`; yield their blocks as they are flown.
 
     The numbers in the blocks are places in ``flights``. What a flight raises is in its last block.

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
-from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.compiled.lanes import WIDTH
 from space_robot_msgs_py.samples import ALL_FIELDS
 
@@ -26,14 +26,16 @@ class LogsInLanes:
         columns: list[Array] = []
 
         def first(shape: tuple[int, ...]) -> Array:
-            columns.append(np.empty((WIDTH, *shape)))
-            return columns[-1][0]
+            column = np.empty((WIDTH, *shape))
+            columns.append(column)
+            of_first: Array = column[0]
+            return of_first
 
         self.logs = [empty_log(flights[0], start, stop, first)]
         """One of each flight."""
         for lane, flight in enumerate(flights[1:], 1):
-            others = iter(columns)
-            self.logs.append(empty_log(flight, start, stop, lambda _, k=lane, c=others: next(c)[k]))
+            own = iter([column[lane] for column in columns])
+            self.logs.append(empty_log(flight, start, stop, partial(_next, own)))
         by_address = {column.ctypes.data: column for column in columns if column.size}
         log = self.logs[0]
 
@@ -50,6 +52,10 @@ class LogsInLanes:
             common(log.actuator_commands),
             _with_axes(common(log.telemetry)),
         )
+
+
+def _next(columns: Iterator[Array], shape: tuple[int, ...]) -> Array:
+    return next(columns)
 
 
 def _with_axes(telemetry: Array) -> Array:

@@ -10,16 +10,8 @@ from numpy.typing import NDArray
 from space_robot_control.controller.kernels import USABLE, apply_transfer, compute_signals
 from space_robot_control.laws.compiled import LawCode
 from space_robot_msgs_py.compiled.kernels import RecordFunction, kernel, subroutine
-from space_robot_msgs_py.compiled.lane_type import as_lanes
-from space_robot_msgs_py.compiled.lanes import (
-    WIDTH,
-    all_lanes,
-    any_lane,
-    lane_of,
-    negated,
-    where,
-    with_lane,
-)
+from space_robot_msgs_py.compiled.lane_functions import as_lanes
+from space_robot_msgs_py.compiled.lanes import WIDTH, any_lane, lane_of, negated, where, with_lane
 from space_robot_msgs_py.compiled.records import Block
 from space_robot_msgs_py.samples import State
 from space_robot_sim.plant.lanes import advance_lanes
@@ -136,9 +128,7 @@ def fly_lanes(
         _spread(of_law.u, log.telemetry[:, row + k, 1])
         _spread(signals.n_hat, log.telemetry[:, row + k, 2])
         _spread(signals.error, log.telemetry[:, row + k, 3])
-        fastest = advance_lanes(
-            plant, memory.plants.alone, buffer, torque, tick, period, is_flying
-        )
+        fastest = advance_lanes(plant, memory.plants.alone, buffer, torque, tick, period, is_flying)
         rates[0] = where(is_flying, fastest, rates[0])
         ticks[0] = where(is_flying, tick + 1.0, ticks[0])
         _end(memory, is_flying & negated(fastest <= RATE_LIMIT), tick + 1)

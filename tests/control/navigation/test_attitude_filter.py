@@ -87,7 +87,7 @@ def test_the_covariance_settles_where_riccati_and_farrenkopf_say(degrees: float)
     omega = np.radians(degrees) * np.array([1.0, -0.5, 0.3])
     steady, filter = riccati(case, omega), case.filter()
     filter.quaternion[:], filter.covariance[:] = [0.5, -0.5, 0.5, 0.5], steady
-    assert update(filter, filter.quaternion)
+    assert update(filter, filter.quaternion, True)
     after = filter.covariance.copy()
     for _ in range(case.interval):
         filter.scratch.rotation[:] = omega * case.period
@@ -264,7 +264,7 @@ def test_an_update_is_kalmans_within_the_gate_and_none_beyond(
     s = p[:3, :3] + filter.noise
     direction = rng.normal(size=3)
     innovation = share * gate * np.linalg.cholesky(s) @ (direction / np.linalg.norm(direction))
-    accepted = update(filter, product(truth, exponential(innovation)))
+    accepted = update(filter, product(truth, exponential(innovation)), True)
     assert accepted == (share < 1.0)
     scale = np.outer(sigmas, sigmas)
     if not accepted:

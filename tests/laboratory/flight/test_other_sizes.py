@@ -66,5 +66,5 @@ def test_another_number_of_joints_compiles_nothing(options: dict[str, str]) -> N
 
 def test_a_law_s_kernel_is_one_for_all_numbers_of_joints() -> None:
     flights = [Flight(resolve(FlightPlan(robot=robot))) for robot in ("paper", "seven_joint")]
-    one, other = (flight.law.function for flight in flights)  # type: ignore[attr-defined]
+    one, other = (flight.law.function() for flight in flights)  # type: ignore[attr-defined]
     assert one is other
