@@ -32,7 +32,11 @@ class _PlainFunction:
     """As `RecordFunction`: called with records, or with their addresses, each followed by its n."""
 
     def __init__(
-        self, function: Any, records: Iterable[type[Record]], seen_as: Iterable[type[Record]]
+        self,
+        function: Any,
+        records: Iterable[type[Record]],
+        seen_as: Iterable[type[Record]],
+        width: int = 1,
     ) -> None:
         self._function, self._records, self._seen_as = function, tuple(records), tuple(seen_as)
 

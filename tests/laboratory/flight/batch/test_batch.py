@@ -1,0 +1,199 @@
+"""Flights flown together: each has the bits that it has alone, whatever flies beside it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, cast
+
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from space_robot import Scenario
+from space_robot.flight.batch.batch import Batch
+from space_robot.flight.batch.fly import batches, fly_group
+from space_robot.flight.batch.sharing import batch_key, reason_to_fly_alone
+from space_robot.flight.plan import Flight
+from space_robot.flight.simulate import simulate
+from space_robot_msgs_py.bag.flight_log import FlightLog
+from space_robot_msgs_py.compiled.lanes import WIDTH
+from space_robot_msgs_py.errors import FlightError
+
+Flown = tuple[FlightLog, str]
+
+
+def alone(flight: Flight) -> Flown:
+    """Log of a flight flown by itself, and what ended it."""
+    try:
+        return simulate(flight), ""
+    except FlightError as error:
+        return cast(FlightLog, error.log), str(error)
+
+
+def together(flights: Sequence[Flight]) -> list[Flown]:
+    """The same of flights flown by groups, all of which have one block."""
+    flown: dict[int, Flown] = {}
+    for group in batches(enumerate(flights)):
+        numbers = [number for number, _ in group]
+        for block in fly_group([flight for _, flight in group]):
+            assert numbers[block.flight] not in flown
+            flown[numbers[block.flight]] = block.log, str(block.error or "")
+    return [flown[number] for number in range(len(flights))]
+
+
+def bits(log: FlightLog) -> dict[str, bytes]:
+    """All columns of a log."""
+    columns = {**log.columns}
+    if log.measured is not None:
+        columns |= {f"measured {name}": values for name, values in log.measured.columns.items()}
+    return {name: values.tobytes() for name, values in columns.items()}
+
+
+def assert_same(flights: Sequence[Flight], copies: Sequence[Flight]) -> None:
+    """Compare flights flown together with copies flown alone: logs, ends, and what is left."""
+    for number, (log, end) in enumerate(together(flights)):
+        flight, copy = flights[number], copies[number]
+        expected, expected_end = alone(copy)
+        assert end == expected_end
+        own, theirs = bits(log), bits(expected)
+        assert own.keys() == theirs.keys()
+        assert [name for name in own if own[name] != theirs[name]] == []
+        assert (log.laws, log.unanswered, log.flight) == (
+            expected.laws,
+            expected.unanswered,
+            expected.flight,
+        )
+        assert flight.plant.tick == copy.plant.tick
+        for part in ("x", "truth", "measured", "actuators", "sensors", "environment", "model"):
+            kept, wanted = flight.plant.memory[part], copy.plant.memory[part]  # type: ignore[index]
+            assert kept.tobytes() == wanted.tobytes(), part
+
+
+FAULTS = (
+    "torque_scale@0.02:all=5",
+    "torque_scale@0.03-0.08:1=0.9",
+    "tracker_blind@0.02-0.09",
+    "gyro_bias@0.04:base_x=0.01",
+    "encoder_stuck@0.05-0.1:2",
+    "stuck_joint@0.03-0.06:3=5",
+    "drive_bias@0.05:2=0.3",
+)
+
+
+@st.composite
+def scenarios(draw: st.DrawFn) -> list[dict[str, Any]]:
+    """Options of flights, most of which can share a batch."""
+    robot = draw(st.sampled_from(["paper", "paper", "paper", "dual_arm", "flexible_panels"]))
+    hardware = ["ideal", "none"]
+    if robot == "paper":
+        hardware += ["wheels", "thrusters", "wheels_and_thrusters"]
+    common = {
+        "robot": robot,
+        "controller": draw(st.sampled_from(["ctc", "ctc_smc", "tde_smc", "tde_tsmc", "tde_stc"])),
+        "case": draw(st.sampled_from(["1", "2", "3"])),
+        "sensors": draw(st.sampled_from(["ideal", "fine", "coarse", "tactical"])),
+        "navigation": draw(st.sampled_from(["direct", "filtered"])),
+        "actuators": draw(st.sampled_from(hardware)),
+        "command_latency_ticks": draw(st.sampled_from([0, 0, 3])),
+        "substeps": draw(st.sampled_from([1, 1, 2])),
+        "duration": draw(st.sampled_from([0.05, 0.14])),
+        "swaps": draw(st.sampled_from([[], [], ["0.03:ctc"]])),
+    }
+    if robot != "paper" and common["actuators"] == "none":
+        common["actuators"] = "ideal"
+    flights = []
+    for seed in range(draw(st.integers(2, WIDTH + 2))):
+        own: dict[str, Any] = {"seed": seed}
+        if draw(st.booleans()):
+            own["faults"] = draw(st.lists(st.sampled_from(FAULTS), unique=True, max_size=2))
+        if draw(st.integers(0, 5)) == 0:
+            own["case"] = draw(st.sampled_from(["1", "3"]))
+        if draw(st.integers(0, 5)) == 0:
+            own["friction"] = False
+        flights.append({**common, **own})
+    return flights
+
+
+@settings(max_examples=25, deadline=None, derandomize=True, suppress_health_check=list(HealthCheck))
+@given(scenarios(), st.randoms(use_true_random=False))
+def test_each_flight_of_any_batch_has_its_own_bits(
+    options: list[dict[str, Any]], order: Any
+) -> None:
+    """In any order: a flight does not know in which lane it is, nor who flies beside it."""
+    order.shuffle(options)
+    first = [Scenario(**option).check() for option in options]
+    assert_same(first, [Scenario(**option).check() for option in options])
+
+
+def some(count: int, **options: Any) -> list[Flight]:
+    return [Scenario(**{"seed": k, "duration": 0.1, **options}).check() for k in range(count)]
+
+
+def test_flights_that_differ_in_what_lanes_share_fly_apart() -> None:
+    flights = [
+        *some(2),
+        *some(2, robot="dual_arm"),
+        *some(2, sensors="fine"),
+        *some(2, controller="ctc"),
+        *some(2, period=0.001),
+        *some(2, duration=0.2),
+        *some(2, actuators="wheels"),
+        *some(2, navigation="filtered"),
+        *some(2, swaps=["0.05:ctc"]),
+        *some(2, command_latency_ticks=2),
+    ]
+    groups = [[number for number, _ in group] for group in batches(enumerate(flights))]
+    assert sorted(groups) == [[k, k + 1] for k in range(0, len(flights), 2)]
+
+
+def test_what_only_changes_numbers_flies_together() -> None:
+    changes: list[dict[str, Any]] = [
+        {},
+        {"case": "3"},
+        {"gains": {"k_1": 2.0}},
+        {"seed": 5},
+        {"faults": ["torque_scale@0.05:all=0.9"]},
+        {"parameters": {"plant": {"friction.coulomb": 0.1}}},
+    ]
+    flights = [flight for change in changes for flight in some(1, sensors="fine", **change)]
+    assert len({batch_key(flight) for flight in flights}) == 1
+    more = some(4, sensors="fine")
+    assert [len(group) for group in batches(enumerate([*flights, *more]))] == [8, 2]
+
+
+def test_message_faults_and_plain_laws_fly_alone() -> None:
+    (lossy,) = some(1, faults=["drop_state@0.01-0.02:0.5"])
+    assert reason_to_fly_alone(lossy) == "messages between plant and controller have faults"
+    assert not reason_to_fly_alone(*some(1))
+
+
+def test_a_diverged_flight_ends_alone() -> None:
+    flights = [*some(3), *some(1, faults=["torque_scale@0:all=0.2"]), *some(2)]
+    copies = [*some(3), *some(1, faults=["torque_scale@0:all=0.2"]), *some(2)]
+    assert_same(flights, copies)
+    assert [flight.plant.tick for flight in flights] == [200] * 3 + [
+        flights[3].plant.tick,
+        200,
+        200,
+    ]
+    assert flights[3].plant.tick < 200
+
+
+def test_captures_and_releases_happen_in_one_lane() -> None:
+    options = {"events": ["capture@0.03:tumbling_satellite", "release@0.07:0.01"]}
+    assert_same([*some(2), *some(1, **options)], [*some(2), *some(1, **options)])
+
+
+def test_a_flight_longer_than_a_block_is_flown_block_by_block(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr("space_robot_msgs_py.bag.blocks.BLOCK_TICKS", 60)
+    blocks = [[], []]  # type: list[list[FlightLog]]
+    for block in Batch(some(2, sensors="fine")).fly():
+        blocks[block.flight].append(block.log)
+    for number, flight in enumerate(some(2, sensors="fine")):
+        whole = simulate(flight)
+        assert [log.ticks for log in blocks[number]] == [60, 60, 60, 20]
+        for name, column in whole.columns.items():
+            parts = b"".join(log.columns[name].tobytes() for log in blocks[number])
+            assert parts == column.tobytes(), name

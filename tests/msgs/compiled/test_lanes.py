@@ -1,0 +1,163 @@
+"""Numbers eight flights wide: every lane has the bits of the same kernel of plain numbers."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+from numba.core.errors import NumbaError
+from numpy.typing import NDArray
+
+from space_robot_model.elementary.sine import sin_cos
+from space_robot_msgs_py.compiled.kernels import kernel
+from space_robot_msgs_py.compiled.lane_functions import as_lanes
+from space_robot_msgs_py.compiled.lanes import (
+    WIDTH,
+    all_lanes,
+    any_lane,
+    lane_of,
+    negated,
+    uniform,
+    where,
+    whole,
+    with_lane,
+)
+from space_robot_msgs_py.compiled.records import Block, Record, nested, shaped
+
+Array = NDArray[np.float64]
+RESULTS = 20
+ANY = st.floats(width=64, allow_nan=True, allow_infinity=True, allow_subnormal=True)
+NUMBERS = arrays(np.float64, (2, WIDTH), elements=ANY)
+
+
+@kernel
+def functions(x: float, y: float, out: Array) -> None:
+    out[0] = x + y
+    out[1] = x - 2.0 * y
+    out[2] = x * y
+    out[3] = x / y
+    out[4] = -x
+    out[5] = abs(x)
+    out[6] = np.sqrt(abs(x)) + math.sqrt(abs(y))
+    out[7] = np.floor(x)
+    out[8] = np.sign(x)
+    out[9] = min(x, y)
+    out[10] = max(x, y)
+    out[11] = math.copysign(x, y)
+    out[12] = where((x < y) | (x >= 3.0), x, y)
+    out[13] = where((x == y) ^ (x != 1.0), 1, y)
+    out[14] = where(negated(np.isnan(x)) & np.isfinite(y), x, 0.5)
+    out[15] = where(where(x > y, x <= 2.0, y > 0.5), 1.0, 2.0)
+    out[16] = np.fmod(where(np.isfinite(x), x, 1.0), 2.5)
+    out[17], out[18] = sin_cos(x)
+    total = 0.0
+    for k in range(3):
+        total += k * x
+        total -= y
+    out[19] = total
+
+
+@kernel
+def functions_in_lanes(numbers: Array, out: Array) -> None:
+    values = as_lanes(numbers)
+    functions(values[0], values[1], as_lanes(out))
+
+
+@given(NUMBERS)
+def test_every_lane_has_the_bits_of_a_plain_number(numbers: Array) -> None:
+    out, alone = np.empty((RESULTS, WIDTH)), np.empty(RESULTS)
+    functions_in_lanes(numbers, out)
+    for lane in range(WIDTH):
+        functions(*numbers[:, lane], alone)
+        same = (out[:, lane].view(np.int64) == alone.view(np.int64)) | (
+            np.isnan(out[:, lane]) & np.isnan(alone)
+        )
+        assert same.all(), (numbers[:, lane], np.flatnonzero(~same))
+
+
+@kernel
+def conditions(numbers: Array, out: Array) -> None:
+    x = as_lanes(numbers)[0]
+    out[0] = any_lane(x > 0.0)
+    out[1] = all_lanes(x > 0.0)
+    out[2] = uniform(x)
+    out[3] = whole(x)
+    for lane in range(WIDTH):
+        out[4 + lane] = lane_of(x, lane) + lane_of(x > 0.0, lane)
+    as_lanes(numbers)[0] = with_lane(x, 3, 7.0)
+
+
+def test_lanes_are_read_one_by_one_and_together() -> None:
+    numbers, out = np.array([[2.0, -1.0, 0.0, 4.0, 5.0, 6.0, 7.0, 8.0]]), np.zeros(12)
+    before = numbers[0].copy()
+    conditions(numbers, out)
+    assert out[:4].tolist() == [1.0, 0.0, 2.0, 2.0]
+    assert out[4:].tolist() == (before + (before > 0.0)).tolist()
+    assert numbers[0].tolist() == [*before[:3], 7.0, *before[4:]]
+
+
+def test_plain_numbers_have_one_lane() -> None:
+    assert where(True, 1.0, 2.0) == 1.0
+    assert (uniform(2.5), whole(2.9), any_lane(True), all_lanes(False)) == (2.5, 2, True, False)
+    assert (negated(True), lane_of(3.0, 5), with_lane(3.0, 5, 4.0)) == (False, 3.0, 4.0)
+    with pytest.raises(TypeError, match="only kernels"):
+        as_lanes(np.zeros(8))
+
+
+@kernel
+def branches(numbers: Array) -> float:
+    return 1.0 if as_lanes(numbers)[0] > 0.0 else 2.0
+
+
+def test_a_mask_has_no_truth_value() -> None:
+    with pytest.raises(NumbaError):
+        branches(np.zeros((1, WIDTH)))
+
+
+class Part(Record):
+    matrix: Array = shaped(lambda n: (n, 3))
+    number: float = shaped(lambda n: ())
+
+
+class Whole(Record):
+    kind: float = shaped(lambda n: (), uniform=True)
+    row: Array = shaped(lambda n: (n + 1,))
+    part: Part = nested(Part)
+    order: Array = shaped(lambda n: (n,), uniform=True)
+
+
+@kernel
+def mix(block: Block) -> None:
+    record = block[0]
+    for i in range(record.part.matrix.shape[0]):
+        for k in range(3):
+            record.part.matrix[i, k] += record.row[i] * record.row[i + 1]
+    record.part.number = record.row[0] * whole(record.kind)
+    record.row[1:] = record.part.number
+
+
+@pytest.mark.parametrize("n", [0, 1, 4])
+def test_a_record_in_lanes_is_eight_records(n: int) -> None:
+    generator, lanes = np.random.default_rng(n), Whole.lanes(n)
+    alone = np.zeros(WIDTH, Whole.dtype(n))
+    numbers = alone.view(np.float64).reshape(WIDTH, -1)
+    numbers[:] = generator.normal(size=numbers.shape)
+    alone["kind"] = 3.0
+    lanes.view(np.float64).reshape(-1, WIDTH)[:] = numbers.T
+    mix(lanes)
+    for k in range(WIDTH):
+        mix(alone[k : k + 1])
+    assert lanes.view(np.float64).reshape(-1, WIDTH).T.tobytes() == numbers.tobytes()
+    assert lanes.ctypes.data % (8 * WIDTH) == 0
+
+
+def test_uniform_numbers_are_those_that_lanes_share() -> None:
+    block: Any = Whole.block(2)
+    block["kind"], block["order"] = 3.0, [5.0, 6.0]
+    block["row"], block["part"]["number"] = 9.0, 9.0
+    assert np.frombuffer(Whole.uniform_numbers(block)).tolist() == [3.0, 5.0, 6.0]
