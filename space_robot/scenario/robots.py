@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+import copy
+from functools import cached_property
+from typing import Any
 
 from space_robot_model.robot import Robot
 from space_robot_model.robot.find import robot_source
@@ -49,27 +51,46 @@ class Robots:
                     f"{plant.robot.name!r} with {', '.join(plant.robot.all_joint_names)} and "
                     f"{other.name!r} with {', '.join(other.all_joint_names)}"
                 )
-        self.plant, self.controller = plant.robot, controller.robot
-        self._plant_content, self._controller_content = plant.content, controller.content
+        self._plant, self._controller = plant, controller
+
+    def with_plant(self, robot: Robot) -> Robots:
+        """Return the same robots but for the plant's, which has the same joints."""
+        robots = copy.copy(self)
+        robots._plant = _Source(robot)
+        return robots
+
+    @property
+    def plant(self) -> Robot:
+        """The true robot."""
+        return self._plant.robot
+
+    @property
+    def controller(self) -> Robot:
+        """The robot assumed by the flight software."""
+        return self._controller.robot
 
     @property
     def description(self) -> dict[str, Any]:
         """Numbers of the plant's robot, and of the controller's if it differs."""
-        plant, controller = self._plant_content, self._controller_content
+        plant, controller = self._plant.content, self._controller.content
         own = {"controller_robot": self.controller.name, "controller_robot_file": controller}
         return {"robot_file": plant, **({} if controller == plant else own)}
 
     @property
     def options(self) -> dict[str, Any]:
         """The robots' numbers as options of a flight."""
-        plant, controller = self._plant_content, self._controller_content
+        plant, controller = self._plant.content, self._controller.content
         return {"robot": controller, **({} if controller == plant else {"plant_robot": plant})}
 
 
-class _Source(NamedTuple):
-    robot: Robot
-    content: dict[str, Any]
-    """The numbers in the robot's file."""
+class _Source:
+    def __init__(self, robot: Robot, content: dict[str, Any] | None = None) -> None:
+        self.robot, self._content = robot, content
+
+    @cached_property
+    def content(self) -> dict[str, Any]:
+        """The numbers in the robot's file; of a robot in memory, its own."""
+        return self.robot.content if self._content is None else self._content
 
 
 def _source(robot: str | Robot | Tree) -> _Source:
@@ -77,7 +98,7 @@ def _source(robot: str | Robot | Tree) -> _Source:
         file = robot_source(robot)
         return _Source(file.robot, file.content)
     if isinstance(robot, Robot):
-        return _Source(robot, robot.content)
+        return _Source(robot)
     return _Source(Robot.from_dict(robot), robot)
 
 

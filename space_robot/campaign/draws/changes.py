@@ -17,7 +17,10 @@ from space_robot_msgs_py.config.trees import flatten
 from space_robot_msgs_py.samples import RobotNames
 
 from ...api import Scenario
+from ...flight.plan import Flight
 from ...scenario.node_settings import NODES
+from ...scenario.resolved import ResolvedScenario
+from ...scenario.varied import Variation, varied
 
 Array = NDArray[np.float64]
 
@@ -117,6 +120,7 @@ class Nominal(NamedTuple):
     law: str
     gains: dict[str, list[float]]
     """Gains of the law that is active at the start."""
+    resolved: ResolvedScenario
 
     @classmethod
     def of(cls, scenario: Scenario) -> Self:
@@ -134,6 +138,7 @@ class Nominal(NamedTuple):
             {node: dict(flatten(own.model_dump())) for node, own in settings.items()},
             flight.law.name,
             flight.scenario.gains_used,
+            flight.scenario,
         )
 
 
@@ -180,6 +185,27 @@ class Changes:
             own[key] = list(self.nominal.gains[name])
         gain: list[float] = own[key]
         return gain
+
+    def flight(self, seed: int) -> Flight:
+        """Return the flight with these changes, see `Scenario.check`.
+
+        Raises:
+            InputError: it cannot be flown.
+        """
+        resolved = None if self.options else varied(self.nominal.resolved, self._variation(seed))
+        if resolved is None:
+            return self.scenario(seed=seed).check()
+        flight = Flight(resolved)
+        flight.check_in_process()
+        return flight
+
+    def _variation(self, seed: int) -> Variation:
+        return Variation(
+            seed,
+            self._robot and self._robot.robot(),
+            [*self.nominal.scenario.faults, *self.faults],
+            self._parameters,
+        )
 
     def scenario(self, **options: Any) -> Scenario:
         """Return the flight with these changes and further options."""

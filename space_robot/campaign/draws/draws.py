@@ -82,13 +82,24 @@ class Draws:
         Raises:
             InputError: there is no such run, or its values cannot be flown together.
         """
+        return self._drawn_changes(run, law).scenario(seed=self._noise_seed(run))
+
+    def flight(self, run: int, law: str) -> Flight:
+        """Return the checked flight of `scenario`; files are read once a law, not once a run.
+
+        Raises:
+            InputError: as there, or it cannot be flown.
+        """
+        return self._drawn_changes(run, law).flight(self._noise_seed(run))
+
+    def _noise_seed(self, run: int) -> int:
         place = self._place(run)
         # in Saltelli's design noise is one more variable, which is never taken from B alone
         of_b = isinstance(self._design, Saltelli) and place.point > len(self.names)
-        seed = noise_seed(self.seed, 2 * place.draw + of_b)
-        return self._changes(law, list(zip(self._variables, self._raw(run), strict=True))).scenario(
-            seed=seed
-        )
+        return noise_seed(self.seed, 2 * place.draw + of_b)
+
+    def _drawn_changes(self, run: int, law: str) -> Changes:
+        return self._changes(law, list(zip(self._variables, self._raw(run), strict=True)))
 
     def nominal(self, law: str) -> Scenario:
         """Return the nominal scenario of a law."""

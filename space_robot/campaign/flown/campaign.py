@@ -51,7 +51,7 @@ class BagFlyer:
     def __call__(self, task: Task) -> None:
         """Fly a task; the bag gets its final name once it is complete."""
         unfinished = self.folder / f".{bag_name(task)}"
-        flight = self.flyer.draws.scenario(task.run, task.law).check()
+        flight = self.flyer.draws.flight(task.run, task.law)
         with closing(fly_blocks(flight, unfinished)) as blocks:
             try:
                 for _ in blocks:

@@ -61,7 +61,7 @@ class RowFlyer:
         vary: dict[str, Value] = {}
         try:
             vary = self.draws.values(task.run)
-            return self.row_of(task, vary, self.draws.scenario(task.run, task.law).check())
+            return self.row_of(task, vary, self.draws.flight(task.run, task.law))
         except Exception as error:  # a defect of this package must not end a campaign either
             return _unflown(task, vary, error)
 
@@ -75,7 +75,7 @@ class RowFlyer:
         flown: list[Task] = []
         for task in tasks:
             try:
-                flights.append(self.draws.scenario(task.run, task.law).check())
+                flights.append(self.draws.flight(task.run, task.law))
                 flown.append(task)
             except Exception as error:
                 rows.append(_unflown(task, self.draws.values(task.run), error))
