@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from .analysis.load_bag import load_bag
     from .api import Bench, FlownFlight, Scenario
     from .api.replayed import replay
+    from .api.together import fly_many
     from .campaign.flown import Campaign, FlownCampaign
 
 __all__ = [
@@ -31,6 +32,7 @@ __all__ = [
     "Robot",
     "Scenario",
     "bias_force",
+    "fly_many",
     "forward_dynamics",
     "load_bag",
     "mass_matrix",
@@ -44,6 +46,7 @@ MODULES = {
     "Robot": "space_robot_model.robot",
     "Scenario": "space_robot.api",
     "bias_force": "space_robot_model.robot.dynamics",
+    "fly_many": "space_robot.api.together",
     "forward_dynamics": "space_robot_model.robot.dynamics",
     "load_bag": "space_robot.analysis.load_bag",
     "mass_matrix": "space_robot_model.robot.dynamics",

@@ -202,7 +202,7 @@ class Changes:
     def _variation(self, seed: int) -> Variation:
         return Variation(
             seed,
-            self._robot and self._robot.robot(),
+            None if self._robot is None else self._robot.robot(),
             [*self.nominal.scenario.faults, *self.faults],
             self._parameters,
         )

@@ -62,11 +62,14 @@ class Batch:
         return [k for k in range(len(self.flights)) if self._memory.flies[0, k]]
 
     def fly(
-        self, progress: Callable[[int], None] = lambda tick: None
+        self, progress: Callable[[int], None] = lambda tick: None, is_whole: bool = False
     ) -> Generator[FlownBlock, None, None]:
-        """Fly every tick; yield the blocks of all flights that fly, as `fly_blocks` does."""
+        """Fly every tick; yield the blocks of all flights that fly, as `fly_blocks` does.
+
+        ``is_whole``: in one block, for those who need a whole flight as one log.
+        """
         first = self.flights[0]
-        for start, stop in block_bounds(first.ticks):
+        for start, stop in [(0, first.ticks)] if is_whole else block_bounds(first.ticks):
             flying = self._flying
             if not flying:
                 return

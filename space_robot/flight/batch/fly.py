@@ -10,7 +10,7 @@ from space_robot_msgs_py.compiled.lanes import WIDTH
 from space_robot_msgs_py.errors import FlightError
 
 from ..plan import Flight
-from ..simulate import fly_blocks
+from ..simulate import fly_blocks, simulate
 from .batch import Batch, FlownBlock
 from .sharing import batch_key, reason_to_fly_alone
 
@@ -33,26 +33,47 @@ def batches(flights: Iterable[tuple[int, Flight]]) -> Iterator[list[tuple[int, F
 
 
 def fly_group(
-    flights: Sequence[Flight], progress: Callable[[int], None] = lambda tick: None
+    flights: Sequence[Flight],
+    progress: Callable[[int], None] = lambda tick: None,
+    is_whole: bool = False,
 ) -> Generator[FlownBlock, None, None]:
     """Fly checked flights of one group of `batches`; yield their blocks as they are flown.
 
-    The numbers in the blocks are places in ``flights``. What a flight raises is in its last block.
+    The numbers in the blocks are places in ``flights``. The error that ended a flight is in its
+    last block. ``is_whole``: each flight has one block.
     """
     if len(flights) >= LEAST:
-        yield from Batch(flights).fly(progress)
+        yield from Batch(flights).fly(progress, is_whole)
         return
     for number, flight in enumerate(flights):
-        last: FlightLog | None = None
-        with closing(fly_blocks(flight, progress=progress)) as blocks:
-            try:
-                for block in blocks:
-                    if last is not None:
-                        yield FlownBlock(number, last, None)
-                    last = block
-            except FlightError as error:
+        for log, error in _alone(flight, progress, is_whole):
+            yield FlownBlock(number, log, error)
+
+
+def _alone(
+    flight: Flight, progress: Callable[[int], None], is_whole: bool
+) -> Iterator[tuple[FlightLog, FlightError | None]]:
+    last: FlightLog | None = None
+    with closing(_blocks(flight, progress, is_whole)) as blocks:
+        try:
+            for block in blocks:
                 if last is not None:
-                    yield FlownBlock(number, last, error)
-                continue
-        if last is not None:
-            yield FlownBlock(number, last, None)
+                    yield last, None
+                last = block
+        except FlightError as error:
+            last = error.log if is_whole else last
+            if last is None:
+                raise
+            yield last, error
+            return
+    if last is not None:
+        yield last, None
+
+
+def _blocks(
+    flight: Flight, progress: Callable[[int], None], is_whole: bool
+) -> Generator[FlightLog, None, None]:
+    if is_whole:
+        yield simulate(flight, progress=progress)
+    else:
+        yield from fly_blocks(flight, progress=progress)

@@ -1,0 +1,102 @@
+"""Many scenarios flown at once, for `space_robot.fly_many`."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Callable, Iterable, Iterator
+from typing import Any
+
+from space_robot_msgs_py.bag.flight_log import FlightLog
+from space_robot_msgs_py.config.validation import short
+from space_robot_msgs_py.errors import InputError
+
+from ..analysis import Analysis
+from ..flight.batch.fly import batches, fly_group
+from ..flight.compilation import compile_kernels, compile_lanes
+from ..flight.ending import Ending
+from ..flight.plan import Flight
+from ..flight.start_step import sentence
+from .flown_flight import FlownFlight
+from .scenario import Scenario
+
+
+def fly_many(
+    scenarios: Iterable[Scenario],
+    keep_log: bool = True,
+    progress: Callable[[int], object] | None = None,
+) -> list[FlownFlight]:
+    """Fly scenarios in this process, eight at a time where they can share a batch.
+
+        flights = sr.fly_many(sr.Scenario(seed=k, sensors="fine") for k in range(100))
+
+    Each flight has the bits of `Scenario.fly`. Those of one batch have the robot's joints and
+    tree, hardware, law, navigation, delays, period and duration in common, and differ in numbers:
+    masses, gains, seeds, faults, missions. The others are flown one after the other.
+
+    Args:
+        scenarios: to be flown.
+        keep_log: False: only the metrics are kept, for flights too long or too many for memory.
+        progress: called with the number of flights that are over.
+
+    Returns:
+        The flights, in the order of ``scenarios``.
+
+    Raises:
+        InputError: a scenario cannot be flown; names its place.
+    """
+    if progress is not None and not callable(progress):
+        raise InputError(f"progress: a function was expected, got {short(progress)}")
+    flown: dict[int, FlownFlight] = {}
+    for group in batches(_checked(scenarios)):
+        flights = [flight for _, flight in group]
+        compile_kernels(any(flight.plant.names.actuators for flight in flights))
+        compile_lanes()
+        for (number, _), flight in zip(group, _fly(flights, keep_log), strict=True):
+            flown[number] = flight
+        if progress:
+            progress(len(flown))
+    return [flown[number] for number in sorted(flown)]
+
+
+def _checked(scenarios: Iterable[Scenario]) -> Iterator[tuple[int, Flight]]:
+    """Yield number and checked flight of each scenario."""
+    for number, scenario in enumerate(scenarios):
+        where = f"scenario {number}"
+        if not isinstance(scenario, Scenario):
+            raise InputError(f"{where}: a Scenario was expected, got {short(scenario)}")
+        if scenario.controller is None:
+            raise InputError(
+                f"{where}: controller is None, so there is nothing to fly: use bench()"
+            )
+        try:
+            flight = scenario.check()
+        except InputError as error:
+            raise InputError(f"{where}: {error}") from None
+        if step := flight.start_step:
+            warnings.warn(f"{where}: {sentence(step)}", stacklevel=3)
+        yield number, flight
+
+
+def _fly(flights: list[Flight], keep_log: bool) -> list[FlownFlight]:
+    """Fly the flights of one group."""
+    analyses = [Analysis() for _ in flights]
+    logs: list[FlightLog | None] = [None for _ in flights]
+    endings = [Ending.complete(flight.ticks, flight.period) for flight in flights]
+    for block in fly_group(flights, is_whole=keep_log):
+        if keep_log:
+            logs[block.flight] = block.log
+        else:
+            analyses[block.flight].add(block.log)
+        if block.error is not None:
+            endings[block.flight] = Ending.early(block.error, flights[block.flight].period)
+    return [
+        FlownFlight(flight, endings[k], None, logs[k], _metrics(analyses[k], keep_log))
+        for k, flight in enumerate(flights)
+    ]
+
+
+def _metrics(analysis: Analysis, keep_log: bool) -> dict[str, Any] | None:
+    """Return the metrics of a flight without a log; None: they are computed from its log."""
+    if keep_log:
+        return None
+    return analysis.report() if analysis.ticks else {}
