@@ -12,7 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from space_robot_msgs_py.compiled.kernels import kernel, subroutine
-from space_robot_msgs_py.compiled.lanes import uniform, whole
+from space_robot_msgs_py.compiled.lanes import WIDTH, lane_of, uniform, whole
+from space_robot_msgs_py.compiled.records import Record, nested, shaped
 from space_robot_msgs_py.samples import Reference
 
 from .algebra import Vector, add, cross, dot, scale, store, vector
@@ -26,21 +27,42 @@ Array = NDArray[np.float64]
 Block = NDArray[Any]
 
 
+class AlongScratch(Record):
+    """Scratch of `inverse_dynamics_along`, in lanes."""
+
+    reference: Reference = nested(Reference)
+    data: Data = nested(Data)
+    vectors: Array = shaped(lambda n: (2, 3))
+    torque: Array = shaped(lambda n: (n + 3,))
+
+
 @kernel
 def inverse_dynamics_along(
-    model: Model, references: Block, data: Data, vectors: Array, out: Array
+    model: Model, references: Array, scratch: Block, numbers: Array, out: Array
 ) -> None:
     """Write the torque for each of N references into ``out`` (N, n+3), N m.
 
+    Eight of them are computed at once.
+
     Args:
         model: the robot.
-        references: (N,) block of `Reference`, with unit quaternions.
-        data: scratch.
-        vectors: (2, 3) scratch.
+        references: (N, numbers) of a `Reference` each, with unit quaternions.
+        scratch: (1,) block of `AlongScratch` in lanes.
+        numbers: (numbers, 8), the memory of its ``reference``.
         out: in base axes, then the joints.
     """
-    for k in range(references.size):
-        inverse_dynamics(model, references[k], data, vectors, out[k])
+    count, size = references.shape
+    work = scratch[0]
+    for first in range(0, count, WIDTH):
+        for lane in range(WIDTH):
+            row = min(first + lane, count - 1)
+            for i in range(size):
+                numbers[i, lane] = references[row, i]
+        inverse_dynamics(model, work.reference, work.data, work.vectors, work.torque)
+        for i in range(out.shape[1]):
+            torque = work.torque[i]
+            for lane in range(min(WIDTH, count - first)):
+                out[first + lane, i] = lane_of(torque, lane)
 
 
 @kernel

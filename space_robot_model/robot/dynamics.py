@@ -7,10 +7,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from space_robot_msgs_py.compiled.lanes import WIDTH
+
 from ..dynamics.aba import aba
 from ..dynamics.crba import crba
 from ..dynamics.free_floating import free_inverse_dynamics_along
-from ..dynamics.inverse_dynamics import inverse_dynamics_along
+from ..dynamics.inverse_dynamics import AlongScratch, inverse_dynamics_along
 from ..dynamics.kinematics import forward_kinematics, spatial_velocities
 from ..dynamics.model import Data
 from ..dynamics.rho_space import RhoSpaceModel
@@ -135,9 +137,11 @@ def inverse_dynamics(robot: Robot, references: Block) -> Array:
     Returns:
         (N, n+3) N m, in base axes, then of the joints.
     """
-    n = robot.n
-    out = np.empty((len(references), n + 3))
-    inverse_dynamics_along(robot.model, references, Data.allocate(n), np.empty((2, 3)), out)
+    n, count = robot.n, len(references)
+    out, scratch = np.empty((count, n + 3)), AlongScratch.lanes(n)
+    numbers: Array = references.view(np.float64).reshape(count, -1)
+    of_reference = scratch.view(np.float64).reshape(-1, WIDTH)[: numbers.shape[1]]
+    inverse_dynamics_along(robot.model, numbers, scratch, of_reference, out)
     return out
 
 

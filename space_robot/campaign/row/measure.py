@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -50,11 +51,15 @@ class Measure:
 
     def metrics(self) -> dict[str, float]:
         """Return the available metrics of the whole flight, by name."""
+        return dict(self._results)
+
+    @cached_property
+    def _results(self) -> dict[str, float]:
         return self._whole.result()
 
     def require(self) -> dict[str, float]:
         """Return the metric of each requirement in its window, by the requirement's name."""
-        whole = self.metrics()
+        whole = self._results
         values = {name: whole.get(metric) for name, metric in self._same.items()}
         for name, window in self._require.items():
             values[name] = next(iter(window.result().values()), None)

@@ -12,7 +12,7 @@ from space_robot_model.robot import Robot
 from space_robot_msgs_py.bag.flight_log import FlightLog
 
 from ...analysis.metrics import AxisRms
-from ...analysis.ripple import Ripple
+from ...analysis.ripple import FAST, Ripple
 from .columns import FAST_RIPPLE, RIPPLE, Columns, missing_for_ripple
 
 Array = NDArray[np.float64]
@@ -118,11 +118,12 @@ class WindowMetrics:
     def _ripples(self) -> dict[str, float]:
         if self._ripple is None or missing_for_ripple(RIPPLE, self._ticks, self._period):
             return {}
-        ripple = self._ripple.result()
+        spectrum = self._ripple.spectrum()
+        bands = ((RIPPLE, spectrum.rms()), (FAST_RIPPLE, spectrum.rms(FAST)))
         values = {
-            f"{prefix}{name}": value
-            for prefix, bands in ((RIPPLE, ripple), (FAST_RIPPLE, ripple["fast"]))
-            for name, value in bands["rms"].items()
+            f"{prefix}{name}": float(np.mean(rms[axes]))
+            for prefix, rms in bands
+            for name, axes in self._columns.torques.items()
         }
         return {
             name: value
