@@ -11,8 +11,9 @@ from space_robot_msgs_py.config.validation import short
 from space_robot_msgs_py.errors import InputError
 
 from ..analysis import Analysis
+from ..flight.batch.compilation import compile_lanes
 from ..flight.batch.fly import batches, fly_group
-from ..flight.compilation import compile_kernels, compile_lanes
+from ..flight.compilation import compile_kernels
 from ..flight.ending import Ending
 from ..flight.plan import Flight
 from ..flight.start_step import sentence

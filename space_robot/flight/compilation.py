@@ -24,7 +24,7 @@ from ..processes.child_process import child_process
 from .closed_loop import fly_ticks
 from .plan import Flight, FlightPlan, resolve
 
-MARK, ALLOCATION_MARK, LANES_MARK = "complete", "allocation", "lanes"
+MARK, ALLOCATION_MARK = "complete", "allocation"
 
 
 def compile_kernels(with_allocation: bool = False) -> None:
@@ -36,7 +36,7 @@ def compile_kernels(with_allocation: bool = False) -> None:
     _compile_flights()
     mark = cache_directory() / ALLOCATION_MARK
     if with_allocation and not mark.exists():
-        with _progress("the allocation", allocate):
+        with compiling("the allocation", allocate):
             allocation_code(is_used=True)
         mark.touch()
 
@@ -52,7 +52,7 @@ def _compile_flights() -> None:
     from .simulate import simulate  # nodes load kernels without it
 
     own = [law.kernel for law in laws().values() if issubclass(law, CompiledLaw)]
-    with _progress("the dynamics and the laws", fly_ticks, read, write, *own):
+    with compiling("the dynamics and the laws", fly_ticks, read, write, *own):
         with child_process(module_command(__name__), stdout=subprocess.DEVNULL) as helper:
             _step_plant(Flight(resolve(FlightPlan())))
             helper.wait()
@@ -63,30 +63,11 @@ def _compile_flights() -> None:
     mark.touch()
 
 
-def compile_lanes() -> None:
-    """Compile the kernels of flights that fly together, see `space_robot.flight.batch`."""
-    compile_kernels()
-    mark = cache_directory() / LANES_MARK
-    if mark.exists():
-        return
-    from .batch.compilation import LANE_KERNELS, compile_controllers, compile_plants, fly_all_laws
-
-    own = [law.kernel for law in laws().values() if issubclass(law, CompiledLaw)]
-    with _progress("flights that fly together", *LANE_KERNELS, *own, again=True):
-        with child_process(module_command(compile_plants.__module__)) as helper:
-            compile_controllers()
-            helper.wait()
-        fly_all_laws()
-    mark.touch()
-
-
-def _progress(what: str, *kernels: Any, again: bool = False) -> AbstractContextManager[None]:
+def compiling(what: str, *kernels: Any, again: bool = False) -> AbstractContextManager[None]:
     """Show the progress of compilation, including other processes.
 
     ``again``: the kernels have been compiled for other types before.
     """
-    from ..console.progress import watching_progress  # only once an installation
-
     click.echo(f"compiling {what} (once an installation, a minute or two) ...", err=True)
     files = index_files(kernels)
     since = time.time_ns() if again else 0

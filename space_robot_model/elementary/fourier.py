@@ -85,11 +85,8 @@ def _stage_in_lanes(
     real_out: Array,
     imaginary_out: Array,
 ) -> None:
-    parts, out = (
-        (as_lanes(real), as_lanes(imaginary)),
-        (as_lanes(real_out), as_lanes(imaginary_out)),
-    )
-    _stage(factor, stride, cosines, sines, parts[0], parts[1], out[0], out[1])
+    samples, out = (as_lanes(real), as_lanes(imaginary)), as_lanes(real_out)
+    _stage(factor, stride, cosines, sines, samples[0], samples[1], out, as_lanes(imaginary_out))
 
 
 @kernel

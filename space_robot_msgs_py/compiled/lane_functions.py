@@ -46,7 +46,7 @@ def _define(function: Any, arity: int, result: Any, build: _Build, of: Any = LAN
     """Define ``function`` of lanes, or masks, with the instructions emitted by ``build``."""
     accepts = _some_lanes if of is LANE else _some_masks
 
-    class Template(AbstractTemplate):
+    class Pointwise(AbstractTemplate):
         key = function
 
         def generic(self, args: Any, kws: Any) -> Any:
@@ -57,7 +57,7 @@ def _define(function: Any, arity: int, result: Any, build: _Build, of: Any = LAN
     def lower(context: Any, builder: Any, sig: Any, args: Any) -> Any:
         return build(builder, *args)
 
-    infer_global(function)(Template)
+    infer_global(function)(Pointwise)
     lower_builtin(function, *[type(of)] * arity)(lower)
 
 
@@ -217,7 +217,7 @@ def _where(context: Any, builder: Any, sig: Any, args: Any) -> Any:
 def _reads_one(function: Any, of_number: Any, of_lane: Any, emit: _Build) -> None:
     """Define a function of the first lane, or of a plain number."""
 
-    class Template(AbstractTemplate):
+    class OfFirstLane(AbstractTemplate):
         key = function
 
         def generic(self, args: Any, kws: Any) -> Any:
@@ -235,7 +235,7 @@ def _reads_one(function: Any, of_number: Any, of_lane: Any, emit: _Build) -> Non
             kind = types.float64 if kind == LANE else types.boolean
         return emit(context, builder, value, kind, sig.return_type)
 
-    infer_global(function)(Template)
+    infer_global(function)(OfFirstLane)
     for kind in (LaneType, MaskType, types.Number, types.Boolean):
         lower_builtin(function, kind)(lower)
 
@@ -257,7 +257,7 @@ _reads_one(
 def _reduces(function: Any, name: str) -> None:
     """Define a function of all lanes of a mask, or of a plain truth value."""
 
-    class Template(AbstractTemplate):
+    class OfAllLanes(AbstractTemplate):
         key = function
 
         def generic(self, args: Any, kws: Any) -> Any:
@@ -272,7 +272,7 @@ def _reduces(function: Any, name: str) -> None:
         whole_name = f"llvm.vector.reduce.{name}.v{WIDTH}i1"
         return builder.call(cgutils.get_or_insert_function(builder.module, kind, whole_name), args)
 
-    infer_global(function)(Template)
+    infer_global(function)(OfAllLanes)
     for kind in (MaskType, types.Boolean):
         lower_builtin(function, kind)(lower)
 
@@ -285,15 +285,20 @@ _reduces(all_lanes, "and")
 class _LaneOf(AbstractTemplate):
     def generic(self, args: Any, kws: Any) -> Any:
         kind, _ = args
-        if kind not in (LANE, MASK):
-            return None
-        return signature(types.float64 if kind == LANE else types.boolean, kind, types.intp)
+        if kind in (LANE, MASK):
+            return signature(types.float64 if kind == LANE else types.boolean, kind, types.intp)
+        return signature(kind, kind, types.intp) if isinstance(kind, types.Float) else None
 
 
 @lower_builtin(lane_of, LaneType, types.Integer)
 @lower_builtin(lane_of, MaskType, types.Integer)
 def _lane_of(context: Any, builder: Any, sig: Any, args: Any) -> Any:
     return builder.extract_element(*args)
+
+
+@lower_builtin(lane_of, types.Float, types.Integer)
+def _lane_of_number(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+    return args[0]
 
 
 @infer_global(with_lane)
@@ -327,16 +332,16 @@ class _AsLanes(AbstractTemplate):
 def _as_lanes(context: Any, builder: Any, sig: Any, args: Any) -> Any:
     from numba.np import arrayobj  # only the compiler needs it
 
-    given = arrayobj.make_array(sig.args[0])(context, builder, value=args[0])
-    data = builder.bitcast(given.data, LANE_VECTOR.as_pointer())
+    numbers = arrayobj.make_array(sig.args[0])(context, builder, value=args[0])
+    data = builder.bitcast(numbers.data, LANE_VECTOR.as_pointer())
     if sig.return_type == LANE:
         return builder.load(data, align=1)
     array = arrayobj.make_array(sig.return_type)(context, builder)
     arrayobj.populate_array(
         array,
         data=data,
-        shape=cgutils.pack_array(builder, cgutils.unpack_tuple(builder, given.shape)[:-1]),
-        strides=cgutils.pack_array(builder, cgutils.unpack_tuple(builder, given.strides)[:-1]),
+        shape=cgutils.pack_array(builder, cgutils.unpack_tuple(builder, numbers.shape)[:-1]),
+        strides=cgutils.pack_array(builder, cgutils.unpack_tuple(builder, numbers.strides)[:-1]),
         itemsize=cgutils.intp_t(8 * WIDTH),
         meminfo=None,
         parent=None,

@@ -245,9 +245,9 @@ def layout_of(dtype: np.dtype[Any]) -> tuple[Layout, int] | None:
 
     None if it is not that of a record.
     """
-    found = _FOUND.get(id(dtype))
-    if found is not None and found[0] is dtype:
-        return found[1]
+    remembered = _FOUND.get(id(dtype))
+    if remembered is not None and remembered[0] is dtype:
+        return remembered[1]
     known = _LAYOUTS.get(dtype)
     if known is not None:
         if len(_FOUND) >= MOST_FOUND:

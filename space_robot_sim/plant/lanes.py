@@ -50,20 +50,30 @@ def advance_lanes(
         flies: mask of the lanes that count.
     """
     begin_interval(memory, command_delay_buffer, torque, tick, period)
+    move_lanes(memory, alone, tick * period, period, flies)
+    fastest: float = end_interval(memory)
+    return fastest
+
+
+@kernel
+def move_lanes(memory: PlantMemory, alone: Block, start: float, period: float, flies: bool) -> None:
+    """Integrate the states of the flights that fly over a tick that begins at ``start``, s.
+
+    ``start`` may be of each lane.
+    """
     model, x, stages = memory.model, memory.x, memory.stages
     substeps = whole(memory.substeps)
     step = period / substeps
     for k in range(substeps):
-        time = tick * period + k * step
+        time = start + k * step
         slides = glide(model, memory.environment, x, time, step, stages)
+        moves = slides & flies
         for i in range(state_size(model)):
-            x[i] = where(slides, stages.end[i], x[i])
+            x[i] = where(moves, stages.end[i], x[i])
         if not all_lanes(slides | negated(flies)):
             for lane in range(WIDTH):
                 if lane_of(flies, lane) and not lane_of(slides, lane):
-                    _move_alone(memory, alone[lane], lane, time, step)
-    fastest: float = end_interval(memory)
-    return fastest
+                    _move_alone(memory, alone[lane], lane, lane_of(time, lane), step)
 
 
 @kernel

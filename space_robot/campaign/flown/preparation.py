@@ -7,7 +7,8 @@ from functools import cached_property
 
 from space_robot_msgs_py.errors import InputError
 
-from ...flight.compilation import compile_kernels, compile_lanes
+from ...flight.batch.compilation import compile_lanes
+from ...flight.compilation import compile_kernels
 from ...flight.plan import Flight
 from ...processes.software import commit
 from ..row.bands import BINS

@@ -41,7 +41,7 @@ class FlownBlock(NamedTuple):
     """What ended the flight in this block; None: it goes on, or is complete."""
 
 
-class Batch:
+class FlightBatch:
     """Flights that fly together, see `can_share`; plants and controllers are flown on."""
 
     def __init__(self, flights: Sequence[Flight]) -> None:

@@ -9,26 +9,46 @@ from numba import types
 from space_robot_control.controller.kernels import ControllerMemory, apply_transfer, compute_signals
 from space_robot_control.laws import CompiledLaw, laws
 from space_robot_msgs_py.compiled.block_type import block_type
+from space_robot_msgs_py.compiled.cache import cache_directory
 from space_robot_msgs_py.compiled.lane_type import MASK, array_of_lanes
 from space_robot_msgs_py.compiled.lanes import WIDTH
 from space_robot_msgs_py.compiled.record_type import record_type
 from space_robot_msgs_py.ros.lifeline import hold_to_standard_input
+from space_robot_msgs_py.ros.run_module import module_command
 from space_robot_msgs_py.samples import Reference, State
 from space_robot_sim.plant.lanes import advance_lanes
 from space_robot_sim.plant.plant import PlantMemory
 
+from ...processes.child_process import child_process
+from ..compilation import compile_kernels, compiling
 from ..plan import Flight, FlightPlan, resolve
-from .batch import Batch
+from .batch import FlightBatch
 from .lane_loop import fly_lanes, measure_lanes
 
-LANE_KERNELS = (fly_lanes, measure_lanes)
+MARK = "lanes"
+
+
+def compile_lanes() -> None:
+    """Compile the kernels of flights that fly together, once an installation."""
+    compile_kernels()
+    mark = cache_directory() / MARK
+    if mark.exists():
+        return
+    own = [law.kernel for law in laws().values() if issubclass(law, CompiledLaw)]
+    kernels = (fly_lanes, measure_lanes, *own)
+    with compiling("flights that fly together", *kernels, again=True):
+        with child_process(module_command(__name__)) as helper:
+            _compile_controllers()
+            helper.wait()
+        _fly_all_laws()
+    mark.touch()
 
 
 def _block(record: Any, width: int = WIDTH) -> Any:
     return block_type(record.layout(), width)
 
 
-def compile_plants() -> None:
+def _compile_plants() -> None:
     """Compile the plant's kernels in lanes."""
     plant, row = record_type(PlantMemory.layout(), WIDTH), array_of_lanes(1)
     alone, numbers = _block(PlantMemory, 1), (types.intp, types.float64)
@@ -38,7 +58,7 @@ def compile_plants() -> None:
     measure.compile((_block(PlantMemory), *numbers))
 
 
-def compile_controllers() -> None:
+def _compile_controllers() -> None:
     """Compile the controller's kernels in lanes."""
     controller, row = _block(ControllerMemory), array_of_lanes(1)
     signals: Any = compute_signals
@@ -48,15 +68,15 @@ def compile_controllers() -> None:
     transfer.compile((controller, types.intp, row, row))
 
 
-def fly_all_laws() -> None:
+def _fly_all_laws() -> None:
     """Fly a few ticks under every law with a kernel."""
     for name, law in laws().items():
         if issubclass(law, CompiledLaw):
             plan = FlightPlan(controller=name, duration=0.002)
-            for _ in Batch([Flight(resolve(plan)) for _ in range(2)]).fly():
+            for _ in FlightBatch([Flight(resolve(plan)) for _ in range(2)]).fly():
                 pass
 
 
 if __name__ == "__main__":
     hold_to_standard_input()
-    compile_plants()
+    _compile_plants()

@@ -11,7 +11,7 @@ from space_robot_msgs_py.errors import FlightError
 
 from ..plan import Flight
 from ..simulate import fly_blocks, simulate
-from .batch import Batch, FlownBlock
+from .batch import FlightBatch, FlownBlock
 from .sharing import batch_key, reason_to_fly_alone
 
 LEAST = 2
@@ -43,7 +43,7 @@ def fly_group(
     last block. ``is_whole``: each flight has one block.
     """
     if len(flights) >= LEAST:
-        yield from Batch(flights).fly(progress, is_whole)
+        yield from FlightBatch(flights).fly(progress, is_whole)
         return
     for number, flight in enumerate(flights):
         for log, error in _alone(flight, progress, is_whole):

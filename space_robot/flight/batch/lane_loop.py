@@ -205,15 +205,15 @@ def _allocate(
     tick: int,
 ) -> None:
     """Allocate the torque on the base, flight by flight: its branches differ too much."""
-    given = memory.controllers.block[0].allocation
+    in_lanes = memory.controllers.block[0].allocation
     for lane in range(WIDTH):
         if lane_of(is_flying, lane):
             allocation = memory.controllers.alone[lane].allocation
             for i in range(3):
-                allocation.demand[i] = lane_of(given.demand[i], lane)
-            for i in range(given.reported_speeds.size):
-                allocation.reported_speeds[i] = lane_of(given.reported_speeds[i], lane)
-                allocation.reported_torques[i] = lane_of(given.reported_torques[i], lane)
+                allocation.demand[i] = lane_of(in_lanes.demand[i], lane)
+            for i in range(in_lanes.reported_speeds.size):
+                allocation.reported_speeds[i] = lane_of(in_lanes.reported_speeds[i], lane)
+                allocation.reported_torques[i] = lane_of(in_lanes.reported_torques[i], lane)
             allocate(allocation, float(tick))
             for i in range(axes, torque.size):
                 torque[i] = with_lane(torque[i], lane, allocation.command[i - axes])

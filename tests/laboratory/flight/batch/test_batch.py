@@ -10,7 +10,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from space_robot import Scenario
-from space_robot.flight.batch.batch import Batch
+from space_robot.flight.batch.batch import FlightBatch
 from space_robot.flight.batch.fly import batches, fly_group
 from space_robot.flight.batch.sharing import batch_key, reason_to_fly_alone
 from space_robot.flight.plan import Flight
@@ -189,7 +189,7 @@ def test_a_flight_longer_than_a_block_is_flown_block_by_block(
 ) -> None:
     monkeypatch.setattr("space_robot_msgs_py.bag.blocks.BLOCK_TICKS", 60)
     blocks = [[], []]  # type: list[list[FlightLog]]
-    for block in Batch(some(2, sensors="fine")).fly():
+    for block in FlightBatch(some(2, sensors="fine")).fly():
         blocks[block.flight].append(block.log)
     for number, flight in enumerate(some(2, sensors="fine")):
         whole = simulate(flight)

@@ -1,0 +1,165 @@
+"""The task "reach": bring the arm from one posture to another while the base keeps its attitude.
+
+Its kernels are compiled for one environment and for eight in lanes, with the same bits.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from space_robot_msgs_py.compiled.kernels import kernel
+from space_robot_msgs_py.compiled.lane_functions import as_lanes
+from space_robot_msgs_py.compiled.lanes import any_lane, where
+from space_robot_msgs_py.compiled.records import Block, Record, shaped
+from space_robot_msgs_py.samples import State
+from space_robot_sim.plant.lanes import move_lanes
+from space_robot_sim.plant.plant import RATE_LIMIT, advance, begin_interval, end_interval
+
+Array = NDArray[np.float64]
+
+WORST_COST = 100.0
+"""Cost per second that terminates an episode: that of a joint error of 10 rad."""
+RATE_WEIGHT, ACTION_WEIGHT = 0.1, 1e-3
+"""Weights of squared rates, rad2/s2, and squared actions in the cost per second; the weight of
+squared errors, rad2, is 1, of the attitude's (half the angle) 4."""
+LARGEST = 1e4
+"""Limit of the absolute values of an observation; larger ones are clipped."""
+
+
+class Reach(Record):
+    """An episode of the task."""
+
+    target: Array = shaped(lambda n: (n,))
+    """Joint positions to be reached, rad or m."""
+    attitude: Array = shaped(lambda n: (4,))
+    """Attitude to be kept, unit quaternion."""
+    scale: Array = shaped(lambda n: (n + 3,))
+    """Torque of an action of 1, N m or N."""
+    action: Array = shaped(lambda n: (n + 3,))
+    """Of the present step."""
+    torque: Array = shaped(lambda n: (n + 3,))
+    """Scratch: the command, N m or N."""
+    tick: float = shaped(lambda n: ())
+    """Ticks of the episode so far."""
+    ticks: float = shaped(lambda n: ())
+    """Length of the episode."""
+    observation: Array = shaped(lambda n: (2 * n + 6,))
+    """Errors of attitude (vector part) and joints, angular velocity of the base, joint rates."""
+    reward: float = shaped(lambda n: ())
+    """Of the last step."""
+    has_failed: float = shaped(lambda n: ())
+    """1 once the cost is `WORST_COST` or the flight has diverged."""
+
+
+@kernel
+def observe(reach: Reach, truth: State) -> None:
+    """Write the observation of a state."""
+    n, out = reach.target.size, reach.observation
+    cosine = 0.0
+    for i in range(4):
+        cosine += truth.quaternion[i] * reach.attitude[i]
+    side = where(cosine >= 0.0, 1.0, -1.0)
+    for i in range(3):
+        out[i] = side * reach.attitude[1 + i] - truth.quaternion[1 + i]
+        out[3 + n + i] = truth.omega_base[i]
+    for i in range(n):
+        out[3 + i] = reach.target[i] - truth.joint_positions[i]
+        out[6 + n + i] = truth.joint_velocities[i]
+    for i in range(out.size):
+        known = where(np.isnan(out[i]), 0.0, out[i])
+        out[i] = min(max(known, -LARGEST), LARGEST)
+
+
+@kernel
+def judge(reach: Reach, truth: State, fastest: float, ticks: int, period: float) -> None:
+    """Write observation, reward and failure after a step of ``ticks`` ticks.
+
+    What is left of a failed episode costs `WORST_COST` a second: an early end is no advantage.
+    """
+    observe(reach, truth)
+    n, out = reach.target.size, reach.observation
+    cost = 0.0
+    for i in range(3):
+        cost += 4.0 * out[i] * out[i] + RATE_WEIGHT * out[3 + n + i] * out[3 + n + i]
+    for i in range(n):
+        cost += out[3 + i] * out[3 + i] + RATE_WEIGHT * out[6 + n + i] * out[6 + n + i]
+    for i in range(n + 3):
+        cost += ACTION_WEIGHT * reach.action[i] * reach.action[i]
+    is_good = (fastest <= RATE_LIMIT) & (cost < WORST_COST)
+    charged = where(is_good, ticks * 1.0, reach.ticks - reach.tick)
+    reach.reward = -where(is_good, cost, WORST_COST) * charged * period
+    reach.has_failed = where(is_good, 0.0, 1.0)
+    reach.tick = reach.tick + ticks
+
+
+@kernel
+def step_alone(
+    plant: Block, command_delay_buffer: Array, reach: Block, ticks: int, period: float
+) -> None:
+    """Apply the action of one environment for some ticks."""
+    memory, task, fastest = plant[0], reach[0], 0.0
+    for i in range(task.torque.size):
+        task.torque[i] = task.scale[i] * task.action[i]
+    for k in range(ticks):
+        if fastest <= RATE_LIMIT:
+            tick = int(task.tick) + k
+            fastest = advance(memory, command_delay_buffer, task.torque, tick, period)
+    judge(task, memory.truth, fastest, ticks, period)
+
+
+@kernel
+def observe_start(plant: Block, reach: Block) -> None:
+    """Write the first observation of an episode."""
+    observe(reach[0], plant[0].truth)
+
+
+@kernel
+def step_in_lanes(
+    plants: Block,
+    alone: Block,
+    command_delay_buffer: Array,
+    reaches: Block,
+    resting: Array,
+    ticks: int,
+    period: float,
+) -> None:
+    """Apply the actions of environments in lanes for some ticks; each has its own time.
+
+    Args:
+        plants: `PlantMemory` of groups of eight, in lanes; commands are not delayed.
+        alone: (8,) block of `PlantMemory` for each group, one behind the other.
+        command_delay_buffer: (0, m, 8).
+        reaches: `Reach` of the groups, in lanes.
+        resting: (groups, 8): 1 for lanes that are left as they are.
+        ticks: of the step.
+        period: s.
+    """
+    buffer, rests = as_lanes(command_delay_buffer), as_lanes(resting)
+    for group in range(plants.size):
+        memory, task, flies = plants[group], reaches[group], rests[group] == 0.0
+        if not any_lane(flies):
+            continue
+        own, fastest = alone[8 * group : 8 * group + 8], 0.0 * task.tick
+        for i in range(task.torque.size):
+            task.torque[i] = task.scale[i] * task.action[i]
+        for k in range(ticks):
+            flies = flies & (fastest <= RATE_LIMIT)
+            begin_interval(memory, buffer, task.torque, 0, period)
+            move_lanes(memory, own, (task.tick + k) * period, period, flies)
+            fastest = where(flies, end_interval(memory), fastest)
+        judge(task, memory.truth, fastest, ticks, period)
+
+
+@kernel
+def observe_in_lanes(plants: Block, reaches: Block) -> None:
+    """Write the observations of groups of environments."""
+    for group in range(plants.size):
+        observe(reaches[group], plants[group].truth)
+
+
+def is_finite_positive(value: float) -> bool:
+    """Return whether a number is above 0 and finite."""
+    return math.isfinite(value) and value > 0.0
