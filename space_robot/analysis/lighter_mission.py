@@ -26,6 +26,8 @@ from .bends import best_bends
 
 WORTHWHILE = 0.98
 """Share of the demand that is left, above which a leg stays straight."""
+BETWEEN_SAMPLES = 1.0 + 1e-5
+"""Factor on durations, since a longer segment is sampled at other places, nearer to its peak."""
 DIGITS = 3
 """Durations are rounded up to this many digits behind the point, s."""
 
@@ -51,7 +53,7 @@ def stretched_mission(
             factor = max(factor, float(np.sqrt(segment["base_torque"] / base_torque)))
         if momentum is not None:
             factor = max(factor, segment["momentum"] / momentum)
-        span = segment["duration_s"] * factor
+        span = segment["duration_s"] * (factor if factor == 1.0 else factor * BETWEEN_SAMPLES)
         spans.append(span if factor == 1.0 else float(np.ceil(span * 10**DIGITS) / 10**DIGITS))
     legs = len(settings.waypoint_times) - 1
     times = [0.0, *np.cumsum(spans[:legs]).tolist()]

@@ -68,6 +68,8 @@ def compiling(what: str, *kernels: Any, again: bool = False) -> AbstractContextM
 
     ``again``: the kernels have been compiled for other types before.
     """
+    from ..console.progress import watching_progress  # only once an installation
+
     click.echo(f"compiling {what} (once an installation, a minute or two) ...", err=True)
     files = index_files(kernels)
     since = time.time_ns() if again else 0

@@ -1,7 +1,4 @@
-"""Spectrum of real samples by Stockham's Fourier transform, for any number of samples.
-
-The columns of the samples are transformed eight at a time, in lanes.
-"""
+"""Spectrum of real samples by Stockham's Fourier transform, for any number of samples."""
 
 from __future__ import annotations
 
@@ -10,9 +7,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from space_robot_msgs_py.compiled.kernels import kernel, subroutine
-from space_robot_msgs_py.compiled.lane_functions import as_lanes
-from space_robot_msgs_py.compiled.lanes import WIDTH
+from space_robot_msgs_py.compiled.kernels import kernel
 
 from .sine import sines_cosines
 
@@ -28,23 +23,13 @@ def squared_spectrum(rows: Array) -> Array:
     turns = np.arange(size, dtype=np.float64)
     angles = 2.0 * math.pi * np.where(turns > size / 2, turns - size, turns) / size
     sines, cosines = sines_cosines(angles)
-    columns, axes = _columns(rows), rows.shape[1]
     if size % 2:
-        real, imaginary = _transformed(columns, np.zeros_like(columns), sines, cosines)
-        spectrum = real * real + imaginary * imaginary
-    else:
-        halves = _transformed(columns[0::2], columns[1::2], sines[::2], cosines[::2])
-        spectrum = np.empty((count, *columns.shape[1:]))
-        _squares_in_lanes(*halves, sines, cosines, spectrum)
-    return spectrum[:count].reshape(count, -1)[:, :axes]
-
-
-def _columns(rows: Array) -> Array:
-    """Return rows (N, axes) as (N, c, 8), with columns of zeros behind the last."""
-    size, axes = rows.shape
-    columns = np.zeros((size, -(-axes // WIDTH) * WIDTH))
-    columns[:, :axes] = rows
-    return columns.reshape(size, -1, WIDTH)
+        real, imaginary = _transformed(rows, np.zeros_like(rows), sines, cosines)
+        return (real * real + imaginary * imaginary)[:count]
+    halves = _transformed(rows[0::2], rows[1::2], sines[::2], cosines[::2])
+    spectrum = np.empty((count, rows.shape[1]))
+    _squares(*halves, sines, cosines, spectrum)
+    return spectrum
 
 
 def _transformed(
@@ -55,7 +40,7 @@ def _transformed(
     sines, cosines = np.ascontiguousarray(sines), np.ascontiguousarray(cosines)
     for factor, stride in _factors(len(real)):
         out = np.empty_like(parts[0]), np.empty_like(parts[1])
-        _stage_in_lanes(factor, stride, cosines, sines, *parts, *out)
+        _stage(factor, stride, cosines, sines, *parts, *out)
         parts = out
     return parts
 
@@ -75,28 +60,6 @@ def _factors(size: int) -> list[tuple[int, int]]:
 
 
 @kernel
-def _stage_in_lanes(
-    factor: int,
-    stride: int,
-    cosines: Array,
-    sines: Array,
-    real: Array,
-    imaginary: Array,
-    real_out: Array,
-    imaginary_out: Array,
-) -> None:
-    samples, out = (as_lanes(real), as_lanes(imaginary)), as_lanes(real_out)
-    _stage(factor, stride, cosines, sines, samples[0], samples[1], out, as_lanes(imaginary_out))
-
-
-@kernel
-def _squares_in_lanes(
-    real: Array, imaginary: Array, sines: Array, cosines: Array, out: Array
-) -> None:
-    _squares(as_lanes(real), as_lanes(imaginary), sines, cosines, as_lanes(out))
-
-
-@subroutine
 def _stage(
     factor: int,
     stride: int,
@@ -125,7 +88,7 @@ def _stage(
                         imaginary_out[begin + q, k] = beside + (c * y - s * x)
 
 
-@subroutine
+@kernel
 def _squares(real: Array, imaginary: Array, sines: Array, cosines: Array, out: Array) -> None:
     """Return in ``out`` the squared magnitudes, from even rows as real, odd as imaginary part."""
     size, axes = real.shape
