@@ -21,7 +21,7 @@ from space_robot_msgs_py.bag.flight_log import FlightLog, of_nan
 from space_robot_msgs_py.bag.reader import read_flight
 from space_robot_msgs_py.bag.recorder import BagRecorder
 from space_robot_msgs_py.errors import FlightError, InputError
-from space_robot_msgs_py.samples import Command, LawInForce, RobotState
+from space_robot_msgs_py.samples import Command, LawInForce, ReferenceChunk, RobotState
 from space_robot_msgs_py.wire.clock import ClockCodec
 from space_robot_msgs_py.wire.codecs import CommandCodec, StateCodec
 from space_robot_msgs_py.wire.controller_law import LawCodec
@@ -141,10 +141,12 @@ def empty_log(
     start: int = 0,
     stop: int | None = None,
     new: Callable[[tuple[int, ...]], Array] = of_nan,
+    reference: ReferenceChunk | None = None,
 ) -> FlightLog:
     """Return the log of the ticks ``start`` to ``stop`` (None: the last) before the flight.
 
-    The reference alone is known. ``new`` makes the columns that the flight fills.
+    The reference alone is known; it may have been computed. ``new`` makes the columns that the
+    flight fills.
     """
     ticks = (flight.ticks if stop is None else stop) - start
     names = flight.plant.names
@@ -155,7 +157,7 @@ def empty_log(
     log.lost = {topic.full_name: 0 for topic in topics.ALL}
     log.commanded_torque = new(log.applied_torque.shape)
     log.telemetry = new((log.ticks, 4, log.axes))
-    reference = flight.mission.chunk(start, log.ticks)
+    reference = reference or flight.mission.chunk(start, log.ticks)
     log.reference_joints, log.reference_base = reference.joints, reference.base
     if not flight.plant.measures_truth:
         log.record_measured(new)

@@ -72,8 +72,13 @@ def normal_numbers(bits: NDArray[np.uint64], out: Array) -> None:
 
     The upper 52 bits select one of 2**52 equidistant probabilities in (0, 1).
     """
+    for i in range(out.size):  # the centre, without branches: it holds for 85 of 100
+        q = (float(bits[i] >> np.uint64(12)) + 0.5) * 2.0**-52 - 0.5
+        out[i] = q * _ratio(CENTRAL, CENTRE * CENTRE - q * q)
     for i in range(out.size):
-        out[i] = quantile((float(bits[i] >> np.uint64(12)) + 0.5) * 2.0**-52)
+        share = (float(bits[i] >> np.uint64(12)) + 0.5) * 2.0**-52
+        if abs(share - 0.5) > CENTRE:
+            out[i] = quantile(share)
 
 
 @kernel

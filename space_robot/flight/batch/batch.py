@@ -23,7 +23,8 @@ from ..plan import Flight
 from ..simulate import ended_early, note_beliefs
 from .lane_log import LogsInLanes
 from .lane_loop import fly_lanes, measure_lanes, take_out
-from .lane_memory import LawInLanes, copy_back, copy_command, memory_of, put_in, references_of
+from .lane_memory import LawInLanes, copy_back, copy_command, memory_of, put_in
+from .references import references_in_lanes
 
 Array = NDArray[np.float64]
 
@@ -118,7 +119,7 @@ class FlightBatch:
                 law = self.flights[k].controller.law
                 if change := self._changes[k].at(start, law):
                     logs.logs[k].laws += (change.law,)
-            references = references_of(self.flights, start, stop)
+            references = references_in_lanes(logs.references, start, stop)
             tick = start
             while tick < stop and self._flying:
                 plants = [self.flights[k].plant for k in self._flying]

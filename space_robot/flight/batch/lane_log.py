@@ -14,6 +14,7 @@ from space_robot_msgs_py.samples import ALL_FIELDS
 from ..plan import Flight
 from ..simulate import empty_log
 from .lane_loop import LaneLog
+from .references import chunks_of
 
 Array = NDArray[np.float64]
 
@@ -23,19 +24,14 @@ class LogsInLanes:
 
     def __init__(self, flights: Sequence[Flight], start: int, stop: int) -> None:
         """Allocate logs of the ticks ``start`` to ``stop``."""
-        columns: list[Array] = []
-
-        def first(shape: tuple[int, ...]) -> Array:
-            column = np.empty((WIDTH, *shape))
-            columns.append(column)
-            of_first: Array = column[0]
-            return of_first
-
-        self.logs = [empty_log(flights[0], start, stop, first)]
+        self.references = references = chunks_of(flights, start, stop)
+        """Desired motion of each flight."""
+        columns = _columns(flights[0], start, stop)
+        self.logs = []
         """One of each flight."""
-        for lane, flight in enumerate(flights[1:], 1):
-            own = iter([column[lane] for column in columns])
-            self.logs.append(empty_log(flight, start, stop, partial(_next, own)))
+        for lane, flight in enumerate(flights):
+            own = partial(_next, iter([column[lane] for column in columns]))
+            self.logs.append(empty_log(flight, start, stop, own, references[lane]))
         by_address = {column.ctypes.data: column for column in columns if column.size}
         log = self.logs[0]
 
@@ -52,6 +48,24 @@ class LogsInLanes:
             common(log.actuator_commands),
             _with_axes(common(log.telemetry)),
         )
+
+
+def _columns(flight: Flight, start: int, stop: int) -> list[Array]:
+    """Return the columns (8, N, ...) that `empty_log` asks for, in its order.
+
+    They are parts of one array, large enough for the pages of memory that the system has for such.
+    """
+    shapes: list[tuple[int, ...]] = []
+
+    def asked(shape: tuple[int, ...]) -> Array:
+        shapes.append(shape[1:])
+        return np.empty(shape)
+
+    empty_log(flight, start, start + 1, asked)
+    ticks = stop - start
+    counts = [WIDTH * ticks * int(np.prod(shape, dtype=int)) for shape in shapes]
+    parts = np.split(np.empty(sum(counts)), np.cumsum(counts)[:-1])
+    return [part.reshape(WIDTH, ticks, *shape) for part, shape in zip(parts, shapes, strict=True)]
 
 
 def _next(columns: Iterator[Array], shape: tuple[int, ...]) -> Array:

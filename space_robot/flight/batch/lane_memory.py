@@ -13,7 +13,6 @@ from space_robot_control.laws.base import LawMemory
 from space_robot_control.laws.compiled import CompiledLaw, LawCode, SomeGains
 from space_robot_msgs_py.compiled.lanes import WIDTH
 from space_robot_msgs_py.compiled.records import Block, Record, prefix
-from space_robot_msgs_py.samples import Reference
 from space_robot_sim.plant.plant import PlantMemory
 
 from ..plan import Flight
@@ -113,22 +112,3 @@ class LawInLanes:
     def copy_back(self, lane: int) -> None:
         """Copy the memory of one lane into its law."""
         self._laws[lane].memory_block.view(np.float64)[:] = numbers_of(self._memory)[:, lane]
-
-
-def references_of(flights: Sequence[Flight], start: int, stop: int) -> Block:
-    """Return the references of the ticks ``start`` to ``stop`` in lanes."""
-    block: Block = np.empty(stop - start, Reference.dtype(flights[0].robot.n, WIDTH))
-    numbers = block.view(np.float64).reshape(stop - start, -1, WIDTH)
-    first = flights[0].mission
-    if all(flight.mission is first for flight in flights):
-        numbers[:] = _reference_numbers(flights[0], start, stop)[:, :, np.newaxis]
-        return block
-    for lane, flight in enumerate(flights):
-        numbers[:, :, lane] = _reference_numbers(flight, start, stop)
-    numbers[:, :, len(flights) :] = numbers[:, :, :1]
-    return block
-
-
-def _reference_numbers(flight: Flight, start: int, stop: int) -> Array:
-    references = flight.mission.chunk(start, stop - start).references()
-    return references.view(np.float64).reshape(stop - start, -1)
