@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from .api.replayed import replay
     from .api.together import fly_many
     from .campaign.flown import Campaign, FlownCampaign
+    from .learning import make, make_vec
 
 __all__ = [
     "Bench",
@@ -35,6 +36,8 @@ __all__ = [
     "fly_many",
     "forward_dynamics",
     "load_bag",
+    "make",
+    "make_vec",
     "mass_matrix",
     "replay",
 ]
@@ -49,6 +52,8 @@ MODULES = {
     "fly_many": "space_robot.api.together",
     "forward_dynamics": "space_robot_model.robot.dynamics",
     "load_bag": "space_robot.analysis.load_bag",
+    "make": "space_robot.learning",
+    "make_vec": "space_robot.learning",
     "mass_matrix": "space_robot_model.robot.dynamics",
     "replay": "space_robot.api.replayed",
 }

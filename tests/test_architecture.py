@@ -43,6 +43,7 @@ ROOMS = {
         "flight",
         "analysis",
         "api",
+        "learning",
         "campaign",
         "paper",
         "view",

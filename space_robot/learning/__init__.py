@@ -1,1 +1,53 @@
-"""Tasks for learning: environments of Gymnasium, one at a time and many in lanes."""
+"""Tasks for learning: environments of Gymnasium, one at a time and many in lanes.
+
+env = space_robot.make("reach")
+envs = space_robot.make_vec("reach", num_envs=64, threads=2)
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from space_robot_msgs_py.config.validation import one_of
+
+if TYPE_CHECKING:
+    from .reach_env import ReachEnv, ReachVectorEnv
+
+TASKS = ("reach",)
+"""Names of the tasks."""
+
+
+def make(task: str, **settings: Any) -> ReachEnv:
+    """Return an environment of Gymnasium for a task.
+
+    Args:
+        task: "reach": see `space_robot.learning.reach_env.ReachEnv`.
+        settings: of the task, see `space_robot.learning.episodes.ReachTask`.
+
+    Raises:
+        InputError: there is no such task, or a setting is out of its range.
+        ImportError: Gymnasium is not installed.
+    """
+    one_of(task, TASKS, "task")
+    from .reach_env import ReachEnv  # Gymnasium is an extra
+
+    return ReachEnv(**settings)
+
+
+def make_vec(task: str, num_envs: int = 8, threads: int = 1, **settings: Any) -> ReachVectorEnv:
+    """Return a vector environment of Gymnasium: many at once, each with the bits of `make`'s.
+
+    Args:
+        task: see `make`.
+        num_envs: number of environments; a multiple of 8 fills all lanes.
+        threads: among which they are divided.
+        settings: see `make`.
+
+    Raises:
+        InputError: there is no such task, or a setting is out of its range.
+        ImportError: Gymnasium is not installed.
+    """
+    one_of(task, TASKS, "task")
+    from .reach_env import ReachVectorEnv  # Gymnasium is an extra
+
+    return ReachVectorEnv(num_envs, threads, **settings)

@@ -5,14 +5,12 @@ Its kernels are compiled for one environment and for eight in lanes, with the sa
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 from numpy.typing import NDArray
 
 from space_robot_msgs_py.compiled.kernels import kernel
 from space_robot_msgs_py.compiled.lane_functions import as_lanes
-from space_robot_msgs_py.compiled.lanes import any_lane, where
+from space_robot_msgs_py.compiled.lanes import WIDTH, lane_of, where, with_lane
 from space_robot_msgs_py.compiled.records import Block, Record, shaped
 from space_robot_msgs_py.samples import State
 from space_robot_sim.plant.lanes import move_lanes
@@ -118,48 +116,62 @@ def observe_start(plant: Block, reach: Block) -> None:
 
 @kernel
 def step_in_lanes(
-    plants: Block,
+    work: Block,
     alone: Block,
     command_delay_buffer: Array,
+    states: Array,
     reaches: Block,
-    resting: Array,
+    actions: Array,
+    results: Array,
+    observations: Array,
     ticks: int,
     period: float,
 ) -> None:
-    """Apply the actions of environments in lanes for some ticks; each has its own time.
+    """Apply the actions of E environments in lanes for some ticks; each has its own time.
 
     Args:
-        plants: `PlantMemory` of groups of eight, in lanes; commands are not delayed.
-        alone: (8,) block of `PlantMemory` for each group, one behind the other.
+        work: (1,) block of `PlantMemory` in lanes, at tick 0. Groups of eight take turns in it:
+            commands are not delayed and drives are exact, so only their states remain.
+        alone: (8,) block of the same.
         command_delay_buffer: (0, m, 8).
+        states: (groups, numbers, 8) state vectors.
         reaches: `Reach` of the groups, in lanes.
-        resting: (groups, 8): 1 for lanes that are left as they are.
+        actions: (E, m).
+        results: (3, groups, 8): rewards; 1 for episodes that have failed; 1 for those whose time is
+            over. Before, 1 in the last one is for an environment that is left as it is.
+        observations: (E, 2 m), written.
         ticks: of the step.
         period: s.
     """
-    buffer, rests = as_lanes(command_delay_buffer), as_lanes(resting)
-    for group in range(plants.size):
-        memory, task, flies = plants[group], reaches[group], rests[group] == 0.0
-        if not any_lane(flies):
-            continue
-        own, fastest = alone[8 * group : 8 * group + 8], 0.0 * task.tick
+    buffer, out = as_lanes(command_delay_buffer), as_lanes(results)
+    memory, all_states = work[0], as_lanes(states)
+    for group in range(reaches.size):
+        task, flies, state = reaches[group], out[2, group] == 0.0, all_states[group]
+        first, fastest = WIDTH * group, 0.0 * task.tick
+        for i in range(state.size):
+            memory.x[i] = state[i]
         for i in range(task.torque.size):
-            task.torque[i] = task.scale[i] * task.action[i]
+            action = task.action[i]
+            for lane in range(WIDTH):
+                action = with_lane(action, lane, actions[first + lane, i])
+            task.action[i] = action
+            task.torque[i] = task.scale[i] * action
         for k in range(ticks):
             flies = flies & (fastest <= RATE_LIMIT)
             begin_interval(memory, buffer, task.torque, 0, period)
-            move_lanes(memory, own, (task.tick + k) * period, period, flies)
+            move_lanes(memory, alone, (task.tick + k) * period, period, flies)
             fastest = where(flies, end_interval(memory), fastest)
+        for i in range(state.size):
+            state[i] = memory.x[i]
         judge(task, memory.truth, fastest, ticks, period)
+        out[0, group], out[1, group] = task.reward, task.has_failed
+        out[2, group] = where((task.tick >= task.ticks) & (task.has_failed == 0.0), 1.0, 0.0)
+        _spread(task.observation, observations[first : first + WIDTH])
 
 
 @kernel
-def observe_in_lanes(plants: Block, reaches: Block) -> None:
-    """Write the observations of groups of environments."""
-    for group in range(plants.size):
-        observe(reaches[group], plants[group].truth)
-
-
-def is_finite_positive(value: float) -> bool:
-    """Return whether a number is above 0 and finite."""
-    return math.isfinite(value) and value > 0.0
+def _spread(values: Array, rows: Array) -> None:
+    for i in range(rows.shape[1]):
+        value = values[i]
+        for lane in range(WIDTH):
+            rows[lane, i] = lane_of(value, lane)

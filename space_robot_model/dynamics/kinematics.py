@@ -101,7 +101,7 @@ def _place(model: Model, data: Data) -> None:
         row[5] = yz - moment[1] * com[2]
 
 
-@kernel
+@subroutine
 def rotated_inertia(axes: Matrix, inertia: Symmetric) -> Symmetric:
     """Return ``R I R^T``, the inertia (kg m2) in outer axes, with R = ``axes``."""
     a = (axes[0], axes[1], axes[2])
@@ -143,7 +143,7 @@ def spatial_velocities(
             keep_motion(w, v, data.outwards[j + 1])
 
 
-@kernel
+@subroutine
 def _momentum_rate(model: Model, i: int, w: Vector, v: Vector, data: Data) -> None:
     moment = vector(data.first_moment[i], 0)
     linear = add(scale(v, model.mass[i]), cross(w, moment))

@@ -1,0 +1,239 @@
+"""The task "reach" as environments of Gymnasium: one, or many in lanes.
+
+env = gymnasium.make("space_robot/Reach-v0")
+envs = space_robot.make_vec("reach", num_envs=64)
+"""
+
+from __future__ import annotations
+
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from space_robot_msgs_py.compiled.lanes import WIDTH
+from space_robot_msgs_py.compiled.records import Block
+from space_robot_msgs_py.config.arguments import as_numbers, as_whole_number
+from space_robot_msgs_py.errors import InputError
+from space_robot_sim.plant.plant import Plant, PlantMemory
+
+try:
+    import gymnasium
+    from gymnasium.spaces import Box
+    from gymnasium.vector import AutoresetMode, VectorEnv
+    from gymnasium.vector.utils import batch_space
+except ImportError:
+    raise ImportError("gymnasium is not installed: pip install 'space_robot[gym]'") from None
+
+from .episodes import ReachTask
+from .reach import LARGEST, Reach, observe_start, step_alone, step_in_lanes
+
+Array = NDArray[np.float64]
+Info = dict[str, Any]
+
+NAME = "space_robot/Reach-v0"
+"""Name for `gymnasium.make` and `gymnasium.make_vec`, registered with this module."""
+
+
+class ReachEnv(gymnasium.Env[Array, Array]):
+    """An arm that is to reach postures while its base keeps its attitude; m = n+3 axes.
+
+    - Reset: joints at rest at a random start, and a random target for them.
+    - Observation (2 m,): errors of the base's attitude (vector part of the quaternion) and of the
+      joints, rad (or m); angular velocity of the base in its frame and joint rates, rad/s.
+    - Action (m,): torque divided by ``torque_scale``, held over ``ticks_per_step`` ticks.
+    - Reward: -cost dt with the cost per second
+      ``4 |e_eps|^2 + |e_theta|^2 + 0.1 |omega, thetadot|^2 + 0.001 |action|^2``.
+    - Terminated: the cost is 100 or more, or the flight has diverged; what is left of the episode
+      then costs 100 per second. Truncated: after ``duration``.
+    """
+
+    def __init__(self, **settings: Any) -> None:
+        """Create an environment; ``settings`` are those of `ReachTask`.
+
+        Raises:
+            InputError: see `ReachTask`.
+        """
+        self.task = ReachTask(**settings)
+        self.observation_space, self.action_space = _spaces(self.task)
+        self._plant, self._reach = self.task.begin.block.copy(), self.task.new_reach()
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Array, Info]:
+        """Start an episode; ``options`` is not used."""
+        super().reset(seed=seed)
+        self.task.put(self.task.episode(self.np_random), self._plant, self._reach)
+        observe_start(self._plant, self._reach)
+        return self._reach["observation"][0].copy(), {}
+
+    def step(self, action: Array) -> tuple[Array, float, bool, bool, Info]:
+        """Apply an action.
+
+        Raises:
+            InputError: the action does not have m numbers, or the episode is over.
+        """
+        reach, task = self._reach, self.task
+        if not reach["ticks"][0] or reach["has_failed"][0] or reach["tick"][0] >= task.ticks:
+            raise InputError("the episode is over, or has not begun: reset the environment")
+        reach["action"] = _checked(action, (task.n + 3,))
+        buffer = task.begin.command_delay_buffer
+        step_alone(self._plant, buffer, reach, task.ticks_per_step, task.period)
+        failed = bool(reach["has_failed"][0])
+        truncated = not failed and bool(reach["tick"][0] >= task.ticks)
+        return reach["observation"][0].copy(), float(reach["reward"][0]), failed, truncated, {}
+
+
+class ReachVectorEnv(VectorEnv[Array, Array, Array]):
+    """Many `ReachEnv` stepped together, eight in the lanes of a vector; each with its own bits.
+
+    An environment whose episode is over begins the next one at the following step, which ignores
+    its action (`AutoresetMode.NEXT_STEP`).
+    """
+
+    def __init__(self, num_envs: int = WIDTH, threads: int = 1, **settings: Any) -> None:
+        """Create the environments.
+
+        Args:
+            num_envs: number of environments; a multiple of 8 fills all lanes.
+            threads: among which they are divided; the bits do not depend on it.
+            settings: of `ReachTask`.
+
+        Raises:
+            InputError: a number is out of its range; see `ReachTask`.
+        """
+        self.num_envs = as_whole_number(num_envs, "num_envs", 1)
+        self.task = task = ReachTask(**settings)
+        self.single_observation_space, self.single_action_space = _spaces(task)
+        self.observation_space = batch_space(self.single_observation_space, self.num_envs)
+        self.action_space = batch_space(self.single_action_space, self.num_envs)
+        self.metadata = {"autoreset_mode": AutoresetMode.NEXT_STEP}
+        groups = -(-self.num_envs // WIDTH)
+        self._states = np.zeros((groups, task.state_size, WIDTH))
+        self._reaches: Block = np.zeros(groups, Reach.dtype(task.n, WIDTH))
+        self._buffer = np.zeros((*task.begin.command_delay_buffer.shape, WIDTH))
+        self._begin = task.begin.block.copy(), task.new_reach()
+        self._actions = np.zeros((groups * WIDTH, task.n + 3))
+        self._results = np.ones((3, groups, WIDTH))
+        self._observations = np.zeros((groups * WIDTH, 2 * (task.n + 3)))
+        self._over = np.zeros(self.num_envs, np.bool_)
+        """Environments that begin a new episode at the next step."""
+        self._generators: list[np.random.Generator] = []
+        parts = np.array_split(np.arange(groups), as_whole_number(threads, "threads", 1))
+        self._parts = [slice(int(part[0]), int(part[-1]) + 1) for part in parts if len(part)]
+        self._work = [_work_of(task.begin) for _ in self._parts]
+        self._pool = ThreadPoolExecutor(len(self._parts)) if len(self._parts) > 1 else None
+
+    def reset(
+        self, *, seed: int | list[int | None] | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Array, Info]:
+        """Start an episode of each environment.
+
+        Args:
+            seed: of the first; the next ones have the numbers after it. Or one for each.
+            options: not used.
+        """
+        if seed is not None or not self._generators:
+            first = seed if isinstance(seed, int) else None
+            seeds = (
+                seed
+                if isinstance(seed, list)
+                else [None if first is None else first + k for k in range(self.num_envs)]
+            )
+            self._generators = [gymnasium.utils.seeding.np_random(own)[0] for own in seeds]
+        self._start(range(self.num_envs))
+        return self._observations[: self.num_envs].copy(), {}
+
+    def step(self, actions: Array) -> tuple[Array, Array, Array, Array, Info]:
+        """Apply an action (num_envs, m) of each environment.
+
+        Raises:
+            InputError: the actions have another shape, or `reset` was not called.
+        """
+        if not self._generators:
+            raise InputError("reset the environments before the first step")
+        count = self.num_envs
+        self._actions[:count] = _checked(actions, (count, self.task.n + 3))
+        over = np.flatnonzero(self._over)
+        results = self._results.reshape(3, -1)
+        results[2, :count] = self._over
+        if self._pool:
+            list(self._pool.map(self._step_part, range(len(self._parts))))
+        else:
+            self._step_part(0)
+        if len(over):
+            self._start(over)
+            results[:, over] = 0.0
+        rewards, failed, truncated = results[:, :count].copy()
+        self._over = (failed + truncated) > 0.0
+        return self._observations[:count].copy(), rewards, failed > 0.0, truncated > 0.0, {}
+
+    def close_extras(self, **kwargs: Any) -> None:
+        """End the threads."""
+        if self._pool:
+            self._pool.shutdown()
+
+    def _step_part(self, number: int) -> None:
+        task, part = self.task, self._parts[number]
+        rows = slice(WIDTH * part.start, WIDTH * part.stop)
+        results = self._results[:, part]
+        if results.shape != self._results.shape:  # kernels want contiguous lanes
+            results = results.copy()
+        step_in_lanes(
+            *self._work[number],
+            self._buffer,
+            self._states[part],
+            self._reaches[part],
+            self._actions[rows],
+            results,
+            self._observations[rows],
+            task.ticks_per_step,
+            task.period,
+        )
+        self._results[:, part] = results
+
+    def _start(self, numbers: Any) -> None:
+        """Begin an episode of some environments."""
+        plant, reach = self._begin
+        for k in numbers:
+            self.task.put(self.task.episode(self._generators[k]), plant, reach)
+            observe_start(plant, reach)
+            group, lane = divmod(int(k), WIDTH)
+            self._states[group, :, lane] = plant["x"][0, : self._states.shape[1]]
+            of_group = self._reaches[group : group + 1].view(np.float64).reshape(-1, WIDTH)
+            of_group[:, lane] = reach.view(np.float64)
+            self._observations[k] = reach["observation"][0]
+
+
+def _spaces(task: ReachTask) -> tuple[Any, Any]:
+    m = task.n + 3
+    high = np.full(2 * m, LARGEST)
+    high[:3] = 2.0
+    return Box(-high, high, dtype=np.float64), Box(-1.0, 1.0, (m,), np.float64)
+
+
+def _checked(action: Any, shape: tuple[int, ...]) -> Array:
+    numbers = as_numbers(action, "action")
+    if numbers.shape != shape:
+        raise InputError(
+            f"action: an array of shape {shape} was expected, got one of shape {numbers.shape}"
+        )
+    return numbers
+
+
+def _work_of(plant: Plant) -> tuple[Block, Block]:
+    """Return memory for eight copies of a plant: in lanes, and each by itself."""
+    n = len(plant.names.joints)
+    lanes, alone = PlantMemory.lanes(n), np.zeros(WIDTH, PlantMemory.dtype(n))
+    alone[:] = plant.block[0]
+    lanes.view(np.float64).reshape(-1, WIDTH)[:] = plant.block.view(np.float64)[:, np.newaxis]
+    return lanes, alone
+
+
+if NAME not in gymnasium.registry:
+    gymnasium.register(
+        NAME,
+        f"{__name__}:{ReachEnv.__name__}",
+        vector_entry_point=f"{__name__}:{ReachVectorEnv.__name__}",
+    )

@@ -1,0 +1,113 @@
+"""The task reach: one environment, and many in lanes with the same bits."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+import space_robot as sr
+from space_robot_msgs_py.errors import InputError
+
+gymnasium = pytest.importorskip("gymnasium")
+from gymnasium.utils.env_checker import check_env  # noqa: E402
+from gymnasium.vector import AutoresetMode, SyncVectorEnv  # noqa: E402
+
+from space_robot.learning.reach_env import NAME, ReachEnv, ReachVectorEnv  # noqa: E402
+
+SHORT: dict[str, Any] = {"duration": 0.03, "ticks_per_step": 2}
+
+
+@pytest.mark.filterwarnings("ignore:.*WARN")
+def test_it_is_an_environment_of_gymnasium() -> None:
+    check_env(gymnasium.make(NAME, **SHORT).unwrapped)
+
+
+@pytest.mark.parametrize("threads", [1, 2])
+@pytest.mark.parametrize("robot", ["paper", "dual_arm", "flexible_panels"])
+def test_many_have_the_bits_of_single_ones(threads: int, robot: str) -> None:
+    """Over resets, failures (large actions diverge) and ends of episodes, in eleven lanes."""
+    count = 11
+    settings = {**SHORT, "scenario": sr.Scenario(robot=robot, case="3")}
+    envs = sr.make_vec("reach", num_envs=count, threads=threads, **settings)
+    singles = SyncVectorEnv(
+        [lambda: sr.make("reach", **settings) for _ in range(count)],
+        autoreset_mode=AutoresetMode.NEXT_STEP,
+    )
+    np.testing.assert_array_equal(envs.reset(seed=5)[0], singles.reset(seed=5)[0])
+    generator, failed, ended = np.random.default_rng(1), 0, 0
+    for step in range(80):
+        actions = generator.uniform(-1.0, 1.0, envs.action_space.shape)
+        if step > 50:
+            actions[::3] *= 1e4
+        for one, other in zip(envs.step(actions)[:4], singles.step(actions)[:4], strict=True):
+            assert one.dtype == other.dtype
+            np.testing.assert_array_equal(one, other)
+        failed += int(np.sum(singles._terminations))
+        ended += int(np.sum(singles._truncations))
+    assert failed > 3
+    assert ended > 10
+    envs.close()
+    singles.close()
+
+
+def test_an_episode_is_a_second_of_steps_with_rewards_below_zero() -> None:
+    env = sr.make("reach", duration=0.02, ticks_per_step=4)
+    first, _ = env.reset(seed=3)
+    again, _ = env.reset(seed=3)
+    np.testing.assert_array_equal(first, again)
+    assert env.observation_space.contains(first)
+    rewards = []
+    for step in range(10):
+        _, reward, failed, truncated, _ = env.step(np.zeros(9))
+        rewards.append(reward)
+        assert not failed
+        assert truncated == (step == 9)
+    assert max(rewards) < 0.0
+    with pytest.raises(InputError, match="the episode is over"):
+        env.step(np.zeros(9))
+
+
+def test_a_failure_costs_the_rest_of_the_episode() -> None:
+    env = ReachEnv(duration=1.0, torque_scale=1e6)
+    env.reset(seed=0)
+    total = 0.0
+    for _ in range(2000):
+        _, reward, failed, truncated, _ = env.step(np.ones(9))
+        total += reward
+        if failed or truncated:
+            break
+    assert failed
+    assert total == pytest.approx(-100.0, rel=0.05)
+
+
+@pytest.mark.parametrize(
+    ("settings", "said"),
+    [
+        ({"scenario": sr.Scenario(sensors="fine")}, "scenario: sensors, drives or faults"),
+        ({"scenario": sr.Scenario(actuators="wheels")}, "scenario: a base without ideal torques"),
+        ({"scenario": sr.Scenario(command_latency_ticks=2)}, "scenario: delayed commands"),
+        ({"scenario": 3}, "scenario: a Scenario was expected"),
+        ({"duration": 0.0}, "duration: a number above 0 was expected"),
+        ({"reach": -1.0}, "reach: a number 0 or more was expected"),
+        ({"ticks_per_step": 0}, "ticks_per_step"),
+        ({"torque_scale": [1.0, 2.0]}, "torque_scale: 1 or 9 numbers above 0"),
+    ],
+)
+def test_wrong_settings_are_named(settings: dict[str, Any], said: str) -> None:
+    with pytest.raises(InputError, match=said):
+        sr.make("reach", **settings)
+
+
+def test_wrong_arguments_are_named() -> None:
+    with pytest.raises(InputError, match="fetch"):
+        sr.make("fetch")
+    with pytest.raises(InputError, match="num_envs"):
+        sr.make_vec("reach", num_envs=0)
+    envs = ReachVectorEnv(3)
+    with pytest.raises(InputError, match="reset the environments"):
+        envs.step(np.zeros((3, 9)))
+    envs.reset()
+    with pytest.raises(InputError, match=r"action: an array of shape \(3, 9\)"):
+        envs.step(np.zeros((2, 9)))
