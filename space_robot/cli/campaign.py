@@ -57,7 +57,8 @@ campaign.add_command(report)
     "timeout_s",
     type=FiniteRange(0.0, min_open=True),
     metavar="S",
-    help="Longest wall-clock time of a flight; its row says out_of_time then [default: any].",
+    help="Longest wall-clock time of a flight; its row says out_of_time then. Flights with a limit "
+    "are flown one by one [default: any].",
 )
 @click.option("--json", "as_json", is_flag=True, help="Print outcomes and verdicts as JSON.")
 def run(

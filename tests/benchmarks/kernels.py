@@ -10,8 +10,10 @@ from space_robot_control.laws.compiled import LawCode
 from space_robot_model.dynamics.aba import aba
 from space_robot_model.dynamics.kinematics import forward_kinematics, spatial_velocities
 from space_robot_msgs_py.compiled.kernels import RecordFunction, kernel
+from space_robot_msgs_py.compiled.lane_functions import as_lanes
 from space_robot_msgs_py.compiled.records import Block
 from space_robot_sim.plant.integrator import state_derivative
+from space_robot_sim.plant.lanes import advance_lanes
 from space_robot_sim.plant.plant import advance
 
 Array = NDArray[np.float64]
@@ -26,6 +28,23 @@ def plant_steps(
     for k in range(tick, tick + steps):
         fastest = advance(memory, command_delay_buffer, torque, k, period)
     return fastest
+
+
+@kernel
+def lane_steps(
+    block: Block,
+    alone: Block,
+    command_delay_buffer: Array,
+    torque: Array,
+    steps: int,
+    period: float,
+) -> None:
+    """Steps of eight plants in lanes under one torque."""
+    buffer, command = as_lanes(command_delay_buffer), as_lanes(torque)
+    memory = block[0]
+    flies = memory.x[3] == memory.x[3]
+    for k in range(steps):
+        advance_lanes(memory, alone, buffer, command, k, period, flies)
 
 
 @kernel

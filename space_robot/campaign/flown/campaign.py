@@ -172,9 +172,10 @@ class Campaign:
             workers: number of processes; 0: this process; None: one per processor.
             scheduler: address of a Dask scheduler whose workers fly instead.
             timeout_s: longest wall-clock time of a flight; its outcome is then ``out_of_time``.
+                With such a limit flights are flown one by one, not eight at a time.
             progress: called at the beginning and after each flight.
-            warn: called with a line for each damaged file of the folder; lost rows are flown
-                again.
+            warn: called with a line for each damaged file of the folder, whose lost rows are
+                flown again, and for each law whose flights are flown one by one.
 
         Raises:
             InputError: something cannot be flown; the folder is another campaign's; disk full.
@@ -197,6 +198,8 @@ class Campaign:
                 options = {"workers": processes, "scheduler": scheduler, "timeout_s": timeout_s}
                 try:
                     if not flights.are_complete:
+                        for line in asked.notes:
+                            warn(line)
                         asked.compile()
                         journal.make_note(WRITTEN, "")  # the table is outdated
                         flights.fly(progress or (lambda _: None), options)

@@ -8,6 +8,7 @@ from functools import cached_property
 from space_robot_msgs_py.errors import InputError
 
 from ...flight.batch.compilation import compile_lanes
+from ...flight.batch.sharing import reason_to_fly_alone
 from ...flight.compilation import compile_kernels
 from ...flight.plan import Flight
 from ...processes.software import commit
@@ -83,6 +84,12 @@ class Preparation:
             flights={law: flight_digest(flight) for law, flight in self.flights.items()},
             table=self._schema(),
         )
+
+    @property
+    def notes(self) -> list[str]:
+        """A line for each law whose flights cannot be flown eight at a time."""
+        reasons = {law: reason_to_fly_alone(flight) for law, flight in self.flights.items()}
+        return [f"{law}: flown one by one: {why}" for law, why in reasons.items() if why]
 
     def compile(self) -> None:
         """Compile the kernels once, before several processes need them."""
