@@ -30,7 +30,8 @@ from .integrator import Stages, first_velocity, rk4_step, state_derivative, stat
 Array = NDArray[np.float64]
 
 MOST_CUTS = 32
-"""Cuts of one step; joints of a real robot come to rest once or twice in it."""
+"""Cuts of one step; joints of a real robot come to rest once or twice in it. Of a flight that
+diverges, velocities may have several roots in a step, so that cuts would not end."""
 MOST_PIVOTS = 64
 MOST_TRIALS = 64
 AT_REST = 1e-16
@@ -57,11 +58,13 @@ def integrate(
             stages.held[joint] = 1.0
             continue
         length = left
-        while joint != NONE:  # one that comes to rest still earlier is met on the way
+        for _ in range(MOST_CUTS):  # one that comes to rest still earlier is met on the way
             velocity = first_velocity(model) + joint
             length = cut(model, environment, x, time, length, velocity, stages)
             stages.end[velocity] = 0.0
             joint = first_at_rest(model, environment, x, stages)
+            if joint == NONE:
+                break
         _take(model, stages, x)
         stages.held[: whole(environment.friction.count)] = 0.0
         time += length

@@ -25,7 +25,9 @@ from ..result import Result, Target
 from .plant import moving_plant
 
 FLIGHT = {"controller": "tde_stc", "sensors": "fine", "navigation": "filtered"}
-RUNS = 64
+SLIDING = 400
+"""Steps after which the joints get their speed again, before friction stops them."""
+RUNS = 150
 """Of the campaign; two laws each."""
 ENVS = 1024
 STEPS = 50
@@ -46,14 +48,19 @@ def _steps(options: Options) -> list[Result]:
     memory.alone[:] = eight.block[0]
     memory.numbers[:] = memory.numbers_alone.T
     buffer, torque = np.zeros((*eight.command_delay_buffer.shape, WIDTH)), np.zeros((n + 3, WIDTH))
-    competitors: dict[str, Callable[[int], object]] = {
-        "lanes": lambda steps: lane_steps(
-            memory.block, memory.alone, buffer, torque, -(-steps // WIDTH), period
-        ),
-        "alone": lambda steps: plant_steps(
-            one.block, one.command_delay_buffer, np.zeros(n + 3), 0, steps, period
-        ),
-    }
+    moving, start = memory.numbers.copy(), one.block.copy()
+
+    def in_eight(steps: int) -> None:
+        for _ in range(0, steps, WIDTH * SLIDING):
+            memory.numbers[:] = moving
+            lane_steps(memory.block, memory.alone, buffer, torque, SLIDING, period)
+
+    def alone(steps: int) -> None:
+        for _ in range(0, steps, SLIDING):
+            one.block[:] = start
+            plant_steps(one.block, one.command_delay_buffer, np.zeros(n + 3), 0, SLIDING, period)
+
+    competitors: dict[str, Callable[[int], object]] = {"lanes": in_eight, "alone": alone}
     if is_installed("mujoco"):
         competitors |= _mujoco(one.robot)
     seconds = interleave(competitors, options.batches(), batch_s=options.batch_s)

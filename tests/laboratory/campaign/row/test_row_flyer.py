@@ -91,3 +91,27 @@ def test_a_digest_covers_every_number() -> None:
     digests |= {row.digested().digest, row.digested(b"state").digest}
     assert len(digests) == len(parts) + 2
     assert Row(**{**row.__dict__, "task": Task(7, "ctc")}).digested().digest in digests
+
+
+def test_a_flight_that_diverges_among_joints_that_stop_comes_to_its_end() -> None:
+    """Near its end velocities have several roots in a step: cutting it never ended."""
+    content = {
+        "scenario": {"case": "3", "sensors": "fine", "duration": 5.0},
+        "laws": ["ctc"],
+        "vary": {"robot.links[*].mass": {"normal": 1.0, "sigma": 0.05, "relative": True}},
+    }
+    flying = RowFlyer.of(Study.model_validate(content), 7, 150)
+    row = flying(Task(89, "ctc"))
+    assert (row.outcome, row.ended_at_s) == ("diverged", pytest.approx(2.602))
+    (other,) = [r for r in flying.together([Task(88, "ctc"), Task(89, "ctc")]) if r.task.run == 89]
+    assert other.digest == row.digest
+
+
+def test_runs_flown_together_have_the_rows_of_single_ones() -> None:
+    flying = flyer(sensors="fine", faults=["torque_scale@0.03:all=0.3"])
+    tasks = [Task(run, "tde_stc") for run in range(5)]
+    rows = {row.task: row for row in flying.together(tasks)}
+    assert rows.keys() == set(tasks)
+    for task, row in rows.items():
+        assert row.digest == flying(task).digest
+        assert row.metrics == flying(task).metrics
