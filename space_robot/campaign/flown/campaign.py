@@ -173,7 +173,7 @@ class Campaign:
             scheduler: address of a Dask scheduler whose workers fly instead.
             timeout_s: longest wall-clock time of a flight; its outcome is then ``out_of_time``.
                 With such a limit flights are flown one by one, not eight at a time.
-            progress: called at the beginning and after each flight.
+            progress: called at the beginning and after each group of up to eight flights.
             warn: called with a line for each damaged file of the folder, whose lost rows are
                 flown again, and for each law whose flights are flown one by one.
 

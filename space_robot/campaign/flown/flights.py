@@ -104,7 +104,7 @@ class Flights:
         """Fly the missing flights; each row is stored in the journal at once.
 
         Args:
-            on_progress: called at the beginning and after every flight.
+            on_progress: called at the beginning and after every group of flights.
             options: of `run_many`.
 
         Raises:
@@ -123,7 +123,7 @@ class Flights:
                 for row in result.result or [self._unflown(result.item[0], result.error)]:
                     self._journal.add(row)
                     self._count(row)
-                    on_progress(self._progress)
+                on_progress(self._progress)
                 if self.precision.is_reached and self.are_complete:
                     return
 

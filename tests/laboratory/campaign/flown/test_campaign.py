@@ -70,15 +70,20 @@ def test_killed_again_and_again_it_has_the_same_table(
         process = context.Process(target=fly, args=(1 + kill % 2, theirs))
         process.start()
         theirs.close()
-        first = ours.recv()
-        kept.append(first)
-        for _ in range(chance.randint(0, 6)):
-            ours.recv()
+        try:
+            first = ours.recv()
+            kept.append(first)
+            for _ in range(chance.randint(0, 1)):  # groups of flights
+                ours.recv()
+        except EOFError:  # all is flown
+            process.join()
+            break
         process.join(chance.uniform(0.0, 0.03))
         os.kill(process.pid or 0, signal.SIGKILL)
         process.join()
         ours.close()
     assert kept == sorted(kept)
+    assert len(kept) > 2
     assert kept[-1] > 0
     found = Campaign(study()).run(RUNS, 7, folder, workers=2)
     assert found.kept >= kept[-1]
@@ -114,13 +119,15 @@ def test_ctrl_c_leaves_the_table_of_what_is_done(
     undisturbed: FlownCampaign, tmp_path: Path
 ) -> None:
     def told(progress: Progress) -> None:
-        if progress.done == 5:
+        if progress.done >= 5:
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
         Campaign(study()).run(RUNS, 7, tmp_path / "a", workers=0, progress=told)
-    opened = FlownCampaign.open(tmp_path / "a")
-    assert opened.table["digest"].tolist() == undisturbed.table["digest"].tolist()[:5]
+    rows, key = FlownCampaign.open(tmp_path / "a").table, ["run", "law"]
+    assert 5 <= len(rows) < 2 * RUNS
+    every = undisturbed.table.set_index(key)["digest"]
+    assert rows.set_index(key)["digest"].equals(every[rows.set_index(key).index])
 
 
 def test_any_row_flies_again_to_the_same_bits(undisturbed: FlownCampaign) -> None:
@@ -148,7 +155,7 @@ def test_a_flight_whose_worker_died_is_a_row_and_is_tried_again(
 ) -> None:
     def run(function: Any, items: Any, **options: Any) -> Iterator[Any]:
         for done in run_many(function, items, **options):
-            if done.item == Task(4, "tde_stc"):
+            if Task(4, "tde_stc") in done.item:  # with others, then alone
                 yield Done(done.item, None, WorkerDiedError("its process died"))
             else:
                 yield done
