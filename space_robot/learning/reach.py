@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from space_robot_msgs_py.compiled.kernels import kernel
-from space_robot_msgs_py.compiled.lane_functions import as_lanes
+from space_robot_msgs_py.compiled.lane_words import as_lanes
 from space_robot_msgs_py.compiled.lanes import WIDTH, lane_of, where, with_lane
 from space_robot_msgs_py.compiled.records import Block, Record, shaped
 from space_robot_msgs_py.samples import State

@@ -22,7 +22,7 @@ from numba.core.runtime.nrt import rtsys
 from numba.experimental import function_type  # noqa: F401  (what Numba makes of a RecordFunction)
 
 from ..errors import InputError
-from . import block_type, lane_functions  # noqa: F401  (both register with Numba)
+from . import block_type, lane_arithmetic, lane_words  # noqa: F401  (they register with Numba)
 from .cache import cache_directory
 from .record_type import record_type
 from .records import Record

@@ -3,7 +3,7 @@
 Its value is a vector of LLVM, ``<8 x double>``, which the compiler turns into the instructions of
 the processor. IEEE arithmetic of a vector is that of its elements, so a lane has the bits of a
 plain number. A comparison gives a mask, ``<8 x i1>``; it has no truth value. What can be done with
-both is in `lane_functions`.
+both is in `lane_arithmetic` and `lane_words`.
 """
 
 from __future__ import annotations

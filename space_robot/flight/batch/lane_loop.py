@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from space_robot_control.controller.kernels import USABLE, apply_transfer, compute_signals
 from space_robot_control.laws.compiled import LawCode
 from space_robot_msgs_py.compiled.kernels import RecordFunction, kernel, subroutine
-from space_robot_msgs_py.compiled.lane_functions import as_lanes
+from space_robot_msgs_py.compiled.lane_words import as_lanes
 from space_robot_msgs_py.compiled.lanes import WIDTH, any_lane, lane_of, negated, where, with_lane
 from space_robot_msgs_py.compiled.records import Block
 from space_robot_msgs_py.samples import State

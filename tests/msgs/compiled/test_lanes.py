@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from space_robot_model.elementary.sine import sin_cos
 from space_robot_msgs_py.compiled.kernels import kernel
-from space_robot_msgs_py.compiled.lane_functions import as_lanes
+from space_robot_msgs_py.compiled.lane_words import as_lanes
 from space_robot_msgs_py.compiled.lanes import (
     WIDTH,
     all_lanes,
