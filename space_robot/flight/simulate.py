@@ -142,18 +142,19 @@ def empty_log(
     stop: int | None = None,
     new: Callable[[tuple[int, ...]], Array] = of_nan,
     reference: ReferenceChunk | None = None,
+    is_brief: bool = False,
 ) -> FlightLog:
     """Return the log of the ticks ``start`` to ``stop`` (None: the last) before the flight.
 
     The reference alone is known; it may have been computed. ``new`` makes the columns that the
-    flight fills.
+    flight fills. ``is_brief``: with `Flight.brief` only, for metrics.
     """
     ticks = (flight.ticks if stop is None else stop) - start
     names = flight.plant.names
     counts = len(names.wheels), len(names.thrusters)
     log = FlightLog.allocate(ticks, names.joints, flight.timebase, *counts, names.passive, new)
     log.first_tick = start
-    log.flight = flight.description
+    log.flight = flight.brief if is_brief else flight.description
     log.lost = {topic.full_name: 0 for topic in topics.ALL}
     log.commanded_torque = new(log.applied_torque.shape)
     log.telemetry = new((log.ticks, 4, log.axes))

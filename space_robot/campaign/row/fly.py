@@ -91,7 +91,7 @@ class RowFlyer:
         """Fly flights that can share a batch."""
         measures = [Measure(flight, self.study.require) for flight in flights]
         endings = [Ending.complete(flight.ticks, flight.period) for flight in flights]
-        with closing(fly_group(flights)) as blocks:
+        with closing(fly_group(flights, is_brief=True)) as blocks:
             for block in blocks:
                 measures[block.flight].add(block.log)
                 if block.error is not None:

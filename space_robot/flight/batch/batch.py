@@ -63,18 +63,22 @@ class FlightBatch:
         return [k for k in range(len(self.flights)) if self._memory.flies[0, k]]
 
     def fly(
-        self, progress: Callable[[int], None] = lambda tick: None, is_whole: bool = False
+        self,
+        progress: Callable[[int], None] = lambda tick: None,
+        is_whole: bool = False,
+        is_brief: bool = False,
     ) -> Generator[FlownBlock, None, None]:
         """Fly every tick; yield the blocks of all flights that fly, as `fly_blocks` does.
 
-        ``is_whole``: in one block, for those who need a whole flight as one log.
+        ``is_whole``: in one block, for those who need a whole flight as one log. ``is_brief``: see
+        `empty_log`.
         """
         first = self.flights[0]
         for start, stop in [(0, first.ticks)] if is_whole else block_bounds(first.ticks):
             flying = self._flying
             if not flying:
                 return
-            logs = LogsInLanes(self.flights, start, stop)
+            logs = LogsInLanes(self.flights, start, stop, is_brief)
             for k in flying:
                 logs.logs[k].laws = self._laws[k]
             self._fly_block(logs, start, stop, progress)

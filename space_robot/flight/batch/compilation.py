@@ -28,6 +28,12 @@ from .lane_loop import fly_lanes, measure_lanes
 MARK = "lanes"
 
 
+def compile_all() -> None:
+    """Compile all kernels of flights, also those of a base with hardware."""
+    compile_kernels(with_allocation=True)
+    compile_lanes()
+
+
 def compile_lanes() -> None:
     """Compile the kernels of flights that fly together, once an installation."""
     compile_kernels()

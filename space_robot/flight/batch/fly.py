@@ -36,14 +36,16 @@ def fly_group(
     flights: Sequence[Flight],
     progress: Callable[[int], None] = lambda tick: None,
     is_whole: bool = False,
+    is_brief: bool = False,
 ) -> Generator[FlownBlock, None, None]:
     """Fly checked flights of one group of `batches`; yield their blocks as they are flown.
 
     The numbers in the blocks are places in ``flights``. The error that ended a flight is in its
-    last block. ``is_whole``: each flight has one block.
+    last block. ``is_whole``: each flight has one block. ``is_brief``: logs are for metrics, see
+    `empty_log`.
     """
     if len(flights) >= LEAST:
-        yield from FlightBatch(flights).fly(progress, is_whole)
+        yield from FlightBatch(flights).fly(progress, is_whole, is_brief)
         return
     for number, flight in enumerate(flights):
         for log, error in _alone(flight, progress, is_whole):

@@ -22,8 +22,10 @@ Array = NDArray[np.float64]
 class LogsInLanes:
     """Logs of up to eight flights over the same ticks."""
 
-    def __init__(self, flights: Sequence[Flight], start: int, stop: int) -> None:
-        """Allocate logs of the ticks ``start`` to ``stop``."""
+    def __init__(
+        self, flights: Sequence[Flight], start: int, stop: int, is_brief: bool = False
+    ) -> None:
+        """Allocate logs of the ticks ``start`` to ``stop``; ``is_brief``: see `empty_log`."""
         self.references = references = chunks_of(flights, start, stop)
         """Desired motion of each flight."""
         columns = _columns(flights[0], start, stop)
@@ -31,7 +33,7 @@ class LogsInLanes:
         """One of each flight."""
         for lane, flight in enumerate(flights):
             own = partial(_next, iter([column[lane] for column in columns]))
-            self.logs.append(empty_log(flight, start, stop, own, references[lane]))
+            self.logs.append(empty_log(flight, start, stop, own, references[lane], is_brief))
         by_address = {column.ctypes.data: column for column in columns if column.size}
         log = self.logs[0]
 
@@ -61,7 +63,7 @@ def _columns(flight: Flight, start: int, stop: int) -> list[Array]:
         shapes.append(shape[1:])
         return np.empty(shape)
 
-    empty_log(flight, start, start + 1, asked)
+    empty_log(flight, start, start + 1, asked, is_brief=True)
     ticks = stop - start
     counts = [WIDTH * ticks * int(np.prod(shape, dtype=int)) for shape in shapes]
     parts = np.split(np.empty(sum(counts)), np.cumsum(counts)[:-1])

@@ -10,6 +10,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from space_robot import Scenario
+from space_robot.analysis.attitude_drift import controls_base
 from space_robot.flight.batch.batch import FlightBatch
 from space_robot.flight.batch.fly import batches, fly_group
 from space_robot.flight.batch.sharing import batch_key, reason_to_fly_alone
@@ -182,6 +183,18 @@ def test_a_diverged_flight_ends_alone() -> None:
 def test_captures_and_releases_happen_in_one_lane() -> None:
     options = {"events": ["capture@0.03:tumbling_satellite", "release@0.07:0.01"]}
     assert_same([*some(2), *some(1, **options)], [*some(2), *some(1, **options)])
+
+
+def test_brief_logs_have_what_metrics_need() -> None:
+    """The kinds of joints, branches and hardware."""
+    for options in ({"robot": "dual_arm"}, {"actuators": "wheels"}, {"actuators": "none"}):
+        full, brief = (
+            [block.log for block in FlightBatch(some(2, **options)).fly(is_brief=is_brief)]
+            for is_brief in (False, True)
+        )
+        assert bits(full[0]) == bits(brief[0])
+        assert (full[0].prismatic, full[0].branches) == (brief[0].prismatic, brief[0].branches)
+        assert controls_base(full[0]) == controls_base(brief[0])
 
 
 def test_a_flight_longer_than_a_block_is_flown_block_by_block(
