@@ -113,6 +113,8 @@ AREAS = {
     "cli": _room("laboratory/cli", "test_start_up.py", marks="not ros"),
     "controller": _room("control/controller", *CLOSED_LOOP),
     "flight": _files("laboratory/flight", "laboratory/flight/test_*.py"),
+    "batch": _room("laboratory/flight/batch", "laboratory/api/test_together.py"),
+    "learning": _room("laboratory/learning"),
     "graph": _room("laboratory/flight/graph", marks=""),
     "replay": _room("laboratory/flight/replay", marks=""),
     "laws": _room("control/laws", "control/controller/test_takeover.py", *CLOSED_LOOP),

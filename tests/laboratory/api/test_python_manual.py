@@ -36,7 +36,9 @@ def test_the_blocks_run(names: dict[str, Any]) -> None:
 
 def test_the_block_of_gymnasium_runs(names: dict[str, Any]) -> None:
     pytest.importorskip("gymnasium")
-    (code,) = blocks(of_gym=True)
+    tracking, reach = blocks(of_gym=True)
     found = {"Scenario": names["Scenario"]}
-    exec(compile(code, "python.md", "exec"), found)
+    exec(compile(tracking, "python.md", "exec"), found)
     assert found["is_over"]
+    exec(compile(reach, "python.md", "exec"), found)
+    assert found["observations"].shape == (16, 18)

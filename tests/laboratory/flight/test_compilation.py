@@ -8,7 +8,7 @@ from space_robot.flight import compilation
 
 
 def test_the_output_of_a_command_stays_clean(capsys: pytest.CaptureFixture[str]) -> None:
-    with compilation._progress("nothing"):
+    with compilation.compiling("nothing"):
         pass
     captured = capsys.readouterr()
     assert captured.out == ""
