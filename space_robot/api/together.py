@@ -11,13 +11,15 @@ from space_robot_msgs_py.config.validation import short
 from space_robot_msgs_py.errors import InputError
 
 from ..analysis import Analysis
+from ..flight.batch.batch import FlightBatch
 from ..flight.batch.compilation import compile_lanes
-from ..flight.batch.fly import batches, fly_group
+from ..flight.batch.sharing import batches
 from ..flight.compilation import compile_kernels
 from ..flight.ending import Ending
 from ..flight.plan import Flight
 from ..flight.start_step import sentence
 from .flown_flight import FlownFlight
+from .in_process import fly_in_process
 from .scenario import Scenario
 
 
@@ -50,10 +52,11 @@ def fly_many(
     flown: dict[int, FlownFlight] = {}
     for group in batches(_checked(scenarios)):
         flights = [flight for _, flight in group]
-        compile_kernels(any(flight.plant.names.actuators for flight in flights))
-        compile_lanes()
-        for (number, _), flight in zip(group, _fly(flights, keep_log), strict=True):
-            flown[number] = flight
+        if len(flights) == 1:
+            over = [fly_in_process(flights[0], keep_log=keep_log)]
+        else:
+            over = _fly_batch(flights, keep_log)
+        flown |= zip((number for number, _ in group), over, strict=True)
         if progress:
             progress(len(flown))
     return [flown[number] for number in sorted(flown)]
@@ -78,12 +81,14 @@ def _checked(scenarios: Iterable[Scenario]) -> Iterator[tuple[int, Flight]]:
         yield number, flight
 
 
-def _fly(flights: list[Flight], keep_log: bool) -> list[FlownFlight]:
-    """Fly the flights of one group."""
+def _fly_batch(flights: list[Flight], keep_log: bool) -> list[FlownFlight]:
+    """Fly the flights of one batch."""
+    compile_kernels(any(flight.plant.names.actuators for flight in flights))
+    compile_lanes()
     analyses = [Analysis() for _ in flights]
     logs: list[FlightLog | None] = [None for _ in flights]
     endings = [Ending.complete(flight.ticks, flight.period) for flight in flights]
-    for block in fly_group(flights, is_whole=keep_log):
+    for block in FlightBatch(flights).fly(is_whole=keep_log):
         if keep_log:
             logs[block.flight] = block.log
         else:

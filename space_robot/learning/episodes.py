@@ -14,7 +14,6 @@ from space_robot_msgs_py.errors import InputError
 from space_robot_sim.plant.plant import Plant, update_true_state
 
 from ..api.scenario import Scenario
-from ..flight.batch.sharing import reason_to_fly_alone
 from ..flight.compilation import compile_kernels
 from ..flight.plan import Flight
 from .reach import Reach
@@ -121,7 +120,5 @@ def _check_simple(flight: Flight) -> None:
         why = "delayed commands"
     elif np.isfinite(plant.next_change):
         why = "faults or events"
-    elif flight.plant_settings.has_message_faults:
-        why = reason_to_fly_alone(flight)
     if why:
         raise InputError(f"scenario: {why}: the task reach has none; see SpaceRobotEnv")

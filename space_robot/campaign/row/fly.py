@@ -11,7 +11,8 @@ from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.config.text import one_line_of
 from space_robot_msgs_py.errors import FlightError, InputError, SpaceRobotError
 
-from ...flight.batch.fly import batches, fly_group
+from ...flight.batch.batch import FlightBatch
+from ...flight.batch.sharing import batches
 from ...flight.ending import FAILED, Ending
 from ...flight.plan import Flight
 from ...flight.simulate import fly_blocks
@@ -81,6 +82,9 @@ class RowFlyer:
                 rows.append(_unflown(task, self.draws.values(task.run), error))
         for group in batches(enumerate(flights)):
             numbers = [number for number, _ in group]
+            if len(group) == 1:
+                rows.append(self(flown[numbers[0]]))
+                continue
             try:
                 rows += self._rows_of([flown[k] for k in numbers], [flights[k] for k in numbers])
             except Exception:  # of one of them, which tells it by itself
@@ -91,7 +95,7 @@ class RowFlyer:
         """Fly flights that can share a batch."""
         measures = [Measure(flight, self.study.require) for flight in flights]
         endings = [Ending.complete(flight.ticks, flight.period) for flight in flights]
-        with closing(fly_group(flights, is_brief=True)) as blocks:
+        with closing(FlightBatch(flights).fly(is_brief=True)) as blocks:
             for block in blocks:
                 measures[block.flight].add(block.log)
                 if block.error is not None:

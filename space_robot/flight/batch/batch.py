@@ -43,7 +43,7 @@ class FlownBlock(NamedTuple):
 
 
 class FlightBatch:
-    """Flights that fly together, see `can_share`; plants and controllers are flown on."""
+    """Flights that fly together, see `batch_key`; plants and controllers are flown on."""
 
     def __init__(self, flights: Sequence[Flight]) -> None:
         """Put up to eight checked flights into lanes, from where their plants stand.

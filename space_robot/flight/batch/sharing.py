@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable
+from collections.abc import Hashable, Iterable, Iterator
+from functools import cache
+from typing import Any
 
 from space_robot_control.controller.kernels import ControllerMemory
-from space_robot_control.laws.base import ControlLaw
 from space_robot_control.laws.compiled import CompiledLaw
 from space_robot_msgs_py.compiled.lanes import WIDTH
 from space_robot_msgs_py.errors import InputError
@@ -19,16 +20,19 @@ def reason_to_fly_alone(flight: Flight) -> str:
     if flight.plant_settings.has_message_faults:
         return "messages between plant and controller have faults"
     for law in (flight.law, *(law for _, law in flight.swaps)):
-        if why := _of_law(law):
+        kind: Any = type(law)  # classes are hashable
+        if why := _of_law(kind):
             return why
     return ""
 
 
-def _of_law(law: ControlLaw) -> str:
-    if not isinstance(law, CompiledLaw):
+@cache
+def _of_law(law: Any) -> str:
+    """Return why a class of laws flies alone; one that cannot be compiled is tried once."""
+    if not issubclass(law, CompiledLaw):
         return f"law {law.name!r} is plain Python"
     try:
-        type(law).function(WIDTH)
+        law.function(WIDTH)
     except InputError as error:
         return f"law {law.name!r} cannot be compiled for eight flights: {error}"
     return ""
@@ -51,3 +55,21 @@ def batch_key(flight: Flight) -> Hashable:
         type(controller.law),
         tuple((tick, type(law)) for tick, law in flight.swaps),
     )
+
+
+def batches(flights: Iterable[tuple[int, Flight]]) -> Iterator[list[tuple[int, Flight]]]:
+    """Yield numbered flights in groups of up to eight that fly together, as soon as one is full.
+
+    A flight that cannot be in a batch, or has no other to share one with, is a group by itself.
+    """
+    waiting: dict[Hashable, list[tuple[int, Flight]]] = {}
+    for number, flight in flights:
+        if reason_to_fly_alone(flight):
+            yield [(number, flight)]
+            continue
+        key = batch_key(flight)
+        group = waiting.setdefault(key, [])
+        group.append((number, flight))
+        if len(group) == WIDTH:
+            yield waiting.pop(key)
+    yield from waiting.values()

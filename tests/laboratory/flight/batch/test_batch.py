@@ -12,8 +12,7 @@ from hypothesis import strategies as st
 from space_robot import Scenario
 from space_robot.analysis.attitude_drift import controls_base
 from space_robot.flight.batch.batch import FlightBatch
-from space_robot.flight.batch.fly import batches, fly_group
-from space_robot.flight.batch.sharing import batch_key, reason_to_fly_alone
+from space_robot.flight.batch.sharing import batch_key, batches, reason_to_fly_alone
 from space_robot.flight.plan import Flight
 from space_robot.flight.simulate import simulate
 from space_robot_msgs_py.bag.flight_log import FlightLog
@@ -36,7 +35,10 @@ def together(flights: Sequence[Flight]) -> list[Flown]:
     flown: dict[int, Flown] = {}
     for group in batches(enumerate(flights)):
         numbers = [number for number, _ in group]
-        for block in fly_group([flight for _, flight in group]):
+        if len(group) == 1:
+            flown[numbers[0]] = alone(group[0][1])
+            continue
+        for block in FlightBatch([flight for _, flight in group]).fly():
             assert numbers[block.flight] not in flown
             flown[numbers[block.flight]] = block.log, str(block.error or "")
     return [flown[number] for number in range(len(flights))]
