@@ -16,7 +16,6 @@ from space_robot_sim.plant.plant import Plant, update_true_state
 from ..api.scenario import Scenario
 from ..flight.compilation import compile_kernels
 from ..flight.plan import Flight
-from .reach import Reach
 
 Array = NDArray[np.float64]
 
@@ -96,10 +95,6 @@ class ReachTask:
         reach["target"], reach["scale"] = episode.target, self.scale
         reach["attitude"] = self.begin.truth.quaternion
         reach["tick"], reach["ticks"], reach["has_failed"] = 0.0, self.ticks, 0.0
-
-    def new_reach(self) -> Block:
-        """Return a block (1,) of a `Reach`."""
-        return Reach.block(self.n)
 
 
 def _positive(value: float, name: str, or_zero: bool = False) -> float:

@@ -9,8 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from space_robot_msgs_py.compiled.kernels import kernel
+from space_robot_msgs_py.compiled.lane_rows import spread
 from space_robot_msgs_py.compiled.lane_words import as_lanes
-from space_robot_msgs_py.compiled.lanes import WIDTH, lane_of, where, with_lane
+from space_robot_msgs_py.compiled.lanes import WIDTH, where, with_lane
 from space_robot_msgs_py.compiled.records import Block, Record, shaped
 from space_robot_msgs_py.samples import State
 from space_robot_sim.plant.lanes import move_lanes
@@ -166,12 +167,4 @@ def step_in_lanes(
         judge(task, memory.truth, fastest, ticks, period)
         out[0, group], out[1, group] = task.reward, task.has_failed
         out[2, group] = where((task.tick >= task.ticks) & (task.has_failed == 0.0), 1.0, 0.0)
-        _spread(task.observation, observations[first : first + WIDTH])
-
-
-@kernel
-def _spread(values: Array, rows: Array) -> None:
-    for i in range(rows.shape[1]):
-        value = values[i]
-        for lane in range(WIDTH):
-            rows[lane, i] = lane_of(value, lane)
+        spread(task.observation, observations[first : first + WIDTH])

@@ -26,6 +26,8 @@ try:
 except ImportError:
     raise ImportError("gymnasium is not installed: pip install 'space_robot[gym]'") from None
 
+from ..flight.batch.lane_loop import InLanes
+from ..flight.batch.lane_memory import in_lanes, numbers_of
 from .episodes import ReachTask
 from .reach import LARGEST, Reach, observe_start, step_alone, step_in_lanes
 
@@ -57,7 +59,7 @@ class ReachEnv(gymnasium.Env[Array, Array]):
         """
         self.task = ReachTask(**settings)
         self.observation_space, self.action_space = _spaces(self.task)
-        self._plant, self._reach = self.task.begin.block.copy(), self.task.new_reach()
+        self._plant, self._reach = self.task.begin.block.copy(), Reach.block(self.task.n)
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -113,7 +115,7 @@ class ReachVectorEnv(VectorEnv[Array, Array, Array]):
         self._states = np.zeros((groups, task.state_size, WIDTH))
         self._reaches: Block = np.zeros(groups, Reach.dtype(task.n, WIDTH))
         self._buffer = np.zeros((*task.begin.command_delay_buffer.shape, WIDTH))
-        self._begin = task.begin.block.copy(), task.new_reach()
+        self._begin = task.begin.block.copy(), Reach.block(task.n)
         self._actions = np.zeros((groups * WIDTH, task.n + 3))
         self._results = np.ones((3, groups, WIDTH))
         self._observations = np.zeros((groups * WIDTH, 2 * (task.n + 3)))
@@ -175,13 +177,14 @@ class ReachVectorEnv(VectorEnv[Array, Array, Array]):
             self._pool.shutdown()
 
     def _step_part(self, number: int) -> None:
-        task, part = self.task, self._parts[number]
+        task, part, work = self.task, self._parts[number], self._work[number]
         rows = slice(WIDTH * part.start, WIDTH * part.stop)
         results = self._results[:, part]
         if results.shape != self._results.shape:  # kernels want contiguous lanes
             results = results.copy()
         step_in_lanes(
-            *self._work[number],
+            work.block,
+            work.alone,
             self._buffer,
             self._states[part],
             self._reaches[part],
@@ -201,8 +204,7 @@ class ReachVectorEnv(VectorEnv[Array, Array, Array]):
             observe_start(plant, reach)
             group, lane = divmod(int(k), WIDTH)
             self._states[group, :, lane] = plant["x"][0, : self._states.shape[1]]
-            of_group = self._reaches[group : group + 1].view(np.float64).reshape(-1, WIDTH)
-            of_group[:, lane] = reach.view(np.float64)
+            numbers_of(self._reaches[group : group + 1])[:, lane] = reach.view(np.float64)
             self._observations[k] = reach["observation"][0]
 
 
@@ -222,13 +224,12 @@ def _checked(action: Any, shape: tuple[int, ...]) -> Array:
     return numbers
 
 
-def _work_of(plant: Plant) -> tuple[Block, Block]:
-    """Return memory for eight copies of a plant: in lanes, and each by itself."""
-    n = len(plant.names.joints)
-    lanes, alone = PlantMemory.lanes(n), np.zeros(WIDTH, PlantMemory.dtype(n))
-    alone[:] = plant.block[0]
-    lanes.view(np.float64).reshape(-1, WIDTH)[:] = plant.block.view(np.float64)[:, np.newaxis]
-    return lanes, alone
+def _work_of(plant: Plant) -> InLanes:
+    """Return memory for eight copies of a plant."""
+    records = in_lanes(PlantMemory, len(plant.names.joints))
+    records.alone[:] = plant.block
+    records.numbers[:] = records.numbers_alone.T
+    return records
 
 
 if NAME not in gymnasium.registry:

@@ -8,7 +8,7 @@ both is in `lane_arithmetic` and `lane_words`.
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, ClassVar
 
 from llvmlite import ir
 from numba.core import cgutils, types
@@ -22,34 +22,34 @@ DOUBLE, BIT, INDEX = ir.DoubleType(), ir.IntType(1), ir.IntType(32)
 LANE_VECTOR, MASK_VECTOR = ir.VectorType(DOUBLE, WIDTH), ir.VectorType(BIT, WIDTH)
 
 
-class LaneType(types.Type):
-    """Numba type of eight floats; a plain number converts to it, the same in all lanes."""
+class WideType(types.Type):
+    """Base class of types that are eight wide; a plain value converts, the same in all lanes."""
+
+    plain: ClassVar[Any]
+    """Kind of the plain values."""
 
     def __init__(self) -> None:
-        super().__init__(f"Lanes{WIDTH}")
+        super().__init__(f"{type(self).__name__}{WIDTH}")
 
     def can_convert_from(self, typingctx: Any, other: Any) -> Any:
-        """Convert plain numbers."""
-        return Conversion.safe if isinstance(other, types.Number) else None
+        """Convert plain values."""
+        return Conversion.safe if isinstance(other, self.plain) else None
 
     def unify(self, typingctx: Any, other: Any) -> Any:
-        """Take the place of plain numbers."""
-        return self if isinstance(other, types.Number) else None
+        """Take the place of plain values."""
+        return self if isinstance(other, self.plain) else None
 
 
-class MaskType(types.Type):
-    """Numba type of eight truth values; a plain one converts to it."""
+class LaneType(WideType):
+    """Numba type of eight floats."""
 
-    def __init__(self) -> None:
-        super().__init__(f"Mask{WIDTH}")
+    plain = types.Number
 
-    def can_convert_from(self, typingctx: Any, other: Any) -> Any:
-        """Convert plain truth values."""
-        return Conversion.safe if isinstance(other, types.Boolean) else None
 
-    def unify(self, typingctx: Any, other: Any) -> Any:
-        """Take the place of plain truth values."""
-        return self if isinstance(other, types.Boolean) else None
+class MaskType(WideType):
+    """Numba type of eight truth values."""
+
+    plain = types.Boolean
 
 
 LANE, MASK = LaneType(), MaskType()

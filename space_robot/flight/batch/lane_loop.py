@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 
 from space_robot_control.controller.kernels import USABLE, apply_transfer, compute_signals
 from space_robot_control.laws.compiled import LawCode
-from space_robot_msgs_py.compiled.kernels import RecordFunction, kernel, subroutine
+from space_robot_msgs_py.compiled.kernels import RecordFunction, kernel
+from space_robot_msgs_py.compiled.lane_rows import spread
 from space_robot_msgs_py.compiled.lane_words import as_lanes
 from space_robot_msgs_py.compiled.lanes import WIDTH, any_lane, lane_of, negated, where, with_lane
 from space_robot_msgs_py.compiled.records import Block
@@ -115,7 +116,7 @@ def fly_lanes(
         )
         is_flying = flies[0] == 1.0
         statuses[0] = where(is_flying, status, statuses[0])
-        _end(memory, is_flying & (status != USABLE), tick)
+        _end(memory, is_flying & (status != USABLE))
         is_flying = flies[0] == 1.0
         if not any_lane(is_flying):
             return tick
@@ -124,14 +125,14 @@ def fly_lanes(
         if torque.size > of_law.force.size:
             _allocate(allocate, memory, is_flying, torque, of_law.force.size, tick)
         _log_command(log, row + k, torque, of_law.force.size)
-        _spread(of_law.s, log.telemetry[:, row + k, 0])
-        _spread(of_law.u, log.telemetry[:, row + k, 1])
-        _spread(signals.n_hat, log.telemetry[:, row + k, 2])
-        _spread(signals.error, log.telemetry[:, row + k, 3])
+        spread(of_law.s, log.telemetry[:, row + k, 0])
+        spread(of_law.u, log.telemetry[:, row + k, 1])
+        spread(signals.n_hat, log.telemetry[:, row + k, 2])
+        spread(signals.error, log.telemetry[:, row + k, 3])
         fastest = advance_lanes(plant, memory.plants.alone, buffer, torque, tick, period, is_flying)
         rates[0] = where(is_flying, fastest, rates[0])
         ticks[0] = where(is_flying, tick + 1.0, ticks[0])
-        _end(memory, is_flying & negated(fastest <= RATE_LIMIT), tick + 1)
+        _end(memory, is_flying & negated(fastest <= RATE_LIMIT))
         if not any_lane(flies[0] == 1.0):
             return tick + 1
     return start + references.size
@@ -145,7 +146,7 @@ def measure_lanes(plants: Block, tick: int, period: float) -> None:
 
 
 @kernel
-def _end(memory: LaneMemory, ends: bool, tick: int) -> None:
+def _end(memory: LaneMemory, ends: bool) -> None:
     """End the flights of some lanes, and keep their memory."""
     if not any_lane(ends):
         return
@@ -164,35 +165,26 @@ def take_out(records: InLanes, lane: int) -> None:
         alone[lane, i] = numbers[i, lane]
 
 
-@subroutine
-def _spread(values: Array, rows: Array) -> None:
-    """Write values in lanes into the rows (8, c) of the flights."""
-    for i in range(rows.shape[1]):
-        value = values[i]
-        for lane in range(WIDTH):
-            rows[lane, i] = lane_of(value, lane)
-
-
 @kernel
 def _log_state(columns: Any, row: int, state: State) -> None:
-    _spread(state.base_position, columns[0][:, row])
-    _spread(state.quaternion, columns[1][:, row])
-    _spread(state.base_velocity, columns[2][:, row])
-    _spread(state.omega_base, columns[3][:, row])
-    _spread(state.joint_positions, columns[4][:, row])
-    _spread(state.joint_velocities, columns[5][:, row])
-    _spread(state.applied_torque, columns[6][:, row])
-    _spread(state.wheel_velocities, columns[7][:, row])
-    _spread(state.wheel_torques, columns[8][:, row])
-    _spread(state.thrusts, columns[9][:, row])
-    _spread(state.passive_positions, columns[10][:, row])
-    _spread(state.passive_velocities, columns[11][:, row])
+    spread(state.base_position, columns[0][:, row])
+    spread(state.quaternion, columns[1][:, row])
+    spread(state.base_velocity, columns[2][:, row])
+    spread(state.omega_base, columns[3][:, row])
+    spread(state.joint_positions, columns[4][:, row])
+    spread(state.joint_velocities, columns[5][:, row])
+    spread(state.applied_torque, columns[6][:, row])
+    spread(state.wheel_velocities, columns[7][:, row])
+    spread(state.wheel_torques, columns[8][:, row])
+    spread(state.thrusts, columns[9][:, row])
+    spread(state.passive_positions, columns[10][:, row])
+    spread(state.passive_velocities, columns[11][:, row])
 
 
 @kernel
 def _log_command(log: LaneLog, row: int, torque: Array, axes: int) -> None:
-    _spread(torque, log.commanded_torque[:, row])
-    _spread(torque[axes:], log.actuator_commands[:, row])
+    spread(torque, log.commanded_torque[:, row])
+    spread(torque[axes:], log.actuator_commands[:, row])
 
 
 @kernel
