@@ -16,8 +16,7 @@ from space_robot_msgs_py.samples import RobotNames, RobotState
 from space_robot_sim.faults.grammar import parse_faults
 from space_robot_sim.faults.schedule import Schedule
 from space_robot_sim.plant.faults import PLANT_KINDS
-from space_robot_sim.sensors.noise import NoiseDraws
-from space_robot_sim.sensors.sensors import FAULTS, Sensors, arrays_of_draws, sense
+from space_robot_sim.sensors.sensors import FAULTS, Sensors, sense
 
 Array = NDArray[np.float64]
 
@@ -55,18 +54,16 @@ class Bench:
         schedule = Schedule(parse_faults(faults, PLANT_KINDS), seed, period, NAMES)
         self.block = Sensors.block(N)
         self.block[0] = Sensors.build(
-            N, SensorSettings.model_validate(settings), period, start.block[0]
+            N, SensorSettings.model_validate(settings), period, start.block[0], seed=seed
         )
         self.block["are_ideal"] = False
         self.faults = [(part, fault(schedule)) for part, fault in FAULTS.items() if faults]
-        self.draws = NoiseDraws(seed, arrays_of_draws(self.block[0]))
         self.period, self.measured = period, RobotState.allocate(N)
 
     def measure(self, truth: RobotState) -> RobotState:
         """What is told of ``truth``; reused."""
         for part, fault in self.faults:
             fault.apply(truth.tick, getattr(self.block[0], part))
-        self.draws.refill(truth.tick)
         self.measured.tick = truth.tick
         sense_blocks(self.block, truth.block, truth.tick, self.period, self.measured.block)
         return self.measured

@@ -10,6 +10,7 @@ every `simulate` more time than its report.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -159,12 +160,17 @@ class PowerSpectrum:
     def _mean_squares(self, rows: Array) -> Array:
         """(F, axes) of one segment."""
         size = len(rows)
-        window = hann(size, size)
-        time = np.arange(size) - 0.5 * (size - 1)
+        window, time = _window_and_time(size)
         trend = np.outer(time, np.sum(time[:, np.newaxis] * rows, axis=0) / np.sum(time * time))
         steady = rows - np.mean(rows, axis=0) - trend
         _, power = one_sided_power(window[:, np.newaxis] * steady, self._period)
         return power / (size * np.sum(window**2))
+
+
+@lru_cache(maxsize=4)
+def _window_and_time(size: int) -> tuple[Array, Array]:
+    """Return Hann's window and the time from the middle, in rows, of a segment."""
+    return hann(size, size), np.arange(size) - 0.5 * (size - 1)
 
 
 def hann(rows: int, period: int) -> Array:

@@ -147,19 +147,31 @@ def empty_log(
     """Return the log of the ticks ``start`` to ``stop`` (None: the last) before the flight.
 
     The reference alone is known; it may have been computed. ``new`` makes the columns that the
-    flight fills. ``is_brief``: with `Flight.brief` only, for metrics.
+    flight fills. ``is_brief``: with what metrics need only, see `Flight.brief`.
     """
-    ticks = (flight.ticks if stop is None else stop) - start
-    names = flight.plant.names
-    counts = len(names.wheels), len(names.thrusters)
-    log = FlightLog.allocate(ticks, names.joints, flight.timebase, *counts, names.passive, new)
+    log = columns_of(flight, (flight.ticks if stop is None else stop) - start, new, is_brief)
     log.first_tick = start
     log.flight = flight.brief if is_brief else flight.description
     log.lost = {topic.full_name: 0 for topic in topics.ALL}
-    log.commanded_torque = new(log.applied_torque.shape)
-    log.telemetry = new((log.ticks, 4, log.axes))
     reference = reference or flight.mission.chunk(start, log.ticks)
     log.reference_joints, log.reference_base = reference.joints, reference.base
+    return log
+
+
+def columns_of(
+    flight: Flight,
+    ticks: int,
+    new: Callable[[tuple[int, ...]], Array] = of_nan,
+    is_brief: bool = False,
+) -> FlightLog:
+    """Return the columns of a log, see `empty_log`; if ``is_brief``, of true states only."""
+    names = flight.plant.names
+    counts = len(names.wheels), len(names.thrusters)
+    log = FlightLog.allocate(ticks, names.joints, flight.timebase, *counts, names.passive, new)
+    if is_brief:
+        return log
+    log.commanded_torque = new(log.applied_torque.shape)
+    log.telemetry = new((ticks, 4, log.axes))
     if not flight.plant.measures_truth:
         log.record_measured(new)
     return log
@@ -311,10 +323,9 @@ def note_beliefs(flight: Flight, block: FlightLog, start: int, stop: int) -> Non
 
 def ended_early(block: FlightLog, measured: int, answered: int) -> FlightLog:
     """The first ``measured`` rows; those from ``answered`` on have no command."""
-    assert block.commanded_torque is not None
-    assert block.telemetry is not None
-    block.commanded_torque[answered:] = block.actuator_commands[answered:] = np.nan
-    block.telemetry[answered:] = np.nan
+    for column in (block.commanded_torque, block.actuator_commands, block.telemetry):
+        if column is not None:
+            column[answered:] = np.nan
     block.unanswered = measured - answered
     block.laws = tuple(law for law in block.laws if law.tick < block.first_tick + answered)
     return block.rows(0, measured)

@@ -7,11 +7,13 @@ import math
 import numpy as np
 
 from space_robot_msgs_py.compiled.kernels import kernel
+from space_robot_msgs_py.compiled.lanes import where
 
 LN2 = (0.6931471803691238, 1.9082149292705877e-10)
 """log 2 in two parts, the first with 32 bits, so that its product with an exponent is exact."""
 LARGEST, SMALLEST = 709.782712893384, -745.1332191019412
 """Range of arguments with a finite exponential above 0."""
+ROOT_HALF = math.sqrt(0.5)
 (E2, E3, E4, E5, E6, E7, E8, E9, E10, E11, E12, E13, E14) = (
     1.0 / math.factorial(k) for k in range(2, 15)
 )
@@ -44,17 +46,16 @@ def log(x: float) -> float:
     ``2 artanh(s) = f - s (f - R)``, ``R = 2 s^2/3 + 2 s^4/5 + ...``. The error is below
     0.9 units in the last place.
     """
-    if not x > 0.0:
-        return -math.inf if x == 0.0 else math.nan
-    if x == math.inf:
-        return x
     mantissa, exponent = math.frexp(x)
-    if mantissa < math.sqrt(0.5):
-        mantissa, exponent = 2.0 * mantissa, exponent - 1
-    f, twos = mantissa - 1.0, float(exponent)
+    is_low = mantissa < ROOT_HALF
+    mantissa = where(is_low, 2.0 * mantissa, mantissa)
+    twos = where(is_low, exponent - 1.0, exponent + 0.0)
+    f = mantissa - 1.0
     s = f / (2.0 + f)
     z = s * s
     rest = L6 + z * (L7 + z * (L8 + z * (L9 + z * (L10 + z * L11))))
     rest = z * (L1 + z * (L2 + z * (L3 + z * (L4 + z * (L5 + z * rest)))))
     half = 0.5 * f * f
-    return twos * LN2[0] - ((half - (s * (half + rest) + twos * LN2[1])) - f)
+    value = twos * LN2[0] - ((half - (s * (half + rest) + twos * LN2[1])) - f)
+    value = where(x < math.inf, value, x)
+    return where(x > 0.0, value, where(x == 0.0, -math.inf, math.nan))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,9 +21,7 @@ def squared_spectrum(rows: Array) -> Array:
     If N is even, two rows are combined into complex numbers. Large prime factors of N are slow.
     """
     size, count = len(rows), len(rows) // 2 + 1
-    turns = np.arange(size, dtype=np.float64)
-    angles = 2.0 * math.pi * np.where(turns > size / 2, turns - size, turns) / size
-    sines, cosines = sines_cosines(angles)
+    sines, cosines = _turns(size)
     if size % 2:
         real, imaginary = _transformed(rows, np.zeros_like(rows), sines, cosines)
         return (real * real + imaginary * imaginary)[:count]
@@ -30,6 +29,14 @@ def squared_spectrum(rows: Array) -> Array:
     spectrum = np.empty((count, rows.shape[1]))
     _squares(*halves, sines, cosines, spectrum)
     return spectrum
+
+
+@lru_cache(maxsize=4)
+def _turns(size: int) -> tuple[Array, Array]:
+    """Return sine and cosine of each whole part of a turn."""
+    turns = np.arange(size, dtype=np.float64)
+    angles = 2.0 * math.pi * np.where(turns > size / 2, turns - size, turns) / size
+    return sines_cosines(angles)
 
 
 def _transformed(
@@ -72,20 +79,23 @@ def _stage(
 ) -> None:
     """Run the stage of one ``factor``; ``stride`` is the product of the previous factors."""
     size, axes = real.shape
-    rest = size // (stride * factor)
+    rest, run = size // (stride * factor), stride * axes
+    xs, ys = real.reshape(-1), imaginary.reshape(-1)
+    us, vs = real_out.reshape(-1), imaginary_out.reshape(-1)
     for j in range(rest):
         for t in range(factor):
-            begin = stride * (factor * j + t)
+            begin = run * (factor * j + t)
+            u, v = us[begin : begin + run], vs[begin : begin + run]
             for r in range(factor):
                 turn = (r * t * (size // factor) + j * t * stride) % size
-                c, s, other = cosines[turn], sines[turn], stride * (j + rest * r)
-                for q in range(stride):
-                    for k in range(axes):
-                        x, y = real[other + q, k], imaginary[other + q, k]
-                        before = real_out[begin + q, k] if r else 0.0
-                        beside = imaginary_out[begin + q, k] if r else 0.0
-                        real_out[begin + q, k] = before + (c * x + s * y)
-                        imaginary_out[begin + q, k] = beside + (c * y - s * x)
+                c, s, other = cosines[turn], sines[turn], run * (j + rest * r)
+                x, y = xs[other : other + run], ys[other : other + run]
+                if r == 0:
+                    for i in range(run):
+                        u[i], v[i] = 0.0 + (c * x[i] + s * y[i]), 0.0 + (c * y[i] - s * x[i])
+                else:
+                    for i in range(run):
+                        u[i], v[i] = u[i] + (c * x[i] + s * y[i]), v[i] + (c * y[i] - s * x[i])
 
 
 @kernel

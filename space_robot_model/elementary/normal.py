@@ -8,8 +8,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from space_robot_msgs_py.compiled.kernels import kernel, subroutine
+from space_robot_msgs_py.compiled.lane_words import as_lanes, as_numbers
+from space_robot_msgs_py.compiled.lanes import WIDTH, all_lanes, any_lane, lane_of, where
 
 from .exponential import exp, log
+from .random_bits import bits_of, following, pcg64
 
 Array = NDArray[np.float64]
 Pair = tuple[float, float]
@@ -19,6 +22,7 @@ SERIES_LIMIT = 3.0
 """Limit between series and continued fraction of the cumulative distribution function."""
 CENTRE = 0.425
 """Distance from 1/2 up to which Wichura's first pair of polynomials is used."""
+UNUSED_BITS = np.uint64(12)
 TAIL = 5.0
 """Limit of sqrt(-log p) between his second and third pair."""
 
@@ -67,18 +71,29 @@ def normal_quantile(share: ArrayLike) -> Array:
 
 
 @kernel
-def normal_numbers(bits: NDArray[np.uint64], out: Array) -> None:
-    """Convert random ``bits`` (N,) to standard normal numbers ``out`` (N,).
+def normal_numbers(draws: Array, seed: float, key: int, block: int) -> None:
+    """Fill ``draws`` with standard normal numbers, a function of the three integers.
 
-    The upper 52 bits select one of 2**52 equidistant probabilities in (0, 1).
+    They are the quantiles of 2**52 equidistant probabilities in (0, 1), selected by the upper bits
+    that ``numpy.random.PCG64((seed, key, block))`` gives.
+
+    Args:
+        draws: a multiple of eight numbers, or, in lanes, the numbers of eight flights.
+        seed: of each flight; below 2**32, as the others.
+        key: of what is drawn.
+        block: counts the drawings.
     """
-    for i in range(out.size):  # the centre, without branches: it holds for 85 of 100
-        q = (float(bits[i] >> np.uint64(12)) + 0.5) * 2.0**-52 - 0.5
-        out[i] = q * _ratio(CENTRAL, CENTRE * CENTRE - q * q)
-    for i in range(out.size):
-        share = (float(bits[i] >> np.uint64(12)) + 0.5) * 2.0**-52
-        if abs(share - 0.5) > CENTRE:
-            out[i] = quantile(share)
+    numbers = as_numbers(draws)
+    width = numbers.shape[-1]
+    flat = numbers.reshape(-1)
+    for lane in range(width):
+        state = pcg64(int(lane_of(seed, lane)), key, block)
+        for i in range(lane, flat.size, width):
+            state = following(state)
+            flat[i] = (np.int64(bits_of(state) >> UNUSED_BITS) + 0.5) * 2.0**-52
+    eights = as_lanes(flat.reshape(-1, WIDTH))
+    for i in range(eights.size):
+        eights[i] = quantile(eights[i])
 
 
 @kernel
@@ -95,14 +110,17 @@ def quantile(share: float) -> float:
     Statistics 37 (1988). The error is below 6 units in the last place.
     """
     q = share - 0.5
-    if abs(q) <= CENTRE:
-        return q * _ratio(CENTRAL, CENTRE * CENTRE - q * q)
-    small = share if q < 0.0 else 1.0 - share
-    if not small > 0.0:
-        return math.copysign(math.inf, q) if small == 0.0 else math.nan
-    r = math.sqrt(-log(small))
-    value = _ratio(MIDDLE, r - 1.6) if r <= TAIL else _ratio(OUTER, r - TAIL)
-    return -value if q < 0.0 else value
+    is_central = abs(q) <= CENTRE
+    value = q * _ratio(CENTRAL, CENTRE * CENTRE - q * q)
+    if all_lanes(is_central):
+        return value
+    small = where(q < 0.0, share, 1.0 - share)
+    r = np.sqrt(-log(small))
+    tail = _ratio(MIDDLE, r - 1.6)
+    if any_lane(r > TAIL):
+        tail = where(r > TAIL, _ratio(OUTER, r - TAIL), tail)
+    tail = where(small > 0.0, tail, where(small == 0.0, math.inf, math.nan))
+    return where(is_central, value, where(q < 0.0, -tail, tail))
 
 
 @subroutine

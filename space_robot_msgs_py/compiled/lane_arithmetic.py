@@ -150,6 +150,37 @@ _define_all(
 )
 
 
+@infer_global(math.frexp)
+class _Exponent(AbstractTemplate):
+    def generic(self, args: Any, kws: Any) -> Any:
+        return signature(types.UniTuple(LANE, 2), LANE) if args == (LANE,) else None
+
+
+@lower_builtin(math.frexp, LaneType)
+def _exponent(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+    """Emit mantissa and exponent, both as floats, from the bits of a float."""
+    (x,) = args
+    words = ir.VectorType(ir.IntType(64), WIDTH)
+
+    def bits(value: int) -> Any:
+        return ir.Constant(words, [value] * WIDTH)
+
+    is_small = builder.fcmp_ordered("<", _intrinsic("fabs")(builder, x), _constant(2.0**-1022))
+    normal = builder.select(is_small, builder.fmul(x, _constant(2.0**54)), x)
+    word = builder.bitcast(normal, words)
+    power = builder.and_(builder.lshr(word, bits(52)), bits(0x7FF))
+    two_52 = builder.bitcast(builder.or_(power, bits(0x433 << 52)), LANE_VECTOR)  # 2**52 + power
+    offset = builder.select(is_small, _constant(2.0**52 + 1076), _constant(2.0**52 + 1022))
+    half = builder.or_(builder.and_(word, bits(~(0x7FF << 52))), bits(1022 << 52))
+    mantissa, exponent = builder.bitcast(half, LANE_VECTOR), builder.fsub(two_52, offset)
+    is_nonzero = builder.fcmp_unordered("!=", x, _constant(0.0))
+    is_usual = builder.and_(_is_finite(builder, x), is_nonzero)
+    return cgutils.pack_array(
+        builder,
+        [builder.select(is_usual, mantissa, x), builder.select(is_usual, exponent, _constant(0.0))],
+    )
+
+
 @infer_global(np.fmod)
 class _Remainder(AbstractTemplate):
     def generic(self, args: Any, kws: Any) -> Any:

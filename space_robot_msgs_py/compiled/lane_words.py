@@ -12,6 +12,7 @@ from numba.core.typing.templates import AbstractTemplate, infer_global, signatur
 
 from .lane_type import (
     BIT,
+    DOUBLE,
     INDEX,
     LANE,
     LANE_VECTOR,
@@ -191,6 +192,41 @@ def _as_lanes(context: Any, builder: Any, sig: Any, args: Any) -> Any:
         shape=cgutils.pack_array(builder, cgutils.unpack_tuple(builder, numbers.shape)[:-1]),
         strides=cgutils.pack_array(builder, cgutils.unpack_tuple(builder, numbers.strides)[:-1]),
         itemsize=cgutils.intp_t(8 * WIDTH),
+        meminfo=None,
+        parent=None,
+    )
+    return array._getvalue()
+
+
+def as_numbers(array: Any) -> Any:
+    """Return an array (...) of lanes as one of floats (..., 8), one of floats as (..., 1)."""
+    raise TypeError("only kernels see an array as numbers")
+
+
+@infer_global(as_numbers)
+class _AsNumbers(AbstractTemplate):
+    def generic(self, args: Any, kws: Any) -> Any:
+        (kind,) = args
+        is_array = isinstance(kind, types.Array) and kind.dtype in (LANE, types.float64)
+        if not is_array or kind.layout != "C":
+            return None
+        return signature(types.Array(types.float64, kind.ndim + 1, "C"), kind)
+
+
+@lower_builtin(as_numbers, types.Array)
+def _as_numbers(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+    from numba.np import arrayobj  # only the compiler needs it
+
+    wide = arrayobj.make_array(sig.args[0])(context, builder, value=args[0])
+    width = WIDTH if sig.args[0].dtype == LANE else 1
+    shape, strides = (cgutils.unpack_tuple(builder, part) for part in (wide.shape, wide.strides))
+    array = arrayobj.make_array(sig.return_type)(context, builder)
+    arrayobj.populate_array(
+        array,
+        data=builder.bitcast(wide.data, DOUBLE.as_pointer()),
+        shape=cgutils.pack_array(builder, [*shape, cgutils.intp_t(width)]),
+        strides=cgutils.pack_array(builder, [*strides, cgutils.intp_t(8)]),
+        itemsize=cgutils.intp_t(8),
         meminfo=None,
         parent=None,
     )

@@ -31,8 +31,7 @@ from ..actuators.actuators import (
 from ..environment.captures import Captures
 from ..environment.environment import Environment, EnvironmentSettings
 from ..environment.payload import with_payload
-from ..sensors.noise import NoiseDraws
-from ..sensors.sensors import Sensors, arrays_of_draws, sense
+from ..sensors.sensors import Sensors, sense
 from .faults import FaultSettings, PartFaults
 from .integrator import MOST_NUMBERS, Stages, state_size
 from .stick_slip import integrate
@@ -89,9 +88,6 @@ class PlantSnapshot(NamedTuple):
     """Record of a `PlantMemory`."""
     command_delay_buffer: Array
     next_change: float
-    next_event: float
-    drawn: tuple[int, int]
-    """Seed and block of the random numbers, see `NoiseDraws`."""
     part_faults: PartFaults
 
 
@@ -104,7 +100,7 @@ class Plant(RecordOwner):
     `pickle`, flies on to the same bits.
     """
 
-    _views = ("truth", "state", "_draws")
+    _views = ("truth", "state")
 
     def __init__(self, robot: Robot, settings: PlantSettings, period: float) -> None:
         """Place the robot at rest.
@@ -158,26 +154,27 @@ class Plant(RecordOwner):
         self.truth.wheel_velocities[:] = speeds
         if self.captures.exchanges:  # so that no tick has to wait for it
             update_true_state(self.block)
-        sensors = Sensors.build(n, settings, period, memory.truth, robot.is_prismatic[:n])
+        sensors = Sensors.build(
+            n, settings, period, memory.truth, robot.is_prismatic[:n], settings.fault_seed
+        )
         schedule = settings.schedule(self.names, period)
         check_faults(schedule, settings)
         self._part_faults = PartFaults(schedule)
         if self._part_faults.are_in("sensors"):
             assign(sensors, are_ideal=False)
         assign(memory, sensors=sensors)
-        self._is_ideal = bool(sensors.are_ideal)
         self.measures_truth = (
-            self._is_ideal
+            bool(sensors.are_ideal)
             and reports_given(memory.actuators)
             and not self._part_faults.are_in("actuators")
             and not settings.has_message_faults
         )
         """True if what comes of `state` can never differ from `truth`."""
-        self._draws.drawn = settings.fault_seed, -1
         self.next_change = math.inf
-        """The first tick to come that needs `begin_tick`: compiled code may fly up to there."""
-        self.next_event = math.inf
-        """The first tick to come at which an event happens, or a fault begins or ends."""
+        """The first tick to come at which an event happens, or a fault begins or ends.
+
+        It needs `begin_tick`: compiled code may fly up to there.
+        """
         self.begin_tick(0)
 
     def _look_into_blocks(self) -> None:
@@ -185,28 +182,23 @@ class Plant(RecordOwner):
         """The true state at the current tick."""
         self.state = RobotState(0, self.block["measured"])
         """Measured state at the current tick."""
-        self._draws = NoiseDraws(0, arrays_of_draws(self.memory.sensors))
 
     def __getstate__(self) -> dict[str, Any]:
         """Return all attributes but the views, and their state outside the block."""
-        return {**super().__getstate__(), "_tick_and_drawn": (self.tick, self._draws.drawn)}
+        return {**super().__getstate__(), "_tick": self.tick}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         """Restore attributes and the tick."""
         PlantMemory.dtype(len(state["names"].joints))  # that compiled code knows the block's layout
-        super().__setstate__({k: v for k, v in state.items() if k != "_tick_and_drawn"})
-        tick, drawn = state["_tick_and_drawn"]
-        self.state.tick = self.truth.tick = tick
-        self._draws.drawn = drawn
+        super().__setstate__({k: v for k, v in state.items() if k != "_tick"})
+        self.state.tick = self.truth.tick = state["_tick"]
 
     def move_to(self, block: Block) -> None:
         """Keep the memory in another ``block`` from now on, beside that of other flights."""
         block[:] = self.block
-        drawn = self._draws.drawn
         tick, self.block = self.tick, block
         self._look_into_blocks()
         self.state.tick = self.truth.tick = tick
-        self._draws.drawn = drawn
 
     @property
     def tick(self) -> int:
@@ -252,7 +244,6 @@ class Plant(RecordOwner):
         Events happen; faults begin and end.
         """
         self.change(tick)
-        self.draw(tick)
         if self.measures_truth and tick == 0:  # what `sense` would say, without compiled code
             self.state.block[:] = self.truth.block
         else:
@@ -264,16 +255,7 @@ class Plant(RecordOwner):
         memory = self.memory
         if self.captures.apply(tick, memory.model, memory.x):
             update_true_state(self.block)
-        self.next_event = min(self._part_faults.apply(tick, memory), self.captures.next_tick(tick))
-        self.next_change = self.next_event
-
-    def draw(self, tick: int) -> bool:
-        """Draw the random numbers of ``tick`` if needed; return whether there are new ones."""
-        if self._is_ideal:
-            return False
-        before = self._draws.drawn
-        self.next_change = min(self.next_event, self._draws.refill(tick))
-        return self._draws.drawn != before
+        self.next_change = min(self._part_faults.apply(tick, memory), self.captures.next_tick(tick))
 
     def save(self) -> PlantSnapshot:
         """Copy all that the rest of the flight depends on, but the commands to come."""
@@ -282,8 +264,6 @@ class Plant(RecordOwner):
             self.block.copy(),
             self.command_delay_buffer.copy(),
             self.next_change,
-            self.next_event,
-            self._draws.drawn,
             copy.deepcopy(self._part_faults),
         )
 
@@ -292,8 +272,7 @@ class Plant(RecordOwner):
         self.block[:] = snapshot.block
         self.command_delay_buffer[:] = snapshot.command_delay_buffer
         self.state.tick = self.truth.tick = snapshot.tick
-        self.next_change, self.next_event = snapshot.next_change, snapshot.next_event
-        self._draws.drawn = snapshot.drawn
+        self.next_change = snapshot.next_change
         self._part_faults = copy.deepcopy(snapshot.part_faults)
 
     def diverged(self, fastest: float) -> DivergedError:

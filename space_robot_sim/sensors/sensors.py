@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import zlib
 from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
+from space_robot_model.elementary.normal import normal_numbers
 from space_robot_model.hardware.sensors import SensorSettings
 from space_robot_msgs_py.compiled.kernels import kernel
 from space_robot_msgs_py.compiled.lanes import uniform
@@ -14,7 +16,7 @@ from space_robot_msgs_py.compiled.records import Record, assign, nested, shaped
 from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.samples import State
 
-from ..faults.schedule import PartFault
+from ..faults.schedule import BLOCK_TICKS, PartFault
 from .encoders import EncoderFault, Encoders, read_encoders
 from .gyro import Gyro, GyroFault, read_gyro
 from .star_tracker import StarTracker, StarTrackerFault, track_stars
@@ -30,6 +32,10 @@ class Sensors(Record):
     encoders: Encoders = nested(Encoders)
     are_ideal: float = shaped(lambda n: (), uniform=True)
     """1 if all sensors are without error."""
+    seed: float = shaped(lambda n: ())
+    """Of the random numbers."""
+    drawn: float = shaped(lambda n: (), uniform=True)
+    """The block of ticks whose random numbers have been drawn; -1: none yet."""
 
     @classmethod
     def build(
@@ -39,10 +45,12 @@ class Sensors(Record):
         period: float,
         truth: State,
         is_prismatic: Sequence[bool] | NDArray[np.bool_] = (),
+        seed: int = 0,
     ) -> Sensors:
         """Read the numbers of the settings for a robot of ``n`` joints, at rest at ``truth``.
 
-        ``is_prismatic`` (n,): which joints slide (empty: none).
+        ``is_prismatic`` (n,): which joints slide (empty: none); ``seed``: of the random numbers,
+        below 2**32.
 
         Raises:
             InputError: they do not fit one another or the period.
@@ -55,6 +63,8 @@ class Sensors(Record):
                 gyro=Gyro.build(n, settings.gyro, period, truth),
                 encoders=Encoders.build(n, settings.encoders, period, truth, is_prismatic),
                 are_ideal=all(getattr(settings, name) == default for name, default in IDEAL),
+                seed=seed,
+                drawn=-1.0,
             )
         except InputError as error:
             file = getattr(settings, "sensors", "given")  # the plant node's settings name it
@@ -62,14 +72,13 @@ class Sensors(Record):
         return sensors
 
 
-def arrays_of_draws(sensors: Sensors) -> dict[str, Array]:
-    """Return the array of each sensor that random numbers are drawn into."""
-    return {name: getattr(sensors, name).draws for name, _ in IDEAL}
-
-
 IDEAL = [(name, getattr(SensorSettings(), name)) for name in SensorSettings.model_fields]
 """The settings of each sensor without error."""
 
+STAR_TRACKER, GYRO, ENCODERS = (
+    zlib.crc32(name.encode()) for name in ("star_tracker", "gyro", "encoders")
+)
+"""Keys of the sensors' random numbers."""
 FAULTS: dict[str, type[PartFault]] = {
     "star_tracker": StarTrackerFault,
     "gyro": GyroFault,
@@ -96,6 +105,23 @@ def sense(sensors: Sensors, truth: State, tick: int, period: float, measured: St
         measured.joint_positions[:] = truth.joint_positions
         measured.joint_velocities[:] = truth.joint_velocities
     else:
+        _draw(sensors, tick)
         track_stars(sensors.star_tracker, truth, tick, measured)
         read_gyro(sensors.gyro, truth, tick, period, measured)
         read_encoders(sensors.encoders, truth, tick, period, measured)
+
+
+@kernel
+def _draw(sensors: Sensors, tick: int) -> None:
+    """Draw the random numbers of the block of ticks that ``tick`` is in, unless they are drawn.
+
+    They are a function of seed, sensor and tick alone: a flight repeats exactly, in any number of
+    processes, and no sensor's numbers depend on the sensors beside it.
+    """
+    block = tick // BLOCK_TICKS
+    if uniform(sensors.drawn) == block:
+        return
+    sensors.drawn = block
+    normal_numbers(sensors.star_tracker.draws, sensors.seed, STAR_TRACKER, block)
+    normal_numbers(sensors.gyro.draws, sensors.seed, GYRO, block)
+    normal_numbers(sensors.encoders.draws, sensors.seed, ENCODERS, block)

@@ -6,9 +6,6 @@ import itertools
 from collections.abc import Callable, Generator, Sequence
 from typing import NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
 from space_robot_control.controller.controller import unusable
 from space_robot_control.controller.kernels import USABLE
 from space_robot_control.controller.law_changes import LawChanges
@@ -24,12 +21,9 @@ from ..simulate import ended_early, note_beliefs
 from .lane_log import LogsInLanes
 from .lane_loop import fly_lanes, measure_lanes, take_out
 from .lane_memory import LawInLanes, copy_back, copy_command, memory_of, put_in
-from .references import references_in_lanes
 
-Array = NDArray[np.float64]
-
-STRETCH_TICKS = 1000
-"""Ticks whose references are in memory at once."""
+STRETCH_TICKS = 4000
+"""Ticks between two reports of progress."""
 
 
 class FlownBlock(NamedTuple):
@@ -123,26 +117,25 @@ class FlightBatch:
                 law = self.flights[k].controller.law
                 if change := self._changes[k].at(start, law):
                     logs.logs[k].laws += (change.law,)
-            references = references_in_lanes(logs.references, start, stop)
             tick = start
             while tick < stop and self._flying:
                 plants = [self.flights[k].plant for k in self._flying]
                 end = int(min(stop, *(plant.next_change for plant in plants)))
-                self._fly_to(logs, references[tick - start : end - start], tick)
+                self._fly_to(logs, tick, end)
                 tick = end
 
-    def _fly_to(self, logs: LogsInLanes, references: Array, start: int) -> None:
-        """Fly a tick for each reference, and begin the next one."""
+    def _fly_to(self, logs: LogsInLanes, start: int, stop: int) -> None:
+        """Fly from tick to tick, and begin the last one."""
         first, memory = self.flights[0], self._memory
-        row = start - logs.logs[0].first_tick
         end = fly_lanes(
             self._law.code,
             first.controller.allocate,
             memory,
             logs.lanes,
-            row,
-            references,
+            logs.references,
+            start - logs.logs[0].first_tick,
             start,
+            stop,
             first.period,
         )
         for k in self._flying:
@@ -152,18 +145,12 @@ class FlightBatch:
     def _begin_tick(self, k: int, tick: int) -> None:
         """Begin a tick of a flight, see `Plant.begin_tick`."""
         plant, plants = self.flights[k].plant, self._memory.plants
-        if tick >= plant.next_event:
-            take_out(plants, k)
-            plant.change(tick)
-            plant.draw(tick)
-            put_in(plants, k)
-        else:
+        if tick < plant.next_change:
             plant.state.tick = plant.truth.tick = tick
-            if plant.draw(tick):
-                sensors, own = plants.block["sensors"], plants.alone["sensors"]
-                for name in sensors.dtype.names or ():
-                    if "draws" in (sensors[name].dtype.names or ()):
-                        sensors[name]["draws"][0, ..., k] = own[name]["draws"][k]
+            return
+        take_out(plants, k)
+        plant.change(tick)
+        put_in(plants, k)
 
     def _swap_laws(self, tick: int) -> None:
         """Let the laws of a planned swap take over."""

@@ -9,12 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from space_robot_msgs_py.compiled.lanes import WIDTH
-from space_robot_msgs_py.samples import ALL_FIELDS
+from space_robot_msgs_py.samples import ALL_FIELDS, ReferenceChunk
 
 from ..plan import Flight
-from ..simulate import empty_log
-from .lane_loop import LaneLog
-from .references import chunks_of
+from ..simulate import columns_of, empty_log
+from .lane_loop import LaneLog, References
 
 Array = NDArray[np.float64]
 
@@ -26,14 +25,16 @@ class LogsInLanes:
         self, flights: Sequence[Flight], start: int, stop: int, is_brief: bool = False
     ) -> None:
         """Allocate logs of the ticks ``start`` to ``stop``; ``is_brief``: see `empty_log`."""
-        self.references = references = chunks_of(flights, start, stop)
-        """Desired motion of each flight."""
-        columns = _columns(flights[0], start, stop)
+        columns = _columns(flights[0], stop - start, is_brief)
         self.logs = []
         """One of each flight."""
+        chunks: dict[int, ReferenceChunk] = {}
         for lane, flight in enumerate(flights):
+            mission = flight.mission
+            if id(mission) not in chunks:
+                chunks[id(mission)] = mission.chunk(start, stop - start)
             own = partial(_next, iter([column[lane] for column in columns]))
-            self.logs.append(empty_log(flight, start, stop, own, references[lane], is_brief))
+            self.logs.append(empty_log(flight, start, stop, own, chunks[id(mission)], is_brief))
         by_address = {column.ctypes.data: column for column in columns if column.size}
         log = self.logs[0]
 
@@ -48,11 +49,17 @@ class LogsInLanes:
             tuple(common(measured.get(name)) for name in ALL_FIELDS),
             common(log.commanded_torque),
             common(log.actuator_commands),
-            _with_axes(common(log.telemetry)),
+            np.empty((WIDTH, 0, 4, 0)) if log.telemetry is None else common(log.telemetry),
         )
+        places = list(chunks)
+        self.references = References(
+            np.stack([_numbers(chunk) for chunk in chunks.values()]),
+            np.array([places.index(id(f.mission)) for f in flights] + [0] * WIDTH)[:WIDTH],
+        )
+        """Desired motion of the flights."""
 
 
-def _columns(flight: Flight, start: int, stop: int) -> list[Array]:
+def _columns(flight: Flight, ticks: int, is_brief: bool) -> list[Array]:
     """Return the columns (8, N, ...) that `empty_log` asks for, in its order.
 
     They are parts of one array, large enough for the pages of memory that the system has for such.
@@ -63,8 +70,7 @@ def _columns(flight: Flight, start: int, stop: int) -> list[Array]:
         shapes.append(shape[1:])
         return np.empty(shape)
 
-    empty_log(flight, start, start + 1, asked, is_brief=True)
-    ticks = stop - start
+    columns_of(flight, 1, asked, is_brief)
     counts = [WIDTH * ticks * int(np.prod(shape, dtype=int)) for shape in shapes]
     parts = np.split(np.empty(sum(counts)), np.cumsum(counts)[:-1])
     return [part.reshape(WIDTH, ticks, *shape) for part, shape in zip(parts, shapes, strict=True)]
@@ -74,5 +80,7 @@ def _next(columns: Iterator[Array], shape: tuple[int, ...]) -> Array:
     return next(columns)
 
 
-def _with_axes(telemetry: Array) -> Array:
-    return telemetry if telemetry.ndim == 4 else telemetry.reshape(WIDTH, -1, 4, 0)
+def _numbers(chunk: ReferenceChunk) -> Array:
+    """Return the numbers (N, ...) of the `Reference` of each tick."""
+    numbers: Array = chunk.references().view(np.float64)
+    return numbers.reshape(len(chunk.joints), -1)

@@ -44,6 +44,10 @@ class LaneMemory(NamedTuple):
     """`ControllerMemory`; the allocations in use are those of the flights by themselves."""
     measured: Block
     """(1,) `State` in lanes, of ``plants``."""
+    reference: Block
+    """(1,) `Reference` in lanes, of the tick."""
+    reference_numbers: Array
+    """(..., 8): the same memory."""
     command_delay_buffer: Array
     """(ticks, m+A, 8)."""
     torque: Array
@@ -56,6 +60,15 @@ class LaneMemory(NamedTuple):
     """(1, 8): of the last state of each flight, see `compute_signals`."""
     fastest: Array
     """(1, 8): `fastest_rate` of each flight, rad/s."""
+
+
+class References(NamedTuple):
+    """Desired motion of eight flights over some ticks."""
+
+    numbers: Array
+    """(M, N, ...): those of the `Reference` of each tick, of M missions."""
+    missions: NDArray[np.int64]
+    """(8,) mission of each lane."""
 
 
 class LaneLog(NamedTuple):
@@ -76,12 +89,13 @@ def fly_lanes(
     allocate: RecordFunction,
     memory: LaneMemory,
     log: LaneLog,
+    references: References,
     row: int,
-    references: Block,
     start: int,
+    stop: int,
     period: float,
 ) -> int:
-    """Fly from the tick ``start`` on, a tick for each reference, or until no flight goes on.
+    """Fly from the tick ``start`` to ``stop``, or until no flight goes on.
 
     The sensors have measured ``start``, and not yet the tick reached. The memory of a flight that
     ends is left in its record by itself, as it was then.
@@ -91,9 +105,10 @@ def fly_lanes(
         allocate: an `allocation_code`.
         memory: of the flights.
         log: to be filled.
+        references: of the ticks in the log.
         row: of ``start`` in the log.
-        references: block of `Reference` in lanes.
         start: first tick.
+        stop: tick after the last.
         period: s.
 
     Returns:
@@ -104,15 +119,16 @@ def fly_lanes(
     flies, ticks = as_lanes(memory.flies), as_lanes(memory.tick)
     statuses, rates = as_lanes(memory.status), as_lanes(memory.fastest)
     h_bar, signals, of_law = as_lanes(law.h_bar), controllers[0].signals, law.memory[0]
-    for k in range(references.size):
-        tick = start + k
-        if k > 0:
+    for tick in range(start, stop):
+        k = row + tick - start
+        if tick > start:
             sense(plant.sensors, plant.truth, tick, period, plant.measured)
-        _log_state(log.truth, row + k, plant.truth)
+        _log_state(log.truth, k, plant.truth)
         if log.measured[0].shape[1] > 0:
-            _log_state(log.measured, row + k, plant.measured)
+            _log_state(log.measured, k, plant.measured)
+        _refer(references, k, memory.reference_numbers)
         status = compute_signals(
-            controllers, tick, memory.measured, references[k : k + 1], h_bar, law.uses_model, period
+            controllers, tick, memory.measured, memory.reference, h_bar, law.uses_model, period
         )
         is_flying = flies[0] == 1.0
         statuses[0] = where(is_flying, status, statuses[0])
@@ -124,18 +140,18 @@ def fly_lanes(
         apply_transfer(controllers, tick, of_law.force, torque)
         if torque.size > of_law.force.size:
             _allocate(allocate, memory, is_flying, torque, of_law.force.size, tick)
-        _log_command(log, row + k, torque, of_law.force.size)
-        spread(of_law.s, log.telemetry[:, row + k, 0])
-        spread(of_law.u, log.telemetry[:, row + k, 1])
-        spread(signals.n_hat, log.telemetry[:, row + k, 2])
-        spread(signals.error, log.telemetry[:, row + k, 3])
+        _log_command(log, k, torque, of_law.force.size)
+        spread(of_law.s, log.telemetry[:, k, 0])
+        spread(of_law.u, log.telemetry[:, k, 1])
+        spread(signals.n_hat, log.telemetry[:, k, 2])
+        spread(signals.error, log.telemetry[:, k, 3])
         fastest = advance_lanes(plant, memory.plants.alone, buffer, torque, tick, period, is_flying)
         rates[0] = where(is_flying, fastest, rates[0])
         ticks[0] = where(is_flying, tick + 1.0, ticks[0])
         _end(memory, is_flying & negated(fastest <= RATE_LIMIT))
         if not any_lane(flies[0] == 1.0):
             return tick + 1
-    return start + references.size
+    return stop
 
 
 @kernel
@@ -163,6 +179,15 @@ def take_out(records: InLanes, lane: int) -> None:
     numbers, alone = records.numbers, records.numbers_alone
     for i in range(len(numbers)):
         alone[lane, i] = numbers[i, lane]
+
+
+@kernel
+def _refer(references: References, row: int, numbers: Array) -> None:
+    """Write the references of a tick into ``numbers`` (..., 8)."""
+    for lane in range(WIDTH):
+        desired = references.numbers[references.missions[lane], row]
+        for i in range(desired.size):
+            numbers[i, lane] = desired[i]
 
 
 @kernel

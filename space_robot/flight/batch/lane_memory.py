@@ -13,6 +13,7 @@ from space_robot_control.laws.base import LawMemory
 from space_robot_control.laws.compiled import CompiledLaw, LawCode, SomeGains
 from space_robot_msgs_py.compiled.lanes import WIDTH
 from space_robot_msgs_py.compiled.records import Block, Record, prefix
+from space_robot_msgs_py.samples import Reference
 from space_robot_sim.plant.plant import PlantMemory
 
 from ..plan import Flight
@@ -53,6 +54,7 @@ def memory_of(flights: Sequence[Flight]) -> LaneMemory:
         records.numbers[:] = records.numbers_alone.T
     buffers = [flight.plant.command_delay_buffer for flight in flights]
     buffers += [buffers[0]] * (WIDTH - len(flights))
+    reference = Reference.lanes(n)
     torque = np.zeros((len(flights[0].controller.names.commanded), WIDTH))
     flies = np.zeros((1, WIDTH))
     flies[0, : len(flights)] = 1.0
@@ -61,6 +63,8 @@ def memory_of(flights: Sequence[Flight]) -> LaneMemory:
         plants,
         controllers,
         plants.block["measured"],
+        reference,
+        numbers_of(reference),
         np.ascontiguousarray(np.stack(buffers, axis=-1)),
         torque,
         flies,

@@ -8,6 +8,8 @@ from decimal import Decimal, localcontext
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from scipy.special import ndtr
 from scipy.stats import norm
 
@@ -134,13 +136,18 @@ def test_the_normal_distribution_is_scipys() -> None:
     np.testing.assert_allclose(normal_quantile([normal_cdf(-1.25)]), -1.25, rtol=1e-14)
 
 
-def test_normal_numbers_of_bits_are_normal_and_finite() -> None:
-    bits = np.random.PCG64(3).random_raw(100_000)
-    bits[:2] = 0, 2**64 - 1
-    found = np.empty(bits.size)
-    normal_numbers(bits, found)
-    assert found[0] == -found[1] == pytest.approx(norm.ppf(2.0**-53))
-    found = found[2:]
-    assert found.mean() == pytest.approx(0.0, abs=0.01)
-    assert found.std() == pytest.approx(1.0, abs=0.01)
-    assert (found**4).mean() == pytest.approx(3.0, abs=0.1)
+@given(st.integers(0, 2**32 - 1), st.integers(0, 2**32 - 1), st.integers(0, 2**32 - 1))
+def test_normal_numbers_are_those_of_numpys_generator(seed: int, key: int, block: int) -> None:
+    bits = np.random.PCG64((seed, key, block)).random_raw(48)
+    shares = ((bits >> np.uint64(12)).astype(float) + 0.5) * 2.0**-52
+    draws = np.empty((8, 6))
+    normal_numbers(draws, float(seed), key, block)
+    np.testing.assert_array_equal(draws.ravel(), normal_quantile(shares))
+
+
+def test_normal_numbers_are_normal() -> None:
+    draws = np.empty(100_000)
+    normal_numbers(draws, 3.0, 0, 0)
+    assert draws.mean() == pytest.approx(0.0, abs=0.01)
+    assert draws.std() == pytest.approx(1.0, abs=0.01)
+    assert (draws**4).mean() == pytest.approx(3.0, abs=0.1)

@@ -18,7 +18,7 @@ PACKAGES = ("space_robot", "space_robot_control", "space_robot_model", "space_ro
 EXACT = {
     *("np.sqrt", "math.sqrt", "np.floor", "np.sign", "np.isnan", "np.isfinite", "math.isfinite"),
     *("math.copysign", "math.ldexp", "math.frexp", "np.fmod", "np.zeros", "np.empty", "np.eye"),
-    *("np.uint64", "math.inf", "math.nan", "math.pi"),
+    *("np.int64", "np.uint64", "math.inf", "math.nan", "math.pi"),
 }
 """What kernels use of `math` and NumPy: each gives the same bits on every processor."""
 SAME_IN_FLIGHT = {"locked", "transfer_left", "tick", "seen", "is_active"}

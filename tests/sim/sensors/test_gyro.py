@@ -85,7 +85,7 @@ def test_at_tick_0_there_is_the_initial_bias_and_white_noise() -> None:
     bench, state = Bench(period=period, gyro=settings), RobotState.allocate(N)
     rates = np.empty((1000, 3))
     for seed in range(len(rates)):
-        bench.draws.drawn = seed, -1
+        bench.block["seed"], bench.block["drawn"] = seed, -1.0
         rates[seed] = bench.measure(state).omega_base - bias
     expected = sigma_v**2 / period + sigma_u**2 * period / 12.0 + sigma**2
     assert np.mean(rates**2) == pytest.approx(expected, rel=5.0 * np.sqrt(2.0 / rates.size))

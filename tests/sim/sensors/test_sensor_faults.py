@@ -13,7 +13,6 @@ from sensor_bench import Bench, a_state
 
 from space_robot_msgs_py.samples import ACTUATOR_FIELDS, ALL_FIELDS, PASSIVE_FIELDS, RobotState
 from space_robot_sim.faults.schedule import BLOCK_TICKS
-from space_robot_sim.sensors.noise import NoiseDraws
 
 Array = NDArray[np.float64]
 
@@ -144,13 +143,14 @@ def test_draws_depend_on_seed_and_tick_alone() -> None:
 
 def test_each_sensor_and_each_block_of_ticks_has_numbers_of_its_own() -> None:
     """Uncorrelated, of any two sensors, blocks and seeds."""
-    arrays = {name: np.empty((BLOCK_TICKS, 6)) for name in ("star_tracker", "gyro", "encoders")}
     rows = []
     for seed in (0, 1):
-        draws = NoiseDraws(seed, arrays)
+        bench = Bench(seed=seed)
         for block in range(3):
-            assert draws.refill(BLOCK_TICKS * block + 7) == BLOCK_TICKS * (block + 1)
-            rows += [array.ravel().copy() for array in arrays.values()]
+            bench.measure(a_state(BLOCK_TICKS * block + 7))
+            assert bench.block["drawn"] == block
+            for name in ("star_tracker", "gyro", "encoders"):
+                rows.append(bench.block[name]["draws"].ravel()[: 3 * BLOCK_TICKS].copy())
     found = np.corrcoef(rows) - np.eye(len(rows))
     assert np.abs(found).max() < 5.0 / np.sqrt(rows[0].size)
 
