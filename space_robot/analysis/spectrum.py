@@ -170,7 +170,7 @@ class PowerSpectrum:
 @lru_cache(maxsize=4)
 def _window_and_time(size: int) -> tuple[Array, Array]:
     """Return Hann's window and the time from the middle, in rows, of a segment."""
-    return hann(size, size), np.arange(size) - 0.5 * (size - 1)
+    return hann(size, size), np.arange(size, dtype=np.float64) - 0.5 * (size - 1)
 
 
 def hann(rows: int, period: int) -> Array:
