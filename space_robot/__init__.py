@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from .analysis.load_bag import load_bag
     from .api import Bench, FlownFlight, Scenario
     from .api.replayed import replay
-    from .api.together import fly_many
+    from .api.together import bench_many, fly_many
     from .campaign.flown import Campaign, FlownCampaign
     from .learning import make, make_vec
 
@@ -32,6 +32,7 @@ __all__ = [
     "FlownFlight",
     "Robot",
     "Scenario",
+    "bench_many",
     "bias_force",
     "fly_many",
     "forward_dynamics",
@@ -48,6 +49,7 @@ MODULES = {
     "FlownFlight": "space_robot.api",
     "Robot": "space_robot_model.robot",
     "Scenario": "space_robot.api",
+    "bench_many": "space_robot.api.together",
     "bias_force": "space_robot_model.robot.dynamics",
     "fly_many": "space_robot.api.together",
     "forward_dynamics": "space_robot_model.robot.dynamics",

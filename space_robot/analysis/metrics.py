@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from space_robot_model.elementary.matrices import norm
 from space_robot_msgs_py.bag.blocks import Metric, blocks_of
 from space_robot_msgs_py.bag.flight_log import FlightLog
+from space_robot_msgs_py.compiled.kernels import kernel
 
 from .spectrum import PowerAbove
 
@@ -102,12 +103,33 @@ def tracking_error(log: FlightLog) -> Array:
     Of +-Q_d it is that of the one on Q's side.
     """
     error = np.empty((log.ticks, log.axes))
-    desired = log.reference_base[:, :4]
-    side = np.where(_sum_of_columns(log.quaternion * desired) < 0.0, -1.0, 1.0)
-    np.multiply(side[:, np.newaxis], desired[:, 1:], out=error[:, :3])
-    error[:, :3] -= log.quaternion[:, 1:]
-    np.subtract(log.reference_joints[:, 0], log.joint_positions, out=error[:, 3:])
+    error[:, 3:] = log.reference_joints[:, 0]
+    error[:, 3:] -= log.joint_positions
+    _attitude_error(
+        np.ascontiguousarray(log.reference_base), np.ascontiguousarray(log.quaternion), error
+    )
     return error
+
+
+@kernel
+def _attitude_error(desired: Array, quaternion: Array, error: Array) -> None:
+    """Write the error of the attitude into the first three columns."""
+    for i in range(len(error)):
+        q, d = quaternion[i], desired[i]
+        side = -1.0 if q[0] * d[0] + q[1] * d[1] + q[2] * d[2] + q[3] * d[3] < 0.0 else 1.0
+        for k in range(3):
+            error[i, k] = side * d[k + 1] - q[k + 1]
+
+
+@kernel
+def _add_squares(values: Array, squares: Array) -> None:
+    """Add the sum over the rows of each column's squares."""
+    sums = np.zeros(squares.size)
+    for i in range(len(values)):
+        for k in range(squares.size):
+            sums[k] += values[i, k] * values[i, k]
+    for k in range(squares.size):
+        squares[k] += sums[k]
 
 
 def largest_of_columns(values: Array) -> Array:
@@ -125,7 +147,7 @@ class AxisRms:
     def add(self, values: Array) -> None:
         """Take further rows."""
         self.rows += len(values)
-        self._squares += np.sum(values**2, axis=0)
+        _add_squares(np.ascontiguousarray(values), self._squares)
 
     @property
     def value(self) -> Array:
@@ -288,8 +310,3 @@ def _by_column(
         )
         for name, axes in columns.items()
     }
-
-
-def _sum_of_columns(values: Array) -> Array:
-    """(N,), as fast as memory allows: NumPy's own sum over short rows is not."""
-    return reduce(np.add, values.T)

@@ -66,8 +66,8 @@ class RippleSpectrum(NamedTuple):
 
     def rms(self, above: float = SLOWEST) -> Array:
         """(n+3,) N m or N, of each axis' ripple ``above`` a frequency, Hz."""
-        fast = self.frequency >= above * (1.0 - 1e-9)
-        rms: Array = np.sqrt(np.sum(self.mean_square[fast], axis=0))
+        first = int(np.searchsorted(self.frequency, above * (1.0 - 1e-9)))
+        rms: Array = np.sqrt(np.sum(self.mean_square[first:], axis=0))
         return rms
 
     def peak(self, axes: AxisIndex) -> Peak | None:
@@ -116,8 +116,8 @@ class Ripple(Metric):
         if self._rows * self._period < SHORTEST_S * (1.0 - 1e-9):
             raise InputError(f"{SHORTEST_S:g} s of flight are needed")
         frequency, mean_square = self._spectrum.value()
-        fast = frequency >= SLOWEST * (1.0 - 1e-9)
-        return RippleSpectrum(frequency[fast], mean_square[fast])
+        first = int(np.searchsorted(frequency, SLOWEST * (1.0 - 1e-9)))
+        return RippleSpectrum(frequency[first:], mean_square[first:])
 
     def result(self) -> dict[str, Any]:
         """Return the RMS by torque column and by axis, N m or N, and the peak of each column.

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from space_robot_model.elementary.fourier import squared_spectrum
 from space_robot_model.elementary.sine import sines_cosines
 from space_robot_msgs_py.bag.blocks import BLOCK_TICKS
+from space_robot_msgs_py.compiled.kernels import kernel
 
 Array = NDArray[np.float64]
 
@@ -161,10 +162,25 @@ class PowerSpectrum:
         """(F, axes) of one segment."""
         size = len(rows)
         window, time = _window_and_time(size)
-        trend = np.outer(time, np.sum(time[:, np.newaxis] * rows, axis=0) / np.sum(time * time))
-        steady = rows - np.mean(rows, axis=0) - trend
-        _, power = one_sided_power(window[:, np.newaxis] * steady, self._period)
+        steady = np.empty(rows.shape)
+        _without_trend(rows, window, time, float(np.sum(time * time)), steady)
+        _, power = one_sided_power(steady, self._period)
         return power / (size * np.sum(window**2))
+
+
+@kernel
+def _without_trend(rows: Array, window: Array, time: Array, square: float, out: Array) -> None:
+    """Write rows without mean and trend, under a window; ``square`` is the sum of time squared."""
+    size, axes = rows.shape
+    sums, slopes = np.zeros(axes), np.zeros(axes)
+    for i in range(size):
+        for k in range(axes):
+            sums[k] += rows[i, k]
+            slopes[k] += time[i] * rows[i, k]
+    for i in range(size):
+        for k in range(axes):
+            steady = rows[i, k] - sums[k] / size - time[i] * (slopes[k] / square)
+            out[i, k] = window[i] * steady
 
 
 @lru_cache(maxsize=4)

@@ -1,4 +1,4 @@
-"""Many scenarios flown at once, for `space_robot.fly_many`."""
+"""Many scenarios at once, for `space_robot.fly_many` and `space_robot.bench_many`."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from space_robot_msgs_py.errors import InputError
 
 from ..analysis import Analysis
 from ..flight.batch.batch import FlightBatch
+from ..flight.batch.benches import Benches
 from ..flight.batch.compilation import compile_lanes
 from ..flight.batch.sharing import batches
 from ..flight.compilation import compile_kernels
@@ -62,13 +63,34 @@ def fly_many(
     return [flown[number] for number in sorted(flown)]
 
 
-def _checked(scenarios: Iterable[Scenario]) -> Iterator[tuple[int, Flight]]:
-    """Yield number and checked flight of each scenario."""
+def bench_many(scenarios: Iterable[Scenario]) -> Benches:
+    """Return benches of scenarios, stepped together under torques from outside.
+
+        benches = sr.bench_many(sr.Scenario(controller=None, seed=k) for k in range(64))
+        states = benches.step(np.zeros((64, 9)))
+
+    Eight that can share a batch are in the lanes of one, see `fly_many`; the others have lanes of
+    their own. Each has the bits of `Scenario.bench`.
+
+    Args:
+        scenarios: of robots with the same number of joints and the same actuators.
+
+    Raises:
+        InputError: a scenario cannot be put on a bench; names its place.
+    """
+    flights = [flight for _, flight in _checked(scenarios, is_flown=False)]
+    compile_kernels(any(flight.plant.names.actuators for flight in flights))
+    compile_lanes()
+    return Benches(flights)
+
+
+def _checked(scenarios: Iterable[Scenario], is_flown: bool = True) -> Iterator[tuple[int, Flight]]:
+    """Yield number and checked flight of each scenario; ``is_flown``: under its law."""
     for number, scenario in enumerate(scenarios):
         where = f"scenario {number}"
         if not isinstance(scenario, Scenario):
             raise InputError(f"{where}: a Scenario was expected, got {short(scenario)}")
-        if scenario.controller is None:
+        if is_flown and scenario.controller is None:
             raise InputError(
                 f"{where}: controller is None, so there is nothing to fly: use bench()"
             )
@@ -76,7 +98,7 @@ def _checked(scenarios: Iterable[Scenario]) -> Iterator[tuple[int, Flight]]:
             flight = scenario.check()
         except InputError as error:
             raise InputError(f"{where}: {error}") from None
-        if step := flight.start_step:
+        if is_flown and (step := flight.start_step):
             warnings.warn(f"{where}: {sentence(step)}", stacklevel=3)
         yield number, flight
 

@@ -43,6 +43,17 @@ class Snapshot(NamedTuple):
     ending: Ending | None
 
 
+def check_for_bench(flight: Flight) -> None:
+    """Check that a flight can be put on a bench.
+
+    Raises:
+        InputError: it needs a graph of nodes or has faults of messages.
+    """
+    flight.check_in_process()
+    if flight.plant_settings.has_message_faults:
+        raise InputError("on the bench are no messages that could fail: fly the faults of them")
+
+
 class Bench(RecordOwner):
     """Plant flown tick by tick under external torques, or under the flight's law.
 
@@ -59,9 +70,7 @@ class Bench(RecordOwner):
         Raises:
             InputError: the flight needs a graph of nodes or has faults of messages.
         """
-        flight.check_in_process()
-        if flight.plant_settings.has_message_faults:
-            raise InputError("on the bench are no messages that could fail: fly the faults of them")
+        check_for_bench(flight)
         self.flight, self.ticks, self.period = flight, flight.ticks, flight.period
         # of its own: a law remembers, and another bench may fly the same flight
         self._laws, self._law, self._swaps = copy.deepcopy((flight.laws, flight.law, flight.swaps))

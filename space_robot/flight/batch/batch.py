@@ -19,8 +19,8 @@ from ..closed_loop import measured_ticks
 from ..plan import Flight
 from ..simulate import ended_early, note_beliefs
 from .lane_log import LogsInLanes
-from .lane_loop import fly_lanes, measure_lanes, take_out
-from .lane_memory import LawInLanes, copy_back, copy_command, memory_of, put_in
+from .lane_loop import fly_lanes, measure_lanes
+from .lane_memory import LawInLanes, begin_tick, copy_back, copy_command, memory_of
 
 STRETCH_TICKS = 4000
 """Ticks between two reports of progress."""
@@ -139,18 +139,8 @@ class FlightBatch:
             first.period,
         )
         for k in self._flying:
-            self._begin_tick(k, end)
+            begin_tick(self.flights[k].plant, memory.plants, k, end)
         measure_lanes(memory.plants.block, end, first.period)
-
-    def _begin_tick(self, k: int, tick: int) -> None:
-        """Begin a tick of a flight, see `Plant.begin_tick`."""
-        plant, plants = self.flights[k].plant, self._memory.plants
-        if tick < plant.next_change:
-            plant.state.tick = plant.truth.tick = tick
-            return
-        take_out(plants, k)
-        plant.change(tick)
-        put_in(plants, k)
 
     def _swap_laws(self, tick: int) -> None:
         """Let the laws of a planned swap take over."""

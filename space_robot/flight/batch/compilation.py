@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
 from numba import types
 
 from space_robot_control.controller.kernels import ControllerMemory, apply_transfer, compute_signals
@@ -23,6 +24,8 @@ from ...processes.child_process import child_process
 from ..compilation import compile_kernels, compiling
 from ..plan import Flight, FlightPlan, resolve
 from .batch import FlightBatch
+from .bench_loop import fly_benches, measure_benches
+from .benches import Benches
 from .lane_loop import fly_lanes, measure_lanes
 
 MARK = "lanes"
@@ -41,7 +44,7 @@ def compile_lanes() -> None:
     if mark.exists():
         return
     own = [law.kernel for law in laws().values() if issubclass(law, CompiledLaw)]
-    kernels = (fly_lanes, measure_lanes, *own)
+    kernels = (fly_lanes, measure_lanes, fly_benches, measure_benches, *own)
     with compiling("flights that fly together", *kernels, again=True):
         with child_process(module_command(__name__)) as helper:
             _compile_controllers()
@@ -75,12 +78,14 @@ def _compile_controllers() -> None:
 
 
 def _fly_all_laws() -> None:
-    """Fly a few ticks under every law with a kernel."""
+    """Fly a few ticks under every law with a kernel, and one on a bench."""
     for name, law in laws().items():
         if issubclass(law, CompiledLaw):
             plan = FlightPlan(controller=name, duration=0.002)
             for _ in FlightBatch([Flight(resolve(plan)) for _ in range(2)]).fly():
                 pass
+    benches = Benches([Flight(resolve(FlightPlan(duration=0.002)))])
+    benches.step(np.zeros((1, len(benches.names.commanded))))
 
 
 if __name__ == "__main__":

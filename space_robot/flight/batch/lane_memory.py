@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from space_robot_control.controller.controller import Controller
 from space_robot_control.controller.kernels import ControllerMemory
 from space_robot_control.laws import ControlLaw
 from space_robot_control.laws.base import LawMemory
@@ -14,7 +15,7 @@ from space_robot_control.laws.compiled import CompiledLaw, LawCode, SomeGains
 from space_robot_msgs_py.compiled.lanes import WIDTH
 from space_robot_msgs_py.compiled.records import Block, Record, prefix
 from space_robot_msgs_py.samples import Reference
-from space_robot_sim.plant.plant import PlantMemory
+from space_robot_sim.plant.plant import Plant, PlantMemory
 
 from ..plan import Flight
 from .lane_loop import InLanes, LaneMemory, take_out
@@ -39,21 +40,40 @@ def put_in(records: InLanes, lane: int) -> None:
     records.numbers[:, lane] = records.numbers_alone[lane]
 
 
-def memory_of(flights: Sequence[Flight]) -> LaneMemory:
-    """Return the memory of up to eight flights; from now on their own records are in it.
+def fill(records: InLanes, owners: Sequence[Plant | Controller]) -> None:
+    """Put the records of up to eight owners into lanes; their own records are in it from now on.
 
-    A lane without a flight has the numbers of the first, and does not fly.
+    A lane without an owner has the numbers of the first.
     """
+    for lane, owner in enumerate(owners):
+        owner.move_to(records.alone[lane : lane + 1])
+    records.numbers_alone[len(owners) :] = records.numbers_alone[0]
+    records.numbers[:] = records.numbers_alone.T
+
+
+def delay_buffers(plants: Sequence[Plant]) -> Array:
+    """Return the commands in transit (ticks, m+A, 8) of up to eight plants."""
+    buffers = [plant.command_delay_buffer for plant in plants]
+    buffers += [buffers[0]] * (WIDTH - len(plants))
+    return np.ascontiguousarray(np.stack(buffers, axis=-1))
+
+
+def begin_tick(plant: Plant, plants: InLanes, lane: int, tick: int) -> None:
+    """Begin a tick of a plant in a lane, see `Plant.begin_tick`; its sensors do not measure yet."""
+    if tick < plant.next_change:
+        plant.state.tick = plant.truth.tick = tick
+        return
+    take_out(plants, lane)
+    plant.change(tick)
+    put_in(plants, lane)
+
+
+def memory_of(flights: Sequence[Flight]) -> LaneMemory:
+    """Return the memory of up to eight flights; a lane without a flight does not fly."""
     n = flights[0].robot.n
     plants, controllers = in_lanes(PlantMemory, n), in_lanes(ControllerMemory, n)
-    for lane, flight in enumerate(flights):
-        flight.plant.move_to(plants.alone[lane : lane + 1])
-        flight.controller.move_to(controllers.alone[lane : lane + 1])
-    for records in (plants, controllers):
-        records.numbers_alone[len(flights) :] = records.numbers_alone[0]
-        records.numbers[:] = records.numbers_alone.T
-    buffers = [flight.plant.command_delay_buffer for flight in flights]
-    buffers += [buffers[0]] * (WIDTH - len(flights))
+    fill(plants, [flight.plant for flight in flights])
+    fill(controllers, [flight.controller for flight in flights])
     reference = Reference.lanes(n)
     torque = np.zeros((len(flights[0].controller.names.commanded), WIDTH))
     flies = np.zeros((1, WIDTH))
@@ -65,7 +85,7 @@ def memory_of(flights: Sequence[Flight]) -> LaneMemory:
         plants.block["measured"],
         reference,
         numbers_of(reference),
-        np.ascontiguousarray(np.stack(buffers, axis=-1)),
+        delay_buffers([flight.plant for flight in flights]),
         torque,
         flies,
         *rates,

@@ -10,7 +10,7 @@ from space_robot_control.controller.kernels import ControllerMemory
 from space_robot_control.laws.compiled import CompiledLaw
 from space_robot_msgs_py.compiled.lanes import WIDTH
 from space_robot_msgs_py.errors import InputError
-from space_robot_sim.plant.plant import PlantMemory
+from space_robot_sim.plant.plant import Plant, PlantMemory
 
 from ..plan import Flight
 
@@ -40,20 +40,27 @@ def _of_law(law: Any) -> str:
 
 def batch_key(flight: Flight) -> Hashable:
     """Return what flights of one batch have in common, of a flight that can be in one."""
-    plant, controller = flight.plant, flight.controller
+    controller = flight.controller
     return (
-        plant.tick,
+        plant_key(flight.plant),
         flight.ticks,
-        flight.period,
-        plant.names,
-        plant.command_delay_buffer.shape,
-        plant.measures_truth,
-        PlantMemory.uniform_numbers(plant.block),
         ControllerMemory.uniform_numbers(controller.block),
         flight.controller_settings.telemetry_decimation,
         flight.mission_settings.chunk_ticks,
         type(controller.law),
         tuple((tick, type(law)) for tick, law in flight.swaps),
+    )
+
+
+def plant_key(plant: Plant) -> Hashable:
+    """Return what plants that are stepped in lanes have in common."""
+    return (
+        plant.tick,
+        plant.period,
+        plant.names,
+        plant.command_delay_buffer.shape,
+        plant.measures_truth,
+        PlantMemory.uniform_numbers(plant.block),
     )
 
 
