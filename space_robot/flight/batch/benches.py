@@ -179,15 +179,15 @@ class _BenchSet:
         self._torques = np.zeros((count * WIDTH, len(benches.names.commanded)))
         self._flies, self._fastest = np.zeros((2, count * WIDTH))
         self._flies[: len(numbers)] = 1.0
-        self._states: Block = np.zeros((2, count * WIDTH), State.dtype(n))
-        """Measured and true, a row a lane."""
+        self._next_change = np.array([plant.next_change for plant in self._plants])
+        size = State.dtype(n).itemsize // 8
+        self._rows = np.zeros((count * WIDTH, size)), np.zeros((count * WIDTH, size))
+        """Numbers of the measured and of the true states."""
+        self._shown = [
+            block.view(np.float64).reshape(-1, size) for block in (benches.states, benches.truths)
+        ]
         measure_benches(self._blocks, 0, self._period, self._flies, *self._rows)
         self._show()
-
-    @property
-    def _rows(self) -> tuple[Array, Array]:
-        measured, true = self._states.view(np.float64).reshape(2, len(self._flies), -1)
-        return measured, true
 
     def step(self, commands: Array) -> None:
         """Fly to the next tick; the flights that are over stand still."""
@@ -196,7 +196,7 @@ class _BenchSet:
         count, tick = len(self._numbers), self._tick + 1
         flew = np.flatnonzero(self._flies)
         self._torques[:count] = commands[self._numbers]
-        changing = [k for k in flew if self._plants[k].next_change <= tick]
+        changing = np.flatnonzero(self._next_change <= tick)
         fly_benches(
             self._blocks,
             self._alone,
@@ -206,15 +206,16 @@ class _BenchSet:
             self._period,
             self._flies,
             self._fastest,
-            not changing,
+            not len(changing),
             *self._rows,
         )
         self._tick = tick
-        if changing:
+        if len(changing):
             for k in changing:
+                eight, lane = divmod(int(k), WIDTH)
                 if self._flies[k]:
-                    eight, lane = divmod(int(k), WIDTH)
                     begin_tick(self._plants[k], self._memory[eight], lane, tick)
+                self._next_change[k] = self._plants[k].next_change if self._flies[k] else np.inf
             measure_benches(self._blocks, tick, self._period, self._flies, *self._rows)
         self._benches.ticks[self._numbers[flew]] = tick
         for k in flew[self._flies[flew] == 0.0]:
@@ -227,8 +228,8 @@ class _BenchSet:
         self._show()
 
     def _show(self) -> None:
-        measured, true = self._states[:, : len(self._numbers)]
-        self._benches.states[self._numbers], self._benches.truths[self._numbers] = measured, true
+        for shown, rows in zip(self._shown, self._rows, strict=True):
+            shown[self._numbers] = rows[: len(self._numbers)]
 
     def _end(self, k: int, ending: Ending) -> None:
         self._flies[k] = 0.0
