@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from space_robot_msgs_py.compiled.kernels import kernel
-from space_robot_msgs_py.compiled.lanes import uniform, whole
+from space_robot_msgs_py.compiled.lanes import all_lanes, any_lane, uniform, where, whole
 
 from .algebra import (
     Matrix,
@@ -22,6 +22,9 @@ from .algebra import (
     Vector,
     add,
     add_symmetric,
+    choose_matrix,
+    choose_symmetric,
+    choose_vector,
     dot,
     inverse_symmetric,
     outer_subtracted,
@@ -57,7 +60,7 @@ def aba(
     Call it after `forward_kinematics` and `spatial_velocities`. ``force`` (N+6,) is
     ``[f0, tau0, tau]``, the base's part in inertial axes, N and N m. Joints locked in ``data`` do
     not accelerate; the required torque is in ``data.holding``. Wheels come after the joints in
-    velocities, force and ``out``. In lanes the same joints are locked in all of them.
+    velocities, force and ``out``.
     """
     # inwards: the articulated-body inertia and bias force of each link, free about its joint
     inertia = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
@@ -82,20 +85,28 @@ def aba(
         U_linear = add(transform_transposed(coupling, angular), transform_symmetric(mass, linear))
         u = force[6 + j] - dot(angular, bias_moment) - dot(linear, bias_force)
         inverse = 1.0 / (dot(angular, U_angular) + dot(linear, U_linear))
-        if uniform(data.locked[j]) != 0.0:
-            inverse = 1.0  # not divided by D, as `holding` needs
+        is_locked = data.locked[j] != 0.0
+        inverse = where(is_locked, 1.0, inverse)  # not divided by D, as `holding` needs
         u_over_d = u * inverse
         U_over_D_angular, U_over_D_linear = scale(U_angular, inverse), scale(U_linear, inverse)
         store(U_over_D_angular, data.U_over_D[i], 0)
         store(U_over_D_linear, data.U_over_D[i], 3)
         data.u_over_d[i] = u_over_d
         # I^a = I^A - U U^T / D,  p^a = p^A + I^a c + U u / D; for a locked joint only p^A + I^A c
-        if uniform(data.locked[j]) == 0.0:
-            inertia = outer_subtracted(inertia, U_over_D_angular, U_angular)
-            coupling = outer_subtracted_general(coupling, U_over_D_angular, U_linear)
-            mass = outer_subtracted(mass, U_over_D_linear, U_linear)
-            bias_moment = add(bias_moment, scale(U_angular, u_over_d))
-            bias_force = add(bias_force, scale(U_linear, u_over_d))
+        if not all_lanes(is_locked):
+            free = outer_subtracted(inertia, U_over_D_angular, U_angular)
+            free_coupling = outer_subtracted_general(coupling, U_over_D_angular, U_linear)
+            free_mass = outer_subtracted(mass, U_over_D_linear, U_linear)
+            free_moment = add(bias_moment, scale(U_angular, u_over_d))
+            free_force = add(bias_force, scale(U_linear, u_over_d))
+            if any_lane(is_locked):
+                free = choose_symmetric(is_locked, inertia, free)
+                free_coupling = choose_matrix(is_locked, coupling, free_coupling)
+                free_mass = choose_symmetric(is_locked, mass, free_mass)
+                free_moment = choose_vector(is_locked, bias_moment, free_moment)
+                free_force = choose_vector(is_locked, bias_force, free_force)
+            inertia, coupling, mass = free, free_coupling, free_mass
+            bias_moment, bias_force = free_moment, free_force
         angular, linear = vector(data.coriolis[i], 0), vector(data.coriolis[i], 3)
         bias_moment = add(bias_moment, transform_symmetric(inertia, angular))
         bias_moment = add(bias_moment, transform(coupling, linear))
@@ -143,9 +154,11 @@ def aba(
         linear = add(linear, vector(data.coriolis[i], 3))
         acceleration = data.u_over_d[i] - dot(vector(data.U_over_D[i], 0), angular)
         acceleration -= dot(vector(data.U_over_D[i], 3), linear)
-        if uniform(data.locked[j]) != 0.0:
-            data.holding[j] = acceleration  # u - U^T a, not divided by D
-            acceleration = 0.0
+        is_locked = data.locked[j] != 0.0
+        if any_lane(is_locked):
+            # u - U^T a, not divided by D
+            data.holding[j] = where(is_locked, acceleration, data.holding[j])
+            acceleration = where(is_locked, 0.0, acceleration)
         out[6 + j] = acceleration
         angular = add(angular, scale(vector(data.motion[i], 0), acceleration))
         linear = add(linear, scale(vector(data.motion[i], 3), acceleration))

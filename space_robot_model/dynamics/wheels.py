@@ -20,9 +20,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from space_robot_msgs_py.compiled.kernels import kernel
-from space_robot_msgs_py.compiled.lanes import uniform, whole
+from space_robot_msgs_py.compiled.lanes import all_lanes, any_lane, where, whole
 
-from .algebra import Symmetric, Vector, add, cross, dot, outer_subtracted, scale, store, vector
+from .algebra import (
+    Symmetric,
+    Vector,
+    add,
+    choose_symmetric,
+    choose_vector,
+    cross,
+    dot,
+    outer_subtracted,
+    scale,
+    store,
+    vector,
+)
 from .model import Data, Model
 
 Array = NDArray[np.float64]
@@ -61,9 +73,12 @@ def take_wheels(
         store(axis, data.wheel_axis[k], 0)
         spin_inertia = model.wheel_inertia[k]
         momentum = add(momentum, scale(axis, spin_inertia * velocities[n + k]))
-        if uniform(data.locked[n + k]) == 0.0:
-            inertia = outer_subtracted(inertia, axis, scale(axis, spin_inertia))
-            bias_moment = add(bias_moment, scale(axis, force[6 + n + k]))
+        is_locked = data.locked[n + k] != 0.0
+        if not all_lanes(is_locked):
+            free = outer_subtracted(inertia, axis, scale(axis, spin_inertia))
+            inertia = choose_symmetric(is_locked, inertia, free)
+            free_moment = add(bias_moment, scale(axis, force[6 + n + k]))
+            bias_moment = choose_vector(is_locked, bias_moment, free_moment)
     return inertia, add(bias_moment, cross(vector(omega_inertial, 0), momentum))
 
 
@@ -77,8 +92,9 @@ def turn_wheels(model: Model, angular: Vector, force: Array, data: Data, out: Ar
     n = whole(model.joint_count)
     for k in range(whole(model.wheel_count)):
         of_base = dot(vector(data.wheel_axis[k], 0), angular)
-        if uniform(data.locked[n + k]) == 0.0:
-            out[6 + n + k] = force[6 + n + k] / model.wheel_inertia[k] - of_base
-        else:
-            out[6 + n + k] = 0.0
-            data.holding[n + k] = force[6 + n + k] - model.wheel_inertia[k] * of_base
+        is_locked = data.locked[n + k] != 0.0
+        free = force[6 + n + k] / model.wheel_inertia[k] - of_base
+        out[6 + n + k] = where(is_locked, 0.0, free)
+        if any_lane(is_locked):
+            holding = force[6 + n + k] - model.wheel_inertia[k] * of_base
+            data.holding[n + k] = where(is_locked, holding, data.holding[n + k])

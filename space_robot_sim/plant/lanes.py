@@ -1,7 +1,8 @@
 """Plants of eight flights, stepped together.
 
-Over most steps every joint slides, so that all flights take the same course (`stick_slip.glide`).
-A flight in which a joint stands, stops or breaks away is integrated by itself over that step.
+Over most steps every joint slides or stands all through, so that all flights take the same course
+(`stick_slip.glide`). A flight in which a joint stops or breaks away is integrated by itself over
+that step.
 """
 
 from __future__ import annotations
@@ -66,13 +67,13 @@ def move_lanes(memory: PlantMemory, alone: Block, start: float, period: float, f
     step = period / substeps
     for k in range(substeps):
         time = start + k * step
-        slides = glide(model, memory.environment, x, time, step, stages)
-        moves = slides & flies
+        goes_on = glide(model, memory.environment, x, time, step, stages)
+        moves = goes_on & flies
         for i in range(state_size(model)):
             x[i] = where(moves, stages.end[i], x[i])
-        if not all_lanes(slides | negated(flies)):
+        if not all_lanes(goes_on | negated(flies)):
             for lane in range(WIDTH):
-                if lane_of(flies, lane) and not lane_of(slides, lane):
+                if lane_of(flies, lane) and not lane_of(goes_on, lane):
                     _move_alone(memory, alone[lane], lane, lane_of(time, lane), step)
 
 

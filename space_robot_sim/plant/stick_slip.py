@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from space_robot_model.dynamics.model import Model
 from space_robot_msgs_py.compiled.kernels import kernel, subroutine
-from space_robot_msgs_py.compiled.lanes import negated, uniform, where, whole
+from space_robot_msgs_py.compiled.lanes import any_lane, negated, uniform, where, whole
 
 from ..environment.disturbance import disturbance_torque
 from ..environment.environment import Environment
@@ -119,7 +119,7 @@ def slip_or_stick(
 def glide(
     model: Model, environment: Environment, x: Array, time: float, period: float, stages: Stages
 ) -> bool:
-    """Write into ``stages.end`` the state after ``x`` if no joint stands, stops or breaks away.
+    """Write into ``stages.end`` the state after ``x`` if no joint stops or breaks away.
 
     In lanes, where those of the others must be found by `integrate`, flight by flight.
 
@@ -128,19 +128,24 @@ def glide(
     """
     directions, coulomb, end = stages.directions, environment.friction.coulomb, stages.end
     first, sticks = first_velocity(model), uniform(environment.friction.set_valued)
-    slides = True
-    for i in range(whole(environment.friction.count)):
+    locked, n = stages.data.locked, whole(environment.friction.count)
+    for i in range(n):
         has_friction = coulomb[i] * sticks > 0.0
         directions[i] = where(has_friction, np.sign(x[first + i]), 0.0)
-        stages.data.locked[i] = 0.0
-        slides = slides & negated(has_friction & (x[first + i] == 0.0))
+        locked[i] = where(has_friction & (x[first + i] == 0.0), 1.0, 0.0)
     disturbance = stages.disturbance[: 3 + whole(model.actuated_count)]
     disturbance_torque(environment.disturbance, time, disturbance)
     state_derivative(model, environment, x, disturbance, stages, stages.slope[0])
+    goes_on = True
+    for i in range(n):
+        breaks_away = (locked[i] != 0.0) & (abs(stages.data.holding[i]) > coulomb[i])
+        goes_on = goes_on & negated(breaks_away)
+    if not any_lane(goes_on):
+        return goes_on
     rk4_step(model, environment, x, time, period, stages)
-    for i in range(whole(environment.friction.count)):
-        slides = slides & negated(end[first + i] * directions[i] < 0.0)
-    return slides
+    for i in range(n):
+        goes_on = goes_on & negated(end[first + i] * directions[i] < 0.0)
+    return goes_on
 
 
 @kernel
