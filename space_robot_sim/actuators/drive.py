@@ -22,6 +22,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from space_robot_model.elementary.steps import in_steps
 from space_robot_model.hardware.drives import DriveSettings
 from space_robot_model.hardware.per_axis import per_axis
 from space_robot_msgs_py.compiled.kernels import kernel
@@ -102,11 +103,8 @@ def drive_torque(drive: Drive, asked: Array, applied: Array) -> None:
         applied[:] = asked
         return
     for i in range(asked.size):
-        u = asked[i]
-        step, mean_decay = drive.step[i], drive.mean_decay[i]
-        if any_lane(step > 0.0):
-            spacing = where(step > 0.0, step, 1.0)
-            u = where(step > 0.0, spacing * np.floor(u / spacing + 0.5), u)
+        mean_decay = drive.mean_decay[i]
+        u = in_steps(asked[i], drive.step[i])
         u = where(abs(u) < drive.dead_band[i], 0.0, u)
         if any_lane(mean_decay > 0.0):
             behind = drive.lagging[i] - u

@@ -11,6 +11,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from space_robot_model.elementary.steps import in_steps
 from space_robot_model.hardware.encoders import MOST_DIFFERENCED, EncoderSettings
 from space_robot_msgs_py.compiled.kernels import kernel
 from space_robot_msgs_py.compiled.lanes import where, whole
@@ -31,7 +32,7 @@ from .faults import (
     add_noise,
     coarsen,
 )
-from .noise import in_steps, row_of
+from .noise import row_of
 
 Array = NDArray[np.float64]
 

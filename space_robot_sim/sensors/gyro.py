@@ -8,6 +8,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from space_robot_model.elementary.steps import in_steps
 from space_robot_model.hardware.gyro import GyroSettings
 from space_robot_msgs_py.compiled.kernels import kernel
 from space_robot_msgs_py.compiled.records import Record, assign, shaped
@@ -17,7 +18,7 @@ from ..faults.axes import About
 from ..faults.grammar import Argument, Kind
 from ..faults.schedule import BLOCK_TICKS, ScheduledFault
 from .faults import SIGMA_RAD_PER_S, STEP_RAD_PER_S, Change, SensorFault, add_noise, coarsen
-from .noise import in_steps, row_of
+from .noise import row_of
 
 Array = NDArray[np.float64]
 

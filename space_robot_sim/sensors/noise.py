@@ -1,11 +1,8 @@
-"""What sensors make of a number: noise, and steps."""
+"""Rows of the sensors' random numbers, which are drawn in blocks of ticks."""
 
 from __future__ import annotations
 
-import numpy as np
-
 from space_robot_msgs_py.compiled.kernels import kernel
-from space_robot_msgs_py.compiled.lanes import any_lane, where
 
 from ..faults.schedule import BLOCK_TICKS
 
@@ -14,13 +11,3 @@ from ..faults.schedule import BLOCK_TICKS
 def row_of(tick: int) -> int:
     """Return the row of a tick in its block of random numbers."""
     return tick % BLOCK_TICKS
-
-
-@kernel
-def in_steps(value: float, step: float) -> float:
-    """Round ``value`` to the nearest whole multiple of ``step``; a step of 0 is none."""
-    if not any_lane(step > 0.0):
-        return value
-    spacing = where(step > 0.0, step, 1.0)
-    rounded: float = spacing * np.floor(value / spacing + 0.5)
-    return where(step > 0.0, rounded, value)

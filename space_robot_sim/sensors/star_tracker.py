@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from space_robot_model.elementary.matrices import norm
 from space_robot_model.elementary.sine import sin_cos
+from space_robot_model.elementary.steps import in_steps
 from space_robot_model.hardware.star_tracker import LEAST_RATE, MOST_UNDER_WAY, StarTrackerSettings
 from space_robot_msgs_py.compiled.kernels import kernel, subroutine
 from space_robot_msgs_py.compiled.lanes import any_lane, where, whole
@@ -20,7 +21,7 @@ from space_robot_msgs_py.samples import State
 from ..faults.grammar import Argument, Kind
 from ..faults.schedule import BLOCK_TICKS, ScheduledFault
 from .faults import SIGMA_RAD, Change, SensorFault, add_noise, coarsen
-from .noise import in_steps, row_of
+from .noise import row_of
 
 Array = NDArray[np.float64]
 
