@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from space_robot_model.elementary.sine import sin_cos
 from space_robot_msgs_py.compiled.kernels import kernel
-from space_robot_msgs_py.compiled.lane_words import as_lanes
+from space_robot_msgs_py.compiled.lane_words import as_lanes, as_numbers
 from space_robot_msgs_py.compiled.lanes import (
     WIDTH,
     all_lanes,
@@ -30,7 +30,7 @@ from space_robot_msgs_py.compiled.lanes import (
 from space_robot_msgs_py.compiled.records import Block, Record, nested, shaped
 
 Array = NDArray[np.float64]
-RESULTS = 20
+RESULTS = 22
 ANY = st.floats(width=64, allow_nan=True, allow_infinity=True, allow_subnormal=True)
 NUMBERS = arrays(np.float64, (2, WIDTH), elements=ANY)
 
@@ -60,6 +60,8 @@ def functions(x: float, y: float, out: Array) -> None:
         total += k * x
         total -= y
     out[19] = total
+    mantissa, exponent = math.frexp(where(np.isfinite(y), y, 3.0))
+    out[20], out[21] = mantissa, exponent + 0.0
 
 
 @kernel
@@ -105,8 +107,30 @@ def test_plain_numbers_have_one_lane() -> None:
     assert where(True, 1.0, 2.0) == 1.0
     assert (uniform(2.5), whole(2.9), any_lane(True), all_lanes(False)) == (2.5, 2, True, False)
     assert (negated(True), lane_of(3.0, 5), with_lane(3.0, 5, 4.0)) == (False, 3.0, 4.0)
-    with pytest.raises(TypeError, match="only kernels"):
-        as_lanes(np.zeros(8))
+    for function in (as_lanes, as_numbers):
+        with pytest.raises(TypeError, match="only kernels"):
+            function(np.zeros(8))
+
+
+@kernel
+def doubled(values: Array) -> None:
+    numbers = as_numbers(values)
+    for i in range(numbers.shape[0]):
+        for lane in range(numbers.shape[1]):
+            numbers[i, lane] *= 2.0
+
+
+@kernel
+def doubled_in_lanes(numbers: Array) -> None:
+    doubled(as_lanes(numbers))
+
+
+def test_numbers_of_lanes_and_of_floats_are_the_same_memory() -> None:
+    wide, plain = np.arange(24.0).reshape(3, WIDTH), np.arange(3.0)
+    doubled_in_lanes(wide)
+    doubled(plain)
+    assert wide.ravel().tolist() == (2.0 * np.arange(24.0)).tolist()
+    assert plain.tolist() == [0.0, 2.0, 4.0]
 
 
 @kernel
