@@ -5,9 +5,12 @@ from __future__ import annotations
 import subprocess
 import time
 from contextlib import AbstractContextManager
+from pathlib import Path
 from typing import Any
 
 import click
+import llvmlite.binding
+import numba
 import numpy as np
 
 from space_robot_control.allocation.allocation import allocate, allocation_code
@@ -24,7 +27,14 @@ from ..processes.child_process import child_process
 from .closed_loop import fly_ticks
 from .plan import Flight, FlightPlan, resolve
 
+_config: Any = numba.config
 MARK, ALLOCATION_MARK = "complete", "allocation"
+
+
+def mark_of(what: str) -> Path:
+    """Return the file whose existence says that kernels are compiled for this kind of processor."""
+    processor = _config.CPU_NAME or llvmlite.binding.get_host_cpu_name()
+    return cache_directory() / f"{what}.{processor}"
 
 
 def compile_kernels(with_allocation: bool = False) -> None:
@@ -34,7 +44,7 @@ def compile_kernels(with_allocation: bool = False) -> None:
     is for bases whose actuators are hardware.
     """
     _compile_flights()
-    mark = cache_directory() / ALLOCATION_MARK
+    mark = mark_of(ALLOCATION_MARK)
     if with_allocation and not mark.exists():
         with compiling("the allocation", allocate):
             allocation_code(is_used=True)
@@ -46,7 +56,7 @@ def _compile_flights() -> None:
 
     The controller's kernels are compiled by a second process while this one compiles the plant's.
     """
-    mark = cache_directory() / MARK
+    mark = mark_of(MARK)
     if mark.exists():
         return
     from .simulate import simulate  # nodes load kernels without it
@@ -78,7 +88,7 @@ def compiling(what: str, *kernels: Any, again: bool = False) -> AbstractContextM
 
 def load_kernels() -> None:
     """Load the kernels used by nodes from the cache, if it exists."""
-    if (cache_directory() / MARK).exists():
+    if mark_of(MARK).exists():
         flight = Flight(resolve(FlightPlan()))
         _step_plant(flight)
         _answer_and_exchange(flight)

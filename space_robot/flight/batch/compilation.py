@@ -10,7 +10,6 @@ from numba import types
 from space_robot_control.controller.kernels import ControllerMemory, apply_transfer, compute_signals
 from space_robot_control.laws import CompiledLaw, laws
 from space_robot_msgs_py.compiled.block_type import block_type
-from space_robot_msgs_py.compiled.cache import cache_directory
 from space_robot_msgs_py.compiled.lane_type import MASK, array_of_lanes
 from space_robot_msgs_py.compiled.lanes import WIDTH
 from space_robot_msgs_py.compiled.record_type import record_type
@@ -21,7 +20,7 @@ from space_robot_sim.plant.lanes import advance_lanes
 from space_robot_sim.plant.plant import PlantMemory
 
 from ...processes.child_process import child_process
-from ..compilation import compile_kernels, compiling
+from ..compilation import compile_kernels, compiling, mark_of
 from ..plan import Flight, FlightPlan, resolve
 from .batch import FlightBatch
 from .bench_loop import fly_benches, measure_benches
@@ -40,7 +39,7 @@ def compile_all() -> None:
 def compile_lanes() -> None:
     """Compile the kernels of flights that fly together, once an installation."""
     compile_kernels()
-    mark = cache_directory() / MARK
+    mark = mark_of(MARK)
     if mark.exists():
         return
     own = [law.kernel for law in laws().values() if issubclass(law, CompiledLaw)]
