@@ -105,7 +105,10 @@ def test_cleaned_up_in_flight(flying: Nodes, ground: Ground) -> None:
 def test_what_was_never_sent_is_not_lost(flying: Nodes, ground: Ground, bag: Path) -> None:
     """A controller that stood still, a plant that was ended before its last answer."""
     flying["controller"].send_signal(signal.SIGSTOP)
-    ground.until(lambda: ground.value("plant", "missed_deadlines") > 200, "missed deadlines")
+    before = ground.value("plant", "missed_deadlines")  # a busy machine misses some by itself
+    ground.until(
+        lambda: ground.value("plant", "missed_deadlines") > before + 200, "missed deadlines"
+    )
     flying["controller"].send_signal(signal.SIGCONT)
     go_on(ground, 0.1)
     for name in ("plant", "controller", "mission", "recorder"):
