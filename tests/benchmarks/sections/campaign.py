@@ -21,8 +21,8 @@ from ..result import Result, Target
 
 LAW, SEED = "tde_stc", 7
 DURATIONS_S = (5.0, 30.0)
-FLIGHTS = {5.0: 24, 30.0: 6}
-"""Of a batch."""
+FLIGHTS = {5.0: 32, 30.0: 16}
+"""Of a repetition: the same number of eights for each of two workers."""
 MANY = 4000
 """Flights over which the memory is looked at."""
 ITEMS = 5000
