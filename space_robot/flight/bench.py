@@ -22,13 +22,14 @@ from space_robot_msgs_py.config.arguments import as_numbers, as_whole_number
 from space_robot_msgs_py.config.validation import short
 from space_robot_msgs_py.errors import FlightError, InputError
 from space_robot_msgs_py.samples import Command, Reference, RobotState
-from space_robot_sim.plant.plant import Plant, PlantSnapshot
+from space_robot_sim.plant.plant import Plant, PlantSettings, PlantSnapshot
 
 from .ending import Ending
 from .plan import Flight
 
 Array = NDArray[np.float64]
 
+LARGEST_SEED = 2**31 - 1
 REFERENCE_TICKS = 1000
 """Ticks of the desired motion that are computed at once."""
 
@@ -52,6 +53,16 @@ def check_for_bench(flight: Flight) -> None:
     flight.check_in_process()
     if flight.plant_settings.has_message_faults:
         raise InputError("on the bench are no messages that could fail: fly the faults of them")
+
+
+def seeded(flight: Flight, seed: int, name: str = "seed") -> PlantSettings:
+    """Return the settings of a flight's plant with another seed of the random numbers.
+
+    Raises:
+        InputError: the seed is not a whole number from 0 to `LARGEST_SEED`; has its ``name``.
+    """
+    number = as_whole_number(seed, name, 0, LARGEST_SEED)
+    return flight.plant_settings.model_copy(update={"fault_seed": number})
 
 
 class Bench(RecordOwner):
@@ -100,10 +111,7 @@ class Bench(RecordOwner):
             InputError: the seed is not a whole number from 0 to 2147483647.
         """
         flight = self.flight
-        settings = flight.plant_settings
-        if seed is not None:
-            number = as_whole_number(seed, "seed", 0, 2**31 - 1)
-            settings = settings.model_copy(update={"fault_seed": number})
+        settings = flight.plant_settings if seed is None else seeded(flight, seed)
         self._plant = Plant(flight.robot, settings, flight.period)
         self.controller: Controller = flight.build_controller(self._law)
         """The controller, with the law in force; its signals are those of the last answer."""

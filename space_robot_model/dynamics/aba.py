@@ -22,9 +22,6 @@ from .algebra import (
     Vector,
     add,
     add_symmetric,
-    choose_matrix,
-    choose_symmetric,
-    choose_vector,
     dot,
     inverse_symmetric,
     outer_subtracted,
@@ -100,11 +97,11 @@ def aba(
             free_moment = add(bias_moment, scale(U_angular, u_over_d))
             free_force = add(bias_force, scale(U_linear, u_over_d))
             if any_lane(is_locked):
-                free = choose_symmetric(is_locked, inertia, free)
-                free_coupling = choose_matrix(is_locked, coupling, free_coupling)
-                free_mass = choose_symmetric(is_locked, mass, free_mass)
-                free_moment = choose_vector(is_locked, bias_moment, free_moment)
-                free_force = choose_vector(is_locked, bias_force, free_force)
+                free = where(is_locked, inertia, free)
+                free_coupling = where(is_locked, coupling, free_coupling)
+                free_mass = where(is_locked, mass, free_mass)
+                free_moment = where(is_locked, bias_moment, free_moment)
+                free_force = where(is_locked, bias_force, free_force)
             inertia, coupling, mass = free, free_coupling, free_mass
             bias_moment, bias_force = free_moment, free_force
         angular, linear = vector(data.coriolis[i], 0), vector(data.coriolis[i], 3)

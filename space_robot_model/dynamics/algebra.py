@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from space_robot_msgs_py.compiled.kernels import subroutine
-from space_robot_msgs_py.compiled.lanes import where
 
 Array = NDArray[np.float64]
 Vector = tuple[float, float, float]
@@ -161,39 +160,4 @@ def inverse_symmetric(s: Symmetric) -> Symmetric:
         xy * factor,
         xz * factor,
         (s[3] * s[4] - s[0] * s[5]) * factor,
-    )
-
-
-@subroutine
-def choose_vector(condition: bool, a: Vector, b: Vector) -> Vector:
-    """Return ``a if condition else b``, lane by lane."""
-    return where(condition, a[0], b[0]), where(condition, a[1], b[1]), where(condition, a[2], b[2])
-
-
-@subroutine
-def choose_symmetric(condition: bool, a: Symmetric, b: Symmetric) -> Symmetric:
-    """Return ``a if condition else b``, lane by lane."""
-    return (
-        where(condition, a[0], b[0]),
-        where(condition, a[1], b[1]),
-        where(condition, a[2], b[2]),
-        where(condition, a[3], b[3]),
-        where(condition, a[4], b[4]),
-        where(condition, a[5], b[5]),
-    )
-
-
-@subroutine
-def choose_matrix(condition: bool, a: Matrix, b: Matrix) -> Matrix:
-    """Return ``a if condition else b``, lane by lane."""
-    return (
-        where(condition, a[0], b[0]),
-        where(condition, a[1], b[1]),
-        where(condition, a[2], b[2]),
-        where(condition, a[3], b[3]),
-        where(condition, a[4], b[4]),
-        where(condition, a[5], b[5]),
-        where(condition, a[6], b[6]),
-        where(condition, a[7], b[7]),
-        where(condition, a[8], b[8]),
     )

@@ -22,19 +22,7 @@ from numpy.typing import NDArray
 from space_robot_msgs_py.compiled.kernels import kernel
 from space_robot_msgs_py.compiled.lanes import all_lanes, any_lane, where, whole
 
-from .algebra import (
-    Symmetric,
-    Vector,
-    add,
-    choose_symmetric,
-    choose_vector,
-    cross,
-    dot,
-    outer_subtracted,
-    scale,
-    store,
-    vector,
-)
+from .algebra import Symmetric, Vector, add, cross, dot, outer_subtracted, scale, store, vector
 from .model import Data, Model
 
 Array = NDArray[np.float64]
@@ -76,9 +64,9 @@ def take_wheels(
         is_locked = data.locked[n + k] != 0.0
         if not all_lanes(is_locked):
             free = outer_subtracted(inertia, axis, scale(axis, spin_inertia))
-            inertia = choose_symmetric(is_locked, inertia, free)
+            inertia = where(is_locked, inertia, free)
             free_moment = add(bias_moment, scale(axis, force[6 + n + k]))
-            bias_moment = choose_vector(is_locked, bias_moment, free_moment)
+            bias_moment = where(is_locked, bias_moment, free_moment)
     return inertia, add(bias_moment, cross(vector(omega_inertial, 0), momentum))
 
 

@@ -47,6 +47,9 @@ class _Where(AbstractTemplate):
             return None
         condition, *values = args
         result = self.context.unify_types(*(types.unliteral(value) for value in values))
+        if isinstance(result, types.UniTuple):
+            is_known = isinstance(condition, (types.Boolean, MaskType))
+            return signature(result, condition, result, result) if is_known else None
         if condition == MASK:
             result = MASK if result == types.boolean else result
             result = LANE if isinstance(result, types.Number) else result
@@ -60,7 +63,11 @@ class _Where(AbstractTemplate):
 @lower_builtin(where, MaskType, types.Any, types.Any)
 @lower_builtin(where, types.Boolean, types.Any, types.Any)
 def _where(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-    return builder.select(*args)
+    condition, *values = args
+    if not isinstance(sig.return_type, types.UniTuple):
+        return builder.select(condition, *values)
+    pairs = zip(*(cgutils.unpack_tuple(builder, value) for value in values), strict=True)
+    return cgutils.pack_array(builder, [builder.select(condition, *pair) for pair in pairs])
 
 
 def _reads_one(function: Any, of_number: Any, of_lane: Any, emit: _Build) -> None:
@@ -185,17 +192,8 @@ def _as_lanes(context: Any, builder: Any, sig: Any, args: Any) -> Any:
     data = builder.bitcast(numbers.data, LANE_VECTOR.as_pointer())
     if sig.return_type == LANE:
         return builder.load(data, align=1)
-    array = arrayobj.make_array(sig.return_type)(context, builder)
-    arrayobj.populate_array(
-        array,
-        data=data,
-        shape=cgutils.pack_array(builder, cgutils.unpack_tuple(builder, numbers.shape)[:-1]),
-        strides=cgutils.pack_array(builder, cgutils.unpack_tuple(builder, numbers.strides)[:-1]),
-        itemsize=cgutils.intp_t(8 * WIDTH),
-        meminfo=None,
-        parent=None,
-    )
-    return array._getvalue()
+    shape, strides = (cgutils.unpack_tuple(builder, p) for p in (numbers.shape, numbers.strides))
+    return _view(context, builder, sig.return_type, data, shape[:-1], strides[:-1], 8 * WIDTH)
 
 
 def as_numbers(array: Any) -> Any:
@@ -220,13 +218,24 @@ def _as_numbers(context: Any, builder: Any, sig: Any, args: Any) -> Any:
     wide = arrayobj.make_array(sig.args[0])(context, builder, value=args[0])
     width = WIDTH if sig.args[0].dtype == LANE else 1
     shape, strides = (cgutils.unpack_tuple(builder, part) for part in (wide.shape, wide.strides))
-    array = arrayobj.make_array(sig.return_type)(context, builder)
+    data = builder.bitcast(wide.data, DOUBLE.as_pointer())
+    shape, strides = [*shape, cgutils.intp_t(width)], [*strides, cgutils.intp_t(8)]
+    return _view(context, builder, sig.return_type, data, shape, strides, 8)
+
+
+def _view(
+    context: Any, builder: Any, kind: Any, data: Any, shape: Any, strides: Any, itemsize: int
+) -> Any:
+    """Emit an array of a kind over memory that another one keeps."""
+    from numba.np import arrayobj  # only the compiler needs it
+
+    array = arrayobj.make_array(kind)(context, builder)
     arrayobj.populate_array(
         array,
-        data=builder.bitcast(wide.data, DOUBLE.as_pointer()),
-        shape=cgutils.pack_array(builder, [*shape, cgutils.intp_t(width)]),
-        strides=cgutils.pack_array(builder, [*strides, cgutils.intp_t(8)]),
-        itemsize=cgutils.intp_t(8),
+        data=data,
+        shape=cgutils.pack_array(builder, shape),
+        strides=cgutils.pack_array(builder, strides),
+        itemsize=cgutils.intp_t(itemsize),
         meminfo=None,
         parent=None,
     )

@@ -16,7 +16,10 @@ WIDTH = 8
 
 
 def where(condition: bool, then: _Value, otherwise: _Value) -> _Value:
-    """Return ``then if condition else otherwise``, lane by lane; both have been computed."""
+    """Return ``then if condition else otherwise``, lane by lane; both have been computed.
+
+    The values are numbers, conditions, or tuples of numbers.
+    """
     return then if condition else otherwise
 
 

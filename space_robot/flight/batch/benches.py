@@ -10,6 +10,7 @@ Each flight has the bits of its `space_robot.flight.bench.Bench`.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -21,16 +22,15 @@ from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.samples import RobotState, State
 from space_robot_sim.plant.plant import Plant, PlantMemory, PlantSettings
 
-from ..bench import check_for_bench
+from ..bench import LARGEST_SEED, check_for_bench, seeded
 from ..ending import Ending
 from ..plan import Flight
-from .bench_loop import fly_benches, measure_benches
-from .lane_loop import InLanes
+from .bench_loop import fly_benches
+from .lane_loop import InLanes, measure_lanes
 from .lane_memory import begin_tick, delay_buffers, fill
 from .sharing import plant_key
 
 Array = NDArray[np.float64]
-LARGEST_SEED = 2**31 - 1
 
 
 class Benches:
@@ -123,16 +123,12 @@ class Benches:
         if isinstance(seed, Sequence) and not isinstance(seed, str):
             if len(seed) != count:
                 raise InputError(f"seed: {count} numbers were expected, got {len(seed)}")
-            seeds = [
-                as_whole_number(one, f"seed[{k}]", 0, LARGEST_SEED) for k, one in enumerate(seed)
+            return [
+                seeded(flight, one, f"seed[{k}]")
+                for k, (flight, one) in enumerate(zip(self.flights, seed, strict=True))
             ]
-        else:
-            first = as_whole_number(seed, "seed", 0, LARGEST_SEED - count + 1)
-            seeds = [first + k for k in range(count)]
-        return [
-            flight.plant_settings.model_copy(update={"fault_seed": number})
-            for flight, number in zip(self.flights, seeds, strict=True)
-        ]
+        first = as_whole_number(seed, "seed", 0, LARGEST_SEED - count + 1)
+        return [seeded(flight, first + k) for k, flight in enumerate(self.flights)]
 
     def _commands(self, torques: Array) -> Array:
         """Return the number (K, m+A) for each axis and actuator."""
@@ -166,28 +162,28 @@ class _BenchSet:
         self._alone: Block = np.zeros(count * WIDTH, PlantMemory.dtype(n))
         lanes = self._blocks.view(np.float64).reshape(count, -1, WIDTH)
         alone = self._alone.view(np.float64).reshape(count * WIDTH, -1)
-        self._memory = []
-        """Of each eight flights."""
+        self._memory, buffers = [], []
         for k in range(count):
             eight = slice(WIDTH * k, WIDTH * (k + 1))
             records = InLanes(self._blocks[k : k + 1], lanes[k], self._alone[eight], alone[eight])
             fill(records, self._plants[eight])
             self._memory.append(records)
-        self._buffers = np.stack(
-            [delay_buffers(self._plants[WIDTH * k : WIDTH * (k + 1)]) for k in range(count)]
-        )
+            buffers.append(delay_buffers(self._plants[eight]))
+        self._buffers = np.stack(buffers)
         self._torques = np.zeros((count * WIDTH, len(benches.names.commanded)))
         self._flies, self._fastest = np.zeros((2, count * WIDTH))
         self._flies[: len(numbers)] = 1.0
         self._next_change = np.array([plant.next_change for plant in self._plants])
         size = State.dtype(n).itemsize // 8
-        self._rows = np.zeros((count * WIDTH, size)), np.zeros((count * WIDTH, size))
-        """Numbers of the measured and of the true states."""
+        of_plant: Any = self._blocks.dtype.fields
         self._shown = [
-            block.view(np.float64).reshape(-1, size) for block in (benches.states, benches.truths)
+            (states.view(np.float64).reshape(-1, size), lanes[:, place : place + size])
+            for states, name in ((benches.states, "measured"), (benches.truths, "truth"))
+            for place in (of_plant[name][1] // (8 * WIDTH),)
         ]
-        measure_benches(self._blocks, 0, self._period, self._flies, *self._rows)
-        self._show()
+        """Rows of numbers of the measured and of the true states, and the same in lanes."""
+        everyone = np.arange(len(numbers))
+        self._show(everyone, everyone)
 
     def step(self, commands: Array) -> None:
         """Fly to the next tick; the flights that are over stand still."""
@@ -207,16 +203,16 @@ class _BenchSet:
             self._flies,
             self._fastest,
             not len(changing),
-            *self._rows,
         )
-        self._tick = tick
+        self._tick, measured = tick, flew
         if len(changing):
             for k in changing:
-                eight, lane = divmod(int(k), WIDTH)
                 if self._flies[k]:
+                    eight, lane = divmod(int(k), WIDTH)
                     begin_tick(self._plants[k], self._memory[eight], lane, tick)
-                self._next_change[k] = self._plants[k].next_change if self._flies[k] else np.inf
-            measure_benches(self._blocks, tick, self._period, self._flies, *self._rows)
+                    self._next_change[k] = self._plants[k].next_change
+            measure_lanes(self._blocks, tick, self._period)
+            measured = np.flatnonzero(self._flies)
         self._benches.ticks[self._numbers[flew]] = tick
         for k in flew[self._flies[flew] == 0.0]:
             self._plants[k].state.tick = self._plants[k].truth.tick = tick
@@ -225,13 +221,15 @@ class _BenchSet:
         if tick == self._ticks:
             for k in np.flatnonzero(self._flies):
                 self._end(int(k), Ending.complete(self._ticks, self._period))
-        self._show()
+        self._show(measured, flew)
 
-    def _show(self) -> None:
-        for shown, rows in zip(self._shown, self._rows, strict=True):
-            shown[self._numbers] = rows[: len(self._numbers)]
+    def _show(self, measured: NDArray[np.int64], flew: NDArray[np.int64]) -> None:
+        """Copy the states of flights, by lane, out of the lanes."""
+        for (rows, lanes), flights in zip(self._shown, (measured, flew), strict=True):
+            groups, within = np.divmod(flights, WIDTH)
+            rows[self._numbers[flights]] = lanes[groups, :, within]
 
     def _end(self, k: int, ending: Ending) -> None:
-        self._flies[k] = 0.0
+        self._flies[k], self._next_change[k] = 0.0, np.inf
         self._benches.done[self._numbers[k]] = True
         self._benches.endings[self._numbers[k]] = ending

@@ -23,7 +23,7 @@ from ...processes.child_process import child_process
 from ..compilation import compile_kernels, compiling, mark_of
 from ..plan import Flight, FlightPlan, resolve
 from .batch import FlightBatch
-from .bench_loop import fly_benches, measure_benches
+from .bench_loop import fly_benches
 from .benches import Benches
 from .lane_loop import fly_lanes, measure_lanes
 
@@ -43,7 +43,7 @@ def compile_lanes() -> None:
     if mark.exists():
         return
     own = [law.kernel for law in laws().values() if issubclass(law, CompiledLaw)]
-    kernels = (fly_lanes, measure_lanes, fly_benches, measure_benches, *own)
+    kernels = (fly_lanes, measure_lanes, fly_benches, *own)
     with compiling("flights that fly together", *kernels, again=True):
         with child_process(module_command(__name__)) as helper:
             _compile_controllers()

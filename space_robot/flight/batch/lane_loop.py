@@ -156,9 +156,10 @@ def fly_lanes(
 
 @kernel
 def measure_lanes(plants: Block, tick: int, period: float) -> None:
-    """Let the sensors measure ``tick``."""
-    memory = plants[0]
-    sense(memory.sensors, memory.truth, tick, period, memory.measured)
+    """Let the sensors of all plants of a block in lanes measure ``tick``."""
+    for group in range(plants.size):
+        memory = plants[group]
+        sense(memory.sensors, memory.truth, tick, period, memory.measured)
 
 
 @kernel
