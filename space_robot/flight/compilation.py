@@ -14,6 +14,7 @@ import numba
 import numpy as np
 
 from space_robot_control.allocation.allocation import allocate, allocation_code
+from space_robot_control.controller.supervisor import Supervisor
 from space_robot_control.laws import CompiledLaw, laws
 from space_robot_msgs_py.compiled.cache import cache_directory
 from space_robot_msgs_py.compiled.call_graph import count_compiled, index_files
@@ -105,7 +106,11 @@ def _answer_and_exchange(flight: Flight) -> None:
     state = RobotState.allocate(flight.robot.n)
     for topic, data in zip(states.topics, states.encode(state), strict=True):
         states.decode(topic, data, state)
-    command = flight.controller.update(state, Reference.at_rest(flight.robot.n))
+    reference = Reference.at_rest(flight.robot.n)
+    flight.controller.update(state, reference)
+    supervisor = Supervisor(flight.controller, len(flight.plant.names.commanded), hold_ticks=0)
+    supervisor.judge(0)
+    command = supervisor.answer(state, reference)
     commands.decode(commands.encode(command), command)
 
 

@@ -123,7 +123,8 @@ def _tabulate_facets(wheels: WheelSet, count: int) -> None:
             y = column[i, 2] * column[j, 0] - column[i, 0] * column[j, 2]
             z = column[i, 0] * column[j, 1] - column[i, 1] * column[j, 0]
             size, load = x * x + y * y + z * z, wheels.full_load[i] * wheels.full_load[j]
-            if not size > (LEAST_SINE * load) ** 2:  # parallel, or one of them is out
+            least = LEAST_SINE * load
+            if not size > least * least:  # parallel, or one of them is out
                 continue
             distance = 0.0
             for k in range(count):
@@ -143,7 +144,7 @@ def _tabulate_null(wheels: WheelSet, axis: Array, count: int) -> None:
     if members <= wheels.rank:
         return
     best = 0.0
-    for pattern in range(2 ** max(count - 1, 0)):
+    for pattern in range(1 << max(count - 1, 0)):
         least, largest = _null_parts(wheels, axis, count, pattern, False)
         if largest > 0.0 and least / largest > best * (1.0 + 1e-9):
             best = least / largest

@@ -34,6 +34,7 @@ from .kernels import (
     ControllerMemory,
     apply_transfer,
     compute_signals,
+    engage,
 )
 
 Array = NDArray[np.float64]
@@ -140,8 +141,7 @@ class Controller(RecordOwner):
     def engage(self) -> None:
         """Reset the law and let it take over from the applied force at the next tick."""
         self._law.reset()
-        self.signals.n_hat[:] = 0.0
-        assign(self._memory, transfer_left=-1.0)
+        engage(self.block)
 
     def move_to(self, block: Block) -> None:
         """Keep the memory in another ``block`` from now on, beside that of other flights."""
@@ -180,15 +180,18 @@ class Controller(RecordOwner):
             SingularAttitudeError: the base has turned by 180 degrees.
             LawError: the code of the law failed.
         """
-        law, command = self._law, self.last_command
+        law = self._law
         status = compute_signals(
             self.block, state.tick, state.block, reference, law.h_bar, law.uses_model, self.period
         )
         if status != USABLE:
             raise unusable(status, state.tick, state.quaternion)
-        force = force_of(law, self.signals, state.tick)
-        apply_transfer(self.block, state.tick, force, command.torque)
-        return self._allocate(state.tick)
+        return self.command_for(state.tick, force_of(law, self.signals, state.tick))
+
+    def command_for(self, tick: int, force: Array) -> Command:
+        """Return the command for the force (m,) of a law, N m, after `compute_signals`."""
+        apply_transfer(self.block, tick, force, self.last_command.torque)
+        return self._allocate(tick)
 
     def allocate_torque(self, state: RobotState, torque: Array) -> Command:
         """Return the command for a torque (m,), N m, without a law; see `update`."""

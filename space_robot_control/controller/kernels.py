@@ -102,13 +102,29 @@ def controller_tick(
     """
     status: int = compute_signals(block, tick, state, reference, law.h_bar, law.uses_model, period)
     if status == USABLE:
-        law.run(block[0].signals, law.gains[0], law.memory[0], period)
-        apply_transfer(block, tick, law.memory[0].force, torque)
-        allocation, axes = block[0].allocation, law.memory[0].force.size
-        allocate(allocation, float(tick))
-        for k in range(axes, torque.size):
-            torque[k] = allocation.command[k - axes]
+        compute_command(block, law, allocate, tick, torque, period)
     return status
+
+
+@kernel
+def compute_command(
+    block: Block, law: LawCode, allocate: RecordFunction, tick: int, torque: Array, period: float
+) -> None:
+    """Compute the command of a tick from its signals, see `controller_tick`."""
+    law.run(block[0].signals, law.gains[0], law.memory[0], period)
+    apply_transfer(block, tick, law.memory[0].force, torque)
+    allocation, axes = block[0].allocation, law.memory[0].force.size
+    allocate(allocation, float(tick))
+    for k in range(axes, torque.size):
+        torque[k] = allocation.command[k - axes]
+
+
+@kernel
+def engage(block: Block) -> None:
+    """Let a law, whose memory has been cleared, take over from the applied force."""
+    memory = block[0]
+    memory.signals.n_hat[:] = 0.0
+    memory.transfer_left = -1.0
 
 
 @kernel

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
+import numpy as np
+
 from space_robot_msgs_py.bag.law_history import LawChange
 
 from ..laws import ControlLaw
 from .law_changes import LawChanges
+from .supervision import swaps_due
 
 
 class LawChoice:
@@ -16,7 +19,10 @@ class LawChoice:
     def __init__(self, chosen: ControlLaw, swaps: Iterable[tuple[int, ControlLaw]] = ()) -> None:
         """Begin with a law; ``swaps`` are increasing ticks with the laws in force from each."""
         self._chosen = chosen
-        self._swaps = list(swaps)
+        planned = list(swaps)
+        self._ticks = np.array([tick for tick, _ in planned], dtype=np.float64)
+        self._laws = [law for _, law in planned]
+        self._made = 0
         self._changes = LawChanges()
         self._may_differ = True
         """True if law or gains may differ from the last tick answered."""
@@ -37,8 +43,10 @@ class LawChoice:
 
         Called once for each tick that is answered.
         """
-        while self._swaps and self._swaps[0][0] <= tick:
-            self.choose(self._swaps.pop(0)[1])
+        due = swaps_due(self._ticks, self._made, tick) if self._made < len(self._laws) else 0
+        if due > self._made:
+            self._made = due
+            self.choose(self._laws[due - 1])
             self.was_swapped = True
         if not self._may_differ:
             return None

@@ -21,6 +21,7 @@ from .controller import Controller
 from .gains import build_laws, check_gains, gain_lengths, gain_range, split_gains
 from .law_choice import LawChoice
 from .settings import ControllerNodeSettings
+from .supervisor import Supervisor
 from .swaps import parse_swaps
 
 
@@ -54,7 +55,9 @@ class LawSet:
         rest = RobotState.allocate(robot.n)
         for law in self._laws.values():
             controller = Controller(robot, law, self._settings.period, actuators=actuators)
-            controller.update(rest, Reference.at_rest(robot.n))
+            supervisor = Supervisor(controller, len(controller.names.commanded), hold_ticks=0)
+            supervisor.judge(rest.tick)
+            supervisor.answer(rest, Reference.at_rest(robot.n))
 
     def tell(self, change: LawChange) -> None:
         """Log a change, and let the parameter ``controller`` follow a planned swap."""

@@ -98,7 +98,7 @@ class ControllerLoop:
                 self._look_ahead(time.monotonic())
                 return self._states.wait
             tick = received
-            last = self._answering.stamps.last
+            last = self._answering.supervisor.last_stamp
             standing = self._answering.judge(tick)
             if standing is StampStatus.ANSWERED:  # the plant asked again: the same answer
                 self._command_out.publish(self._answering.answer)
@@ -120,7 +120,8 @@ class ControllerLoop:
 
     def deactivate(self) -> None:
         """Answer one more state with zero torque, which the plant holds."""
-        answering, answered = self._answering, self._answering.answered
+        answering = self._answering
+        answered = answering.supervisor.answered
         if answered >= 0 and self._node.count_publishers(self._states.inputs[0].full_name):
             until = time.monotonic() + STAND_DOWN_S
             tick = self._unanswered
@@ -144,7 +145,7 @@ class ControllerLoop:
         silence = time.monotonic() - max(self._state_at, self._paused.running_since)
         allocation = self._controller.allocation
         values: dict[str, float | int | str] = {
-            "tick": self._answering.answered,
+            "tick": supervisor.answered,
             "controller": self._controller.law.name,
             "references_held": references.held,
             **allocation.values,
@@ -154,7 +155,7 @@ class ControllerLoop:
             values |= entry.counts("rejected")
         if references.is_waited_for:
             return Health("waiting for the reference: no mission sends it", Level.WARN, values)
-        if self._answering.answered < 0:
+        if supervisor.answered < 0:
             return Health("waiting for the first state", values=values)
         if supervisor.mode is not Mode.NOMINAL:
             level = Level.ERROR if supervisor.mode is Mode.SAFE else Level.WARN
@@ -186,6 +187,6 @@ class ControllerLoop:
 
     def _believe(self, tick: int, last: int) -> None:
         """Accept a state with a plausible stamp, which may begin a new time."""
-        if self._answering.stamps.is_new_time and last >= 0:
+        if self._answering.supervisor.is_new_time and last >= 0:
             self._node.log(f"a new time begins at tick {tick}, after {last}")
         self._state_at = time.monotonic()

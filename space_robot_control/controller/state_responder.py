@@ -13,24 +13,27 @@ from space_robot_msgs_py.wire.codecs import CommandCodec
 from space_robot_msgs_py.wire.controller_law import NODE, LawCodec
 from space_robot_msgs_py.wire.controller_signals import SignalsCodec
 from space_robot_msgs_py.wire.controller_telemetry import TelemetryCodec
-from space_robot_msgs_py.wire.stamp_guard import StampGuard
 
 from .controller import Controller
 from .law_choice import LawChoice
 from .reference_buffer import ReferenceBuffer
 from .settings import ControllerNodeSettings
+from .supervision import ANSWERED, NEW, REFUSED
 from .supervisor import Supervisor
 
 
 class StampStatus(Enum):
     """Status of a received state by its stamp."""
 
-    ANSWERED = "answered"
+    ANSWERED = ANSWERED
     """The state was answered last; the plant repeats its request."""
-    NEW = "new"
+    NEW = NEW
     """The state is to be answered."""
-    REFUSED = "refused"
+    REFUSED = REFUSED
     """The stamp of the state is not plausible."""
+
+
+STANDINGS = tuple(StampStatus)
 
 
 class StateResponder:
@@ -50,15 +53,14 @@ class StateResponder:
         """
         self._controller, self._laws, self._references = controller, laws, references
         names = controller.names
-        self.supervisor = Supervisor(controller, len(names.commanded), settings.hold_ticks)
-        self.stamps = StampGuard(settings.longest_jump)
+        self.supervisor = Supervisor(
+            controller, len(names.commanded), settings.hold_ticks, settings.longest_jump
+        )
         self._commands = CommandCodec(names.commanded, settings.timebase)
         self._telemetry = TelemetryCodec(names.axes)
         self._signals = SignalsCodec(names.axes, settings.timebase)
         self._law = LawCodec(settings.timebase, node)
         self._telemetry_decimation = settings.telemetry_decimation
-        self.answered = -1
-        """Last tick answered; -1: none."""
         self.answer = b""
         """Command for that tick, as it was sent."""
         self.change: LawChange | None = None
@@ -66,16 +68,14 @@ class StateResponder:
 
     def judge(self, tick: int) -> StampStatus:
         """Return the status of a received state of ``tick``."""
-        if tick == self.answered:
-            return StampStatus.ANSWERED
-        if tick == self.stamps.last:
-            return StampStatus.NEW
-        if not self.stamps.passes(tick):
-            return StampStatus.REFUSED
-        if self.stamps.is_new_time:
-            self._references.begin(tick)
-        self._references.now = tick
-        return StampStatus.NEW
+        supervisor = self.supervisor
+        last = supervisor.last_stamp
+        standing = STANDINGS[supervisor.judge(tick)]
+        if standing is StampStatus.NEW and tick != last:
+            if supervisor.is_new_time:
+                self._references.begin(tick)
+            self._references.now = tick
+        return standing
 
     def messages(
         self, tick: int, state: RobotState, reference: Block
@@ -92,7 +92,6 @@ class StateResponder:
                 controller.law = laws.chosen
         state.tick = tick
         self.answer = self.encode(self.supervisor.answer(state, reference))
-        self.answered = tick
         yield topics.COMMAND, self.answer
         if tick % self._telemetry_decimation == 0:
             s, u, n_hat, e = controller.telemetry()

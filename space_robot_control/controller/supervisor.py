@@ -5,7 +5,7 @@
 
 Holding repeats the last good torque, but closes the valves of thrusters: how long a pulse is to be
 is not known there. Safe commands none. Coming back, the law takes over from the
-applied force (`Controller.engage`).
+applied force (`Controller.engage`). All of it happens in the kernels of `.supervision`.
 """
 
 from __future__ import annotations
@@ -14,23 +14,23 @@ from collections import Counter
 from enum import Enum
 
 import numpy as np
-from numpy.typing import NDArray
 
-from space_robot_model.elementary.matrices import norm
-from space_robot_msgs_py.compiled.records import Block
-from space_robot_msgs_py.errors import SingularAttitudeError, UnusableStateError
+from space_robot_msgs_py.compiled.records import Block, assign
 from space_robot_msgs_py.samples import Command, RobotState
 
-from .controller import Controller
-from .kernels import NORM_TOLERANCE
-from .time_delay_estimation import LONGEST_GAP
-
-Array = NDArray[np.float64]
-
-SAFE_BELOW_ETA = 0.02
-"""|eta| below which the mode is safe, since the torques grow without bound: 177.7 degrees."""
-NOMINAL_FROM_ETA = 0.05
-"""|eta| from which it is nominal again: 174.3 degrees."""
+from ..laws.checked import force_of
+from ..laws.compiled import CompiledLaw, LawCode
+from .controller import Controller, unusable
+from .kernels import USABLE
+from .supervision import (
+    STATUSES,
+    Supervision,
+    admit_state,
+    answer_state,
+    conclude,
+    judge,
+    takes_over,
+)
 
 
 class Mode(Enum):
@@ -41,60 +41,108 @@ class Mode(Enum):
     SAFE = "safe"
 
 
+MODES = tuple(Mode)
+KINDS = tuple(unusable(status, 0, np.zeros(4)).kind for status in range(STATUSES))
+"""What is wrong with a state, in a word or two, by its status."""
+
+
 class Supervisor:
     """Supervisor that answers every state, with the controller's command if it is safe."""
 
-    def __init__(self, controller: Controller, axes: int, hold_ticks: int) -> None:
+    def __init__(
+        self, controller: Controller, axes: int, hold_ticks: int, longest_jump: int = 2000
+    ) -> None:
+        """Supervise a controller.
+
+        Args:
+            controller: which computes the commands.
+            axes: of a command: axes of the robot, then actuators of its base.
+            hold_ticks: invalid states for which the last torque is held.
+            longest_jump: largest number of ticks from one state to the next.
+        """
         self.controller = controller
-        self.mode = Mode.NOMINAL
-        self.reason = ""
+        self.block = Supervision.block(len(controller.names.joints))
+        """The `Supervision`."""
+        self._record: Supervision = self.block[0]
+        assign(
+            self._record,
+            hold_ticks=hold_ticks,
+            first_valve=controller.valves.start,
+            answered=-1.0,
+            last_tick=-1.0,
+        )
+        assign(self._record.stamps, longest_jump=longest_jump, last=-1.0, other=-1.0)
+        self._command = Command(-1, self._record.command[:axes])
+        self._law: CompiledLaw | None = None
+        self._code: LawCode
+
+    @property
+    def mode(self) -> Mode:
+        """Mode of the last answer."""
+        return MODES[int(self._record.mode)]
+
+    @property
+    def reason(self) -> str:
         """Reason why the mode is not nominal."""
-        self.rejected: Counter[str] = Counter()
+        return "" if self._record.reason == USABLE else KINDS[int(self._record.reason)]
+
+    @property
+    def rejected(self) -> Counter[str]:
         """States not used, by reason."""
-        self._hold_ticks = hold_ticks
-        self._command = Command(-1, np.zeros(axes))
-        self._last_tick = -1
-        self._held_since = 0
+        counts = zip(KINDS, self._record.rejected, strict=True)
+        return Counter({kind: int(count) for kind, count in counts if count})
+
+    @property
+    def answered(self) -> int:
+        """Last tick answered; -1: none."""
+        return int(self._record.answered)
+
+    @property
+    def last_stamp(self) -> int:
+        """Last tick whose stamp was plausible; -1: none."""
+        return int(self._record.stamps.last)
+
+    @property
+    def is_new_time(self) -> bool:
+        """True if that tick started a new time."""
+        return bool(self._record.stamps.is_new_time)
+
+    def judge(self, tick: int) -> int:
+        """Return the standing of a state by its stamp, see `.supervision.judge`."""
+        return judge(self.block, tick)
 
     def answer(self, state: RobotState, reference: Block) -> Command:
-        """Return the command for a state, from the law or safe; see `Controller.update`."""
-        controller = self.controller
-        if self.mode is Mode.SAFE or not 0 < state.tick - self._last_tick <= LONGEST_GAP:
+        """Return the command for a state, from the law or safe; see `Controller.update`.
+
+        Raises:
+            LawError: the code of the law failed.
+        """
+        controller, tick, command = self.controller, state.tick, self._command
+        law = controller.law
+        if takes_over(self.block, tick):
             controller.engage()
-        try:
-            eta = abs(state.quaternion[0])
-            least = NOMINAL_FROM_ETA if self.mode is Mode.SAFE else SAFE_BELOW_ETA
-            if eta < least and _is_unit(state.quaternion):
-                raise SingularAttitudeError(state.tick, float(state.quaternion[0]))
-            self._command = controller.update(state, reference)
-        except UnusableStateError as error:
-            return self._safe_command(error)
-        self._last_tick = state.tick
-        self.mode, self.reason = Mode.NOMINAL, ""
-        return self._command
+        inputs = tick, state.block, reference, controller.period
+        if isinstance(law, CompiledLaw):
+            answer_state(
+                self.block, controller.block, self._code_of(law), controller.allocate, *inputs
+            )
+        else:
+            status = admit_state(self.block, controller.block, law.h_bar, law.uses_model, *inputs)
+            if status == USABLE:
+                force = force_of(law, controller.signals, tick)
+                command.torque[:] = controller.command_for(tick, force).torque
+            conclude(self.block, tick, status)
+        command.tick = tick
+        return command
 
     def deactivate(self, tick: int) -> Command:
         """Return the zero-torque command that ends a flight."""
-        self._command = Command(tick, np.zeros_like(self._command.torque))
-        self._last_tick = -1
+        self._command.torque[:] = 0.0
+        self._command.tick = tick
+        assign(self._record, last_tick=-1.0)
         return self._command
 
-    def _safe_command(self, error: UnusableStateError) -> Command:
-        self.rejected[error.kind] += 1
-        self.reason = error.kind
-        if self.mode is Mode.NOMINAL:
-            self.mode, self._held_since = Mode.HOLDING, error.tick
-            self._command = Command(error.tick, self._command.torque.copy())
-            self._command.torque[self.controller.valves] = 0.0
-        self._command.tick = error.tick
-        is_singular = isinstance(error, SingularAttitudeError)
-        if is_singular or not 0 <= error.tick - self._held_since < self._hold_ticks:
-            self.mode = Mode.SAFE
-            self._command.torque[:] = 0.0
-        return self._command
-
-
-def _is_unit(quaternion: Array) -> bool:
-    """Return True if the quaternion is close enough to unit norm."""
-    length = norm(quaternion)
-    return abs(length * length - 1.0) <= NORM_TOLERANCE
+    def _code_of(self, law: CompiledLaw) -> LawCode:
+        if self._law is not law:
+            self._law, self._code = law, law.code
+        return self._code

@@ -83,8 +83,11 @@ def to_rho_space(quaternion: Array, out: RhoSpaceModel) -> None:
         for k in range(3):
             bias[i] -= inertia[i, k] * moved[k]
     for j in range(size):
-        convective[:] = inertia[:3, j]
-        rotate(out.to_force, convective, inertia[:3, j])
+        for k in range(3):
+            convective[k] = inertia[k, j]
+        rotate(out.to_force, convective, moved)
+        for k in range(3):
+            inertia[k, j] = moved[k]
     for i in range(size):
         convective[:] = inertia[i, :3]
         rotate(out.to_force, convective, inertia[i, :3])

@@ -1,6 +1,6 @@
 """Sine and cosine in plain Python, without compilation.
 
-For compiled code and arrays, `sine` compiles the same function, with the same bits.
+For compiled code and arrays, `sine` compiles the same function as a ``@kernel``: the same bits.
 """
 
 from __future__ import annotations

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 AGREEING = 5
 """Number of consecutive consistent stamps after which a new time is accepted."""
 
@@ -15,22 +17,36 @@ class StampGuard:
 
     def __init__(self, longest_jump: int) -> None:
         """Create the guard; ``longest_jump`` is the largest accepted step in ticks."""
-        self._longest_jump = longest_jump
+        self.longest_jump = longest_jump
         self.last = -1
         """Last accepted tick; -1 before the first."""
         self.is_new_time = False
         """True if the last accepted tick started a new time."""
-        self._other = -1
-        self._agreeing = 0
+        self.other = -1
+        """Last rejected tick."""
+        self.agreeing = 0
+        """Number of consistent ticks that were rejected one after the other."""
 
     def passes(self, tick: int) -> bool:
         """Return True if ``tick`` is accepted; it is then the last one."""
-        follows = 0 < tick - self.last <= self._longest_jump
-        if not follows and self.last >= 0:
-            agrees = self._agreeing and 0 <= tick - self._other <= self._longest_jump
-            self._agreeing = self._agreeing + 1 if agrees else 1
-            self._other = tick
-            if self._agreeing < AGREEING:
-                return False
-        self.last, self._agreeing, self.is_new_time = tick, 0, not follows
-        return True
+        return accept(self, tick)
+
+
+def accept(guard: Any, tick: int) -> bool:
+    """Return whether ``tick`` is accepted by a `StampGuard`, or by a record of its attributes.
+
+    Plain Python; the controller compiles it as a ``@kernel``.
+    """
+    step = tick - guard.last
+    follows = step > 0 and step <= guard.longest_jump
+    if not follows and guard.last >= 0:
+        since = tick - guard.other
+        agrees = guard.agreeing > 0 and since >= 0 and since <= guard.longest_jump
+        guard.agreeing = guard.agreeing + 1 if agrees else 1
+        guard.other = tick
+        if guard.agreeing < AGREEING:
+            return False
+    guard.last = tick
+    guard.agreeing = 0
+    guard.is_new_time = not follows
+    return True

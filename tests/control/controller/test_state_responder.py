@@ -130,7 +130,7 @@ def test_the_law_is_told_before_the_command_and_telemetry_after_it(
         telemetry = [topics.TELEMETRY, topics.SIGNALS] if tick % DECIMATION == 0 else []
         assert sent == [*([topics.LAW] if is_news else []), topics.COMMAND, *telemetry]
         assert (bench.answering.change is not None) == is_news
-        assert (command.tick, bench.answering.answered) == (tick, tick)
+        assert (command.tick, bench.answering.supervisor.answered) == (tick, tick)
         assert bench.controller.law.name == ("ctc" if tick < first + 3 else "tde_stc")
         if tick == first + 3:
             np.testing.assert_allclose(command.torque, 0.1, atol=1e-9)

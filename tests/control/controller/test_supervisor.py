@@ -12,12 +12,8 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from space_robot_control.controller.controller import Controller
-from space_robot_control.controller.supervisor import (
-    NOMINAL_FROM_ETA,
-    SAFE_BELOW_ETA,
-    Mode,
-    Supervisor,
-)
+from space_robot_control.controller.supervision import NOMINAL_FROM_ETA, SAFE_BELOW_ETA
+from space_robot_control.controller.supervisor import Mode, Supervisor
 from space_robot_control.controller.time_delay_estimation import LONGEST_GAP
 from space_robot_model.robot import Robot
 from space_robot_msgs_py.samples import STATE_FIELDS, Reference, RobotState

@@ -1,0 +1,211 @@
+"""Supervision of a controller in one record: kernels that answer every state, good or bad.
+
+They call nothing of Python and know no ROS, so they are what flies, compiled here or as C.
+`.supervisor` explains the modes.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from space_robot_msgs_py.compiled.kernels import RecordFunction, kernel
+from space_robot_msgs_py.compiled.records import Block, Record, nested, shaped
+from space_robot_msgs_py.samples import MOST_THRUSTERS, MOST_WHEELS
+from space_robot_msgs_py.wire.stamp_guard import accept
+
+from ..laws.compiled import LawCode
+from .kernels import NORM_TOLERANCE, SINGULAR, USABLE, compute_command, compute_signals
+from .time_delay_estimation import LONGEST_GAP
+
+Array = NDArray[np.float64]
+
+NOMINAL, HOLDING, SAFE = range(3)
+"""The modes of commands."""
+ANSWERED, NEW, REFUSED = range(3)
+"""A received state by its stamp: answered last; to be answered; not plausible."""
+LAST_TICK = 1 << 52
+"""Largest tick that is answered: up to here a float has every integer."""
+STATUSES = 5
+"""Number of different statuses of a state."""
+SAFE_BELOW_ETA = 0.02
+"""|eta| below which the mode is safe, since the torques grow without bound: 177.7 degrees."""
+NOMINAL_FROM_ETA = 0.05
+"""|eta| from which it is nominal again: 174.3 degrees."""
+
+
+class Stamps(Record):
+    """Check of the stamps of states, see `StampGuard`."""
+
+    longest_jump: float = shaped(lambda n: ())
+    """Largest accepted step, ticks."""
+    last: float = shaped(lambda n: ())
+    """Last accepted tick; -1 before the first."""
+    is_new_time: float = shaped(lambda n: ())
+    """1 if the last accepted tick started a new time, else 0."""
+    other: float = shaped(lambda n: ())
+    """Last rejected tick."""
+    agreeing: float = shaped(lambda n: ())
+    """Number of consistent ticks that were rejected one after the other."""
+
+
+class Supervision(Record):
+    """Settings and memory of a supervisor."""
+
+    hold_ticks: float = shaped(lambda n: ())
+    """Invalid states for which the last torque is held."""
+    first_valve: float = shaped(lambda n: ())
+    """Index of the first thruster in ``command``."""
+    stamps: Stamps = nested(Stamps)
+    answered: float = shaped(lambda n: ())
+    """Last tick answered; -1: none."""
+    mode: float = shaped(lambda n: ())
+    """`NOMINAL`, `HOLDING` or `SAFE`."""
+    reason: float = shaped(lambda n: ())
+    """Status of the last state that was not usable; `USABLE` in nominal mode."""
+    last_tick: float = shaped(lambda n: ())
+    """Last tick answered by the law; -1: none."""
+    held_since: float = shaped(lambda n: ())
+    """Tick at which holding began."""
+    rejected: Array = shaped(lambda n: (STATUSES,))
+    """Number of states not used, by status."""
+    command: Array = shaped(lambda n: (n + 3 + MOST_WHEELS + MOST_THRUSTERS,))
+    """Answer to the last state: torque of every axis, N m, then what is asked of each of the
+    base's actuators, N m and N."""
+
+
+accept_stamp = kernel(accept)
+"""`accept`, compiled."""
+
+
+@kernel
+def judge(block: Block, tick: int) -> int:
+    """Return `ANSWERED`, `NEW` or `REFUSED` for a state of ``tick``."""
+    supervision = block[0]
+    if tick < 0 or tick > LAST_TICK:
+        return REFUSED
+    if tick == supervision.answered:
+        return ANSWERED
+    if tick == supervision.stamps.last or accept_stamp(supervision.stamps, tick):
+        return NEW
+    return REFUSED
+
+
+@kernel
+def swaps_due(ticks: Array, made: int, tick: int) -> int:
+    """Return how many swaps are due at ``tick``; ``made`` have been.
+
+    Args:
+        ticks: (k,) of the swaps, increasing.
+        made: number of those already made.
+        tick: that is to be answered.
+    """
+    due = made
+    while due < ticks.size and ticks[due] <= tick:
+        due += 1
+    return due
+
+
+@kernel
+def takes_over(block: Block, tick: int) -> bool:
+    """Return whether the law has to take over at ``tick``: after safe mode, a gap, at the start."""
+    supervision = block[0]
+    gap = tick - supervision.last_tick
+    return bool(supervision.mode == SAFE or gap < 1.0 or gap > LONGEST_GAP)
+
+
+@kernel
+def answer_state(
+    block: Block,
+    controller: Block,
+    law: LawCode,
+    allocate: RecordFunction,
+    tick: int,
+    state: Block,
+    reference: Block,
+    period: float,
+) -> int:
+    """Write the command for a state, from the law or safe, into ``command`` of the supervision.
+
+    Args:
+        block: of the `Supervision`.
+        controller: of the `ControllerMemory`.
+        law: a `CompiledLaw.code`.
+        allocate: an `allocation_code`.
+        tick: of the state.
+        state: of a `State`.
+        reference: of a `Reference`.
+        period: s.
+
+    Returns:
+        The status of the state.
+    """
+    status = admit_state(
+        block, controller, law.h_bar, law.uses_model, tick, state, reference, period
+    )
+    if status == USABLE:
+        compute_command(controller, law, allocate, tick, block[0].command, period)
+    conclude(block, tick, status)
+    return status
+
+
+@kernel
+def admit_state(
+    block: Block,
+    controller: Block,
+    h_bar: Array,
+    uses_model: bool,
+    tick: int,
+    state: Block,
+    reference: Block,
+    period: float,
+) -> int:
+    """Compute the signals of a state that is usable, and not too near to 180 degrees.
+
+    Args: see `compute_signals`.
+
+    Returns:
+        The status of the state.
+    """
+    quaternion = state[0].quaternion
+    least = NOMINAL_FROM_ETA if block[0].mode == SAFE else SAFE_BELOW_ETA
+    if abs(quaternion[0]) < least and is_unit(quaternion):
+        return SINGULAR
+    status: int = compute_signals(controller, tick, state, reference, h_bar, uses_model, period)
+    return status
+
+
+@kernel
+def is_unit(quaternion: Array) -> bool:
+    """Return whether a quaternion is close enough to unit norm."""
+    total = 0.0
+    for k in range(4):
+        total += quaternion[k] * quaternion[k]
+    length = math.sqrt(total)
+    return bool(abs(length * length - 1.0) <= NORM_TOLERANCE)
+
+
+@kernel
+def conclude(block: Block, tick: int, status: int) -> None:
+    """End the answer to a state of a ``status``: the law's command, or a safe one."""
+    supervision = block[0]
+    supervision.answered = tick
+    supervision.reason = status
+    if status == USABLE:
+        supervision.last_tick = tick
+        supervision.mode = NOMINAL
+        return
+    command = supervision.command
+    supervision.rejected[status] += 1.0
+    if supervision.mode == NOMINAL:
+        supervision.mode = HOLDING
+        supervision.held_since = tick
+        for k in range(int(supervision.first_valve), command.size):
+            command[k] = 0.0
+    held = tick - supervision.held_since
+    if status == SINGULAR or held < 0.0 or held >= supervision.hold_ticks:
+        supervision.mode = SAFE
+        for k in range(command.size):
+            command[k] = 0.0
