@@ -170,7 +170,7 @@ def _allocate_thrusters(allocation: Allocation, tick: int) -> None:
 
 
 @kernel
-def _leave_alone(allocation: Allocation, tick: float) -> None:
+def leave_alone(allocation: Allocation, tick: float) -> None:
     """Do nothing: allocation of a base without actuator hardware."""
 
 
@@ -181,4 +181,4 @@ def allocation_code(is_used: bool) -> RecordFunction:
     Given as a value it is compiled once, and not into every loop; without hardware not at all.
     """
     record = (Allocation,)
-    return RecordFunction(allocate if is_used else _leave_alone, record, record)
+    return RecordFunction(allocate if is_used else leave_alone, record, record)

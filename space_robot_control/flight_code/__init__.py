@@ -1,0 +1,1 @@
+"""Export of the flight software as C99 that computes the same bits."""

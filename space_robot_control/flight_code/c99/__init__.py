@@ -1,0 +1,1 @@
+"""Translator of kernels, a small part of Python, to C99."""

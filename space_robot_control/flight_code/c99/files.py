@@ -1,0 +1,260 @@
+"""The text of a translated program: structs, constants, prototypes, and functions by room."""
+
+from __future__ import annotations
+
+import ast
+import inspect
+import re
+import textwrap
+from collections.abc import Callable, Iterable, Sequence
+from functools import cache
+from typing import Any
+
+from space_robot_msgs_py.compiled.records import Field as RecordField
+from space_robot_msgs_py.compiled.records import Record
+
+from .functions import Function, syntax_of
+from .language import PREFIX, ArrayOf, BlockOf, Field, Pointer, TupleOf, Type, literal
+from .program import Constant, Program
+
+WIDTH = 100
+"""Longest line."""
+
+
+def comment(text: str, indent: str = "") -> str:
+    """Return a comment, wrapped."""
+    lines = inspect.cleandoc(re.sub(r"`+", "", text).replace("*/", "* /")).splitlines()
+    if len(lines) == 1 and len(indent) + len(lines[0]) + 6 <= WIDTH:
+        return f"{indent}/* {lines[0]} */\n"
+    body = "".join(f"{indent} * {line}".rstrip() + "\n" for line in lines)
+    return f"{indent}/*\n{body}{indent} */\n"
+
+
+def wrapped(line: str) -> str:
+    """Return a line of code, broken between words where it is too long."""
+    if len(line) <= WIDTH:
+        return line
+    indent = line[: len(line) - len(line.lstrip())]
+    bound = re.sub(r"(const|static|return|\w+_\w+|double) (?=[*\w])", "\\1\0", line.strip())
+    parts = textwrap.wrap(
+        bound,
+        WIDTH - len(indent),
+        subsequent_indent="    ",
+        break_long_words=False,
+        break_on_hyphens=False,
+    )
+    return "\n".join(f"{indent}{part}" for part in parts).replace("\0", " ")
+
+
+@cache
+def descriptions(record: type[Record]) -> dict[str, str]:
+    """Return what is said about each field of a record, in its class and in those above."""
+    found: dict[str, str] = {}
+    for owner in reversed(record.__mro__):
+        if not issubclass(owner, Record) or owner is Record:
+            continue
+        tree: Any = ast.parse(textwrap.dedent(inspect.getsource(owner))).body[0]
+        for this, after in zip(tree.body, [*tree.body[1:], None], strict=True):
+            if isinstance(this, ast.AnnAssign) and isinstance(this.target, ast.Name):
+                if isinstance(after, ast.Expr) and isinstance(after.value, ast.Constant):
+                    found[this.target.id] = str(after.value.value)
+        for name, field in owner.fields().items():
+            if isinstance(field, RecordField) and field.description:
+                found.setdefault(name, f"{field.description}.")
+    return found
+
+
+class Files:
+    """Writer of a program's files."""
+
+    def __init__(
+        self,
+        program: Program,
+        first: Sequence[Function],
+        whole: Iterable[type[Record]],
+        room_of: Callable[[str], str],
+    ) -> None:
+        """Take the functions that are reached from the ``first`` ones.
+
+        Args:
+            program: that they are part of.
+            first: called from outside.
+            whole: records whose fields are all kept; others have those that are used.
+            room_of: returns the file, without its ending, of a Python module's functions.
+        """
+        self.program, self.room_of = program, room_of
+        self.functions = program.reachable(first)
+        self.fields = program.fields_of(self.functions)
+        for record in whole:
+            self.fields |= {Field(record, name) for name in record.fields()}
+        self._names = self._function_names()
+        self._constants = self._constant_names()
+
+    def has(self, record: type[Record], name: str) -> bool:
+        """Return whether a field is part of the exported struct."""
+        declared = record.fields()[name]
+        if not isinstance(declared, RecordField):
+            return any(self.has(declared, inner) for inner in declared.fields())
+        return Field(record, name) in self.fields and 0 not in self.program.shape(record, name)
+
+    def name_of(self, function: Function) -> str:
+        """Return a function's name in C."""
+        return self._names[self.program.functions.index(function)]
+
+    def final(self, text: str) -> str:
+        """Return a text with its final names."""
+        return self.program.final(text, self._names, self._constants)
+
+    def struct(self, record: type[Record]) -> str:
+        """Return the definition of a record's struct, without those of its nested records."""
+        said = descriptions(record)
+        text = comment(inspect.getdoc(record) or record.__name__)
+        text += "typedef struct {\n"
+        for name, field in record.fields().items():
+            if not self.has(record, name):
+                continue
+            text += comment(said[name], "    ") if name in said else ""
+            if isinstance(field, RecordField):
+                sizes = "".join(f"[{size}]" for size in self.program.shape(record, name))
+                text += f"    double {name}{sizes};\n"
+            else:
+                text += f"    {self.program.struct_name(field)} {name};\n"
+        return f"{text}}} {self.program.struct_name(record)};\n"
+
+    def structs(self, roots: Iterable[type[Record]]) -> str:
+        """Return the definitions of records and of all nested in them."""
+        done: list[type[Record]] = []
+
+        def visit(record: type[Record]) -> None:
+            for name, field in record.fields().items():
+                if not isinstance(field, RecordField) and self.has(record, name):
+                    visit(field)
+            if record not in done:
+                done.append(record)
+
+        for root in roots:
+            visit(root)
+        return "\n".join(self.struct(record) for record in done)
+
+    def tuples(self) -> str:
+        """Return the definitions of the structs that stand for tuples."""
+        used = "\n".join(self.prototype(f) + "\n".join(f.lines) for f in self.functions)
+        text = ""
+        for kind, name in self.program.tuples.items():
+            if not re.search(rf"\b{name}\b", used):
+                continue
+            text += "typedef struct {\n"
+            if kind.is_uniform:
+                text += f"    double at[{len(kind.items)}];\n"
+            else:
+                for k, item in enumerate(kind.items):
+                    inner = (
+                        self.program.tuple_name(item) if isinstance(item, TupleOf) else item.name
+                    )
+                    text += f"    {inner} item_{k};\n"
+            text += f"}} {name};\n\n"
+        return text
+
+    def constants(self) -> str:
+        """Return the definitions of the constants that are read."""
+        lines = []
+        for constant in sorted(self.program.constants_of(self.functions)):
+            name = self._constants[self.program.number_of_constant(constant)]
+            value = literal(constant.number)
+            value = f"({value})" if value.startswith("-") else value
+            lines.append(f"#define {name} {value}\n")
+        return "".join(lines)
+
+    def prototype(self, function: Function) -> str:
+        """Return a function's head."""
+        parameters = ", ".join(
+            self._parameter(p.name, p.type, p.is_written) for p in function.parameters
+        )
+        kind = function.result
+        result = self.program.tuple_name(kind) if isinstance(kind, TupleOf) else kind.name
+        return f"{result} {self.name_of(function)}({parameters or 'void'})"
+
+    def prototypes(self) -> str:
+        """Return the declarations of the functions that several files call."""
+        shared = [f for f in self.functions if not self._is_local(f)]
+        return "".join(f"{wrapped(self.prototype(f))};\n" for f in shared)
+
+    def rooms(self) -> dict[str, str]:
+        """Return the functions by file."""
+        texts: dict[str, str] = {}
+        for function in self.functions:
+            room = self.room_of(function.body.__module__)
+            texts[room] = texts.get(room, "") + "\n" + self._definition(function)
+        return texts
+
+    def _definition(self, function: Function) -> str:
+        tree, file = syntax_of(function.body)
+        said = ast.get_docstring(tree) or tree.name
+        line = function.body.__code__.co_firstlineno
+        text = comment(f"{said}\n\nPython: {tree.name}, {file}, line {line}.")
+        text += wrapped(
+            f"{'static ' if self._is_local(function) else ''}{self.prototype(function)}"
+        )
+        lines = (wrapped(self.final(line)) for line in function.lines)
+        return "\n".join([text, "{", *lines, "}", ""])
+
+    def _parameter(self, name: str, kind: Type, is_written: bool) -> str:
+        const = "" if is_written else "const "
+        if isinstance(kind, (Pointer, BlockOf)):
+            return f"{const}{self.program.struct_name(kind.record)} *{name}"
+        if isinstance(kind, ArrayOf):
+            sizes = "".join(f"[{size}]" for size in kind.shape[1:])
+            first = "" if kind.shape[0] is None else kind.shape[0]
+            return f"{const if not sizes else ''}double {name}[{first}]{sizes}"
+        if isinstance(kind, TupleOf):
+            return f"{self.program.tuple_name(kind)} {name}"
+        return f"{kind.name} {name}"
+
+    def _is_local(self, function: Function) -> bool:
+        """Return whether only its own file calls a function."""
+        number = self.program.functions.index(function)
+        home = self.room_of(function.body.__module__)
+        callers = [
+            caller
+            for caller in self.functions
+            if f"\N{CURRENCY SIGN}{number}(" in "\n".join(caller.lines)
+        ]
+        return bool(callers) and all(self.room_of(c.body.__module__) == home for c in callers)
+
+    def _function_names(self) -> dict[int, str]:
+        """Return names by number: the kernel's, with its module's or its law's where several are."""
+        bare = {f: f.body.__name__.lstrip("_") for f in self.functions}
+        names: dict[int, str] = {}
+        taken: set[str] = set()
+        for function in self.functions:
+            alike = [f for f in self.functions if bare[f] == bare[function]]
+            name = bare[function]
+            if len({f.body for f in alike}) > 1:
+                name = f"{function.body.__module__.rpartition('.')[2]}_{name}"
+            if (
+                len(alike) > 1
+                and function.label
+                and sum(f.body is function.body for f in alike) > 1
+            ):
+                name = f"{name}_{function.label}"
+            fresh, count = name, 1
+            while fresh in taken:
+                count += 1
+                fresh = f"{name}_{count}"
+            taken.add(fresh)
+            names[self.program.functions.index(function)] = f"{PREFIX}{fresh}"
+        return names
+
+    def _constant_names(self) -> dict[int, str]:
+        """Return names by number: the constant's, with its module's where several are."""
+        found = self.program.constants_of(self.functions)
+        names = {}
+        for constant in found:
+            name = constant.name
+            if sum(other.name == name for other in found) > 1:
+                name = f"{self.program.modules[constant].rpartition('.')[2].upper()}_{name}"
+            names[self.program.number_of_constant(constant)] = f"{PREFIX.upper()}{name}"
+        return names
+
+
+__all__ = ["Constant", "Files", "comment", "descriptions", "wrapped"]

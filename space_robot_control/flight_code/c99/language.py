@@ -1,0 +1,229 @@
+"""Types and values of the kernels' language, and how they are written in C."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple
+
+from space_robot_msgs_py.compiled.records import Record
+from space_robot_msgs_py.errors import InputError
+
+PREFIX = "sr_"
+"""Of every name that a linker sees."""
+TERNARY, OR, AND, BITS, EQUAL, RELATION, SHIFT, SUM, PRODUCT, UNARY, POSTFIX, ATOM = range(12)
+"""Ranks of C's operators; a higher one binds tighter."""
+
+
+class NotInSubsetError(InputError):
+    """A construct that has no translation to C."""
+
+    def __init__(self, file: str, line: int, what: str, instead: str) -> None:
+        """Name the place, the construct, and what to write instead."""
+        super().__init__(f"{file}, line {line}: {what} cannot be exported as C: {instead}")
+
+
+class Refusal(Exception):
+    """A construct is refused; the place is added by the caller who knows it."""
+
+    def __init__(self, what: str, instead: str) -> None:
+        super().__init__(what)
+        self.what, self.instead = what, instead
+
+
+@dataclass(frozen=True)
+class Scalar:
+    """A number or truth value."""
+
+    name: str
+    """In C."""
+
+
+FLOAT, INT, BOOL, NOTHING = (Scalar(name) for name in ("double", "int64_t", "bool", "void"))
+
+
+@dataclass(frozen=True)
+class TupleOf:
+    """A tuple; a struct in C."""
+
+    items: tuple[Any, ...]
+
+    @property
+    def is_uniform(self) -> bool:
+        """Whether all items are floats: then the struct has an array."""
+        return all(item == FLOAT for item in self.items)
+
+
+@dataclass(frozen=True)
+class ArrayOf:
+    """An array of floats."""
+
+    shape: tuple[int | None, ...]
+    """Only the first dimension may be unknown."""
+
+
+@dataclass(frozen=True)
+class Pointer:
+    """A record; in C a pointer to a struct."""
+
+    record: type[Record]
+
+
+@dataclass(frozen=True)
+class BlockOf:
+    """An array of one record, whose only use is ``block[0]``."""
+
+    record: type[Record]
+
+
+class Known:
+    """An object that is bound when the code is exported: a function, a module, a number."""
+
+    def __init__(self, value: Any) -> None:
+        self.value = value
+
+    def _identity(self) -> Any:
+        is_number = isinstance(self.value, (bool, int, float, str))
+        return (type(self.value), self.value) if is_number else id(self.value)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Known) and self._identity() == other._identity()
+
+    def __hash__(self) -> int:
+        return hash(self._identity())
+
+
+@dataclass(frozen=True)
+class Bundle:
+    """A named tuple whose items are bound, or are arguments of their own in C."""
+
+    label: str
+    """Distinguishes the functions made for it."""
+    items: tuple[tuple[str, Any], ...]
+    """Names and types."""
+
+
+Type = Any
+
+
+class Field(NamedTuple):
+    """A field of a record."""
+
+    record: type[Record]
+    name: str
+
+
+@dataclass(frozen=True)
+class Value:
+    """A translated expression."""
+
+    type: Type
+    text: str = ""
+    rank: int = ATOM
+    constant: Any = None
+    """Its number, if it is known when the code is exported; the text reads it all the same."""
+    roots: frozenset[str] = frozenset()
+    """Local names through which its memory is reached."""
+    fields: frozenset[Field] = frozenset()
+    """Of an array or number in a record: its field."""
+    offset: str = ""
+    """Of an array: index of its first number in ``text``."""
+    size: str = ""
+    """Of an array whose length is unknown: the text of its length."""
+    is_pointer: bool = True
+    """Of a record: whether the text is a pointer."""
+    calls: bool = False
+    """Whether evaluating it calls a kernel."""
+    is_bound: bool = False
+    """Whether its constant is bound when the code is exported: no argument in C."""
+    parts: tuple[Value, ...] = ()
+    """Of a bundle: its items."""
+
+    def at(self, rank: int) -> str:
+        """Return the text for a place that needs at least a rank."""
+        return self.text if self.rank >= rank else f"({self.text})"
+
+    @property
+    def address(self) -> str:
+        """The text of an array or record as an argument."""
+        if isinstance(self.type, ArrayOf) and self.offset:
+            return f"&{self.text}[{self.offset}]"
+        if isinstance(self.type, Pointer) and not self.is_pointer:
+            return f"&{self.text}"
+        return self.text
+
+
+def literal(number: float) -> str:
+    """Return a number in C, with all its bits."""
+    if isinstance(number, bool):
+        return "true" if number else "false"
+    if isinstance(number, int):
+        return str(number) if abs(number) < 2**31 else f"INT64_C({number})"
+    if math.isnan(number):
+        return "(double)NAN"
+    if math.isinf(number):
+        return "(double)INFINITY" if number > 0 else "-(double)INFINITY"
+    text = repr(float(number))
+    return text if any(c in text for c in ".e") else f"{text}.0"
+
+
+def number_of(number: Any) -> Value:
+    """Return the value of a number."""
+    kind = BOOL if isinstance(number, bool) else INT if isinstance(number, int) else FLOAT
+    text = literal(number)
+    return Value(kind, text, UNARY if text.startswith(("-", "(")) else ATOM, number)
+
+
+def cast(value: Value, kind: Type) -> Value:
+    """Return a value converted to a scalar type, as Numba does."""
+    if value.type == kind:
+        return value
+    constant = value.constant
+    if kind == FLOAT and value.type == INT:
+        if constant is not None and value.text.lstrip("-").isdigit():
+            return number_of(float(constant))
+        text = f"(double){value.at(UNARY)}"
+        number = None if constant is None else float(constant)
+        return replace(value, type=FLOAT, text=text, rank=UNARY, constant=number)
+    if kind in (FLOAT, INT) and value.type == BOOL:
+        one, zero = ("1.0", "0.0") if kind == FLOAT else ("1", "0")
+        number = None if constant is None else float(constant) if kind == FLOAT else int(constant)
+        text = f"{value.at(OR)} ? {one} : {zero}"
+        return replace(value, type=kind, text=text, rank=TERNARY, constant=number)
+    if kind == BOOL and value.type in (FLOAT, INT):
+        zero = "0.0" if value.type == FLOAT else "0"
+        known = None if constant is None else constant != 0
+        text = f"{value.at(RELATION)} != {zero}"
+        return replace(value, type=BOOL, text=text, rank=EQUAL, constant=known)
+    raise Refusal(f"{described(value.type)} where {described(kind)} is needed", "one type a name")
+
+
+def joined(one: Type, other: Type) -> Type:
+    """Return the type that holds values of both, as Numba unifies them."""
+    if one == other or other is None:
+        return one
+    if one is None:
+        return other
+    if {one, other} <= {FLOAT, INT}:
+        return FLOAT
+    if isinstance(one, TupleOf) and isinstance(other, TupleOf):
+        if len(one.items) == len(other.items):
+            return TupleOf(tuple(map(joined, one.items, other.items)))
+    if isinstance(one, ArrayOf) and isinstance(other, ArrayOf) and one.shape[1:] == other.shape[1:]:
+        return ArrayOf((None, *one.shape[1:]))
+    raise Refusal(
+        f"a name for {described(one)} and for {described(other)}", "use a name for each type"
+    )
+
+
+def described(kind: Type) -> str:
+    """Return a type in words."""
+    if isinstance(kind, Scalar):
+        return {"double": "a float", "int64_t": "an integer", "bool": "a bool"}.get(
+            kind.name, "nothing"
+        )
+    if isinstance(kind, Known):
+        return f"the Python object {getattr(kind.value, '__name__', kind.value)!r}"
+    return {TupleOf: "a tuple", ArrayOf: "an array", Pointer: "a record", BlockOf: "a block"}.get(
+        type(kind), "a named tuple"
+    )

@@ -1,0 +1,267 @@
+"""The flight software as a program of C: what is translated, and the functions that call it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from space_robot_msgs_py.compiled.records import Field as RecordField
+from space_robot_msgs_py.compiled.records import Record
+from space_robot_msgs_py.errors import InputError
+from space_robot_msgs_py.samples import Reference, State
+
+from ..allocation.allocation import allocate, leave_alone
+from ..controller.controller import Controller
+from ..controller.kernels import ControllerMemory, engage
+from ..controller.supervision import Supervision, answer_state, judge, swaps_due, takes_over
+from ..controller.supervisor import Supervisor
+from ..laws import CompiledLaw, ControlLaw
+from .c99.files import Files
+from .c99.language import FLOAT, INT, ArrayOf, BlockOf, Bundle, Field, Known, Type, Value
+from .c99.program import Program, same_number
+
+ROOMS = {
+    "space_robot_control.controller.supervision": "supervision",
+    "space_robot_msgs_py.wire.stamp_guard": "supervision",
+    "space_robot_control.controller.kernels": "controller",
+    "space_robot_control.controller.time_delay_estimation": "estimate",
+    "space_robot_control.controller.tracking": "tracking",
+    "space_robot_control.navigation": "navigation",
+    "space_robot_control.allocation": "allocation",
+    "space_robot_model.dynamics": "dynamics",
+    "space_robot_model.elementary": "elementary",
+}
+"""Files of C by the beginning of a module's name; all other kernels are those of laws."""
+SMALLEST_RING = 4
+
+
+class Part(NamedTuple):
+    """A record in the state struct."""
+
+    name: str
+    record: type[Record]
+    numbers: Any
+    """The record with its initial numbers."""
+    source: str
+    """Where they come from, in words."""
+
+
+@dataclass(frozen=True)
+class FlightSoftware:
+    """Controller, laws and swaps of a flight, as they are before its first tick."""
+
+    controller: Controller
+    """With the law in force at the start."""
+    laws: Sequence[CompiledLaw]
+    """That law first, then all to which it can be swapped."""
+    swaps: Sequence[tuple[int, int]]
+    """Ticks, increasing, and the place in ``laws`` of the law from each on."""
+    hold_ticks: int
+    longest_jump: int
+    sources: dict[str, str]
+    """Where numbers come from, by name of the part: ``controller``, or a law's name."""
+
+    @classmethod
+    def of(
+        cls,
+        controller: Controller,
+        laws: Sequence[ControlLaw],
+        swaps: Sequence[tuple[int, ControlLaw]],
+        supervision: tuple[int, int],
+        sources: dict[str, str],
+    ) -> FlightSoftware:
+        """Collect the flight software.
+
+        Args:
+            controller: with the law in force at the start.
+            laws: all laws that may be in force, that one first.
+            swaps: ticks, increasing, and the law from each on.
+            supervision: ``hold_ticks`` and ``longest_jump``.
+            sources: see `FlightSoftware`.
+
+        Raises:
+            InputError: a law has no kernel.
+        """
+        compiled: list[CompiledLaw] = []
+        for law in laws:
+            if not isinstance(law, CompiledLaw):
+                code = type(law).force.__code__
+                raise InputError(
+                    f"{code.co_filename}, line {code.co_firstlineno}: the law {law.name!r} is a "
+                    "Python function and cannot be exported as C: write its equation as the "
+                    "`kernel` of a CompiledLaw"
+                )
+            compiled.append(law)
+        places = [
+            (tick, next(k for k, one in enumerate(laws) if one is law)) for tick, law in swaps
+        ]
+        return cls(controller, compiled, places, *supervision, sources)
+
+    @property
+    def joints(self) -> int:
+        """n."""
+        return len(self.controller.names.joints)
+
+    @cached_property
+    def sizes(self) -> dict[str, int]:
+        """Capacities of arrays in C, in place of those in Python: exactly what is needed."""
+        names, memory = self.controller.names, self.controller.block[0]
+        wheels, ring = len(names.wheels), SMALLEST_RING
+        while ring < memory.navigation.attitude.delay + 2:
+            ring *= 2
+        return {
+            "MOST_JOINTS": int(memory.model.joint_count),
+            "MOST_WHEELS": wheels,
+            "MOST_PAIRS": wheels * (wheels - 1) // 2,
+            "MOST_THRUSTERS": len(names.thrusters),
+            "RING": ring,
+        }
+
+    @cached_property
+    def parts(self) -> list[Part]:
+        """Records of the state struct in order."""
+        names = self.controller.names
+        supervisor = Supervisor(
+            self.controller, len(names.commanded), self.hold_ticks, self.longest_jump
+        )
+        self.controller.engage()
+        parts = [
+            Part("supervision", Supervision, supervisor.block[0], self._source("controller")),
+            Part("controller", ControllerMemory, self.controller.block[0], self._source("robot")),
+        ]
+        for law in self.laws:
+            law.reset()
+            own = type(law)
+            source = self._source(law.name)
+            parts.append(Part(f"{law.name}_gains", own.gains_type, law.gains_block[0], source))
+            parts.append(Part(f"{law.name}_memory", own.memory_type, law.memory_block[0], ""))
+        return parts
+
+    def _source(self, name: str) -> str:
+        return self.sources.get(name, "")
+
+
+@dataclass(frozen=True)
+class Translated:
+    """The flight software's kernels in C."""
+
+    software: FlightSoftware
+    program: Program
+    files: Files
+    roots: dict[str, str]
+    """Names in C of the kernels that are called from outside, by their names here."""
+
+    def kept(self, record: type[Record]) -> Iterator[tuple[str, tuple[int, ...] | type[Record]]]:
+        """Return the fields of an exported struct: shapes, or records."""
+        for name, field in record.fields().items():
+            if self.files.has(record, name):
+                is_array = isinstance(field, RecordField)
+                yield name, self.program.shape(record, name) if is_array else field  # type: ignore[misc]
+
+    def dtype(self, record: type[Record]) -> list[tuple[str, type[np.float64], tuple[int, ...]]]:
+        """Return the memory layout of a struct without nested records."""
+        return [
+            (name, np.float64, kind) for name, kind in self.kept(record) if isinstance(kind, tuple)
+        ]
+
+
+def translate(software: FlightSoftware) -> Translated:
+    """Translate the flight software.
+
+    It is translated twice: the first time tells which numbers no kernel writes. Those are known
+    the second time, so branches that they decide for good are left out.
+
+    Raises:
+        InputError: a kernel has no translation; names file, line and what to write instead.
+    """
+    first, roots = _program(software, {})
+    written = first.written_fields(first.reachable(roots.values()))
+    constants = _constants(software, first, written)
+    program, roots = _program(software, constants)
+    whole = [State, Reference, *(part.record for part in software.parts if "_" in part.name)]
+    files = Files(program, list(roots.values()), whole, _room)
+    return Translated(
+        software, program, files, {name: files.name_of(f) for name, f in roots.items()}
+    )
+
+
+def _program(software: FlightSoftware, constants: dict[Field, float]) -> tuple[Program, Any]:
+    program = Program(software.sizes, software.joints)
+    program.constants = constants
+    supervision, tick = _value(BlockOf(Supervision)), _value(INT)
+    controller, names = _value(BlockOf(ControllerMemory)), software.controller.names
+    how = _value(Known(allocate if names.actuators else leave_alone))
+    state, reference, period = _value(BlockOf(State)), _value(BlockOf(Reference)), _value(FLOAT)
+
+    def root(kernel: Any, *arguments: Value) -> Any:
+        return program.function(kernel.py_func, arguments)
+
+    roots = {
+        "judge": root(judge, supervision, tick),
+        "takes_over": root(takes_over, supervision, tick),
+        "engage": root(engage, controller),
+    }
+    if software.swaps:
+        swaps = _value(ArrayOf((len(software.swaps),)))
+        roots["swaps_due"] = root(swaps_due, swaps, tick, tick)
+    for law in software.laws:
+        bundle = _law(law, software.joints + 3)
+        roots[f"answer_state {law.name}"] = root(
+            answer_state, supervision, controller, bundle, how, tick, state, reference, period
+        )
+    return program, roots
+
+
+def _value(kind: Type) -> Value:
+    return Value(kind, "argument")
+
+
+def _law(law: CompiledLaw, axes: int) -> Value:
+    """Return a law as the argument of a kernel: its function bound, gains and memory passed."""
+    own = type(law)
+    kinds = {
+        "run": Known(own.kernel),
+        "gains": BlockOf(own.gains_type),
+        "memory": BlockOf(own.memory_type),
+        "h_bar": ArrayOf((axes if law.h_bar.size else 0,)),
+    }
+    parts = [_value(kind) for kind in kinds.values()]
+    parts.append(Value(Known(law.uses_model), "", constant=law.uses_model, is_bound=True))
+    items = tuple({**kinds, "uses_model": Known(law.uses_model)}.items())
+    return Value(Bundle(law.name, items), "law", parts=tuple(parts))
+
+
+def _constants(
+    software: FlightSoftware, program: Program, written: set[Field]
+) -> dict[Field, float]:
+    """Return the fields that no kernel writes and that have one number, wherever they are."""
+    found: dict[Field, set[float | None]] = {}
+
+    def visit(record: type[Record], numbers: Any) -> None:
+        for name, field in record.fields().items():
+            if isinstance(field, RecordField):
+                kept = numbers_of(program.shape(record, name), numbers[name])
+                found.setdefault(Field(record, name), set()).add(same_number(kept))
+            else:
+                visit(field, numbers[name])
+
+    for part in software.parts:
+        if part.name in ("supervision", "controller"):  # gains may be changed in flight
+            visit(part.record, part.numbers)
+    constants = {field: values.pop() for field, values in found.items() if len(values) == 1}
+    return {f: c for f, c in constants.items() if c is not None and f not in written}
+
+
+def numbers_of(shape: tuple[int, ...], numbers: Any) -> NDArray[np.float64]:
+    """Return the part of a field's numbers that a shape keeps."""
+    array: NDArray[np.float64] = np.asarray(numbers, dtype=np.float64)
+    return array[tuple(slice(0, size) for size in shape)]
+
+
+def _room(module: str) -> str:
+    return next((room for start, room in ROOMS.items() if module.startswith(start)), "laws")
