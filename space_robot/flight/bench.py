@@ -51,8 +51,10 @@ def check_for_bench(flight: Flight) -> None:
         InputError: it needs a graph of nodes or has faults of messages.
     """
     flight.check_in_process()
-    if flight.plant_settings.has_message_faults:
-        raise InputError("on the bench are no messages that could fail: fly the faults of them")
+    if flight.flies_by_messages:
+        raise InputError(
+            "on the bench are no messages that could fail, or that C could answer: fly them"
+        )
 
 
 def seeded(flight: Flight, seed: int, name: str = "seed") -> PlantSettings:

@@ -12,6 +12,7 @@ from collections.abc import Callable
 from space_robot_control.controller.law_choice import LawChoice
 from space_robot_control.controller.reference_buffer import ReferenceBuffer
 from space_robot_control.controller.state_responder import StampStatus, StateResponder
+from space_robot_control.flight_code.supervisors import supervisor_of
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.errors import MessageError
 from space_robot_msgs_py.samples import RobotState
@@ -46,6 +47,9 @@ class MessageLoop:
             LawChoice(flight.law, flight.swaps),
             self._references,
             flight.controller_settings,
+            supervisor=supervisor_of(
+                flight.controller, list(flight.laws.values()), flight.controller_settings
+            ),
         )
         self._state = RobotState.allocate(robot.n)
         self._streamed = 0

@@ -65,6 +65,13 @@ class Flight:
         """True if the base has actuators; else it floats freely."""
         return self.plant_settings.controls_base
 
+    @property
+    def flies_by_messages(self) -> bool:
+        """True if the controller has to answer as a node does, state by state."""
+        controller = self.controller_settings
+        is_plain = controller.controller_code == "python" and controller.shadow == "none"
+        return self.plant_settings.has_message_faults or not is_plain
+
     def check_in_process(self) -> None:
         """Check that the flight can run in one process.
 

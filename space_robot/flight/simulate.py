@@ -203,7 +203,7 @@ def fly_blocks(
         InputError: the bag cannot be written, or the flight needs a graph of nodes.
     """
     flight.check_in_process()
-    if flight.plant_settings.has_message_faults:
+    if flight.flies_by_messages:
         yield from _fly_by_messages(flight, bag, progress)
         return
     block_of = block_of or (lambda start, stop: empty_log(flight, start, stop))
@@ -234,7 +234,7 @@ def simulate(
         InputError: as there, or a log of the whole flight would not fit into memory.
     """
     flight.check_in_process()
-    if flight.plant_settings.has_message_faults:
+    if flight.flies_by_messages:
         return _flown_by_messages(flight, bag, progress)
     _check_memory(flight)
     log, flown = empty_log(flight), 0

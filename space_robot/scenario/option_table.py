@@ -154,6 +154,22 @@ OPTIONS = (
     ),
     Option("seed", "whole number", "Seed of the random numbers of faults and sensors", 0, low=0),
     Option(
+        "controller_code",
+        "text",
+        "What answers as the controller: its kernels compiled here (python), the same as C, built "
+        "by the system's compiler (c), or a flight computer at udp:HOST:PORT",
+        "python",
+        metavar="CODE",
+    ),
+    Option(
+        "shadow",
+        "text",
+        "Let the C code answer, too, and end the flight with exit code 1 at the first number that "
+        "differs",
+        "none",
+        choices=("none", "c"),
+    ),
+    Option(
         "realtime", "switch", "Pace by the wall clock instead of lockstep", False, needs_graph=True
     ),
     Option(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, ByteSize, Field
 
@@ -75,6 +75,8 @@ class FlightPlan(StrictModel):
     events: list[EventText] = of("events")
     seed: int = of("seed")
     swaps: list[str] = of("swaps")
+    controller_code: str = of("controller_code")
+    shadow: Literal["none", "c"] = of("shadow")
     restart_controller: bool = of("restart_controller")
     composed: bool = of("composed")
     domain: int | None = of("domain")
@@ -132,6 +134,12 @@ class FlightPlan(StrictModel):
                 **values,
                 "fifo_priority": self.fifo_priority,
                 "swaps": self.swaps,
+                **(
+                    {}
+                    if self.controller_code == "python"
+                    else {"controller_code": self.controller_code}
+                ),
+                **({} if self.shadow == "none" else {"shadow": self.shadow}),
                 **({} if self.navigation is None else {"navigation": self.navigation}),
             },
             "mission": {**period, "robot": robot, "mission": mission, **waypoints},

@@ -59,6 +59,11 @@ class LawSet:
             supervisor.judge(rest.tick)
             supervisor.answer(rest, Reference.at_rest(robot.n))
 
+    @property
+    def laws(self) -> list[ControlLaw]:
+        """All laws, that in force at the start first."""
+        return list(self._laws.values())
+
     def tell(self, change: LawChange) -> None:
         """Log a change, and let the parameter ``controller`` follow a planned swap."""
         when = (

@@ -21,7 +21,7 @@ from .reference_input import ReferenceInput
 from .settings import ControllerNodeSettings
 from .state_input import StateInput
 from .state_responder import StampStatus, StateResponder
-from .supervisor import Mode
+from .supervisor import Mode, Supervisor
 
 FLUSH_S = 1.0
 LOOK_AHEAD_S = 0.02
@@ -63,6 +63,7 @@ class ControllerLoop:
             self._references.buffer,
             settings,
             node.get_fully_qualified_name(),
+            _supervisor(self._controller, self._laws, settings),
         )
         self._command_out = RawPublisher(node, topics.COMMAND)
         self._out = {
@@ -143,7 +144,7 @@ class ControllerLoop:
         supervisor, references = self._answering.supervisor, self._references
         rejected = self._states.rejected + references.rejected + supervisor.rejected
         silence = time.monotonic() - max(self._state_at, self._paused.running_since)
-        allocation = self._controller.allocation
+        allocation = supervisor.diagnosis
         values: dict[str, float | int | str] = {
             "tick": supervisor.answered,
             "controller": self._controller.law.name,
@@ -190,3 +191,14 @@ class ControllerLoop:
         if self._answering.supervisor.is_new_time and last >= 0:
             self._node.log(f"a new time begins at tick {tick}, after {last}")
         self._state_at = time.monotonic()
+
+
+def _supervisor(
+    controller: Controller, laws: LawSet, settings: ControllerNodeSettings
+) -> Supervisor | None:
+    """Return the supervisor that the settings ask for; None: the usual one."""
+    if settings.controller_code == "python" and settings.shadow == "none":
+        return None
+    from ..flight_code.supervisors import supervisor_of  # most flights need no translator
+
+    return supervisor_of(controller, laws.laws, settings)

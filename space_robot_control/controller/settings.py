@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, ClassVar
+from typing import Annotated, ClassVar, Literal
 
 from pydantic import Field
 
@@ -69,6 +69,17 @@ class ControllerNodeSettings(NodeSettings):
         "ideal",
         description="the base's actuators that the controller assumes: a name of config/actuators, "
         "or a path to a YAML file",
+    )
+    controller_code: str = Field(
+        "python",
+        pattern=r"^(python|c|udp:[^:]+:\d{1,5})$",
+        description="what answers: the kernels compiled here (python), the same as C (c), or the "
+        "flight computer at udp:HOST:PORT",
+    )
+    shadow: Literal["none", "c"] = Field(
+        "none",
+        description="what answers beside it, to be compared bit by bit; a difference ends the "
+        "flight",
     )
     telemetry_decimation: Annotated[int, Field(ge=1, le=10**6)] = Field(
         20,

@@ -46,14 +46,16 @@ class StateResponder:
         references: ReferenceBuffer,
         settings: ControllerNodeSettings,
         node: str = NODE,
+        supervisor: Supervisor | None = None,
     ) -> None:
         """Answer with ``controller`` under the laws chosen, as the node's settings say.
 
-        ``references`` receive the current tick; ``node`` is the node's full name.
+        ``references`` receive the current tick; ``node`` is the node's full name; ``supervisor``
+        answers in place of one made here.
         """
-        self._controller, self._laws, self._references = controller, laws, references
+        self._laws, self._references = laws, references
         names = controller.names
-        self.supervisor = Supervisor(
+        self.supervisor = supervisor or Supervisor(
             controller, len(names.commanded), settings.hold_ticks, settings.longest_jump
         )
         self._commands = CommandCodec(names.commanded, settings.timebase)
@@ -84,17 +86,16 @@ class StateResponder:
 
         The command goes out before the telemetry is written.
         """
-        controller, laws = self._controller, self._laws
+        laws = self._laws
         self.change = laws.change_at(tick)
         if self.change:
             yield topics.LAW, self._law.encode(self.change.law)
-            if controller.law is not laws.chosen:
-                controller.law = laws.chosen
+            self.supervisor.use(laws.chosen)
         state.tick = tick
         self.answer = self.encode(self.supervisor.answer(state, reference))
         yield topics.COMMAND, self.answer
         if tick % self._telemetry_decimation == 0:
-            s, u, n_hat, e = controller.telemetry()
+            s, u, n_hat, e = self.supervisor.telemetry()
             yield topics.TELEMETRY, self._telemetry.encode(tick, (s, u, n_hat, e))
             yield topics.SIGNALS, self._signals.encode(tick, e, s, n_hat)
 

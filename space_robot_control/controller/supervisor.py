@@ -14,10 +14,13 @@ from collections import Counter
 from enum import Enum
 
 import numpy as np
+from numpy.typing import NDArray
 
 from space_robot_msgs_py.compiled.records import Block, assign
 from space_robot_msgs_py.samples import Command, RobotState
 
+from ..allocation.diagnosis import Diagnosis
+from ..laws import ControlLaw
 from ..laws.checked import force_of
 from ..laws.compiled import CompiledLaw, LawCode
 from .controller import Controller, unusable
@@ -31,6 +34,9 @@ from .supervision import (
     judge,
     takes_over,
 )
+
+
+Array = NDArray[np.float64]
 
 
 class Mode(Enum):
@@ -134,6 +140,20 @@ class Supervisor:
             conclude(self.block, tick, status)
         command.tick = tick
         return command
+
+    def use(self, law: ControlLaw) -> None:
+        """Let a law, whose gains may have changed, answer from the next state on."""
+        if self.controller.law is not law:
+            self.controller.law = law
+
+    def telemetry(self) -> tuple[Array, Array, Array, Array]:
+        """Telemetry of the last tick, see `Controller.telemetry`."""
+        return self.controller.telemetry()
+
+    @property
+    def diagnosis(self) -> Diagnosis:
+        """Diagnosis of the base's actuators."""
+        return self.controller.allocation
 
     def deactivate(self, tick: int) -> Command:
         """Return the zero-torque command that ends a flight."""

@@ -1,0 +1,125 @@
+"""A flight computer: the flight code in a program of its own, which answers by UDP.
+
+Each request is one datagram, and so is each answer; examples/flight_computer has the other side.
+"""
+
+from __future__ import annotations
+
+import socket
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from space_robot_msgs_py.compiled.records import Block
+from space_robot_msgs_py.errors import FlightError, InputError
+from space_robot_msgs_py.samples import Reference, RobotState
+
+from ..laws import ControlLaw
+from .folder import Exported
+from .library import CONDITION, Array, command_of, fill_measurement, measurement_of
+
+TIMEOUT_S = 2.0
+"""Longest wait for an answer, s of the wall clock."""
+LARGEST = 65_507
+"""Bytes of a datagram at most."""
+BEGIN, JUDGE, ANSWER, USE, STAND_DOWN = range(5)
+"""Kinds of requests."""
+
+
+class FlightComputer:
+    """The flight software in a program that answers by UDP."""
+
+    def __init__(self, exported: Exported, host: str, port: int) -> None:
+        """Connect, and have the program begin anew.
+
+        Raises:
+            InputError: nobody answers, or the program is for another robot.
+        """
+        axes = exported.software.joints + 3
+        self._laws = [law.name for law in exported.software.laws]
+        measurement, command = measurement_of(exported), command_of(exported)
+        reference = exported.translated.dtype(Reference)
+        request = [
+            ("kind", np.int64),
+            ("law", np.int64),
+            ("measurement", measurement.dtype),
+            ("reference", np.dtype(reference)),
+        ]
+        answer = [
+            ("kind", np.int64),
+            ("tick", np.int64),
+            ("result", np.int64),
+            ("command", command.dtype),
+            ("condition", np.float64, (len(CONDITION),)),
+            ("telemetry", np.float64, (4, axes)),
+        ]
+        self._request: NDArray[Any] = np.zeros(1, request)
+        self._answer: NDArray[Any] = np.zeros(1, answer)
+        self._fields = [name for name, *_ in reference]
+        self._where = f"{host}:{port}"
+        self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self._socket.settimeout(TIMEOUT_S)
+        try:
+            self._socket.connect((host, port))
+            self._ask(BEGIN, 0)
+        except (OSError, FlightError) as error:
+            raise InputError(
+                f"controller_code udp:{self._where}: {error}; start the flight computer first"
+            ) from None
+
+    def _ask(self, kind: int, tick: int) -> int:
+        self._request["kind"] = kind
+        self._request["measurement"]["tick"] = tick
+        try:
+            self._socket.send(self._request.tobytes())
+            data = self._socket.recv(LARGEST)
+        except OSError as error:
+            raise FlightError(f"the flight computer does not answer ({error})") from None
+        if len(data) != self._answer.nbytes:
+            raise FlightError(
+                f"the flight computer answered {len(data)} bytes instead of {self._answer.nbytes}: "
+                "its code was exported for another robot or other actuators"
+            )
+        self._answer = np.frombuffer(data, self._answer.dtype)
+        if (self._answer["kind"][0], self._answer["tick"][0]) != (kind, tick):
+            raise FlightError("the flight computer answered another request")
+        return int(self._answer["result"][0])
+
+    def judge(self, tick: int) -> int:
+        """Return the standing of a state by its stamp."""
+        return self._ask(JUDGE, tick)
+
+    def answer(self, state: RobotState, reference: Block) -> int:
+        """Answer a state that was judged to be new; return its status."""
+        fill_measurement(self._request["measurement"], state)
+        for name in self._fields:
+            self._request["reference"][name] = reference[name]
+        return self._ask(ANSWER, state.tick)
+
+    def stand_down(self, tick: int) -> None:
+        """Have the flight end with zero torque."""
+        self._ask(STAND_DOWN, tick)
+
+    def use(self, law: ControlLaw) -> None:
+        """Let a law take over if another one is in force; its gains are the program's own."""
+        self._request["law"] = self._laws.index(law.name)
+        self._ask(USE, 0)
+
+    @property
+    def command(self) -> Array:
+        """The command of the last answer, as `Command.torque`."""
+        command: Array = self._answer["command"]["command"][0]
+        return command
+
+    @property
+    def telemetry(self) -> tuple[Array, Array, Array, Array]:
+        """s, u, N_hat and e of the last tick, (m,) each."""
+        s, u, n_hat, error = self._answer["telemetry"][0]
+        return s, u, n_hat, error
+
+    @property
+    def condition(self) -> Array:
+        """The numbers of `CONDITION`."""
+        condition: Array = self._answer["condition"][0]
+        return condition

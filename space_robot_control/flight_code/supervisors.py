@@ -1,0 +1,175 @@
+"""Supervisors that let the flight code in C answer, in place of the kernels or beside them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from space_robot_msgs_py.compiled.records import Block, assign
+from space_robot_msgs_py.errors import FlightError
+from space_robot_msgs_py.samples import Command, RobotState
+
+from ..allocation.diagnosis import Diagnosis
+from ..controller.controller import Controller
+from ..controller.settings import ControllerNodeSettings
+from ..controller.supervisor import Supervisor
+from ..laws import ControlLaw
+from .folder import Exported
+from .library import CONDITION, FlightLibrary
+from .remote import FlightComputer
+from .software import FlightSoftware
+
+Array = NDArray[np.float64]
+TELEMETRY = ("s", "u", "N_hat", "e")
+
+
+class ShadowError(FlightError):
+    """Python and C have answered a state differently."""
+
+
+class CodeSupervisor(Supervisor):
+    """Supervisor whose states are answered by the flight code in C."""
+
+    def __init__(
+        self,
+        controller: Controller,
+        settings: ControllerNodeSettings,
+        code: FlightLibrary | FlightComputer,
+    ) -> None:
+        """Answer by ``code``; ``controller`` only tells what the law in force is."""
+        axes = len(controller.names.commanded)
+        super().__init__(controller, axes, settings.hold_ticks, settings.longest_jump)
+        self._flight_code = code
+
+    def judge(self, tick: int) -> int:
+        """Return the standing of a state by its stamp."""
+        standing = self._flight_code.judge(tick)
+        self._take_condition()
+        return standing
+
+    def answer(self, state: RobotState, reference: Block) -> Command:
+        """Return the command for a state."""
+        self._flight_code.answer(state, reference)
+        self._take_condition()
+        self._command.torque[:] = self._flight_code.command
+        self._command.tick = state.tick
+        return self._command
+
+    def use(self, law: ControlLaw) -> None:
+        """Let a law answer from the next state on."""
+        super().use(law)
+        self._flight_code.use(law)
+
+    def telemetry(self) -> tuple[Array, Array, Array, Array]:
+        """Telemetry of the last tick."""
+        return self._flight_code.telemetry
+
+    @property
+    def diagnosis(self) -> Diagnosis:
+        """Empty: the actuators' health is in the memory of the flight code."""
+        return Diagnosis((), "", {})
+
+    def deactivate(self, tick: int) -> Command:
+        """Return the zero-torque command that ends a flight."""
+        self._flight_code.stand_down(tick)
+        return super().deactivate(tick)
+
+    def _take_condition(self) -> None:
+        numbers = self._flight_code.condition
+        record, first = self._record, CONDITION.index("rejected")
+        reason, mode, answered, last, is_new_time = numbers[:first]
+        assign(record, reason=reason, mode=mode, answered=answered, rejected=numbers[first:])
+        assign(record.stamps, last=last, is_new_time=is_new_time)
+
+
+class ShadowSupervisor(Supervisor):
+    """Supervisor that compares every answer of the kernels with that of the flight code in C."""
+
+    def __init__(
+        self, controller: Controller, settings: ControllerNodeSettings, code: FlightLibrary
+    ) -> None:
+        """Answer by the kernels, and compare with ``code``."""
+        axes = len(controller.names.commanded)
+        super().__init__(controller, axes, settings.hold_ticks, settings.longest_jump)
+        self._flight_code = code
+        self._names = controller.names
+
+    def judge(self, tick: int) -> int:
+        """Return the standing of a state by its stamp.
+
+        Raises:
+            ShadowError: C judges differently.
+        """
+        standing, other = super().judge(tick), self._flight_code.judge(tick)
+        if standing != other:
+            raise ShadowError(f"at tick {tick} Python judges the stamp as {standing}, C as {other}")
+        return standing
+
+    def answer(self, state: RobotState, reference: Block) -> Command:
+        """Return the command for a state.
+
+        Raises:
+            ShadowError: C answers differently; names the first number that differs.
+        """
+        command, code = super().answer(state, reference), self._flight_code
+        code.answer(state, reference)
+        self._compare(state.tick, "command of", self._names.commanded, command.torque, code.command)
+        pairs = zip(TELEMETRY, self.telemetry(), code.telemetry, strict=True)
+        for name, python, c in pairs:
+            self._compare(state.tick, f"{name} of", self._names.axes, python, c)
+        return command
+
+    def use(self, law: ControlLaw) -> None:
+        """Let a law answer from the next state on."""
+        super().use(law)
+        self._flight_code.use(law)
+
+    def deactivate(self, tick: int) -> Command:
+        """Return the zero-torque command that ends a flight."""
+        self._flight_code.stand_down(tick)
+        return super().deactivate(tick)
+
+    @staticmethod
+    def _compare(tick: int, what: str, names: Sequence[str], python: Array, c: Array) -> None:
+        different = np.flatnonzero(bits(python) != bits(c))
+        if different.size:
+            k = int(different[0])
+            raise ShadowError(
+                f"at tick {tick} the {what} {names[k]} is {python[k]!r} in Python and {c[k]!r} in C"
+            )
+
+
+def bits(numbers: Array) -> NDArray[np.int64]:
+    """Return the bits of numbers; all NaN are one, since processors make different ones."""
+    copied: Array = np.array(numbers, dtype=np.float64)
+    copied[np.isnan(copied)] = np.nan
+    return copied.view(np.int64)
+
+
+def supervisor_of(
+    controller: Controller, laws: Sequence[ControlLaw], settings: ControllerNodeSettings
+) -> Supervisor | None:
+    """Return the supervisor that the settings ask for; None: the usual one.
+
+    Args:
+        controller: with the law in force at the start.
+        laws: all laws that it may be given, that one first.
+        settings: of the controller's node.
+
+    Raises:
+        InputError: a law cannot be exported, or there is no compiler.
+    """
+    code = settings.controller_code
+    if code == "python" and settings.shadow == "none":
+        return None
+    limits = settings.hold_ticks, settings.longest_jump
+    software = FlightSoftware.of(controller, laws, [], limits, {})
+    exported = Exported(software, settings.robot)
+    if code.startswith("udp:"):
+        _, host, port = code.split(":")
+        return CodeSupervisor(controller, settings, FlightComputer(exported, host, int(port)))
+    library = FlightLibrary(exported)
+    kind = CodeSupervisor if code == "c" else ShadowSupervisor
+    return kind(controller, settings, library)
