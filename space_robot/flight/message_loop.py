@@ -12,6 +12,7 @@ from collections.abc import Callable
 from space_robot_control.controller.law_choice import LawChoice
 from space_robot_control.controller.reference_buffer import ReferenceBuffer
 from space_robot_control.controller.state_responder import StampStatus, StateResponder
+from space_robot_control.controller.supervisor import Supervisor
 from space_robot_control.flight_code.supervisors import supervisor_of
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.errors import MessageError
@@ -30,9 +31,20 @@ class MessageLoop:
     """Loop that flies tick by tick and hands every message to ``record``."""
 
     def __init__(
-        self, flight: Flight, record: Record, update_true_state: Callable[[RobotState], None]
+        self,
+        flight: Flight,
+        record: Record,
+        update_true_state: Callable[[RobotState], None],
+        supervisor: Supervisor | None = None,
     ) -> None:
-        """``update_true_state``: called with each true state that is not the measured one."""
+        """Begin at the flight's first tick.
+
+        Args:
+            flight: to be flown.
+            record: called with every message.
+            update_true_state: called with each true state that is not the measured one.
+            supervisor: of the flight's controller, to answer (None: as the settings say).
+        """
         robot, settings = flight.robot, flight.plant_settings
         names = flight.plant.names
         self._flight, self._plant, self._record = flight, flight.plant, record
@@ -47,7 +59,8 @@ class MessageLoop:
             LawChoice(flight.law, flight.swaps),
             self._references,
             flight.controller_settings,
-            supervisor=supervisor_of(
+            supervisor=supervisor
+            or supervisor_of(
                 flight.controller, list(flight.laws.values()), flight.controller_settings
             ),
         )

@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterable
 from functools import cached_property
-from importlib.resources import files
+from math import prod
 from pathlib import PurePosixPath
 from typing import Any
 
 import jinja2
 
 from space_robot_msgs_py.compiled.records import Field as RecordField
+from space_robot_msgs_py.compiled.records import Record
+from space_robot_msgs_py.samples import Reference, State
 
 from .c99.words import SUPPORT
 from .parameters import entries, reset_lines
@@ -88,11 +89,28 @@ class Exported:
         }
         return self._templates.get_template(f"{template}.j2").render(**general, **content)
 
+    def figures(self) -> dict[str, Any]:
+        """Return what can be counted without a compiler."""
+        text = "".join(self.sources.values())
+        return {
+            "laws": [law.name for law in self.software.laws],
+            "functions": len(self.translated.files.functions),
+            "lines": text.count("\n"),
+            "state_bytes": 8 * (2 + sum(self._numbers(p.record) for p in self.software.parts)),
+            "swaps": [
+                (tick * self.software.controller.period, self.software.laws[place].name)
+                for tick, place in self.software.swaps
+            ],
+        }
+
+    def _numbers(self, record: type[Record]) -> int:
+        """Return the number of floats in an exported struct."""
+        kinds = (kind for _, kind in self.translated.kept(record))
+        return sum(prod(kind) if isinstance(kind, tuple) else self._numbers(kind) for kind in kinds)
+
     def _header(self) -> str:
         parts = self.translated.software.parts
         program = self.translated.program
-        from space_robot_msgs_py.samples import Reference, State
-
         records = [State, Reference, *(part.record for part in parts)]
         return self.render(
             "space_robot_flight.h",
@@ -150,13 +168,3 @@ class Exported:
         files_ = self.translated.files
         function = next(f for f in files_.functions if files_.name_of(f) == name)
         return ", ".join(given[parameter.name] for parameter in function.parameters)
-
-
-def shared_text(name: str) -> str:
-    """Return a file of the templates that is copied as it is."""
-    return (files(__package__) / "templates" / name).read_text(encoding="utf-8")
-
-
-def all_paths(sources: Iterable[PurePosixPath]) -> list[str]:
-    """Return paths as text, sorted."""
-    return sorted(str(path) for path in sources)

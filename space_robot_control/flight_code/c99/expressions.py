@@ -293,6 +293,10 @@ class Expressions:
                 constant = function(left.constant, right.constant)
             if kind == INT and constant is not None:
                 return number_of(constant)
+        if kind == INT and sign in "+-" and right.constant == 0:
+            return left
+        if sign == "<<":
+            left = replace(left, text=f"INT64_C({left.text})") if left.text.isdigit() else left
         if rank == ATOM:
             if kind != INT:
                 raise Refusal("a remainder of floats", "use np.floor")
@@ -326,8 +330,7 @@ class Expressions:
         if len(values) == 1:
             return values[0]
         sign, rank = (" && ", AND) if is_and else (" || ", OR)
-        # C compilers ask for parentheses where both are mixed
-        texts = [v.text if v.rank == rank or v.rank > AND else f"({v.text})" for v in values]
+        texts = [v.text if v.rank == rank else v.at(UNARY) for v in values]
         return Value(BOOL, sign.join(texts), rank, calls=any(v.calls for v in values))
 
     def _boolop(self, node: ast.BoolOp) -> Value:

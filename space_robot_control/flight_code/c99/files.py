@@ -160,7 +160,8 @@ class Files:
         lines = []
         for constant in sorted(self.program.constants_of(self.functions)):
             name = self._constants[self.program.number_of_constant(constant)]
-            value = literal(constant.number)
+            number = constant.number
+            value = literal(number) if isinstance(number, float) else f"INT64_C({number})"
             value = f"({value})" if value.startswith("-") else value
             lines.append(f"#define {name} {value}\n")
         return "".join(lines)

@@ -188,7 +188,7 @@ def cast(value: Value, kind: Type) -> Value:
     if kind in (FLOAT, INT) and value.type == BOOL:
         one, zero = ("1.0", "0.0") if kind == FLOAT else ("1", "0")
         number = None if constant is None else float(constant) if kind == FLOAT else int(constant)
-        text = f"{value.at(OR)} ? {one} : {zero}"
+        text = f"{value.at(UNARY)} ? {one} : {zero}"
         return replace(value, type=kind, text=text, rank=TERNARY, constant=number)
     if kind == BOOL and value.type in (FLOAT, INT):
         zero = "0.0" if value.type == FLOAT else "0"

@@ -33,6 +33,8 @@ from .language import (
 )
 
 INDENT = "    "
+TRANSPARENT = ("any_lane", "all_lanes", "uniform", "bool")
+"""Words that give a truth value as it is."""
 
 
 class Statements(Expressions):
@@ -53,6 +55,8 @@ class Statements(Expressions):
         self.stores: set[Field] = set()
         """Fields that are written."""
         self._roots: dict[str, frozenset[str]] = {}
+        self._facts: set[str] = set()
+        """Names of truth values that are known in a part of the function."""
         self._depth = 1
         self._declared: set[str] = set()
         self._counter: dict[str, int] = {}
@@ -74,16 +78,40 @@ class Statements(Expressions):
         """Add a line."""
         self.lines.append(f"{INDENT * self._depth}{line}")
 
-    def _block(self, statements: Sequence[ast.stmt]) -> None:
+    def _block(self, statements: Sequence[ast.stmt]) -> bool:
+        """Translate statements until one leaves the block; return whether one does."""
+        before = dict(self.names)
+        is_left = False
         for statement in statements:
+            if is_left:
+                break
             try:
                 self._declare_before(statement)
                 method = getattr(self, f"_{type(statement).__name__.lower()}_statement", None)
                 if method is None:
                     raise Refusal(f"{type(statement).__name__.lower()}", "use if, for and while")
-                method(statement)
+                is_left = bool(method(statement))
             except Refusal as refusal:
                 raise self.refused(statement, refusal) from None
+        for name in self._facts & before.keys():
+            self.names[name] = before[name]
+        return is_left
+
+    def _learn(self, test: ast.expr, is_true: bool) -> None:
+        """Note that a condition, if it is a name's that never changes, is true or false here."""
+        while True:
+            if isinstance(test, ast.UnaryOp) and isinstance(test.op, ast.Not):
+                test, is_true = test.operand, not is_true
+            elif isinstance(test, ast.Call) and len(test.args) == 1:
+                test = test.args[0] if ast.unparse(test.func) in TRANSPARENT else test.func
+            else:
+                break
+        most = 0 if isinstance(test, ast.Name) and self.homes.is_parameter(test.id) else 1
+        if isinstance(test, ast.Name) and test.id in self.names:
+            is_steady = self.homes.assignments[test.id] <= most
+            if is_steady and self.names[test.id].type == BOOL:
+                self.names[test.id] = number_of(is_true)
+                self._facts.add(test.id)
 
     # declarations
 
@@ -260,30 +288,45 @@ class Statements(Expressions):
 
     # control flow
 
-    def _if_statement(self, node: ast.If) -> None:
+    def _if_statement(self, node: ast.If) -> bool:
         condition = cast(self.translate(node.test), BOOL)
         if condition.constant is not None:
-            self._block(node.body if condition.constant else node.orelse)
-            return
+            return self._block(node.body if condition.constant else node.orelse)
+        known = dict(self.names)
         self.emit(f"if ({condition.text}) {{")
-        self._inside(node.body)
-        while len(node.orelse) == 1 and isinstance(node.orelse[0], ast.If):
-            following = node.orelse[0]
-            condition = cast(self.translate(following.test), BOOL)
-            if condition.constant is not None or self.homes.beginning(following):
-                break
-            node = following
-            self.emit(f"}} else if ({condition.text}) {{")
-            self._inside(node.body)
+        self._learn(node.test, True)
+        is_left = self._inside(node.body)
+        self._forget(known)
         if node.orelse:
-            self.emit("} else {")
-            self._inside(node.orelse)
+            self._learn(node.test, False)
+            first, lines = len(self.lines), self.lines
+            is_other_left = self._inside(node.orelse)
+            self._forget(known)
+            inside = [line for line in lines[first:] if line.strip()]
+            if len(node.orelse) == 1 and inside and inside[0].strip().startswith("if ("):
+                lines[first:] = [line.removeprefix(INDENT) for line in lines[first:]]
+                lines[first] = f"{INDENT * self._depth}}} else {lines[first].strip()}"
+                return is_left and is_other_left
+            if inside:
+                lines.insert(first, f"{INDENT * self._depth}}} else {{")
+            is_left = is_left and is_other_left
+            self.emit("}")
+            return is_left
         self.emit("}")
+        if is_left:
+            self._learn(node.test, False)
+        return False
 
-    def _inside(self, statements: Sequence[ast.stmt]) -> None:
+    def _forget(self, known: dict[str, Value]) -> None:
+        """Drop what was learned in a branch."""
+        for name in self._facts & known.keys():
+            self.names[name] = known[name]
+
+    def _inside(self, statements: Sequence[ast.stmt]) -> bool:
         self._depth += 1
-        self._block(statements)
+        is_left = self._block(statements)
         self._depth -= 1
+        return is_left
 
     def _while_statement(self, node: ast.While) -> None:
         condition = cast(self.translate(node.test), BOOL)
@@ -359,11 +402,11 @@ class Statements(Expressions):
         self._depth -= 1
         self.emit("}")
 
-    def _return_statement(self, node: ast.Return) -> None:
+    def _return_statement(self, node: ast.Return) -> bool:
         if node.value is None:
             self.result = NOTHING
             self.emit("return;")
-            return
+            return True
         value = self.translate(node.value)
         self.result = joined(self.result, value.type)
         if self.result in (FLOAT, INT, BOOL):
@@ -371,6 +414,7 @@ class Statements(Expressions):
         elif not isinstance(value.type, TupleOf):
             raise Refusal(f"returning {described(value.type)}", "write into an argument")
         self.emit(f"return {value.text};")
+        return True
 
     def _expr_statement(self, node: ast.Expr) -> None:
         if isinstance(node.value, ast.Constant):  # a docstring
@@ -382,11 +426,13 @@ class Statements(Expressions):
     def _pass_statement(self, node: ast.Pass) -> None:
         """Do nothing."""
 
-    def _break_statement(self, node: ast.Break) -> None:
+    def _break_statement(self, node: ast.Break) -> bool:
         self.emit("break;")
+        return True
 
-    def _continue_statement(self, node: ast.Continue) -> None:
+    def _continue_statement(self, node: ast.Continue) -> bool:
         self.emit("continue;")
+        return True
 
     def _fresh(self, name: str) -> str:
         """Return a name that the function does not have yet."""

@@ -37,19 +37,19 @@ SUPPORT = """\
 /* Operations as the kernels have them in Python; see README.md. */
 
 /* The larger one; the first if they are equal or the second is NaN. */
-static inline double sr_max(double a, double b) { return b > a ? b : a; }
+static inline double sr_max(double a, double b) { return (b > a) ? b : a; }
 
 /* The smaller one; the first if they are equal or the second is NaN. */
-static inline double sr_min(double a, double b) { return b < a ? b : a; }
+static inline double sr_min(double a, double b) { return (b < a) ? b : a; }
 
-static inline int64_t sr_max_int(int64_t a, int64_t b) { return b > a ? b : a; }
+static inline int64_t sr_max_int(int64_t a, int64_t b) { return (b > a) ? b : a; }
 
-static inline int64_t sr_min_int(int64_t a, int64_t b) { return b < a ? b : a; }
+static inline int64_t sr_min_int(int64_t a, int64_t b) { return (b < a) ? b : a; }
 
 /* 1, -1, or 0 for either zero; NaN of NaN. */
 static inline double sr_sign(double x)
 {
-    return x > 0.0 ? 1.0 : (x < 0.0 ? -1.0 : (x == 0.0 ? 0.0 : x));
+    return (x > 0.0) ? 1.0 : ((x < 0.0) ? -1.0 : ((x == 0.0) ? 0.0 : x));
 }
 
 static inline bool sr_isfinite(double x) { return fabs(x) <= DBL_MAX; }
@@ -59,19 +59,19 @@ static inline bool sr_isnan(double x) { return !(x == x); }
 /* The integer towards zero; the least integer for NaN and beyond the range, where C has none. */
 static inline int64_t sr_int(double x)
 {
-    return (x >= -9223372036854775808.0 && x < 9223372036854775808.0) ? (int64_t)x : INT64_MIN;
+    return ((x >= -0x1p63) && (x < 0x1p63)) ? (int64_t)x : INT64_MIN;
 }
 
 /* The remainder with the sign of the divisor, and the quotient rounded down; 0 for divisor 0. */
 static inline int64_t sr_modulo(int64_t a, int64_t b)
 {
-    int64_t rest = (b == 0 || b == -1) ? 0 : a % b;
-    return (rest != 0 && ((rest < 0) != (b < 0))) ? rest + b : rest;
+    const int64_t rest = ((b == 0) || (b == -1)) ? 0 : (a % b);
+    return ((rest != 0) && ((rest < 0) != (b < 0))) ? (rest + b) : rest;
 }
 
 static inline int64_t sr_floor_divide(int64_t a, int64_t b)
 {
-    return (b == 0) ? 0 : (b == -1) ? -a : (a - sr_modulo(a, b)) / b;
+    return (b == 0) ? 0 : ((b == -1) ? -a : ((a - sr_modulo(a, b)) / b));
 }
 """
 
@@ -144,8 +144,10 @@ def chosen(arguments: tuple[Value, ...]) -> Value:
         then, otherwise = cast(then, kind), cast(otherwise, kind)
     if condition.constant is not None:
         return then if condition.constant else otherwise
+    if then.text == otherwise.text:
+        return then
     calls = condition.calls or then.calls or otherwise.calls
-    text = f"{condition.at(OR)} ? {then.at(TERNARY + 1)} : {otherwise.at(TERNARY + 1)}"
+    text = f"{condition.at(UNARY)} ? {then.at(TERNARY + 1)} : {otherwise.at(TERNARY + 1)}"
     return Value(kind, text, TERNARY, calls=calls)
 
 

@@ -1,0 +1,118 @@
+"""The command ``space-robot export``: flight software as C99 that computes the same bits."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import click
+
+from .options import flight_options, plan_flight
+
+
+@click.command()
+@flight_options(
+    "controller",
+    "robot",
+    "gains",
+    "mission",
+    "case",
+    "sensors",
+    "actuators",
+    "navigation",
+    "duration",
+    "period",
+    "swaps",
+    "faults",
+    "seed",
+    "set",
+    "scenario",
+    "json",
+)
+@click.option(
+    "--law",
+    "laws",
+    multiple=True,
+    metavar="LAW",
+    help="A further law of the gain set, for space_robot_choose_law(); may be repeated.",
+)
+@click.option(
+    "-o",
+    "--out",
+    type=click.Path(path_type=Path),
+    default=Path("flight_code"),
+    show_default=True,
+    help="Folder to write.",
+)
+@click.option("--force", is_flag=True, help="Replace the folder if it exists.")
+@click.option(
+    "--verify", "is_verified", is_flag=True, help="Build and replay with all compilers here."
+)
+@click.option(
+    "--acceptance-seconds",
+    type=click.FloatRange(min=0.01),
+    metavar="S",
+    help="Seconds of the scenario to record [default: all of it].",
+)
+def export(
+    as_json: bool,
+    laws: tuple[str, ...],
+    out: Path,
+    force: bool,
+    is_verified: bool,
+    acceptance_seconds: float | None,
+    **options: Any,
+) -> None:
+    """Export the flight software of a scenario as C99 that computes the same bits.
+
+    The folder has the supervisor, the laws with their swaps, the estimate, navigation and
+    allocation, as functions of C with their gains and the robot's masses, and recorded flights.
+    `make` in it replays them: every command must be equal to the bit. Nothing of it allocates
+    memory, and it calls no function of the C library that may differ between machines.
+
+    \b
+    Examples:
+      space-robot export -o flight_code --verify
+      space-robot export --controller tde_stc --swap 5:ctc --navigation filtered --sensors fine
+      space-robot export --robot seven_joint --actuators wheels --law tde_smc --law ctc
+      space-robot export --scenario mine.yaml --force
+    """
+    from space_robot_msgs_py.config.validation import validate
+    from space_robot_msgs_py.errors import FlightError
+
+    from ..console.progress import counting_progress
+    from ..console.terminal import echo_json, terminal
+    from ..export.folder import check_folder, write_folder
+    from ..export.recorded import recorded_flights
+    from ..export.software import export as exported_of
+    from ..export.verify import verify
+    from ..flight.compilation import compile_kernels
+    from ..scenario.options import FlightPlan
+    from .export_display import print_export, print_verdicts
+
+    check_folder(out, force)
+    flight = plan_flight(**options)
+    flight.check_in_process()
+    exported = exported_of(flight, laws)
+    compile_kernels(bool(flight.plant.names.actuators))
+    plan = validate(FlightPlan, options, "options")
+    flights = recorded_flights(plan, exported, laws, acceptance_seconds)
+    with counting_progress("recorded flights") as begin:
+        advance = begin(len(exported.software.laws) + 2)
+        written = write_folder(out, exported, flights, advance)
+    verdicts = list(verify(out)) if is_verified else []
+    if as_json:
+        echo_json(
+            {
+                "folder": str(out),
+                "digest": exported.digest,
+                **exported.figures(),
+                "flights": [{"name": n, "about": a, "records": count} for n, a, count in written],
+                "verified": [verdict._asdict() for verdict in verdicts],
+            }
+        )
+    else:
+        print_export(out, exported, written, terminal())
+        print_verdicts(verdicts, terminal())
+    if wrong := [v for v in verdicts if not v.is_accepted]:
+        raise FlightError("; ".join(f"{v.target}: {v.reason}" for v in wrong))

@@ -1,0 +1,1 @@
+"""Export of a scenario's flight software as a folder of C, with recorded flights to accept it."""

@@ -1,0 +1,127 @@
+"""Recorded flights that accept exported flight software."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from space_robot_control.controller.law_choice import LawChoice
+from space_robot_control.controller.supervision import NEW
+from space_robot_control.flight_code.acceptance import CHOOSE, Recording, RecordingSupervisor
+from space_robot_control.flight_code.folder import Exported
+from space_robot_control.flight_code.hostile import SHARE, hostile_ticks, spoil
+from space_robot_msgs_py.errors import FlightError
+
+from ..flight.message_loop import MessageLoop
+from ..flight.plan import Flight, FlightPlan, resolve
+from .software import laws_of
+
+FAULTS = (
+    "drop_state@0.1-0.2:0.3",
+    "jitter_state@0.2-0.3:4",
+    "repeat_state@0.3-0.35:0.3",
+    "nan_state@0.35-0.4:0.2",
+    "inf_state@0.4-0.45:0.2",
+    "scaled_quaternion@0.45-0.5:0.2",
+    "stamp_back@0.5-0.55:0.2",
+    "stamp_jump@0.55-0.6:0.2",
+    "nan_state@0.65-0.78:1",
+    "drop_state@0.82-0.84:1",
+)
+"""Of messages: states are lost, late, twice, wrong; the last but one outlasts the holding."""
+FAULTY_S, HOSTILE_TICKS = 1.0, 4000
+
+
+class RecordedFlight(NamedTuple):
+    """A recorded flight."""
+
+    name: str
+    about: str
+    """What it is, in a line."""
+    recording: Recording
+
+
+def recorded_flights(
+    plan: FlightPlan, exported: Exported, further: Sequence[str], seconds: float | None = None
+) -> Iterator[RecordedFlight]:
+    """Fly and record what exported flight software has to answer.
+
+    The scenario as it is; its first second under each law in case 3 with faults of messages and
+    hardware; and hostile states.
+
+    Args:
+        plan: of the scenario.
+        exported: made from it.
+        further: laws beside those of the scenario.
+        seconds: of the scenario to fly (None: all of it).
+    """
+    shorter = plan if seconds is None else plan.model_copy(update={"duration": seconds})
+    flight = Flight(resolve(shorter))
+    yield RecordedFlight("mission", "the scenario", _flown(flight, exported))
+    laws = [law.name for law in laws_of(flight, further)]
+    for place, law in enumerate(laws):
+        faults = [*FAULTS, *_of_hardware(flight)]
+        update = {"faults": faults, "case": "3", "duration": FAULTY_S}
+        faulty = Flight(resolve(plan.model_copy(update=update)))
+        about = f"{law}, case 3, lost, late and wrong states, safe mode"
+        yield RecordedFlight(f"faults_{law}", about, _flown(faulty, exported, place, law))
+    yield RecordedFlight("hostile", "hostile states and stamps", _hostile(plan, exported, laws))
+
+
+def _of_hardware(flight: Flight) -> list[str]:
+    names = flight.plant.names
+    faults = [f"wheel_fail@0.2:{name}" for name in names.wheels[:1]]
+    return [*faults, *(f"thruster_stuck_off@0.2:{name}" for name in names.thrusters[:1])]
+
+
+def _supervisor(flight: Flight, recording: Recording) -> RecordingSupervisor:
+    settings = flight.controller_settings
+    return RecordingSupervisor(
+        flight.controller, recording, settings.hold_ticks, settings.longest_jump
+    )
+
+
+def _flown(flight: Flight, exported: Exported, place: int = 0, law: str = "") -> Recording:
+    recording = Recording(exported)
+    supervisor = _supervisor(flight, recording)
+    if law and place:
+        recording.add(CHOOSE, place, supervisor, 0)
+        flight.law = flight.controller.law = flight.laws[law]
+    nothing: Callable[..., None] = lambda *_: None  # noqa: E731
+    loop = MessageLoop(flight, nothing, nothing, supervisor)
+    try:
+        for _ in range(flight.ticks):
+            loop.fly_tick()
+    except FlightError:  # whatever was flown up to here counts
+        pass
+    supervisor.finish()
+    return recording
+
+
+def _hostile(plan: FlightPlan, exported: Exported, laws: Sequence[str]) -> Recording:
+    """Record the answers to hostile states beside states of the plant at rest."""
+    flight = Flight(resolve(plan))
+    recording, random = Recording(exported), np.random.default_rng(20)
+    supervisor = _supervisor(flight, recording)
+    choice, wheels = LawChoice(flight.law, flight.swaps), len(flight.plant.names.wheels)
+    references = flight.mission.chunk(0, HOSTILE_TICKS).references()
+    for k, tick in enumerate(hostile_ticks(HOSTILE_TICKS, random)):
+        if random.random() < 0.005 and len(laws) > 1:
+            place = int(random.integers(len(laws)))
+            choice.choose(flight.laws[laws[place]])
+            supervisor.use(choice.chosen)
+            recording.add(CHOOSE, place, supervisor, 0)
+        if supervisor.judge(tick) != NEW:
+            continue
+        if choice.change_at(tick):
+            supervisor.use(choice.chosen)
+        state = flight.plant.state.copy()
+        state.tick = tick
+        state.numbers[:] += 1e-4 * random.normal(size=state.numbers.size)
+        state.quaternion[:] /= np.sqrt(state.quaternion @ state.quaternion)
+        spoil(state, wheels, random, is_hostile=random.random() < SHARE)
+        supervisor.answer(state, references[k : k + 1])
+    supervisor.finish()
+    return recording

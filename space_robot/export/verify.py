@@ -1,0 +1,64 @@
+"""Acceptance of an exported folder by every compiler that is here."""
+
+from __future__ import annotations
+
+import re
+import shutil
+import subprocess
+from collections.abc import Iterator
+from pathlib import Path
+from typing import NamedTuple
+
+from space_robot_msgs_py.errors import InputError
+
+CROSS = {"aarch64": "aarch64-linux-gnu-gcc", "armhf": "arm-linux-gnueabihf-gcc"}
+EMULATORS = {"aarch64": "qemu-aarch64", "armhf": "qemu-arm"}
+
+
+class Verdict(NamedTuple):
+    """Result of the recorded flights on one compiler."""
+
+    target: str
+    """Compiler, or processor."""
+    is_accepted: bool
+    states: int
+    """Answered, every bit equal."""
+    tick_ns: float | None
+    """Time of a tick in the first flight, ns; None where it was not taken."""
+    reason: str
+    """First line that says why it was not accepted."""
+
+
+def targets() -> dict[str, list[str]]:
+    """Return what can be verified here: the arguments of make by compiler or processor."""
+    native = {name: [f"COMPILERS={name}", "figures"] for name in ("gcc", "clang")}
+    found = {name: made for name, made in native.items() if shutil.which(name)}
+    for name, compiler in CROSS.items():
+        if shutil.which(compiler) and shutil.which(EMULATORS[name]):
+            found[name] = [name]
+    return found
+
+
+def verify(folder: Path) -> Iterator[Verdict]:
+    """Build the folder and replay its flights with all compilers.
+
+    Raises:
+        InputError: there is no compiler, or no make.
+    """
+    found = targets()
+    if not found or not shutil.which("make"):
+        raise InputError("no gcc, clang or make was found to verify the folder with")
+    for target, arguments in found.items():
+        command = ["make", "--no-print-directory", "-C", str(folder), *arguments]
+        run = subprocess.run(command, capture_output=True, text=True, check=False)
+        counted = re.findall(r"(\d+) states answered, every bit equal", run.stdout)
+        times = re.findall(r"mission\.bin: .* (\d+) ns a tick", run.stdout)
+        output = (run.stdout + run.stderr).splitlines()
+        wrong = [line for line in output if " instead of " in line or "error:" in line]
+        yield Verdict(
+            target,
+            run.returncode == 0,
+            sum(map(int, counted)),
+            float(times[0]) if times else None,
+            "" if run.returncode == 0 else next(iter(wrong), output[-1] if output else "failed"),
+        )

@@ -1,0 +1,56 @@
+"""Hostile states: what no sensor should ever send, for the flight code to answer all the same."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from space_robot_msgs_py.samples import RobotState
+
+Array = NDArray[np.float64]
+
+VALUES = (
+    *(np.nan, -np.nan, np.inf, -np.inf, 0.0, -0.0, 5e-324, -5e-324, 2.2e-308, 1e-160, 1e-6),
+    *(1.0, -1.0, 1e15, -1e15, 1e29, 1.1e30, -1e31, 1e154, 1e200, 1.7e308, -1.7e308),
+)
+JUMPS = (0, -1, -2, 2, 7, 20, 21, 500, 1999, 2001, -5000, 10**6, 10**12, 2**52, -(2**62), 2**62)
+LEAST, MOST = -(2**63), 2**63 - 1
+SHARE = 0.3
+"""Share of the states that are hostile."""
+
+
+def spoil(
+    state: RobotState, wheels: int, random: np.random.Generator, is_hostile: bool = True
+) -> None:
+    """Change some numbers of a state; those of wheels that the base does not have become zero."""
+    numbers = state.numbers
+    way = random.integers(5) if is_hostile else -1
+    if way == 0:  # any numbers
+        places = random.integers(numbers.size, size=random.integers(1, 4))
+        numbers[places] = random.choice(VALUES, size=places.size)
+    elif way == 1:  # an attitude near half a turn, or beyond
+        eta = random.choice([0.0, 1e-7, 0.01, 0.0199, 0.03, -0.04, 0.06])
+        axis = random.normal(size=3)
+        axis *= np.sqrt(1.0 - eta * eta) / np.sqrt(axis @ axis)
+        state.quaternion[:] = [eta, *axis]
+    elif way == 2:  # a quaternion of another norm
+        state.quaternion[:] *= random.choice([0.0, 0.9, 0.9996, 1.0004, 1.1, -1.0])
+    elif way == 3:  # everything the same number
+        numbers[:] = random.choice(VALUES)
+    elif way == 4:  # large but allowed
+        numbers[:] *= 10.0 ** random.integers(0, 20)
+        state.quaternion[:] = [1.0, 0.0, 0.0, 0.0]
+    state.wheel_velocities[wheels:] = state.wheel_torques[wheels:] = 0.0
+
+
+def hostile_ticks(count: int, random: np.random.Generator) -> Iterator[int]:
+    """Return ticks of states, most of them one after the other."""
+    tick = 0
+    for _ in range(count):
+        yield tick if random.random() > 0.02 else int(random.choice([LEAST, MOST, -1, 2**52 + 1]))
+        step = int(random.choice(JUMPS)) if random.random() < 0.05 else 1
+        tick = min(max(tick + step, LEAST), MOST)
+        if not 0 <= tick <= 2**52 and random.random() < 0.5:
+            tick = int(random.integers(10**6))
