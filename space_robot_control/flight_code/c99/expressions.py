@@ -93,6 +93,8 @@ class Expressions:
         self.program, self.function = program, function
         self.names: dict[str, Value] = {}
         """Values of local names."""
+        self.facts: dict[str, bool] = {}
+        """Conditions, as dumped syntax, that are known in a part of the function."""
 
     def translate(self, node: ast.expr) -> Value:
         """Return the value of an expression.
@@ -100,6 +102,8 @@ class Expressions:
         Raises:
             Refusal: it is not of the language.
         """
+        if self.facts and (known := self.facts.get(ast.dump(node))) is not None:
+            return number_of(known)
         method = getattr(self, f"_{type(node).__name__.lower()}", None)
         if method is None:
             raise Refusal(f"{type(node).__name__} ({ast.unparse(node)})", "use plain arithmetic")
@@ -133,7 +137,9 @@ class Expressions:
         owner = self.translate(node.value)
         kind = owner.type
         if isinstance(kind, Known) and isinstance(kind.value, ModuleType):
-            return self._known(getattr(kind.value, node.attr), node.attr)
+            value = getattr(kind.value, node.attr)
+            is_number = isinstance(value, float)
+            return number_of(value) if is_number else Value(Known(value), node.attr)
         if isinstance(kind, ArrayOf) and node.attr == "size":
             return self.length(owner)
         if isinstance(kind, ArrayOf) and node.attr == "shape":

@@ -250,7 +250,7 @@ def kind_of_argument(value: Value, name: str, lengths: set[str]) -> Type:
     lengths share functions that do not.
     """
     kind = value.type
-    if value.is_bound:
+    if value.is_bound or (kind == BOOL and value.constant is not None):
         return Known(value.constant)
     if isinstance(kind, ArrayOf):
         first = (

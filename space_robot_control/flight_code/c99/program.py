@@ -141,7 +141,8 @@ class Program:
             raise Refusal(f"a call of {tree.name}() with {len(arguments)} arguments", "give all")
         labels = [a.type.label for a in arguments if isinstance(a.type, Bundle)]
         is_bound = any(
-            isinstance(a.type, Known) or getattr(a.type, "shape", None) == (0,) for a in arguments
+            a.is_bound or isinstance(a.type, Known) or getattr(a.type, "shape", None) == (0,)
+            for a in arguments
         )
         label = labels[0] if labels else label if is_bound else ""
         lengths = self._lengths.setdefault(body, set())

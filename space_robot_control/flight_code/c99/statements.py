@@ -55,8 +55,6 @@ class Statements(Expressions):
         self.stores: set[Field] = set()
         """Fields that are written."""
         self._roots: dict[str, frozenset[str]] = {}
-        self._facts: set[str] = set()
-        """Names of truth values that are known in a part of the function."""
         self._depth = 1
         self._declared: set[str] = set()
         self._counter: dict[str, int] = {}
@@ -80,7 +78,7 @@ class Statements(Expressions):
 
     def _block(self, statements: Sequence[ast.stmt]) -> bool:
         """Translate statements until one leaves the block; return whether one does."""
-        before = dict(self.names)
+        before = dict(self.facts)
         is_left = False
         for statement in statements:
             if is_left:
@@ -93,25 +91,27 @@ class Statements(Expressions):
                 is_left = bool(method(statement))
             except Refusal as refusal:
                 raise self.refused(statement, refusal) from None
-        for name in self._facts & before.keys():
-            self.names[name] = before[name]
+        self.facts = before
         return is_left
 
     def _learn(self, test: ast.expr, is_true: bool) -> None:
-        """Note that a condition, if it is a name's that never changes, is true or false here."""
+        """Note that a condition of names that never change is true or false from here on."""
         while True:
             if isinstance(test, ast.UnaryOp) and isinstance(test.op, ast.Not):
                 test, is_true = test.operand, not is_true
-            elif isinstance(test, ast.Call) and len(test.args) == 1:
-                test = test.args[0] if ast.unparse(test.func) in TRANSPARENT else test.func
+            elif isinstance(test, ast.Call) and ast.unparse(test.func) in TRANSPARENT:
+                test = test.args[0]
             else:
                 break
-        most = 0 if isinstance(test, ast.Name) and self.homes.is_parameter(test.id) else 1
-        if isinstance(test, ast.Name) and test.id in self.names:
-            is_steady = self.homes.assignments[test.id] <= most
-            if is_steady and self.names[test.id].type == BOOL:
-                self.names[test.id] = number_of(is_true)
-                self._facts.add(test.id)
+        is_plain = not any(isinstance(n, (ast.Call, ast.Attribute)) for n in ast.walk(test))
+        names = names_in([test])
+        if is_plain and names <= self.names.keys() and all(map(self._is_steady_name, names)):
+            self.facts = {**self.facts, ast.dump(test): is_true}
+
+    def _is_steady_name(self, name: str) -> bool:
+        """Return whether a truth value has the same value wherever it is read."""
+        most = 0 if self.homes.is_parameter(name) else 1
+        return self.names[name].type == BOOL and self.homes.assignments[name] <= most
 
     # declarations
 
@@ -292,35 +292,28 @@ class Statements(Expressions):
         condition = cast(self.translate(node.test), BOOL)
         if condition.constant is not None:
             return self._block(node.body if condition.constant else node.orelse)
-        known = dict(self.names)
+        known = self.facts
         self.emit(f"if ({condition.text}) {{")
         self._learn(node.test, True)
         is_left = self._inside(node.body)
-        self._forget(known)
-        if node.orelse:
-            self._learn(node.test, False)
-            first, lines = len(self.lines), self.lines
-            is_other_left = self._inside(node.orelse)
-            self._forget(known)
-            inside = [line for line in lines[first:] if line.strip()]
-            if len(node.orelse) == 1 and inside and inside[0].strip().startswith("if ("):
-                lines[first:] = [line.removeprefix(INDENT) for line in lines[first:]]
-                lines[first] = f"{INDENT * self._depth}}} else {lines[first].strip()}"
-                return is_left and is_other_left
-            if inside:
-                lines.insert(first, f"{INDENT * self._depth}}} else {{")
-            is_left = is_left and is_other_left
+        self.facts = known
+        if not node.orelse:
             self.emit("}")
+            if is_left:
+                self._learn(node.test, False)
+            return False
+        self._learn(node.test, False)
+        first, lines = len(self.lines), self.lines
+        is_left = self._inside(node.orelse) and is_left
+        self.facts = known
+        if len(node.orelse) == 1 and lines[first:] and lines[first].strip().startswith("if ("):
+            lines[first:] = [line.removeprefix(INDENT) for line in lines[first:]]
+            lines[first] = f"{INDENT * self._depth}}} else {lines[first].strip()}"
             return is_left
+        if lines[first:]:
+            lines.insert(first, f"{INDENT * self._depth}}} else {{")
         self.emit("}")
-        if is_left:
-            self._learn(node.test, False)
-        return False
-
-    def _forget(self, known: dict[str, Value]) -> None:
-        """Drop what was learned in a branch."""
-        for name in self._facts & known.keys():
-            self.names[name] = known[name]
+        return is_left
 
     def _inside(self, statements: Sequence[ast.stmt]) -> bool:
         self._depth += 1

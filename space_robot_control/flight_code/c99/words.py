@@ -59,7 +59,7 @@ static inline bool sr_isnan(double x) { return !(x == x); }
 /* The integer towards zero; the least integer for NaN and beyond the range, where C has none. */
 static inline int64_t sr_int(double x)
 {
-    return ((x >= -0x1p63) && (x < 0x1p63)) ? (int64_t)x : INT64_MIN;
+    return (fabs(x) <= 9.223372036854774784e18) ? (int64_t)x : INT64_MIN;
 }
 
 /* The remainder with the sign of the divisor, and the quotient rounded down; 0 for divisor 0. */
