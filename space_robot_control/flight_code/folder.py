@@ -14,7 +14,6 @@ from space_robot_msgs_py.compiled.records import Field as RecordField
 from space_robot_msgs_py.compiled.records import Record
 from space_robot_msgs_py.samples import Reference, State
 
-from .c99.words import SUPPORT
 from .parameters import entries, reset_lines
 from .software import FlightSoftware, Translated, translate
 
@@ -57,7 +56,6 @@ class Exported:
             ),
             PurePosixPath("src/kernels.h"): self.render(
                 "kernels.h",
-                support=SUPPORT,
                 constants=found.constants(),
                 tuples=found.tuples(),
                 prototypes=found.final(found.prototypes()),
@@ -158,7 +156,6 @@ class Exported:
             "controller": "&state->controller",
             "law_gains": f"&state->{law}_gains",
             "law_memory": f"&state->{law}_memory",
-            "law_h_bar": f"state->{law}_gains.h_bar",
             "tick": "tick",
             "state": "&measurement->state",
             "reference": "reference",

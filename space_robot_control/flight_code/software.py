@@ -21,8 +21,8 @@ from ..controller.kernels import ControllerMemory, engage
 from ..controller.supervision import Supervision, answer_state, judge, swaps_due, takes_over
 from ..controller.supervisor import Supervisor
 from ..laws import CompiledLaw, ControlLaw
+from .c99 import language as lang
 from .c99.files import Files
-from .c99.language import FLOAT, INT, ArrayOf, BlockOf, Bundle, Field, Known, Type, Value
 from .c99.program import Program, same_number
 
 ROOMS = {
@@ -104,7 +104,7 @@ class FlightSoftware:
 
     @property
     def joints(self) -> int:
-        """n."""
+        """N."""
         return len(self.controller.names.joints)
 
     @cached_property
@@ -190,63 +190,66 @@ def translate(software: FlightSoftware) -> Translated:
     )
 
 
-def _program(software: FlightSoftware, constants: dict[Field, float]) -> tuple[Program, Any]:
+def _program(software: FlightSoftware, constants: dict[lang.Field, float]) -> tuple[Program, Any]:
+    """Return a program, and the functions that are called from outside."""
     program = Program(software.sizes, software.joints)
     program.constants = constants
-    supervision, tick = _value(BlockOf(Supervision)), _value(INT)
-    controller, names = _value(BlockOf(ControllerMemory)), software.controller.names
-    how = _value(Known(allocate if names.actuators else leave_alone))
-    state, reference, period = _value(BlockOf(State)), _value(BlockOf(Reference)), _value(FLOAT)
-
-    def root(kernel: Any, *arguments: Value) -> Any:
-        return program.function(kernel.py_func, arguments)
-
-    roots = {
-        "judge": root(judge, supervision, tick),
-        "takes_over": root(takes_over, supervision, tick),
-        "engage": root(engage, controller),
+    supervision, controller, state, reference = (
+        _value(lang.BlockOf(record)) for record in (Supervision, ControllerMemory, State, Reference)
+    )
+    tick, period = _value(lang.INT), _value(lang.FLOAT)
+    has_actuators = bool(software.controller.names.actuators)
+    how = _value(lang.Known(allocate if has_actuators else leave_alone))
+    calls = {
+        "judge": (judge, (supervision, tick)),
+        "takes_over": (takes_over, (supervision, tick)),
+        "engage": (engage, (controller,)),
     }
     if software.swaps:
-        swaps = _value(ArrayOf((len(software.swaps),)))
-        roots["swaps_due"] = root(swaps_due, swaps, tick, tick)
+        ticks = _value(lang.ArrayOf((len(software.swaps),)))
+        calls["swaps_due"] = (swaps_due, (ticks, tick, tick))
     for law in software.laws:
-        bundle = _law(law, software.joints + 3)
-        roots[f"answer_state {law.name}"] = root(
-            answer_state, supervision, controller, bundle, how, tick, state, reference, period
+        inputs = how, tick, state, reference, period
+        calls[f"answer_state {law.name}"] = (
+            answer_state,
+            (supervision, controller, _law(law), *inputs),
         )
-    return program, roots
+    numbers = {
+        name: program.function(kernel.py_func, arguments)
+        for name, (kernel, arguments) in calls.items()
+    }
+    return program, {name: program.functions[number] for name, number in numbers.items()}
 
 
-def _value(kind: Type) -> Value:
-    return Value(kind, "argument")
+def _value(kind: lang.Type) -> lang.Value:
+    return lang.Value(kind, "argument")
 
 
-def _law(law: CompiledLaw, axes: int) -> Value:
+def _law(law: CompiledLaw) -> lang.Value:
     """Return a law as the argument of a kernel: its function bound, gains and memory passed."""
     own = type(law)
-    kinds = {
-        "run": Known(own.kernel),
-        "gains": BlockOf(own.gains_type),
-        "memory": BlockOf(own.memory_type),
-        "h_bar": ArrayOf((axes if law.h_bar.size else 0,)),
+    has_h_bar = law.uses_time_delay_estimate()
+    items = {
+        "run": lang.Known(own.kernel),
+        "gains": lang.BlockOf(own.gains_type),
+        "memory": lang.BlockOf(own.memory_type),
+        "h_bar": lang.FieldOf("gains", "h_bar") if has_h_bar else lang.EMPTY,
+        "uses_model": lang.Known(law.uses_model),
     }
-    parts = [_value(kind) for kind in kinds.values()]
-    parts.append(Value(Known(law.uses_model), "", constant=law.uses_model, is_bound=True))
-    items = tuple({**kinds, "uses_model": Known(law.uses_model)}.items())
-    return Value(Bundle(law.name, items), "law", parts=tuple(parts))
+    return _value(lang.Bundle(law.name, tuple(items.items())))
 
 
 def _constants(
-    software: FlightSoftware, program: Program, written: set[Field]
-) -> dict[Field, float]:
+    software: FlightSoftware, program: Program, written: set[lang.Field]
+) -> dict[lang.Field, float]:
     """Return the fields that no kernel writes and that have one number, wherever they are."""
-    found: dict[Field, set[float | None]] = {}
+    found: dict[lang.Field, set[float | None]] = {}
 
     def visit(record: type[Record], numbers: Any) -> None:
         for name, field in record.fields().items():
             if isinstance(field, RecordField):
                 kept = numbers_of(program.shape(record, name), numbers[name])
-                found.setdefault(Field(record, name), set()).add(same_number(kept))
+                found.setdefault(lang.Field(record, name), set()).add(same_number(kept))
             else:
                 visit(field, numbers[name])
 

@@ -13,8 +13,8 @@ from typing import Any
 from space_robot_msgs_py.compiled.records import Field as RecordField
 from space_robot_msgs_py.compiled.records import Record
 
+from . import language as lang
 from .functions import Function, syntax_of
-from .language import PREFIX, ArrayOf, BlockOf, Field, Pointer, TupleOf, Type, literal
 from .program import Constant, Program
 
 WIDTH = 100
@@ -86,7 +86,7 @@ class Files:
         self.functions = program.reachable(first)
         self.fields = program.fields_of(self.functions)
         for record in whole:
-            self.fields |= {Field(record, name) for name in record.fields()}
+            self.fields |= {lang.Field(record, name) for name in record.fields()}
         self._names = self._function_names()
         self._constants = self._constant_names()
 
@@ -95,7 +95,7 @@ class Files:
         declared = record.fields()[name]
         if not isinstance(declared, RecordField):
             return any(self.has(declared, inner) for inner in declared.fields())
-        return Field(record, name) in self.fields and 0 not in self.program.shape(record, name)
+        return lang.Field(record, name) in self.fields and 0 not in self.program.shape(record, name)
 
     def name_of(self, function: Function) -> str:
         """Return a function's name in C."""
@@ -149,7 +149,9 @@ class Files:
             else:
                 for k, item in enumerate(kind.items):
                     inner = (
-                        self.program.tuple_name(item) if isinstance(item, TupleOf) else item.name
+                        self.program.tuple_name(item)
+                        if isinstance(item, lang.TupleOf)
+                        else item.name
                     )
                     text += f"    {inner} item_{k};\n"
             text += f"}} {name};\n\n"
@@ -161,7 +163,7 @@ class Files:
         for constant in sorted(self.program.constants_of(self.functions)):
             name = self._constants[self.program.number_of_constant(constant)]
             number = constant.number
-            value = literal(number) if isinstance(number, float) else f"INT64_C({number})"
+            value = lang.literal(number) if isinstance(number, float) else f"INT64_C({number})"
             value = f"({value})" if value.startswith("-") else value
             lines.append(f"#define {name} {value}\n")
         return "".join(lines)
@@ -172,7 +174,7 @@ class Files:
             self._parameter(p.name, p.type, p.is_written) for p in function.parameters
         )
         kind = function.result
-        result = self.program.tuple_name(kind) if isinstance(kind, TupleOf) else kind.name
+        result = self.program.tuple_name(kind) if isinstance(kind, lang.TupleOf) else kind.name
         return f"{result} {self.name_of(function)}({parameters or 'void'})"
 
     def prototypes(self) -> str:
@@ -199,15 +201,15 @@ class Files:
         lines = (wrapped(self.final(line)) for line in function.lines)
         return "\n".join([text, "{", *lines, "}", ""])
 
-    def _parameter(self, name: str, kind: Type, is_written: bool) -> str:
+    def _parameter(self, name: str, kind: lang.Type, is_written: bool) -> str:
         const = "" if is_written else "const "
-        if isinstance(kind, (Pointer, BlockOf)):
+        if isinstance(kind, (lang.Pointer, lang.BlockOf)):
             return f"{const}{self.program.struct_name(kind.record)} *{name}"
-        if isinstance(kind, ArrayOf):
+        if isinstance(kind, lang.ArrayOf):
             sizes = "".join(f"[{size}]" for size in kind.shape[1:])
             first = "" if kind.shape[0] is None else kind.shape[0]
             return f"{const if not sizes else ''}double {name}[{first}]{sizes}"
-        if isinstance(kind, TupleOf):
+        if isinstance(kind, lang.TupleOf):
             return f"{self.program.tuple_name(kind)} {name}"
         return f"{kind.name} {name}"
 
@@ -220,7 +222,9 @@ class Files:
             for caller in self.functions
             if f"\N{CURRENCY SIGN}{number}(" in "\n".join(caller.lines)
         ]
-        return bool(callers) and all(self.room_of(c.body.__module__) == home for c in callers)
+        return bool(callers) and all(
+            self.room_of(caller.body.__module__) == home for caller in callers
+        )
 
     def _function_names(self) -> dict[int, str]:
         """Return names by number: the kernel's, with its module's or its law's where several are."""
@@ -243,7 +247,7 @@ class Files:
                 count += 1
                 fresh = f"{name}_{count}"
             taken.add(fresh)
-            names[self.program.functions.index(function)] = f"{PREFIX}{fresh}"
+            names[self.program.functions.index(function)] = f"{lang.PREFIX}{fresh}"
         return names
 
     def _constant_names(self) -> dict[int, str]:
@@ -254,7 +258,7 @@ class Files:
             name = constant.name
             if sum(other.name == name for other in found) > 1:
                 name = f"{self.program.modules[constant].rpartition('.')[2].upper()}_{name}"
-            names[self.program.number_of_constant(constant)] = f"{PREFIX.upper()}{name}"
+            names[self.program.number_of_constant(constant)] = f"{lang.PREFIX.upper()}{name}"
         return names
 
 

@@ -12,24 +12,8 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from .language import (
-    BOOL,
-    FLOAT,
-    INT,
-    NOTHING,
-    ArrayOf,
-    BlockOf,
-    Bundle,
-    Field,
-    Known,
-    NotInSubsetError,
-    Pointer,
-    Refusal,
-    TupleOf,
-    Type,
-    Value,
-    number_of,
-)
+from . import language as lang
+from .declarations import declared
 from .statements import Statements
 
 MOST_PASSES = 5
@@ -41,7 +25,7 @@ class Parameter:
     """An argument in C."""
 
     name: str
-    type: Type
+    type: lang.Type
     is_written: bool
     """Whether the memory that it points to is written."""
 
@@ -57,105 +41,73 @@ class Function:
     parameters: tuple[Parameter, ...]
     arguments: tuple[tuple[str, ...], ...]
     """Names of the parameters that each argument in Python becomes in C."""
-    result: Type
+    result: lang.Type
     lines: tuple[str, ...]
-    stores: frozenset[Field]
+    stores: frozenset[lang.Field]
     """Fields of records that it writes."""
-
-    @property
-    def has_effects(self) -> bool:
-        """Whether it writes memory."""
-        return any(parameter.is_written for parameter in self.parameters)
 
 
 @cache
 def syntax_of(body: Callable[..., Any]) -> tuple[ast.FunctionDef, str]:
-    """Return the syntax tree of a function, and its file from the project's root."""
-    source = textwrap.dedent(inspect.getsource(body))
-    tree = ast.parse(source).body[0]
-    file = Path(inspect.getsourcefile(body) or "?")
-    parts = file.parts
-    start = next((k for k, part in enumerate(parts) if part.startswith("space_robot")), None)
-    inside = [k for k, part in enumerate(parts) if part.startswith("space_robot_")] or [start]
-    shown = "/".join(parts[inside[-1] :]) if inside[-1] is not None else str(file)
+    """Return the syntax tree of a function, and its file from the package's folder on."""
+    tree = ast.parse(textwrap.dedent(inspect.getsource(body))).body[0]
+    path = Path(inspect.getsourcefile(body) or "?")
+    packages = [k for k, part in enumerate(path.parts) if part.startswith("space_robot_")]
+    file = "/".join(path.parts[packages[-1] :]) if packages else str(path)
     if not isinstance(tree, ast.FunctionDef):
         line = body.__code__.co_firstlineno
-        raise NotInSubsetError(shown, line, "a lambda", "write a kernel with def")
-    return tree, shown
+        raise lang.NotInSubsetError(file, line, "a lambda", "write a kernel with def")
+    return tree, file
 
 
 class _Translation(Statements):
     """Translation of one kernel for arguments of given types."""
 
     def __init__(
-        self, program: Any, body: Callable[..., Any], kinds: tuple[Type, ...], lengths: set[str]
+        self, program: Any, body: Callable[..., Any], kinds: tuple[lang.Type, ...]
     ) -> None:
         tree, file = syntax_of(body)
         super().__init__(program, body, tree, file)
-        self.lengths = lengths
         self.arguments: list[tuple[str, ...]] = []
-        self.parameters: list[tuple[str, Type]] = []
-        names = [argument.arg for argument in tree.args.args]
-        if len(names) != len(kinds):
-            raise Refusal(f"a call of {tree.name}() with {len(kinds)} arguments", "give them all")
-        for name, kind in zip(names, kinds, strict=True):
-            self.names[name] = self._parameter(name, kind)
-            self.types[name] = kind
+        self.parameters: list[tuple[str, lang.Type]] = []
+        for argument, kind in zip(tree.args.args, kinds, strict=True):
+            before = len(self.parameters)
+            self.names[argument.arg] = self._parameter(argument.arg, kind)
+            self.types[argument.arg] = kind
+            self.arguments.append(tuple(name for name, _ in self.parameters[before:]))
 
-    def _parameter(self, name: str, kind: Type) -> Value:
-        if getattr(kind, "shape", None) == (0,):  # C has no such arrays
-            self.arguments.append(())
-            return Value(kind, name)
-        if isinstance(kind, Known):
-            self.arguments.append(())
+    def _parameter(self, name: str, kind: lang.Type) -> lang.Value:
+        if isinstance(kind, lang.Known):
             is_number = isinstance(kind.value, (bool, int))
-            return replace(number_of(kind.value), is_bound=True) if is_number else Value(kind, name)
-        if isinstance(kind, Bundle):
-            before = len(self.arguments)
-            parts = tuple(self._parameter(f"{name}_{item}", of) for item, of in kind.items)
-            inner = [n for group in self.arguments[before:] for n in group]
-            self.arguments[before:] = [tuple(inner)]
-            return Value(kind, name, parts=parts)
-        self.parameters.append((name, kind))
-        self.arguments.append((name,))
-        size = ""
-        if isinstance(kind, ArrayOf) and kind.shape[0] is None and name in self.lengths:
-            size = f"{name}_size"
-            self.parameters.append((size, INT))
-            self.arguments[-1] = (name, size)
-        return Value(kind, name, roots=frozenset({name}), size=size)
-
-    def missing_length(self, array: Value) -> str:
-        """Ask for the length of an argument."""
-        if array.text in dict(self.parameters) and not array.offset:
-            raise LengthNeeded(array.text)
-        return super().missing_length(array)
-
-
-class LengthNeeded(Exception):
-    """A function reads the length of an argument."""
+            bound = lang.number_of(kind.value) if is_number else lang.Value(kind, name)
+            return replace(bound, is_bound=is_number)
+        if isinstance(kind, lang.Bundle):
+            parts: dict[str, lang.Value] = {}
+            for item, of in kind.items:
+                if isinstance(of, lang.FieldOf):
+                    owner = parts[of.item]
+                    pointer = replace(owner, type=lang.Pointer(owner.type.record))
+                    parts[item] = self.field(pointer, of.name)
+                else:
+                    parts[item] = self._parameter(f"{name}_{item}", of)
+            return lang.Value(kind, name, parts=tuple(parts.values()))
+        if kind != lang.EMPTY:  # C has no such arrays
+            self.parameters.append((name, kind))
+        return lang.Value(kind, name, roots=frozenset({name}))
 
 
 def translated(
-    program: Any, body: Callable[..., Any], kinds: tuple[Type, ...], label: str, lengths: set[str]
+    program: Any, body: Callable[..., Any], kinds: tuple[lang.Type, ...], label: str
 ) -> Function:
-    """Translate a kernel.
-
-    Args:
-        program: the export that it is part of.
-        body: the kernel as plain Python.
-        kinds: types of its arguments.
-        label: of the bundle that it is made for.
-        lengths: arrays whose length it reads, or may.
+    """Translate a kernel of a program for types of arguments; ``label`` is a bundle's.
 
     Raises:
-        LengthNeeded: it reads the length of another one.
         NotInSubsetError: a construct has no translation.
     """
-    types: dict[str, Type] = {}
-    result: Type = None
+    types: dict[str, lang.Type] = {}
+    result: lang.Type = None
     for _ in range(MOST_PASSES):
-        translation = _Translation(program, body, kinds, lengths)
+        translation = _Translation(program, body, kinds)
         translation.types |= types
         translation.result = result
         translation.body()
@@ -163,106 +115,62 @@ def translated(
             break
         types, result = dict(translation.types), translation.result
     written = set(translation.written)
-    for name, value in translation.names.items():
-        if isinstance(value.type, ArrayOf) and len(value.type.shape) > 1 and value.roots:
-            written |= value.roots  # C99 has no pointers to constant rows from variable ones
-    lines = _finished(translation, written)
+    for value in translation.names.values():
+        if isinstance(value.type, lang.ArrayOf) and len(value.type.shape) > 1:
+            written |= value.roots  # C99 cannot pass variable rows as constant ones
+    lines = declared(translation.lines, _declarations(translation, written))
     text = "\n".join(lines)
-    parameters = tuple(
-        Parameter(name, kind, name in written) for name, kind in translation.parameters
-    )
-    unused = [p for p in parameters if not re.search(rf"\b{p.name}\b", text)]
+    is_used = {p: bool(re.search(rf"\b{p}\b", text)) for p, _ in translation.parameters}
     own = {argument.arg for argument in translation.tree.args.args}
-    dropped = {p.name for p in unused if p.name not in own}
-    lines = [f"    (void){p.name};" for p in unused if p.name in own] + lines
+    kept = [(p, kind) for p, kind in translation.parameters if is_used[p] or p in own]
+    ignored = [f"    (void){p};" for p, _ in kept if not is_used[p]]
     return Function(
         body,
         label,
-        tuple(p for p in parameters if p.name not in dropped),
-        tuple(tuple(n for n in names if n not in dropped) for names in translation.arguments),
-        translation.result or NOTHING,
-        tuple(lines),
+        tuple(Parameter(p, kind, p in written) for p, kind in kept),
+        tuple(tuple(p for p in names if p in dict(kept)) for names in translation.arguments),
+        translation.result or lang.NOTHING,
+        tuple(ignored + lines),
         frozenset(translation.stores),
     )
 
 
-def _finished(translation: _Translation, written: set[str]) -> list[str]:
-    """Return the lines with constant pointers declared so, and without names nobody reads."""
-    lines = list(translation.lines)
-    declaration = re.compile("\N{SECTION SIGN}(\\w+)\N{SECTION SIGN}")
-    for k in range(len(lines) - 1, -1, -1):
-        match = declaration.search(lines[k])
-        if match is None:
-            continue
-        name = match[1]
-        kind = translation.types[name]
-        is_pointer = isinstance(kind, (Pointer, BlockOf, ArrayOf))
-        rest = "\n".join(lines[:k] + lines[k + 1 :])
-        uses = len(re.findall(rf"(?<![\w.>]){name}\b", declaration.sub("", rest)))
-        if uses == 0 and ("=" not in lines[k] or "(" not in lines[k].split("=", 1)[1]):
-            del lines[k]
-            continue
-        qualifier = "const " if is_pointer and name not in written else ""
-        lines[k] = declaration.sub(qualifier, lines[k])
-    return lines
+def _declarations(translation: _Translation, written: set[str]) -> dict[str, str]:
+    """Return the declaration of each local name; a pointer is to constants if it can be."""
+    declarations = {}
+    for name, kind in translation.types.items():
+        if name not in translation.own and not isinstance(kind, lang.Known):
+            is_pointer = isinstance(kind, (lang.Pointer, lang.BlockOf, lang.ArrayOf))
+            const = "const " if is_pointer and name not in written else ""
+            declarations[name] = f"{const}{translation.declared(kind, name)}"
+    return declarations
 
 
-def passed(function: Function, arguments: tuple[Value, ...], inside: Statements) -> list[str]:
+def passed(function: Function, arguments: tuple[lang.Value, ...]) -> list[str]:
     """Return the texts of the arguments of a call."""
     texts: list[str] = []
-    kinds = {p.name: p.type for p in function.parameters}
     for names, argument in zip(function.arguments, arguments, strict=True):
-        if isinstance(argument.type, Bundle):
-            given = _bundled(argument, inside)
-            found = {name: next(t for end, t in given if name.endswith(end)) for name in names}
-            assert all(found.values())
-            texts += found.values()
-        else:
-            given = texts_of(argument, inside)[: len(names)]
-            texts += [text or inside.missing_length(argument) for _, text in given]
-    assert len(texts) == len(kinds)
+        if isinstance(argument.type, lang.Bundle):
+            items = zip(argument.type.items, argument.parts, strict=True)
+            found = {item: part.text for (item, _), part in items}
+            texts += [next(t for item, t in found.items() if n.endswith(f"_{item}")) for n in names]
+        elif names:
+            texts.append(argument.address)
     return texts
 
 
-def _bundled(bundle: Value, inside: Statements) -> list[tuple[str, str]]:
-    pairs = []
-    for (name, _), part in zip(bundle.type.items, bundle.parts, strict=True):
-        if not isinstance(part.type, Known):
-            for suffix, text in texts_of(part, inside):
-                pairs.append((f"_{name}{suffix}", text))
-    return pairs
-
-
-def texts_of(value: Value, inside: Statements) -> list[tuple[str, str]]:
-    """Return an argument's text, and of an array that of its length."""
-    if isinstance(value.type, ArrayOf):
-        yield_size = value.type.shape[0] is not None or value.size
-        size = inside.length(value).text if yield_size else ""
-        return [("", value.address), ("_size", size)]
-    is_memory = isinstance(value.type, (Pointer, BlockOf))
-    return [("", value.address if is_memory else value.text)]
-
-
-def kind_of_argument(value: Value, name: str, lengths: set[str]) -> Type:
+def kind_of_argument(value: lang.Value) -> lang.Type:
     """Return the type of a parameter for an argument.
 
-    An array's length is part of it only if the function reads it, so that arrays of different
-    lengths share functions that do not.
+    Raises:
+        RefusedError: it cannot be one.
     """
     kind = value.type
-    if value.is_bound or (kind == BOOL and value.constant is not None):
-        return Known(value.constant)
-    if isinstance(kind, ArrayOf):
-        first = (
-            kind.shape[0] if name in lengths or len(kind.shape) > 1 or kind.shape[0] == 0 else None
-        )
-        return ArrayOf((first, *kind.shape[1:]))
-    if isinstance(kind, Bundle):
-        items = tuple(
-            (item, kind_of_argument(part, f"{name}_{item}", lengths))
-            for (item, _), part in zip(kind.items, value.parts, strict=True)
-        )
-        return Bundle(kind.label, items)
-    if kind in (FLOAT, INT, BOOL) or isinstance(kind, (TupleOf, Known, Pointer, BlockOf)):
-        return kind
-    raise Refusal(f"the argument {name!r}", "pass numbers, arrays and records")
+    if value.is_bound or (kind == lang.BOOL and value.constant is not None):
+        return lang.Known(value.constant)
+    is_memory = isinstance(
+        kind, (lang.TupleOf, lang.Known, lang.Pointer, lang.BlockOf, lang.ArrayOf, lang.Bundle)
+    )
+    if kind not in (lang.FLOAT, lang.INT, lang.BOOL) and not is_memory:
+        raise lang.RefusedError("such an argument", "pass numbers, arrays and records")
+    return kind

@@ -23,7 +23,7 @@ class NotInSubsetError(InputError):
         super().__init__(f"{file}, line {line}: {what} cannot be exported as C: {instead}")
 
 
-class Refusal(Exception):
+class RefusedError(Exception):
     """A construct is refused; the place is added by the caller who knows it."""
 
     def __init__(self, what: str, instead: str) -> None:
@@ -76,6 +76,10 @@ class BlockOf:
     record: type[Record]
 
 
+EMPTY = ArrayOf((0,))
+"""What stands for an array that a law does not have."""
+
+
 class Known:
     """An object that is bound when the code is exported: a function, a module, a number."""
 
@@ -91,6 +95,14 @@ class Known:
 
     def __hash__(self) -> int:
         return hash(self._identity())
+
+
+@dataclass(frozen=True)
+class FieldOf:
+    """An item of a bundle that is a field of another one."""
+
+    item: str
+    name: str
 
 
 @dataclass(frozen=True)
@@ -128,8 +140,6 @@ class Value:
     """Of an array or number in a record: its field."""
     offset: str = ""
     """Of an array: index of its first number in ``text``."""
-    size: str = ""
-    """Of an array whose length is unknown: the text of its length."""
     is_pointer: bool = True
     """Of a record: whether the text is a pointer."""
     calls: bool = False
@@ -195,7 +205,9 @@ def cast(value: Value, kind: Type) -> Value:
         known = None if constant is None else constant != 0
         text = f"{value.at(RELATION)} != {zero}"
         return replace(value, type=BOOL, text=text, rank=EQUAL, constant=known)
-    raise Refusal(f"{described(value.type)} where {described(kind)} is needed", "one type a name")
+    raise RefusedError(
+        f"{described(value.type)} where {described(kind)} is needed", "one type a name"
+    )
 
 
 def joined(one: Type, other: Type) -> Type:
@@ -211,7 +223,7 @@ def joined(one: Type, other: Type) -> Type:
             return TupleOf(tuple(map(joined, one.items, other.items)))
     if isinstance(one, ArrayOf) and isinstance(other, ArrayOf) and one.shape[1:] == other.shape[1:]:
         return ArrayOf((None, *one.shape[1:]))
-    raise Refusal(
+    raise RefusedError(
         f"a name for {described(one)} and for {described(other)}", "use a name for each type"
     )
 

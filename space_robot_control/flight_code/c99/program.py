@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterable, Mapping
+from dataclasses import replace
 from types import FunctionType
 from typing import Any, NamedTuple
 
@@ -12,25 +13,18 @@ import numpy as np
 from space_robot_msgs_py.compiled.records import Field as RecordField
 from space_robot_msgs_py.compiled.records import Record
 
-from .functions import Function, LengthNeeded, kind_of_argument, passed, syntax_of, translated
-from .language import (
-    ATOM,
-    PREFIX,
-    Bundle,
-    Field,
-    Known,
-    NotInSubsetError,
-    Refusal,
-    TupleOf,
-    Type,
-    Value,
-)
+from . import language as lang
+from .functions import Function, kind_of_argument, passed, syntax_of, translated
 
 FIELD = re.compile(
     "\N{LEFT-POINTING DOUBLE ANGLE QUOTATION MARK}(\\d+):(\\w+)"
     "\N{RIGHT-POINTING DOUBLE ANGLE QUOTATION MARK}"
 )
 CALL, CONSTANT = re.compile("\N{CURRENCY SIGN}(\\d+)\\("), re.compile("\N{PILCROW SIGN}(\\d+);")
+
+
+def _names(function: Function) -> list[tuple[str, bool]]:
+    return [(p.name, p.is_written) for p in function.parameters]
 
 
 class Constant(NamedTuple):
@@ -55,14 +49,13 @@ class Program:
             joints: n, of which the shapes of records are functions.
         """
         self.sizes, self.joints = dict(sizes), joints
-        self.constants: dict[Field, float] = {}
+        self.constants: dict[lang.Field, float] = {}
         """Fields that never change; of an array, all of its numbers are the same."""
         self.functions: list[Function] = []
         self.modules: dict[Constant, str] = {}
         """First module that reads each constant."""
-        self.tuples: dict[TupleOf, str] = {}
+        self.tuples: dict[lang.TupleOf, str] = {}
         self._known: dict[Any, int] = {}
-        self._lengths: dict[tuple[Any, tuple[Type, ...]], set[str]] = {}
         self._named: dict[Constant, int] = {}
         self._records: dict[int, type[Record]] = {}
         self._active: list[Any] = []
@@ -79,7 +72,7 @@ class Program:
         numbers: tuple[int, ...] = tuple(resized(self.joints))
         return numbers
 
-    def constant(self, field: Field) -> float | None:
+    def constant(self, field: lang.Field) -> float | None:
         """Return the number of a field that never changes; None if it does."""
         return self.constants.get(field)
 
@@ -95,79 +88,79 @@ class Program:
         name = re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", record.__name__).lower()
         if name in ("gains", "memory"):  # of a law
             name = f"{record.__module__.rpartition('.')[2]}_{name}"
-        return f"{PREFIX}{name}"
+        return f"{lang.PREFIX}{name}"
 
-    def tuple_name(self, kind: TupleOf) -> str:
+    def tuple_name(self, kind: lang.TupleOf) -> str:
         """Return the name of a tuple's struct."""
         if kind not in self.tuples:
             for item in kind.items:
-                if isinstance(item, TupleOf):
+                if isinstance(item, lang.TupleOf):
                     self.tuple_name(item)
             if kind.is_uniform:
-                name = f"{PREFIX}tuple_{len(kind.items)}"
+                name = f"{lang.PREFIX}tuple_{len(kind.items)}"
             else:
                 parts = (
-                    self.tuple_name(i).rpartition("_")[2] if isinstance(i, TupleOf) else i.name[0]
+                    self.tuple_name(i).rpartition("_")[2]
+                    if isinstance(i, lang.TupleOf)
+                    else i.name[0]
                     for i in kind.items
                 )
-                name = f"{PREFIX}tuple_{''.join(parts)}"
+                name = f"{lang.PREFIX}tuple_{''.join(parts)}"
             self.tuples[kind] = name
         return self.tuples[kind]
 
-    def call(self, body: Callable[..., Any], arguments: tuple[Value, ...], inside: Any) -> Value:
+    def call(
+        self, body: Callable[..., Any], arguments: tuple[lang.Value, ...], inside: Any
+    ) -> lang.Value:
         """Return the call of a kernel by a translation, ``inside`` which it stands."""
-        function = self.function(body, arguments, getattr(inside, "label", ""))
+        number = self.function(body, arguments, getattr(inside, "label", ""))
+        function = self.functions[number]
         written = {p.name for p in function.parameters if p.is_written}
         for names, argument in zip(function.arguments, arguments, strict=True):
-            is_bundle = isinstance(argument.type, Bundle)
-            parts = zip(argument.type.items, argument.parts) if is_bundle else ()
-            for (item, _), part in parts:
-                if any(name.endswith(f"_{item}") for name in written & set(names)):
-                    inside.write(part)
-            if not is_bundle and written & set(names):
+            if isinstance(argument.type, lang.Bundle):
+                for (item, _), part in zip(argument.type.items, argument.parts, strict=True):
+                    if any(name.endswith(f"_{item}") for name in written & set(names)):
+                        inside.write(part)
+            elif written & set(names):
                 inside.write(argument)
-        texts = ", ".join(passed(function, arguments, inside))
-        number = self.functions.index(function)
-        text = f"\N{CURRENCY SIGN}{number}({texts})"
-        return Value(function.result, text, ATOM, calls=True)
+        text = f"\N{CURRENCY SIGN}{number}({', '.join(passed(function, arguments))})"
+        return lang.Value(function.result, text, calls=True)
 
     def function(
-        self, body: Callable[..., Any], arguments: tuple[Value, ...], label: str = ""
-    ) -> Function:
-        """Return the translation of a kernel for arguments."""
+        self, body: Callable[..., Any], arguments: tuple[lang.Value, ...], label: str = ""
+    ) -> int:
+        """Return the number of the translation of a kernel for arguments.
+
+        Translations that differ only in the lengths of arrays that they do not read are one.
+        """
         tree, file = syntax_of(body)
-        names = [argument.arg for argument in tree.args.args]
-        if len(names) != len(arguments):
-            raise Refusal(f"a call of {tree.name}() with {len(arguments)} arguments", "give all")
-        labels = [a.type.label for a in arguments if isinstance(a.type, Bundle)]
-        is_bound = any(
-            a.is_bound or isinstance(a.type, Known) or getattr(a.type, "shape", None) == (0,)
-            for a in arguments
-        )
-        label = labels[0] if labels else label if is_bound else ""
-        lengths = self._lengths.setdefault(body, set())
-        while True:
-            kinds = tuple(
-                kind_of_argument(value, name, lengths)
-                for value, name in zip(arguments, names, strict=True)
+        if len(tree.args.args) != len(arguments):
+            raise lang.RefusedError(
+                f"a call of {tree.name}() without all arguments", "give them all"
             )
-            known = self._known.get((body, kinds))
-            if known is not None:
-                return self.functions[known]
-            if body in self._active:
-                line = body.__code__.co_firstlineno
-                raise NotInSubsetError(file, line, "recursion", "write a loop")
-            self._active.append(body)
-            try:
-                function = translated(self, body, kinds, label, set(lengths))
-            except LengthNeeded as needed:
-                lengths.add(str(needed))
-                continue
-            finally:
-                self._active.pop()
-            self.functions.append(function)
-            self._known[body, kinds] = len(self.functions) - 1
-            return function
+        kinds = tuple(map(kind_of_argument, arguments))
+        if (body, kinds) in self._known:
+            return self._known[body, kinds]
+        if body in self._active:
+            line = body.__code__.co_firstlineno
+            raise lang.NotInSubsetError(file, line, "recursion", "write a loop")
+        labels = [kind.label for kind in kinds if isinstance(kind, lang.Bundle)]
+        is_bound = any(isinstance(kind, lang.Known) or kind == lang.EMPTY for kind in kinds)
+        self._active.append(body)
+        new = translated(self, body, kinds, labels[0] if labels else label if is_bound else "")
+        self._active.pop()
+        number = len(self.functions)
+        for k, old in enumerate(self.functions):
+            if old.body is body and old.lines == new.lines and _names(old) == _names(new):
+                pairs = zip(old.parameters, new.parameters, strict=True)
+                merged = tuple(replace(p, type=lang.joined(p.type, q.type)) for p, q in pairs)
+                self.functions[k] = replace(old, parameters=merged)
+                number = k
+                break
+        else:
+            self.functions.append(new)
+        self._known[body, kinds] = number
+        return number
 
     def reachable(self, first: Iterable[Function]) -> list[Function]:
         """Return the functions that are called from the ``first`` ones, callees first."""
@@ -184,13 +177,15 @@ class Program:
             visit(function)
         return found
 
-    def fields_of(self, functions: Iterable[Function]) -> set[Field]:
+    def fields_of(self, functions: Iterable[Function]) -> set[lang.Field]:
         """Return the fields that functions read or write."""
         text = "\n".join("\n".join(function.lines) for function in functions)
-        return {Field(self._records[int(number)], name) for number, name in FIELD.findall(text)}
+        return {
+            lang.Field(self._records[int(number)], name) for number, name in FIELD.findall(text)
+        }
 
     @staticmethod
-    def written_fields(functions: Iterable[Function]) -> set[Field]:
+    def written_fields(functions: Iterable[Function]) -> set[lang.Field]:
         """Return the fields that functions write."""
         return {field for function in functions for field in function.stores}
 

@@ -7,32 +7,10 @@ from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from typing import Any
 
-from .blocks import Homes, assigned_names, names_in
+from . import language as lang
+from .declarations import INDENT, MARK, assignments, check_counters, names_in
 from .expressions import Expressions
-from .language import (
-    BOOL,
-    FLOAT,
-    INT,
-    NOTHING,
-    PRODUCT,
-    SUM,
-    ArrayOf,
-    BlockOf,
-    Field,
-    Known,
-    NotInSubsetError,
-    Pointer,
-    Refusal,
-    TupleOf,
-    Type,
-    Value,
-    cast,
-    described,
-    joined,
-    number_of,
-)
 
-INDENT = "    "
 TRANSPARENT = ("any_lane", "all_lanes", "uniform", "bool")
 """Words that give a truth value as it is."""
 
@@ -45,18 +23,20 @@ class Statements(Expressions):
         super().__init__(program, function)
         self.tree, self.file = tree, file
         self.first_line = function.__code__.co_firstlineno
-        self.homes = Homes(tree)
-        self.types: dict[str, Type] = {}
+        self.assigned = assignments([tree])
+        self.own = {argument.arg for argument in tree.args.args}
+        """Names of its arguments."""
+        self._taken = names_in([tree]) | self.own
+        self.types: dict[str, lang.Type] = {}
         """Types of local names; they grow from pass to pass until they hold all values."""
-        self.result: Type = None
+        self.result: lang.Type = None
         self.lines: list[str] = []
         self.written: set[str] = set()
         """Local names whose memory is written."""
-        self.stores: set[Field] = set()
+        self.stores: set[lang.Field] = set()
         """Fields that are written."""
         self._roots: dict[str, frozenset[str]] = {}
         self._depth = 1
-        self._declared: set[str] = set()
         self._counter: dict[str, int] = {}
 
     def body(self) -> None:
@@ -65,12 +45,16 @@ class Statements(Expressions):
         Raises:
             NotInSubsetError: one has no translation.
         """
+        try:
+            check_counters(self.tree)
+        except lang.RefusedError as refusal:
+            raise self.refused(self.tree, refusal) from None
         self._block(self.tree.body)
 
-    def refused(self, node: ast.AST, refusal: Refusal) -> NotInSubsetError:
+    def refused(self, node: ast.AST, refusal: lang.RefusedError) -> lang.NotInSubsetError:
         """Return the error for a refused construct."""
         line = self.first_line + getattr(node, "lineno", 1) - 1
-        return NotInSubsetError(self.file, line, refusal.what, refusal.instead)
+        return lang.NotInSubsetError(self.file, line, refusal.what, refusal.instead)
 
     def emit(self, line: str) -> None:
         """Add a line."""
@@ -84,12 +68,13 @@ class Statements(Expressions):
             if is_left:
                 break
             try:
-                self._declare_before(statement)
                 method = getattr(self, f"_{type(statement).__name__.lower()}_statement", None)
                 if method is None:
-                    raise Refusal(f"{type(statement).__name__.lower()}", "use if, for and while")
+                    raise lang.RefusedError(
+                        f"{type(statement).__name__.lower()}", "use if, for and while"
+                    )
                 is_left = bool(method(statement))
-            except Refusal as refusal:
+            except lang.RefusedError as refusal:
                 raise self.refused(statement, refusal) from None
         self.facts = before
         return is_left
@@ -110,35 +95,18 @@ class Statements(Expressions):
 
     def _is_steady_name(self, name: str) -> bool:
         """Return whether a truth value has the same value wherever it is read."""
-        most = 0 if self.homes.is_parameter(name) else 1
-        return self.names[name].type == BOOL and self.homes.assignments[name] <= most
+        most = 0 if name in self.own else 1
+        return self.names[name].type == lang.BOOL and self.assigned[name] <= most
 
-    # declarations
-
-    def _declare_before(self, statement: ast.stmt) -> None:
-        """Declare the names that live in this block from here on, unless they get a value here."""
-        for name in self.homes.beginning(statement):
-            if name in self._declared or name not in self.types:
-                continue
-            if not self.homes.is_assigned_first(name, statement):
-                self._declared.add(name)
-                if isinstance(self.types[name], (Known, BlockOf)):
-                    continue
-                self.emit(f"{self.declaration(name)};")
-
-    def declaration(self, name: str) -> str:
-        """Return the declaration of a local name, without a value."""
-        return f"\N{SECTION SIGN}{name}\N{SECTION SIGN}{self.declared(self.types[name], name)}"
-
-    def declared(self, kind: Type, name: str) -> str:
+    def declared(self, kind: lang.Type, name: str) -> str:
         """Return C's declaration of a name of a type."""
-        if isinstance(kind, (Pointer, BlockOf)):
+        if isinstance(kind, (lang.Pointer, lang.BlockOf)):
             return f"{self.program.struct_name(kind.record)} *{name}"
-        if isinstance(kind, ArrayOf):
+        if isinstance(kind, lang.ArrayOf):
             if len(kind.shape) == 1:
                 return f"double *{name}"
             return f"double (*{name}){''.join(f'[{size}]' for size in kind.shape[1:])}"
-        if isinstance(kind, TupleOf):
+        if isinstance(kind, lang.TupleOf):
             return f"{self.program.tuple_name(kind)} {name}"
         return f"{kind.name} {name}"
 
@@ -146,33 +114,33 @@ class Statements(Expressions):
 
     def _assign_statement(self, node: ast.Assign) -> None:
         if len(node.targets) == 1 and isinstance(node.targets[0], ast.Tuple):
-            self._assign_together(node, node.targets[0], node.value)
+            self._assign_together(node.targets[0], node.value)
             return
         value = self.translate(node.value)
-        if len(node.targets) > 1 and (value.calls or isinstance(value.type, TupleOf)):
+        if len(node.targets) > 1 and (value.calls or isinstance(value.type, lang.TupleOf)):
             name = self._fresh("value")
             self.emit(f"const {self.declared(value.type, name)} = {value.text};")
             value = replace(value, text=name, rank=11, calls=False)
         for target in node.targets:
-            self._assign(target, value, node)
+            self._assign(target, value)
 
     def _annassign_statement(self, node: ast.AnnAssign) -> None:
         if node.value is not None:
-            self._assign(node.target, self.translate(node.value), node)
+            self._assign(node.target, self.translate(node.value))
 
-    def _assign_together(self, node: ast.stmt, target: ast.Tuple, source: ast.expr) -> None:
+    def _assign_together(self, target: ast.Tuple, source: ast.expr) -> None:
         """Assign a tuple to several targets; all values are there before the first is stored."""
         if not isinstance(source, ast.Tuple):
             value = self.translate(source)
-            if not isinstance(value.type, TupleOf):
-                raise Refusal(f"unpacking {described(value.type)}", "return tuples")
+            if not isinstance(value.type, lang.TupleOf):
+                raise lang.RefusedError(f"unpacking {lang.described(value.type)}", "return tuples")
             name = value.text
             if value.calls or not name.isidentifier():
                 name = self._fresh("result")
                 self.emit(f"const {self.declared(value.type, name)} = {value.text};")
             for k, (part, kind) in enumerate(zip(target.elts, value.type.items, strict=True)):
                 item = f"{name}.at[{k}]" if value.type.is_uniform else f"{name}.item_{k}"
-                self._assign(part, Value(kind, item, PRODUCT + 2), node)
+                self._assign(part, lang.Value(kind, item, lang.POSTFIX))
             return
         values = [self.translate(part) for part in source.elts]
         for k in range(1, len(values)):
@@ -181,72 +149,69 @@ class Statements(Expressions):
             stores = any("[" in target or "." in target for target in written)
             loads = values[k].calls or "[" in values[k].text or "->" in values[k].text
             touched = bool(mentioned & set(written)) or (stores and loads)
-            if touched and not isinstance(values[k].type, (Pointer, ArrayOf)):
+            if touched and not isinstance(values[k].type, (lang.Pointer, lang.ArrayOf)):
                 name = self._fresh("new")
                 self.emit(f"const {self.declared(values[k].type, name)} = {values[k].text};")
                 values[k] = replace(values[k], text=name, rank=11, calls=False)
         for part, value in zip(target.elts, values, strict=True):
-            self._assign(part, value, node)
+            self._assign(part, value)
 
-    def _assign(self, target: ast.expr, value: Value, node: ast.stmt) -> None:
+    def _assign(self, target: ast.expr, value: lang.Value) -> None:
         if isinstance(target, ast.Tuple):
-            raise Refusal("nested unpacking", "unpack one tuple after the other")
+            raise lang.RefusedError("nested unpacking", "unpack one tuple after the other")
         if isinstance(target, ast.Name):
-            self._assign_name(target.id, value, node)
+            self._assign_name(target.id, value)
         elif isinstance(target, ast.Subscript) and self._is_slice(target.slice):
             self._fill(self.translate(target), value)
         else:
             place = self.translate(target)
-            if isinstance(place.type, ArrayOf):
+            if isinstance(place.type, lang.ArrayOf):
                 self._fill(place, value)
                 return
-            if place.type != FLOAT:
-                raise Refusal(f"storing in {ast.unparse(target)}", "store numbers in fields")
+            if place.type != lang.FLOAT:
+                raise lang.RefusedError(
+                    f"storing in {ast.unparse(target)}", "store numbers in fields"
+                )
             self.write(place)
-            self.emit(f"{place.text} = {cast(value, FLOAT).text};")
+            self.emit(f"{place.text} = {lang.cast(value, lang.FLOAT).text};")
 
     @staticmethod
     def _is_slice(index: ast.expr) -> bool:
         return isinstance(index, ast.Slice)
 
-    def _assign_name(self, name: str, value: Value, node: ast.stmt) -> None:
-        kind = joined(self.types.get(name), value.type) if name in self.types else value.type
+    def _assign_name(self, name: str, value: lang.Value) -> None:
+        kind = lang.joined(self.types.get(name), value.type) if name in self.types else value.type
         self.types[name] = kind
-        if isinstance(kind, Known):
+        if isinstance(kind, lang.Known):
             self.names[name] = value
             return
-        if kind in (FLOAT, INT, BOOL):
-            value = cast(value, kind)
-        is_once = self.homes.assignments[name] == 1 and not self.homes.is_parameter(name)
-        known = value.constant if is_once and kind in (FLOAT, INT, BOOL) else None
+        if kind in (lang.FLOAT, lang.INT, lang.BOOL):
+            value = lang.cast(value, kind)
+        is_once = self.assigned[name] == 1 and name not in self.own
+        known = value.constant if is_once and kind in (lang.FLOAT, lang.INT, lang.BOOL) else None
         roots = frozenset({name}) | value.roots | self._roots.get(name, frozenset())
         self._roots[name] = roots
-        size = value.size if isinstance(kind, ArrayOf) else ""
-        local = Value(kind, name, constant=known, roots=roots, fields=value.fields, size=size)
-        if known is not None and kind == INT:
-            local = replace(number_of(known), roots=frozenset())
-        elif known is not None and kind == BOOL:
-            local = number_of(known)
-        elif isinstance(kind, ArrayOf) and value.constant is not None and is_once:
+        local = lang.Value(kind, name, constant=known, roots=roots, fields=value.fields)
+        if known is not None and kind == lang.INT:
+            local = replace(lang.number_of(known), roots=frozenset())
+        elif known is not None and kind == lang.BOOL:
+            local = lang.number_of(known)
+        elif isinstance(kind, lang.ArrayOf) and value.constant is not None and is_once:
             local = replace(local, constant=value.constant)
         self.names[name] = local
-        text = value.address if isinstance(kind, (ArrayOf, Pointer)) else value.text
-        if name not in self._declared and self.homes.is_declared_here(name, node):
-            self._declared.add(name)
-            self.emit(f"{self.declaration(name)} = {text};")
-        else:
-            self.emit(f"{name} = {text};")
+        text = value.address if isinstance(kind, (lang.ArrayOf, lang.Pointer)) else value.text
+        self.emit(f"{MARK}{name}{MARK} = {text};")
 
-    def write(self, place: Value) -> None:
+    def write(self, place: lang.Value) -> None:
         """Note that the memory of a value is written."""
         self.written |= place.roots
         self.stores |= place.fields
 
-    def _fill(self, place: Value, value: Value) -> None:
+    def _fill(self, place: lang.Value, value: lang.Value) -> None:
         """Write an array, or a number, into an array."""
         self.write(place)
         shape = list(place.type.shape)
-        if isinstance(value.type, ArrayOf) and shape[0] is None:
+        if isinstance(value.type, lang.ArrayOf) and shape[0] is None:
             shape[0] = value.type.shape[0]
         if 0 in shape:
             return
@@ -257,39 +222,39 @@ class Statements(Expressions):
             self.emit(f"for (int64_t {name} = 0; {name} < {end}; ++{name}) {{")
             self._depth += 1
         target, source = self._element(place, names), value
-        if isinstance(value.type, ArrayOf):
+        if isinstance(value.type, lang.ArrayOf):
             source = self._element(value, names)
-        self.emit(f"{target.text} = {cast(source, FLOAT).text};")
+        self.emit(f"{target.text} = {lang.cast(source, lang.FLOAT).text};")
         for _ in names:
             self._depth -= 1
             self.emit("}")
         assert self._depth == depth
 
     @staticmethod
-    def _element(array: Value, names: Iterable[str]) -> Value:
+    def _element(array: lang.Value, names: Iterable[str]) -> lang.Value:
         text, offset = array.text, array.offset
         for name in names:
             text, offset = f"{text}[{f'{offset} + {name}' if offset else name}]", ""
-        return Value(FLOAT, text)
+        return lang.Value(lang.FLOAT, text)
 
     def _augassign_statement(self, node: ast.AugAssign) -> None:
         old, new = self.translate(node.target), self.translate(node.value)
         sign = {ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/"}.get(type(node.op))
-        if sign is None or isinstance(old.type, ArrayOf):
-            raise Refusal("this augmented assignment", "write out the assignment")
+        if sign is None or isinstance(old.type, lang.ArrayOf):
+            raise lang.RefusedError("this augmented assignment", "write out the assignment")
         if isinstance(node.target, ast.Name):
-            name, kind = node.target.id, joined(old.type, new.type)
+            name, kind = node.target.id, lang.joined(old.type, new.type)
             if kind != self.types[name]:
                 self.types[name] = kind
         else:
-            kind = FLOAT
+            kind = lang.FLOAT
             self.write(old)
-        self.emit(f"{old.text} {sign}= {cast(new, kind).text};")
+        self.emit(f"{old.text} {sign}= {lang.cast(new, kind).text};")
 
     # control flow
 
     def _if_statement(self, node: ast.If) -> bool:
-        condition = cast(self.translate(node.test), BOOL)
+        condition = lang.cast(self.translate(node.test), lang.BOOL)
         if condition.constant is not None:
             return self._block(node.body if condition.constant else node.orelse)
         known = self.facts
@@ -306,7 +271,9 @@ class Statements(Expressions):
         first, lines = len(self.lines), self.lines
         is_left = self._inside(node.orelse) and is_left
         self.facts = known
-        if len(node.orelse) == 1 and lines[first:] and lines[first].strip().startswith("if ("):
+        level = INDENT * (self._depth + 1)
+        heads = [line[len(level) :] for line in lines[first:] if line[len(level) :][:1] != " "]
+        if heads and heads[0][:4] == "if (" and all(head[:1] == "}" for head in heads[1:]):
             lines[first:] = [line.removeprefix(INDENT) for line in lines[first:]]
             lines[first] = f"{INDENT * self._depth}}} else {lines[first].strip()}"
             return is_left
@@ -322,7 +289,7 @@ class Statements(Expressions):
         return is_left
 
     def _while_statement(self, node: ast.While) -> None:
-        condition = cast(self.translate(node.test), BOOL)
+        condition = lang.cast(self.translate(node.test), lang.BOOL)
         if condition.constant is False:
             return
         self.emit(f"while ({condition.text}) {{")
@@ -336,25 +303,25 @@ class Statements(Expressions):
         call = node.iter
         is_range = isinstance(call, ast.Call) and ast.unparse(call.func) == "range"
         if not (isinstance(call, ast.Call) and is_range and isinstance(node.target, ast.Name)):
-            raise Refusal(f"a loop over {ast.unparse(node.iter)}", "loop over range() or a tuple")
+            raise lang.RefusedError(
+                f"a loop over {ast.unparse(node.iter)}", "loop over range() or a tuple"
+            )
         name = node.target.id
-        if not self.homes.is_only_of_loops(name) or name in assigned_names(node.body):
-            raise Refusal(f"{name!r} beside its loop", "use another name")
-        bounds = [cast(self.translate(a), INT) for a in call.args]
-        start = bounds[0] if len(bounds) > 1 else number_of(0)
+        bounds = [lang.cast(self.translate(a), lang.INT) for a in call.args]
+        start = bounds[0] if len(bounds) > 1 else lang.number_of(0)
         stop, step = bounds[min(len(bounds) - 1, 1)], bounds[2] if len(bounds) > 2 else None
         by = 1 if step is None else step.constant
         if not isinstance(by, int) or by not in (1, -1):
-            raise Refusal("a loop with another step than 1 or -1", "compute the index")
+            raise lang.RefusedError("a loop with another step than 1 or -1", "compute the index")
         if start.constant is not None and stop.constant is not None:
             if (stop.constant - start.constant) * by <= 0:
                 return
-        stop_text = stop.at(SUM)
+        stop_text = stop.at(lang.SUM)
         if stop.constant is None and not self._is_steady(call.args[min(len(bounds) - 1, 1)], node):
             stop_text = self._fresh("end")
             self.emit(f"const int64_t {stop_text} = {stop.text};")
         shown = self._fresh("round") if name == "_" else name
-        self.names[name] = Value(INT, shown)
+        self.names[name] = lang.Value(lang.INT, shown)
         sign, change = ("<", "++") if by == 1 else (">", "--")
         self.emit(
             f"for (int64_t {shown} = {start.text}; {shown} {sign} {stop_text}; {change}{shown}) {{"
@@ -368,28 +335,26 @@ class Statements(Expressions):
         nodes = list(ast.walk(bound))
         if any(isinstance(n, (ast.Attribute, ast.Subscript, ast.Call)) for n in nodes):
             return False
-        return not names_in([bound]) & assigned_names(loop.body)
+        return not names_in([bound]) & assignments(loop.body).keys()
 
     def _over_tuple(self, node: ast.For, items: ast.Tuple) -> None:
         rows = [row.elts if isinstance(row, ast.Tuple) else [row] for row in items.elts]
         targets = node.target.elts if isinstance(node.target, ast.Tuple) else [node.target]
         index = self._fresh("row")
-        lists: list[tuple[str, Type, str]] = []
+        lists: list[tuple[str, lang.Type, str]] = []
         for k, target in enumerate(targets):
             values = [self.translate(row[k]) for row in rows]
-            kind: Type = None
+            kind: lang.Type = None
             for value in values:
-                kind = joined(kind, value.type)
+                kind = lang.joined(kind, value.type)
             table = self._fresh(f"{ast.unparse(target)}s")
-            texts = ", ".join(cast(value, kind).text for value in values)
+            texts = ", ".join(lang.cast(value, kind).text for value in values)
             self.emit(f"const {kind.name} {table}[{len(rows)}] = {{{texts}}};")
             lists.append((ast.unparse(target), kind, table))
         self.emit(f"for (int64_t {index} = 0; {index} < {len(rows)}; ++{index}) {{")
         self._depth += 1
         for name, kind, table in lists:
-            if not self.homes.is_only_of_loops(name) or name in assigned_names(node.body):
-                raise Refusal(f"{name!r} beside its loop", "use another name")
-            self.names[name] = Value(kind, name)
+            self.names[name] = lang.Value(kind, name)
             self.emit(f"const {kind.name} {name} = {table}[{index}];")
         self._block(node.body)
         self._depth -= 1
@@ -397,15 +362,17 @@ class Statements(Expressions):
 
     def _return_statement(self, node: ast.Return) -> bool:
         if node.value is None:
-            self.result = NOTHING
+            self.result = lang.NOTHING
             self.emit("return;")
             return True
         value = self.translate(node.value)
-        self.result = joined(self.result, value.type)
-        if self.result in (FLOAT, INT, BOOL):
-            value = cast(value, self.result)
-        elif not isinstance(value.type, TupleOf):
-            raise Refusal(f"returning {described(value.type)}", "write into an argument")
+        self.result = lang.joined(self.result, value.type)
+        if self.result in (lang.FLOAT, lang.INT, lang.BOOL):
+            value = lang.cast(value, self.result)
+        elif not isinstance(value.type, lang.TupleOf):
+            raise lang.RefusedError(
+                f"returning {lang.described(value.type)}", "write into an argument"
+            )
         self.emit(f"return {value.text};")
         return True
 
@@ -414,7 +381,7 @@ class Statements(Expressions):
             return
         value = self.translate(node.value)
         if value.text:
-            self.emit(f"{'' if value.type == NOTHING else '(void)'}{value.text};")
+            self.emit(f"{'' if value.type == lang.NOTHING else '(void)'}{value.text};")
 
     def _pass_statement(self, node: ast.Pass) -> None:
         """Do nothing."""
@@ -432,5 +399,5 @@ class Statements(Expressions):
         while True:
             count = self._counter[name] = self._counter.get(name, 0) + 1
             fresh = name if count == 1 else f"{name}_{count}"
-            if fresh not in self.homes.names:
+            if fresh not in self._taken:
                 return fresh
