@@ -24,9 +24,10 @@ def check_folder(folder: Path, force: bool) -> None:
     """
     if folder.exists() and not force:
         raise InputError(f"{folder}: exists; --force replaces it")
-    if folder.exists() and not (folder / "include" / "space_robot_flight.h").is_file():
-        if not folder.is_dir() or any(folder.iterdir()):
-            raise InputError(f"{folder}: is not an exported folder, so --force does not replace it")
+    is_exported = (folder / "include" / "space_robot_flight.h").is_file()
+    is_empty = folder.is_dir() and not any(folder.iterdir())
+    if folder.exists() and not (is_exported or is_empty):
+        raise InputError(f"{folder}: is not an exported folder, so --force does not replace it")
     if not folder.resolve().parent.is_dir():
         raise InputError(f"{folder}: there is no folder {folder.resolve().parent}")
 

@@ -35,7 +35,6 @@ from .supervision import (
     takes_over,
 )
 
-
 Array = NDArray[np.float64]
 
 

@@ -109,7 +109,7 @@ class Exported:
     def _header(self) -> str:
         parts = self.translated.software.parts
         program = self.translated.program
-        records = [State, Reference, *(part.record for part in parts)]
+        records: list[type[Record]] = [State, Reference, *(part.record for part in parts)]
         return self.render(
             "space_robot_flight.h",
             laws=[law.name for law in self.software.laws],

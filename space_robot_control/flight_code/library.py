@@ -121,6 +121,6 @@ def fill_measurement(measurement: NDArray[Any], state: RobotState) -> None:
     """Write a state into a ``space_robot_measurement``."""
     measurement["tick"] = state.tick
     inside = measurement["state"]
-    for name in inside.dtype.names:
+    for name in inside.dtype.names or ():
         field = inside[name]
         field[0] = getattr(state, name)[: field.shape[1]]

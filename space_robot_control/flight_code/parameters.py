@@ -9,8 +9,8 @@ import numpy as np
 
 from space_robot_msgs_py.compiled.records import Record
 
-from .c99.files import comment, descriptions, wrapped
 from .c99.language import literal
+from .files import comment, descriptions, wrapped
 from .software import Part, Translated, numbers_of
 
 

@@ -22,8 +22,8 @@ from ..controller.supervision import Supervision, answer_state, judge, swaps_due
 from ..controller.supervisor import Supervisor
 from ..laws import CompiledLaw, ControlLaw
 from .c99 import language as lang
-from .c99.files import Files
-from .c99.program import Program, same_number
+from .c99.program import Program
+from .files import Files, reachable
 
 ROOMS = {
     "space_robot_control.controller.supervision": "supervision",
@@ -180,10 +180,12 @@ def translate(software: FlightSoftware) -> Translated:
         InputError: a kernel has no translation; names file, line and what to write instead.
     """
     first, roots = _program(software, {})
-    written = first.written_fields(first.reachable(roots.values()))
+    reached = reachable(first, roots.values())
+    written = {field for function in reached for field in function.stores}
     constants = _constants(software, first, written)
     program, roots = _program(software, constants)
-    whole = [State, Reference, *(part.record for part in software.parts if "_" in part.name)]
+    whole: list[type[Record]] = [State, Reference]
+    whole += [part.record for part in software.parts if "_" in part.name]
     files = Files(program, list(roots.values()), whole, _room)
     return Translated(
         software, program, files, {name: files.name_of(f) for name, f in roots.items()}
@@ -200,7 +202,7 @@ def _program(software: FlightSoftware, constants: dict[lang.Field, float]) -> tu
     tick, period = _value(lang.INT), _value(lang.FLOAT)
     has_actuators = bool(software.controller.names.actuators)
     how = _value(lang.Known(allocate if has_actuators else leave_alone))
-    calls = {
+    calls: dict[str, tuple[Any, tuple[lang.Value, ...]]] = {
         "judge": (judge, (supervision, tick)),
         "takes_over": (takes_over, (supervision, tick)),
         "engage": (engage, (controller,)),
@@ -264,6 +266,13 @@ def numbers_of(shape: tuple[int, ...], numbers: Any) -> NDArray[np.float64]:
     """Return the part of a field's numbers that a shape keeps."""
     array: NDArray[np.float64] = np.asarray(numbers, dtype=np.float64)
     return array[tuple(slice(0, size) for size in shape)]
+
+
+def same_number(numbers: NDArray[np.float64]) -> float | None:
+    """Return the number that all numbers of an array are; None if they differ."""
+    if numbers.size and np.all(numbers == numbers.flat[0]):
+        return float(numbers.flat[0])
+    return None
 
 
 def _room(module: str) -> str:

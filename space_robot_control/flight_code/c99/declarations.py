@@ -7,7 +7,7 @@ import re
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 
-from . import language as lang
+from .language import RefusedError
 
 INDENT = "    "
 MARK = "\N{SECTION SIGN}"
@@ -37,13 +37,13 @@ def check_counters(tree: ast.FunctionDef) -> None:
         for name in names_in([loop.target]):
             outer = [o for o in loops if o is not loop and name in names_in([o.target])]
             if any(n is loop for o in outer for n in ast.walk(o)):
-                raise lang.RefusedError(f"{name!r} in a loop of its own name", "use another name")
+                raise RefusedError(f"{name!r} in a loop of its own name", "use another name")
             if name in assignments(loop.body):
-                raise lang.RefusedError(f"{name!r} set beside its loop", "use another name")
+                raise RefusedError(f"{name!r} set beside its loop", "use another name")
             inside[name] += _mentions(loop, name)
     for name, count in inside.items():
         if _mentions(tree, name) != count and name != "_":
-            raise lang.RefusedError(f"{name!r} outside of its loop", "use another name")
+            raise RefusedError(f"{name!r} outside of its loop", "use another name")
 
 
 def _mentions(node: ast.AST, name: str) -> int:
@@ -73,11 +73,11 @@ def declared(lines: Sequence[str], declarations: Mapping[str, str]) -> list[str]
         while not _is_in_block(done, first, level, places[-1]):
             level -= 1
             first = _beginning(done, first, level)
-        loops = [k for k in range(first) if _encloses(done, k, first) and _is_loop(done[k])]
+        is_in_loop = any(_is_loop_around(done, k, first) for k in range(first))
         if first == places[0] and done[first].strip().startswith(value):
             done[first] = done[first].replace(value, f"{declaration} = ")
         else:
-            place, level = (first, level) if not loops else (0, 1)
+            place, level = (0, 1) if is_in_loop else (first, level)
             done.insert(place, f"{INDENT * level}{declaration};")
     return [line.replace(MARK, "") for line in done]
 
@@ -98,10 +98,7 @@ def _beginning(lines: Sequence[str], place: int, level: int) -> int:
     return place
 
 
-def _encloses(lines: Sequence[str], head: int, place: int) -> bool:
-    level = _level(lines[head])
-    return all(_level(line) > level for line in lines[head + 1 : place + 1])
-
-
-def _is_loop(line: str) -> bool:
-    return line.strip().startswith(("for (", "while ("))
+def _is_loop_around(lines: Sequence[str], head: int, place: int) -> bool:
+    """Return whether the line ``head`` begins a loop around the line at ``place``."""
+    level, is_loop = _level(lines[head]), lines[head].strip().startswith(("for (", "while ("))
+    return is_loop and all(_level(line) > level for line in lines[head + 1 : place + 1])

@@ -8,13 +8,16 @@ import operator
 from collections.abc import Callable
 from dataclasses import replace
 from types import ModuleType
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 from space_robot_msgs_py.compiled.records import Field as RecordField
-from space_robot_msgs_py.compiled.records import Record
 
 from . import language as lang
+from .language import ArrayOf, Known, Pointer, RefusedError, Value, cast, number_of
 from .words import WORDS, chosen, negated
+
+if TYPE_CHECKING:
+    from .program import Program
 
 ARITHMETIC: dict[type[ast.operator], tuple[str, int, Callable[[Any, Any], Any]]] = {
     ast.Add: ("+", lang.SUM, operator.add),
@@ -36,127 +39,96 @@ COMPARISONS: dict[type[ast.cmpop], tuple[str, int, Callable[[Any, Any], Any]]] =
 }
 
 
-class Program(Protocol):
-    """What expressions ask of the whole export."""
-
-    sizes: dict[str, int]
-
-    def shape(self, record: type[Record], name: str) -> tuple[int, ...]:
-        """Return the shape of a field."""
-
-    def constant(self, field: lang.Field) -> float | None:
-        """Return the number of a field that never changes; None if it does."""
-
-    def named(self, module: str, name: str, number: float) -> str:
-        """Return the text of a module's constant."""
-
-    def tuple_name(self, kind: lang.TupleOf) -> str:
-        """Return the name of a struct."""
-
-    def call(self, function: Any, arguments: dict[str, lang.Value], inside: Any) -> lang.Value:
-        """Return the call of a kernel."""
-
-
 class Expressions:
     """Translator of the expressions of one function."""
 
     def __init__(self, program: Program, function: Any) -> None:
         """Translate for a kernel, a plain Python function."""
         self.program, self.function = program, function
-        self.names: dict[str, lang.Value] = {}
+        self.names: dict[str, Value] = {}
         """Values of local names."""
         self.facts: dict[str, bool] = {}
         """Conditions, as dumped syntax, that are known in a part of the function."""
 
-    def translate(self, node: ast.expr) -> lang.Value:
+    def translate(self, node: ast.expr) -> Value:
         """Return the value of an expression.
 
         Raises:
             RefusedError: it is not of the language.
         """
         if self.facts and (known := self.facts.get(ast.dump(node))) is not None:
-            return lang.number_of(known)
+            return number_of(known)
         method = getattr(self, f"_{type(node).__name__.lower()}", None)
         if method is None:
-            raise lang.RefusedError(
+            raise RefusedError(
                 f"{type(node).__name__} ({ast.unparse(node)})", "use plain arithmetic"
             )
-        value: lang.Value = method(node)
+        value: Value = method(node)
         return value
 
-    def _constant(self, node: ast.Constant) -> lang.Value:
+    def _constant(self, node: ast.Constant) -> Value:
         if not isinstance(node.value, (bool, int, float)):
-            raise lang.RefusedError(f"the constant {node.value!r}", "use numbers")
-        return lang.number_of(node.value)
+            raise RefusedError(f"the constant {node.value!r}", "use numbers")
+        return number_of(node.value)
 
-    def _name(self, node: ast.Name) -> lang.Value:
+    def _name(self, node: ast.Name) -> Value:
         if node.id in self.names:
             return self.names[node.id]
         module = self.function.__globals__
         if node.id in self.program.sizes and node.id in module:
-            return lang.number_of(self.program.sizes[node.id])
+            return number_of(self.program.sizes[node.id])
         if node.id in module:
             return self._known(module[node.id], node.id)
-        return lang.Value(lang.Known(getattr(builtins, node.id, None)), node.id)
+        return Value(Known(getattr(builtins, node.id, None)), node.id)
 
-    def _known(self, value: Any, name: str) -> lang.Value:
+    def _known(self, value: Any, name: str) -> Value:
         if isinstance(value, bool):
-            return lang.number_of(value)
+            return number_of(value)
         if isinstance(value, (float, int)):
             text = self.program.named(self.function.__module__, name, value)
-            return lang.Value(
-                lang.FLOAT if isinstance(value, float) else lang.INT, text, lang.ATOM, value
-            )
-        return lang.Value(lang.Known(value), name)
+            return replace(number_of(value), text=text, rank=lang.ATOM)
+        return Value(Known(value), name)
 
-    def _attribute(self, node: ast.Attribute) -> lang.Value:
+    def _attribute(self, node: ast.Attribute) -> Value:
         owner = self.translate(node.value)
         kind = owner.type
-        if isinstance(kind, lang.Known) and isinstance(kind.value, ModuleType):
+        if isinstance(kind, Known) and isinstance(kind.value, ModuleType):
             value = getattr(kind.value, node.attr)
             is_number = isinstance(value, float)
-            return lang.number_of(value) if is_number else lang.Value(lang.Known(value), node.attr)
-        if isinstance(kind, lang.ArrayOf) and node.attr == "size":
+            return number_of(value) if is_number else Value(Known(value), node.attr)
+        if isinstance(kind, ArrayOf) and node.attr == "size":
             return self.length(owner)
-        if isinstance(kind, lang.ArrayOf) and node.attr == "shape":
-            return lang.Value(lang.Known(owner), "shape")
+        if isinstance(kind, ArrayOf) and node.attr == "shape":
+            return Value(Known(owner), "shape")
         if isinstance(kind, lang.Bundle):
             names = [name for name, _ in kind.items]
             return owner.parts[names.index(node.attr)]
-        if not isinstance(kind, lang.Pointer):
-            raise lang.RefusedError(
+        if not isinstance(kind, Pointer):
+            raise RefusedError(
                 f"attribute {node.attr!r} of {lang.described(kind)}", "use records and arrays"
             )
         return self.field(owner, node.attr)
 
-    def field(self, owner: lang.Value, name: str) -> lang.Value:
+    def field(self, owner: Value, name: str) -> Value:
         """Return a field of a record."""
         record = owner.type.record
         declared = record.fields().get(name)
         if declared is None:
-            raise lang.RefusedError(
-                f"attribute {name!r} of {record.__name__}", "declare it as a field"
-            )
+            raise RefusedError(f"attribute {name!r} of {record.__name__}", "declare it as a field")
         field = lang.Field(record, name)
         arrow = "->" if owner.is_pointer else "."
         text = f"{owner.at(lang.POSTFIX)}{arrow}\N{LEFT-POINTING DOUBLE ANGLE QUOTATION MARK}"
         text += f"{id(record)}:{name}\N{RIGHT-POINTING DOUBLE ANGLE QUOTATION MARK}"
         if not isinstance(declared, RecordField):
-            return lang.Value(
-                lang.Pointer(declared), text, lang.POSTFIX, roots=owner.roots, is_pointer=False
-            )
+            return Value(Pointer(declared), text, lang.POSTFIX, roots=owner.roots, is_pointer=False)
         shape = self.program.shape(record, name)
         constant = self.program.constant(field)
         if not shape:
-            return lang.Value(
-                lang.FLOAT, text, lang.POSTFIX, constant, owner.roots, frozenset({field})
-            )
-        return lang.Value(
-            lang.ArrayOf(shape), text, lang.POSTFIX, constant, owner.roots, frozenset({field})
-        )
+            return Value(lang.FLOAT, text, lang.POSTFIX, constant, owner.roots, frozenset({field}))
+        return Value(ArrayOf(shape), text, lang.POSTFIX, constant, owner.roots, frozenset({field}))
 
     @staticmethod
-    def length(array: lang.Value) -> lang.Value:
+    def length(array: Value) -> Value:
         """Return the length of an array.
 
         Raises:
@@ -164,28 +136,24 @@ class Expressions:
         """
         length = array.type.shape[0]
         if length is None:
-            raise lang.RefusedError(
-                "the length of a slice with variable ends", "give it as an argument"
-            )
-        return lang.number_of(length)
+            raise RefusedError("the length of a slice with variable ends", "give it as an argument")
+        return number_of(length)
 
-    def _subscript(self, node: ast.Subscript) -> lang.Value:
+    def _subscript(self, node: ast.Subscript) -> Value:
         owner = self.translate(node.value)
         kind, index = owner.type, node.slice
         if isinstance(kind, lang.BlockOf):
-            return replace(owner, type=lang.Pointer(kind.record))
-        if isinstance(kind, lang.Known) and isinstance(kind.value, lang.Value):  # array.shape[k]
+            return replace(owner, type=Pointer(kind.record))
+        if isinstance(kind, Known) and isinstance(kind.value, Value):  # array.shape[k]
             k = self._place(index)
             array = kind.value
-            return lang.number_of(array.type.shape[k]) if k else self.length(array)
-        if isinstance(kind, lang.Known) and isinstance(kind.value, tuple):
-            return lang.number_of(kind.value[self._place(index)])
+            return number_of(array.type.shape[k]) if k else self.length(array)
+        if isinstance(kind, Known) and isinstance(kind.value, tuple):
+            return number_of(kind.value[self._place(index)])
         if isinstance(kind, lang.TupleOf):
             return self._item(owner, index)
-        if not isinstance(kind, lang.ArrayOf):
-            raise lang.RefusedError(
-                f"an element of {lang.described(kind)}", "use arrays and tuples"
-            )
+        if not isinstance(kind, ArrayOf):
+            raise RefusedError(f"an element of {lang.described(kind)}", "use arrays and tuples")
         parts = index.elts if isinstance(index, ast.Tuple) else [index]
         for part in parts:
             owner = self._part(owner, part)
@@ -194,26 +162,28 @@ class Expressions:
     def _place(self, index: ast.expr) -> int:
         place = self.translate(index).constant
         if not isinstance(place, int) or place < 0:
-            raise lang.RefusedError(f"the index {ast.unparse(index)}", "use a number")
+            raise RefusedError(f"the index {ast.unparse(index)}", "use a number")
         return place
 
-    def _item(self, owner: lang.Value, index: ast.expr) -> lang.Value:
+    def _item(self, owner: Value, index: ast.expr) -> Value:
         place = self.translate(index)
         if owner.type.is_uniform:
             text = f"{owner.at(lang.POSTFIX)}.at[{place.text}]"
-            return lang.Value(lang.FLOAT, text, lang.POSTFIX, calls=owner.calls)
+            return Value(lang.FLOAT, text, lang.POSTFIX, calls=owner.calls)
         k = self._place(index)
-        return lang.Value(owner.type.items[k], f"{owner.at(lang.POSTFIX)}.item_{k}", lang.POSTFIX)
+        return Value(owner.type.items[k], f"{owner.at(lang.POSTFIX)}.item_{k}", lang.POSTFIX)
 
-    def _part(self, owner: lang.Value, index: ast.expr) -> lang.Value:
-        _, *rest = owner.type.shape
+    def _part(self, owner: Value, index: ast.expr) -> Value:
         if isinstance(index, ast.Slice):
             return self._slice(owner, index)
         place = self.translate(index)
-        if place.type != lang.INT:
-            raise lang.RefusedError(f"the index {ast.unparse(index)}", "use an integer")
-        if place.constant is not None and place.constant < 0:
-            raise lang.RefusedError(f"the index {place.constant}", "count from the beginning")
+        if place.type != lang.INT or (place.constant is not None and place.constant < 0):
+            raise RefusedError(f"the index {ast.unparse(index)}", "use an integer from 0 on")
+        return self.element(owner, place)
+
+    @staticmethod
+    def element(owner: Value, place: Value) -> Value:
+        """Return an element, or a row, of an array."""
         text = place.text
         if owner.offset:
             text = (
@@ -223,18 +193,17 @@ class Expressions:
             )
             if place.constant is not None and owner.offset.isdigit():
                 text = str(int(owner.offset) + place.constant)
-        kind = lang.ArrayOf(tuple(rest)) if rest else lang.FLOAT
+        rest = owner.type.shape[1:]
+        kind = ArrayOf(rest) if rest else lang.FLOAT
         element = f"{owner.at(lang.POSTFIX)}[{text}]"
         return replace(owner, type=kind, text=element, rank=lang.POSTFIX, offset="")
 
-    def _slice(self, owner: lang.Value, part: ast.Slice) -> lang.Value:
+    def _slice(self, owner: Value, part: ast.Slice) -> Value:
         if part.lower is None and part.upper is None and part.step is None:
             return owner
         if len(owner.type.shape) > 1 or part.step is not None:
-            raise lang.RefusedError(
-                "a slice that is not of neighbouring numbers", "copy them in a loop"
-            )
-        start = self.translate(part.lower) if part.lower else lang.number_of(0)
+            raise RefusedError("a slice that is not of neighbouring numbers", "copy them in a loop")
+        start = self.translate(part.lower) if part.lower else number_of(0)
         stop = self.translate(part.upper) if part.upper else self.length(owner)
         known = None
         if start.constant is not None and stop.constant is not None:
@@ -242,127 +211,131 @@ class Expressions:
         offset = start.text if start.constant != 0 else ""
         if owner.offset:
             offset = f"{owner.offset} + {start.at(lang.PRODUCT)}" if offset else owner.offset
-        return replace(owner, type=lang.ArrayOf((known,)), offset=offset)
+        return replace(owner, type=ArrayOf((known,)), offset=offset)
 
-    def _tuple(self, node: ast.Tuple) -> lang.Value:
+    def _tuple(self, node: ast.Tuple) -> Value:
         return self.tuple_of([self.translate(item) for item in node.elts])
 
-    def tuple_of(self, items: list[lang.Value]) -> lang.Value:
+    def tuple_of(self, items: list[Value]) -> Value:
         """Return a tuple of values."""
-        items = [lang.cast(item, lang.FLOAT) if item.type == lang.INT else item for item in items]
+        items = [cast(item, lang.FLOAT) if item.type == lang.INT else item for item in items]
         kind = lang.TupleOf(tuple(item.type for item in items))
         texts = ", ".join(item.text for item in items)
         inside = f"{{{{{texts}}}}}" if kind.is_uniform else f"{{{texts}}}"
         text = f"({self.program.tuple_name(kind)}){inside}"
-        calls = any(item.calls for item in items)
-        return lang.Value(kind, text, lang.POSTFIX, parts=tuple(items), calls=calls)
+        lang.check_order(items)
+        calls = max((item.calls for item in items), default=0)
+        return Value(kind, text, lang.POSTFIX, parts=tuple(items), calls=calls)
 
-    def _unaryop(self, node: ast.UnaryOp) -> lang.Value:
+    def _unaryop(self, node: ast.UnaryOp) -> Value:
         value = self.translate(node.operand)
         if isinstance(node.op, ast.Not):
             return negated((value,))
         if not isinstance(node.op, ast.USub) or value.type not in (lang.FLOAT, lang.INT):
-            raise lang.RefusedError(f"the operator of {ast.unparse(node)}", "use plain arithmetic")
+            raise RefusedError(f"the operator of {ast.unparse(node)}", "use plain arithmetic")
         constant = None if value.constant is None else -value.constant
         text = f"-{value.at(lang.UNARY + 1)}"
         return replace(value, text=text, rank=lang.UNARY, constant=constant)
 
-    def _binop(self, node: ast.BinOp) -> lang.Value:
+    def _binop(self, node: ast.BinOp) -> Value:
         return self.operation(node.op, self.translate(node.left), self.translate(node.right))
 
-    def operation(self, op: ast.operator, left: lang.Value, right: lang.Value) -> lang.Value:
+    def operation(self, op: ast.operator, left: Value, right: Value) -> Value:
         """Return ``left op right``."""
-        calls = left.calls or right.calls
+        lang.check_order((left, right))
+        calls = max(left.calls, right.calls)
         if isinstance(op, (ast.BitAnd, ast.BitOr)):
             return self._bits(op, left, right)
         if type(op) not in ARITHMETIC:
-            raise lang.RefusedError(f"the operator {type(op).__name__}", "write products out")
+            raise RefusedError(f"the operator {type(op).__name__}", "write products out")
         sign, rank, function = ARITHMETIC[type(op)]
         kind = lang.FLOAT if isinstance(op, ast.Div) else lang.joined(left.type, right.type)
         if kind not in (lang.FLOAT, lang.INT):
-            raise lang.RefusedError(f"arithmetic of {lang.described(kind)}", "use numbers")
-        left, right = lang.cast(left, kind), lang.cast(right, kind)
+            raise RefusedError(f"arithmetic of {lang.described(kind)}", "use numbers")
+        left, right = cast(left, kind), cast(right, kind)
         constant = None
         if left.constant is not None and right.constant is not None:
             if not (sign == "/" and right.constant == 0):
                 constant = function(left.constant, right.constant)
             if kind == lang.INT and constant is not None:
-                return lang.number_of(constant)
+                return number_of(constant)
         if kind == lang.INT and sign in "+-" and right.constant == 0:
             return left
         if sign == "<<":
             left = replace(left, text=f"INT64_C({left.text})") if left.text.isdigit() else left
         if rank == lang.ATOM:
             if kind != lang.INT:
-                raise lang.RefusedError("a remainder of floats", "use np.floor")
+                raise RefusedError("a remainder of floats", "use np.floor")
             text = f"{sign}({left.text}, {right.text})"
         else:
             text = f"{left.at(rank)} {sign} {right.at(rank + 1)}"
-        return lang.Value(kind, text, rank, constant, calls=calls)
+        return Value(kind, text, rank, constant, calls=calls)
 
-    def _bits(self, op: ast.operator, left: lang.Value, right: lang.Value) -> lang.Value:
+    def _bits(self, op: ast.operator, left: Value, right: Value) -> Value:
         sign = "&" if isinstance(op, ast.BitAnd) else "|"
         if left.type == lang.INT and right.type == lang.INT:
-            return lang.Value(
+            return Value(
                 lang.INT, f"{left.at(lang.SHIFT)} {sign} {right.at(lang.SHIFT)}", lang.BITS
             )
         return self._logic(isinstance(op, ast.BitAnd), [left, right])
 
-    def _logic(self, is_and: bool, values: list[lang.Value]) -> lang.Value:
+    def _logic(self, is_and: bool, values: list[Value]) -> Value:
         """Return a conjunction or disjunction; C evaluates no more of it than Python."""
         rest = []
-        for value in (lang.cast(value, lang.BOOL) for value in values):
+        for value in (cast(value, lang.BOOL) for value in values):
             if value.constant is None:
                 rest.append(value)
             elif value.constant is not is_and:
                 return (
-                    lang.number_of(not is_and)
+                    number_of(not is_and)
                     if not rest
-                    else self._joined(is_and, [*rest, lang.number_of(not is_and)])
+                    else self._joined(is_and, [*rest, number_of(not is_and)])
                 )
-        return self._joined(is_and, rest) if rest else lang.number_of(is_and)
+        return self._joined(is_and, rest) if rest else number_of(is_and)
 
     @staticmethod
-    def _joined(is_and: bool, values: list[lang.Value]) -> lang.Value:
+    def _joined(is_and: bool, values: list[Value]) -> Value:
         if len(values) == 1:
             return values[0]
         sign, rank = (" && ", lang.AND) if is_and else (" || ", lang.OR)
         texts = [v.text if v.rank == rank else v.at(lang.UNARY) for v in values]
-        return lang.Value(lang.BOOL, sign.join(texts), rank, calls=any(v.calls for v in values))
+        return Value(lang.BOOL, sign.join(texts), rank, calls=max(v.calls for v in values))
 
-    def _boolop(self, node: ast.BoolOp) -> lang.Value:
+    def _boolop(self, node: ast.BoolOp) -> Value:
         values = [self.translate(value) for value in node.values]
         return self._logic(isinstance(node.op, ast.And), values)
 
-    def _compare(self, node: ast.Compare) -> lang.Value:
+    def _compare(self, node: ast.Compare) -> Value:
         values = [self.translate(value) for value in (node.left, *node.comparators)]
         pairs = zip(values, node.ops, values[1:], strict=False)
         return self._logic(True, [self._comparison(*pair) for pair in pairs])
 
     @staticmethod
-    def _comparison(left: lang.Value, op: ast.cmpop, right: lang.Value) -> lang.Value:
+    def _comparison(left: Value, op: ast.cmpop, right: Value) -> Value:
         if type(op) not in COMPARISONS:
-            raise lang.RefusedError(f"the comparison {type(op).__name__}", "compare numbers")
+            raise RefusedError(f"the comparison {type(op).__name__}", "compare numbers")
         sign, rank, function = COMPARISONS[type(op)]
         kind = lang.joined(left.type, right.type)
-        left, right = lang.cast(left, kind), lang.cast(right, kind)
+        left, right = cast(left, kind), cast(right, kind)
         if left.constant is not None and right.constant is not None:
-            return lang.number_of(bool(function(left.constant, right.constant)))
+            return number_of(bool(function(left.constant, right.constant)))
         text = f"{left.at(rank + 1)} {sign} {right.at(rank + 1)}"
-        return lang.Value(lang.BOOL, text, rank, calls=left.calls or right.calls)
+        lang.check_order((left, right))
+        return Value(lang.BOOL, text, rank, calls=max(left.calls, right.calls))
 
-    def _ifexp(self, node: ast.IfExp) -> lang.Value:
-        condition = lang.cast(self.translate(node.test), lang.BOOL)
+    def _ifexp(self, node: ast.IfExp) -> Value:
+        condition = cast(self.translate(node.test), lang.BOOL)
         if condition.constant is not None:
             return self.translate(node.body if condition.constant else node.orelse)
         return chosen((condition, self.translate(node.body), self.translate(node.orelse)))
 
-    def _call(self, node: ast.Call) -> lang.Value:
+    def _call(self, node: ast.Call) -> Value:
         function = self.translate(node.func)
-        known = function.type.value if isinstance(function.type, lang.Known) else None
+        known = function.type.value if isinstance(function.type, Known) else None
         if node.keywords or any(isinstance(a, ast.Starred) for a in node.args):
-            raise lang.RefusedError("a call with keywords or a star", "give arguments by position")
+            raise RefusedError("a call with keywords or a star", "give arguments by position")
         arguments = tuple(self.translate(argument) for argument in node.args)
+        lang.check_order(arguments)
         known = getattr(known, "kernel", known)  # of a RecordFunction
         if known is len:
             return self.length(arguments[0])
@@ -374,7 +347,7 @@ class Expressions:
             return word(arguments)
         body = getattr(known, "py_func", None)
         if body is None:
-            raise lang.RefusedError(
+            raise RefusedError(
                 f"a call of {ast.unparse(node.func)}()", "call kernels and exact functions"
             )
         return self.program.call(body, arguments, self)

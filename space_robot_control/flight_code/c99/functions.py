@@ -14,6 +14,7 @@ from typing import Any
 
 from . import language as lang
 from .declarations import declared
+from .language import ArrayOf, Known, Pointer, Value, number_of
 from .statements import Statements
 
 MOST_PASSES = 5
@@ -76,24 +77,24 @@ class _Translation(Statements):
             self.types[argument.arg] = kind
             self.arguments.append(tuple(name for name, _ in self.parameters[before:]))
 
-    def _parameter(self, name: str, kind: lang.Type) -> lang.Value:
-        if isinstance(kind, lang.Known):
+    def _parameter(self, name: str, kind: lang.Type) -> Value:
+        if isinstance(kind, Known):
             is_number = isinstance(kind.value, (bool, int))
-            bound = lang.number_of(kind.value) if is_number else lang.Value(kind, name)
+            bound = number_of(kind.value) if is_number else Value(kind, name)
             return replace(bound, is_bound=is_number)
         if isinstance(kind, lang.Bundle):
-            parts: dict[str, lang.Value] = {}
+            parts: dict[str, Value] = {}
             for item, of in kind.items:
                 if isinstance(of, lang.FieldOf):
                     owner = parts[of.item]
-                    pointer = replace(owner, type=lang.Pointer(owner.type.record))
+                    pointer = replace(owner, type=Pointer(owner.type.record))
                     parts[item] = self.field(pointer, of.name)
                 else:
                     parts[item] = self._parameter(f"{name}_{item}", of)
-            return lang.Value(kind, name, parts=tuple(parts.values()))
+            return Value(kind, name, parts=tuple(parts.values()))
         if kind != lang.EMPTY:  # C has no such arrays
             self.parameters.append((name, kind))
-        return lang.Value(kind, name, roots=frozenset({name}))
+        return Value(kind, name, roots=frozenset({name}))
 
 
 def translated(
@@ -116,7 +117,7 @@ def translated(
         types, result = dict(translation.types), translation.result
     written = set(translation.written)
     for value in translation.names.values():
-        if isinstance(value.type, lang.ArrayOf) and len(value.type.shape) > 1:
+        if isinstance(value.type, ArrayOf) and len(value.type.shape) > 1:
             written |= value.roots  # C99 cannot pass variable rows as constant ones
     lines = declared(translation.lines, _declarations(translation, written))
     text = "\n".join(lines)
@@ -139,14 +140,14 @@ def _declarations(translation: _Translation, written: set[str]) -> dict[str, str
     """Return the declaration of each local name; a pointer is to constants if it can be."""
     declarations = {}
     for name, kind in translation.types.items():
-        if name not in translation.own and not isinstance(kind, lang.Known):
-            is_pointer = isinstance(kind, (lang.Pointer, lang.BlockOf, lang.ArrayOf))
+        if name not in translation.own and not isinstance(kind, Known):
+            is_pointer = isinstance(kind, (Pointer, lang.BlockOf, ArrayOf))
             const = "const " if is_pointer and name not in written else ""
             declarations[name] = f"{const}{translation.declared(kind, name)}"
     return declarations
 
 
-def passed(function: Function, arguments: tuple[lang.Value, ...]) -> list[str]:
+def passed(function: Function, arguments: tuple[Value, ...]) -> list[str]:
     """Return the texts of the arguments of a call."""
     texts: list[str] = []
     for names, argument in zip(function.arguments, arguments, strict=True):
@@ -159,18 +160,7 @@ def passed(function: Function, arguments: tuple[lang.Value, ...]) -> list[str]:
     return texts
 
 
-def kind_of_argument(value: lang.Value) -> lang.Type:
-    """Return the type of a parameter for an argument.
-
-    Raises:
-        RefusedError: it cannot be one.
-    """
-    kind = value.type
-    if value.is_bound or (kind == lang.BOOL and value.constant is not None):
-        return lang.Known(value.constant)
-    is_memory = isinstance(
-        kind, (lang.TupleOf, lang.Known, lang.Pointer, lang.BlockOf, lang.ArrayOf, lang.Bundle)
-    )
-    if kind not in (lang.FLOAT, lang.INT, lang.BOOL) and not is_memory:
-        raise lang.RefusedError("such an argument", "pass numbers, arrays and records")
-    return kind
+def kind_of_argument(value: Value) -> lang.Type:
+    """Return the type of a parameter for an argument; a truth value that is known is bound."""
+    is_bound = value.is_bound or (value.type == lang.BOOL and value.constant is not None)
+    return Known(value.constant) if is_bound else value.type

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 from space_robot_msgs_py.compiled.records import Record
 from space_robot_msgs_py.errors import InputError
 
+WRITES = 2
+"""See `Value.calls`."""
 PREFIX = "sr_"
 """Of every name that a linker sees."""
 TERNARY, OR, AND, BITS, EQUAL, RELATION, SHIFT, SUM, PRODUCT, UNARY, POSTFIX, ATOM = range(12)
@@ -142,8 +145,8 @@ class Value:
     """Of an array: index of its first number in ``text``."""
     is_pointer: bool = True
     """Of a record: whether the text is a pointer."""
-    calls: bool = False
-    """Whether evaluating it calls a kernel."""
+    calls: int = 0
+    """1: evaluating it calls a kernel; 2: one that writes memory."""
     is_bound: bool = False
     """Whether its constant is bound when the code is exported: no argument in C."""
     parts: tuple[Value, ...] = ()
@@ -184,6 +187,17 @@ def number_of(number: Any) -> Value:
     return Value(kind, text, UNARY if text.startswith(("-", "(")) else ATOM, number)
 
 
+def check_order(values: Iterable[Value]) -> None:
+    """Check that it does not matter which of some values C evaluates first.
+
+    Raises:
+        RefusedError: a kernel that writes is called beside other values that may depend on it.
+    """
+    reading = [v for v in values if v.calls or "[" in v.text or "." in v.text or ">" in v.text]
+    if len(reading) > 1 and any(v.calls == WRITES for v in reading):
+        raise RefusedError("a kernel that writes, beside other values", "name its result first")
+
+
 def cast(value: Value, kind: Type) -> Value:
     """Return a value converted to a scalar type, as Numba does."""
     if value.type == kind:
@@ -205,9 +219,8 @@ def cast(value: Value, kind: Type) -> Value:
         known = None if constant is None else constant != 0
         text = f"{value.at(RELATION)} != {zero}"
         return replace(value, type=BOOL, text=text, rank=EQUAL, constant=known)
-    raise RefusedError(
-        f"{described(value.type)} where {described(kind)} is needed", "one type a name"
-    )
+    both = f"{described(value.type)} where {described(kind)} is needed"
+    raise RefusedError(both, "give every name one type")
 
 
 def joined(one: Type, other: Type) -> Type:
@@ -218,24 +231,19 @@ def joined(one: Type, other: Type) -> Type:
         return other
     if {one, other} <= {FLOAT, INT}:
         return FLOAT
-    if isinstance(one, TupleOf) and isinstance(other, TupleOf):
-        if len(one.items) == len(other.items):
-            return TupleOf(tuple(map(joined, one.items, other.items)))
-    if isinstance(one, ArrayOf) and isinstance(other, ArrayOf) and one.shape[1:] == other.shape[1:]:
+    are_arrays = isinstance(one, ArrayOf) and isinstance(other, ArrayOf)
+    if are_arrays and one.shape[1:] == other.shape[1:]:
         return ArrayOf((None, *one.shape[1:]))
-    raise RefusedError(
-        f"a name for {described(one)} and for {described(other)}", "use a name for each type"
-    )
+    both = f"{described(one)} and {described(other)}"
+    raise RefusedError(f"one name for {both}", "use a name for each type")
 
 
 def described(kind: Type) -> str:
     """Return a type in words."""
     if isinstance(kind, Scalar):
-        return {"double": "a float", "int64_t": "an integer", "bool": "a bool"}.get(
-            kind.name, "nothing"
-        )
+        words = {"double": "a float", "int64_t": "an integer", "bool": "a bool"}
+        return words.get(kind.name, "nothing")
     if isinstance(kind, Known):
         return f"the Python object {getattr(kind.value, '__name__', kind.value)!r}"
-    return {TupleOf: "a tuple", ArrayOf: "an array", Pointer: "a record", BlockOf: "a block"}.get(
-        type(kind), "a named tuple"
-    )
+    words_of = {TupleOf: "a tuple", ArrayOf: "an array", Pointer: "a record", BlockOf: "a block"}
+    return words_of.get(type(kind), "a named tuple")

@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from types import FunctionType
 from typing import Any, NamedTuple
-
-import numpy as np
 
 from space_robot_msgs_py.compiled.records import Field as RecordField
 from space_robot_msgs_py.compiled.records import Record
 
 from . import language as lang
 from .functions import Function, kind_of_argument, passed, syntax_of, translated
+from .language import Known, RefusedError, Value
 
 FIELD = re.compile(
     "\N{LEFT-POINTING DOUBLE ANGLE QUOTATION MARK}(\\d+):(\\w+)"
@@ -52,17 +51,19 @@ class Program:
         self.constants: dict[lang.Field, float] = {}
         """Fields that never change; of an array, all of its numbers are the same."""
         self.functions: list[Function] = []
+        self.named_numbers: dict[Constant, int] = {}
+        """Named numbers, and their places in markers."""
         self.modules: dict[Constant, str] = {}
-        """First module that reads each constant."""
+        """First module that reads each of them."""
+        self.records: dict[int, type[Record]] = {}
+        """Records by their places in markers."""
         self.tuples: dict[lang.TupleOf, str] = {}
         self._known: dict[Any, int] = {}
-        self._named: dict[Constant, int] = {}
-        self._records: dict[int, type[Record]] = {}
         self._active: list[Any] = []
 
     def shape(self, record: type[Record], name: str) -> tuple[int, ...]:
         """Return the shape of a field under the sizes."""
-        self._records[id(record)] = record
+        self.records[id(record)] = record
         declared = record.fields()[name]
         assert isinstance(declared, RecordField)
         shape: Any = declared.shape
@@ -80,11 +81,13 @@ class Program:
         """Return the text of a module's constant."""
         constant = Constant(name, number)
         self.modules.setdefault(constant, module)
-        return f"\N{PILCROW SIGN}{self._named.setdefault(constant, len(self._named))};"
+        return (
+            f"\N{PILCROW SIGN}{self.named_numbers.setdefault(constant, len(self.named_numbers))};"
+        )
 
     def struct_name(self, record: type[Record]) -> str:
         """Return the name of a record's struct."""
-        self._records[id(record)] = record
+        self.records[id(record)] = record
         name = re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", record.__name__).lower()
         if name in ("gains", "memory"):  # of a law
             name = f"{record.__module__.rpartition('.')[2]}_{name}"
@@ -93,25 +96,15 @@ class Program:
     def tuple_name(self, kind: lang.TupleOf) -> str:
         """Return the name of a tuple's struct."""
         if kind not in self.tuples:
-            for item in kind.items:
-                if isinstance(item, lang.TupleOf):
-                    self.tuple_name(item)
-            if kind.is_uniform:
-                name = f"{lang.PREFIX}tuple_{len(kind.items)}"
-            else:
-                parts = (
-                    self.tuple_name(i).rpartition("_")[2]
-                    if isinstance(i, lang.TupleOf)
-                    else i.name[0]
-                    for i in kind.items
-                )
-                name = f"{lang.PREFIX}tuple_{''.join(parts)}"
-            self.tuples[kind] = name
+            inner = [
+                self.tuple_name(i).rpartition("_")[2] if isinstance(i, lang.TupleOf) else i.name[0]
+                for i in kind.items
+            ]
+            name = str(len(inner)) if kind.is_uniform else "".join(inner)
+            self.tuples[kind] = f"{lang.PREFIX}tuple_{name}"
         return self.tuples[kind]
 
-    def call(
-        self, body: Callable[..., Any], arguments: tuple[lang.Value, ...], inside: Any
-    ) -> lang.Value:
+    def call(self, body: Callable[..., Any], arguments: tuple[Value, ...], inside: Any) -> Value:
         """Return the call of a kernel by a translation, ``inside`` which it stands."""
         number = self.function(body, arguments, getattr(inside, "label", ""))
         function = self.functions[number]
@@ -124,10 +117,11 @@ class Program:
             elif written & set(names):
                 inside.write(argument)
         text = f"\N{CURRENCY SIGN}{number}({', '.join(passed(function, arguments))})"
-        return lang.Value(function.result, text, calls=True)
+        calls = lang.WRITES if written else 1
+        return Value(function.result, text, calls=calls)
 
     def function(
-        self, body: Callable[..., Any], arguments: tuple[lang.Value, ...], label: str = ""
+        self, body: Callable[..., Any], arguments: tuple[Value, ...], label: str = ""
     ) -> int:
         """Return the number of the translation of a kernel for arguments.
 
@@ -135,9 +129,7 @@ class Program:
         """
         tree, file = syntax_of(body)
         if len(tree.args.args) != len(arguments):
-            raise lang.RefusedError(
-                f"a call of {tree.name}() without all arguments", "give them all"
-            )
+            raise RefusedError(f"a call of {tree.name}() without all arguments", "give them all")
         kinds = tuple(map(kind_of_argument, arguments))
         if (body, kinds) in self._known:
             return self._known[body, kinds]
@@ -145,7 +137,7 @@ class Program:
             line = body.__code__.co_firstlineno
             raise lang.NotInSubsetError(file, line, "recursion", "write a loop")
         labels = [kind.label for kind in kinds if isinstance(kind, lang.Bundle)]
-        is_bound = any(isinstance(kind, lang.Known) or kind == lang.EMPTY for kind in kinds)
+        is_bound = any(isinstance(kind, Known) or kind == lang.EMPTY for kind in kinds)
         self._active.append(body)
         new = translated(self, body, kinds, labels[0] if labels else label if is_bound else "")
         self._active.pop()
@@ -161,54 +153,3 @@ class Program:
             self.functions.append(new)
         self._known[body, kinds] = number
         return number
-
-    def reachable(self, first: Iterable[Function]) -> list[Function]:
-        """Return the functions that are called from the ``first`` ones, callees first."""
-        found: list[Function] = []
-
-        def visit(function: Function) -> None:
-            if function in found:
-                return
-            for number in CALL.findall("\n".join(function.lines)):
-                visit(self.functions[int(number)])
-            found.append(function)
-
-        for function in first:
-            visit(function)
-        return found
-
-    def fields_of(self, functions: Iterable[Function]) -> set[lang.Field]:
-        """Return the fields that functions read or write."""
-        text = "\n".join("\n".join(function.lines) for function in functions)
-        return {
-            lang.Field(self._records[int(number)], name) for number, name in FIELD.findall(text)
-        }
-
-    @staticmethod
-    def written_fields(functions: Iterable[Function]) -> set[lang.Field]:
-        """Return the fields that functions write."""
-        return {field for function in functions for field in function.stores}
-
-    def constants_of(self, functions: Iterable[Function]) -> list[Constant]:
-        """Return the constants that functions read."""
-        text = "\n".join("\n".join(function.lines) for function in functions)
-        numbers = {int(number) for number in CONSTANT.findall(text)}
-        return [c for c, number in self._named.items() if number in numbers]
-
-    def final(self, text: str, names: Mapping[int, str], constants: Mapping[int, str]) -> str:
-        """Return the text with the names of fields, functions and constants."""
-        text = FIELD.sub(lambda m: m[2], text)
-        text = CALL.sub(lambda m: f"{names[int(m[1])]}(", text)
-        return CONSTANT.sub(lambda m: constants[int(m[1])], text)
-
-    def number_of_constant(self, constant: Constant) -> int:
-        """Return the number of a constant in markers."""
-        return self._named[constant]
-
-
-def same_number(values: Any) -> float | None:
-    """Return the number that all numbers of an array are; None if they differ."""
-    numbers = np.asarray(values, dtype=np.float64).reshape(-1)
-    if numbers.size and np.all(numbers == numbers[0]):
-        return float(numbers[0])
-    return None

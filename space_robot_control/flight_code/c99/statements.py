@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import ast
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
 from . import language as lang
 from .declarations import INDENT, MARK, assignments, check_counters, names_in
 from .expressions import Expressions
+from .language import ArrayOf, Known, Pointer, RefusedError, Value, cast, number_of
 
 TRANSPARENT = ("any_lane", "all_lanes", "uniform", "bool")
 """Words that give a truth value as it is."""
@@ -47,11 +48,11 @@ class Statements(Expressions):
         """
         try:
             check_counters(self.tree)
-        except lang.RefusedError as refusal:
+        except RefusedError as refusal:
             raise self.refused(self.tree, refusal) from None
         self._block(self.tree.body)
 
-    def refused(self, node: ast.AST, refusal: lang.RefusedError) -> lang.NotInSubsetError:
+    def refused(self, node: ast.AST, refusal: RefusedError) -> lang.NotInSubsetError:
         """Return the error for a refused construct."""
         line = self.first_line + getattr(node, "lineno", 1) - 1
         return lang.NotInSubsetError(self.file, line, refusal.what, refusal.instead)
@@ -70,11 +71,11 @@ class Statements(Expressions):
             try:
                 method = getattr(self, f"_{type(statement).__name__.lower()}_statement", None)
                 if method is None:
-                    raise lang.RefusedError(
+                    raise RefusedError(
                         f"{type(statement).__name__.lower()}", "use if, for and while"
                     )
                 is_left = bool(method(statement))
-            except lang.RefusedError as refusal:
+            except RefusedError as refusal:
                 raise self.refused(statement, refusal) from None
         self.facts = before
         return is_left
@@ -100,9 +101,9 @@ class Statements(Expressions):
 
     def declared(self, kind: lang.Type, name: str) -> str:
         """Return C's declaration of a name of a type."""
-        if isinstance(kind, (lang.Pointer, lang.BlockOf)):
+        if isinstance(kind, (Pointer, lang.BlockOf)):
             return f"{self.program.struct_name(kind.record)} *{name}"
-        if isinstance(kind, lang.ArrayOf):
+        if isinstance(kind, ArrayOf):
             if len(kind.shape) == 1:
                 return f"double *{name}"
             return f"double (*{name}){''.join(f'[{size}]' for size in kind.shape[1:])}"
@@ -120,7 +121,7 @@ class Statements(Expressions):
         if len(node.targets) > 1 and (value.calls or isinstance(value.type, lang.TupleOf)):
             name = self._fresh("value")
             self.emit(f"const {self.declared(value.type, name)} = {value.text};")
-            value = replace(value, text=name, rank=11, calls=False)
+            value = replace(value, text=name, rank=lang.ATOM, calls=0)
         for target in node.targets:
             self._assign(target, value)
 
@@ -133,14 +134,14 @@ class Statements(Expressions):
         if not isinstance(source, ast.Tuple):
             value = self.translate(source)
             if not isinstance(value.type, lang.TupleOf):
-                raise lang.RefusedError(f"unpacking {lang.described(value.type)}", "return tuples")
+                raise RefusedError(f"unpacking {lang.described(value.type)}", "return tuples")
             name = value.text
             if value.calls or not name.isidentifier():
                 name = self._fresh("result")
                 self.emit(f"const {self.declared(value.type, name)} = {value.text};")
             for k, (part, kind) in enumerate(zip(target.elts, value.type.items, strict=True)):
                 item = f"{name}.at[{k}]" if value.type.is_uniform else f"{name}.item_{k}"
-                self._assign(part, lang.Value(kind, item, lang.POSTFIX))
+                self._assign(part, Value(kind, item, lang.POSTFIX))
             return
         values = [self.translate(part) for part in source.elts]
         for k in range(1, len(values)):
@@ -149,112 +150,84 @@ class Statements(Expressions):
             stores = any("[" in target or "." in target for target in written)
             loads = values[k].calls or "[" in values[k].text or "->" in values[k].text
             touched = bool(mentioned & set(written)) or (stores and loads)
-            if touched and not isinstance(values[k].type, (lang.Pointer, lang.ArrayOf)):
+            if touched and not isinstance(values[k].type, (Pointer, ArrayOf)):
                 name = self._fresh("new")
                 self.emit(f"const {self.declared(values[k].type, name)} = {values[k].text};")
-                values[k] = replace(values[k], text=name, rank=11, calls=False)
+                values[k] = replace(values[k], text=name, rank=lang.ATOM, calls=0)
         for part, value in zip(target.elts, values, strict=True):
             self._assign(part, value)
 
-    def _assign(self, target: ast.expr, value: lang.Value) -> None:
+    def _assign(self, target: ast.expr, value: Value) -> None:
         if isinstance(target, ast.Tuple):
-            raise lang.RefusedError("nested unpacking", "unpack one tuple after the other")
+            raise RefusedError("nested unpacking", "unpack one tuple after the other")
         if isinstance(target, ast.Name):
             self._assign_name(target.id, value)
-        elif isinstance(target, ast.Subscript) and self._is_slice(target.slice):
-            self._fill(self.translate(target), value)
         else:
-            place = self.translate(target)
-            if isinstance(place.type, lang.ArrayOf):
-                self._fill(place, value)
-                return
-            if place.type != lang.FLOAT:
-                raise lang.RefusedError(
-                    f"storing in {ast.unparse(target)}", "store numbers in fields"
-                )
-            self.write(place)
-            self.emit(f"{place.text} = {lang.cast(value, lang.FLOAT).text};")
+            self._store(self.translate(target), value)
 
-    @staticmethod
-    def _is_slice(index: ast.expr) -> bool:
-        return isinstance(index, ast.Slice)
-
-    def _assign_name(self, name: str, value: lang.Value) -> None:
+    def _assign_name(self, name: str, value: Value) -> None:
         kind = lang.joined(self.types.get(name), value.type) if name in self.types else value.type
         self.types[name] = kind
-        if isinstance(kind, lang.Known):
+        if isinstance(kind, Known):
             self.names[name] = value
             return
         if kind in (lang.FLOAT, lang.INT, lang.BOOL):
-            value = lang.cast(value, kind)
+            value = cast(value, kind)
         is_once = self.assigned[name] == 1 and name not in self.own
         known = value.constant if is_once and kind in (lang.FLOAT, lang.INT, lang.BOOL) else None
         roots = frozenset({name}) | value.roots | self._roots.get(name, frozenset())
         self._roots[name] = roots
-        local = lang.Value(kind, name, constant=known, roots=roots, fields=value.fields)
+        local = Value(kind, name, constant=known, roots=roots, fields=value.fields)
         if known is not None and kind == lang.INT:
-            local = replace(lang.number_of(known), roots=frozenset())
+            local = replace(number_of(known), roots=frozenset())
         elif known is not None and kind == lang.BOOL:
-            local = lang.number_of(known)
-        elif isinstance(kind, lang.ArrayOf) and value.constant is not None and is_once:
+            local = number_of(known)
+        elif isinstance(kind, ArrayOf) and value.constant is not None and is_once:
             local = replace(local, constant=value.constant)
         self.names[name] = local
-        text = value.address if isinstance(kind, (lang.ArrayOf, lang.Pointer)) else value.text
+        text = value.address if isinstance(kind, (ArrayOf, Pointer)) else value.text
         self.emit(f"{MARK}{name}{MARK} = {text};")
 
-    def write(self, place: lang.Value) -> None:
+    def write(self, place: Value) -> None:
         """Note that the memory of a value is written."""
         self.written |= place.roots
         self.stores |= place.fields
 
-    def _fill(self, place: lang.Value, value: lang.Value) -> None:
-        """Write an array, or a number, into an array."""
+    def _store(self, place: Value, value: Value) -> None:
+        """Write a number into a number or into a whole array, or an array into an array."""
         self.write(place)
-        shape = list(place.type.shape)
-        if isinstance(value.type, lang.ArrayOf) and shape[0] is None:
-            shape[0] = value.type.shape[0]
-        if 0 in shape:
+        if not isinstance(place.type, ArrayOf):
+            self.emit(f"{place.text} = {cast(value, lang.FLOAT).text};")
             return
-        ends = [str(size) if size is not None else self.length(place).text for size in shape]
-        depth = self._depth
-        names = [self._fresh("item") for _ in shape]
-        for name, end in zip(names, ends, strict=True):
-            self.emit(f"for (int64_t {name} = 0; {name} < {end}; ++{name}) {{")
-            self._depth += 1
-        target, source = self._element(place, names), value
-        if isinstance(value.type, lang.ArrayOf):
-            source = self._element(value, names)
-        self.emit(f"{target.text} = {lang.cast(source, lang.FLOAT).text};")
-        for _ in names:
-            self._depth -= 1
-            self.emit("}")
-        assert self._depth == depth
-
-    @staticmethod
-    def _element(array: lang.Value, names: Iterable[str]) -> lang.Value:
-        text, offset = array.text, array.offset
-        for name in names:
-            text, offset = f"{text}[{f'{offset} + {name}' if offset else name}]", ""
-        return lang.Value(lang.FLOAT, text)
+        if isinstance(value.type, ArrayOf) and place.type.shape[0] is None:
+            place = replace(place, type=value.type)
+        length = self.length(place).constant
+        if length == 0:
+            return
+        item = Value(lang.INT, self._fresh("item"))
+        self.emit(f"for (int64_t {item.text} = 0; {item.text} < {length}; ++{item.text}) {{")
+        self._depth += 1
+        is_copied = isinstance(value.type, ArrayOf)
+        self._store(self.element(place, item), self.element(value, item) if is_copied else value)
+        self._depth -= 1
+        self.emit("}")
 
     def _augassign_statement(self, node: ast.AugAssign) -> None:
         old, new = self.translate(node.target), self.translate(node.value)
         sign = {ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/"}.get(type(node.op))
-        if sign is None or isinstance(old.type, lang.ArrayOf):
-            raise lang.RefusedError("this augmented assignment", "write out the assignment")
+        if sign is None or isinstance(old.type, ArrayOf):
+            raise RefusedError("this augmented assignment", "write out the assignment")
         if isinstance(node.target, ast.Name):
-            name, kind = node.target.id, lang.joined(old.type, new.type)
-            if kind != self.types[name]:
-                self.types[name] = kind
+            kind = self.types[node.target.id] = lang.joined(old.type, new.type)
         else:
             kind = lang.FLOAT
             self.write(old)
-        self.emit(f"{old.text} {sign}= {lang.cast(new, kind).text};")
+        self.emit(f"{old.text} {sign}= {cast(new, kind).text};")
 
     # control flow
 
     def _if_statement(self, node: ast.If) -> bool:
-        condition = lang.cast(self.translate(node.test), lang.BOOL)
+        condition = cast(self.translate(node.test), lang.BOOL)
         if condition.constant is not None:
             return self._block(node.body if condition.constant else node.orelse)
         known = self.facts
@@ -289,7 +262,7 @@ class Statements(Expressions):
         return is_left
 
     def _while_statement(self, node: ast.While) -> None:
-        condition = lang.cast(self.translate(node.test), lang.BOOL)
+        condition = cast(self.translate(node.test), lang.BOOL)
         if condition.constant is False:
             return
         self.emit(f"while ({condition.text}) {{")
@@ -303,25 +276,22 @@ class Statements(Expressions):
         call = node.iter
         is_range = isinstance(call, ast.Call) and ast.unparse(call.func) == "range"
         if not (isinstance(call, ast.Call) and is_range and isinstance(node.target, ast.Name)):
-            raise lang.RefusedError(
-                f"a loop over {ast.unparse(node.iter)}", "loop over range() or a tuple"
-            )
+            raise RefusedError(f"a loop over {ast.unparse(node.iter)}", "use range() or a tuple")
         name = node.target.id
-        bounds = [lang.cast(self.translate(a), lang.INT) for a in call.args]
-        start = bounds[0] if len(bounds) > 1 else lang.number_of(0)
-        stop, step = bounds[min(len(bounds) - 1, 1)], bounds[2] if len(bounds) > 2 else None
-        by = 1 if step is None else step.constant
-        if not isinstance(by, int) or by not in (1, -1):
-            raise lang.RefusedError("a loop with another step than 1 or -1", "compute the index")
-        if start.constant is not None and stop.constant is not None:
-            if (stop.constant - start.constant) * by <= 0:
-                return
+        ends = [ast.Constant(0), *call.args] if len(call.args) == 1 else call.args
+        start, stop, *steps = (cast(self.translate(a), lang.INT) for a in ends)
+        by = steps[0].constant if steps else 1
+        if by not in (1, -1):
+            raise RefusedError("a loop with another step than 1 or -1", "compute the index")
+        is_known = start.constant is not None and stop.constant is not None
+        if is_known and (stop.constant - start.constant) * by <= 0:
+            return
         stop_text = stop.at(lang.SUM)
-        if stop.constant is None and not self._is_steady(call.args[min(len(bounds) - 1, 1)], node):
+        if stop.constant is None and not self._is_steady(ends[1], node):
             stop_text = self._fresh("end")
             self.emit(f"const int64_t {stop_text} = {stop.text};")
         shown = self._fresh("round") if name == "_" else name
-        self.names[name] = lang.Value(lang.INT, shown)
+        self.names[name] = Value(lang.INT, shown)
         sign, change = ("<", "++") if by == 1 else (">", "--")
         self.emit(
             f"for (int64_t {shown} = {start.text}; {shown} {sign} {stop_text}; {change}{shown}) {{"
@@ -348,13 +318,13 @@ class Statements(Expressions):
             for value in values:
                 kind = lang.joined(kind, value.type)
             table = self._fresh(f"{ast.unparse(target)}s")
-            texts = ", ".join(lang.cast(value, kind).text for value in values)
+            texts = ", ".join(cast(value, kind).text for value in values)
             self.emit(f"const {kind.name} {table}[{len(rows)}] = {{{texts}}};")
             lists.append((ast.unparse(target), kind, table))
         self.emit(f"for (int64_t {index} = 0; {index} < {len(rows)}; ++{index}) {{")
         self._depth += 1
         for name, kind, table in lists:
-            self.names[name] = lang.Value(kind, name)
+            self.names[name] = Value(kind, name)
             self.emit(f"const {kind.name} {name} = {table}[{index}];")
         self._block(node.body)
         self._depth -= 1
@@ -368,11 +338,9 @@ class Statements(Expressions):
         value = self.translate(node.value)
         self.result = lang.joined(self.result, value.type)
         if self.result in (lang.FLOAT, lang.INT, lang.BOOL):
-            value = lang.cast(value, self.result)
+            value = cast(value, self.result)
         elif not isinstance(value.type, lang.TupleOf):
-            raise lang.RefusedError(
-                f"returning {lang.described(value.type)}", "write into an argument"
-            )
+            raise RefusedError(f"returning {lang.described(value.type)}", "write into an argument")
         self.emit(f"return {value.text};")
         return True
 
@@ -386,13 +354,11 @@ class Statements(Expressions):
     def _pass_statement(self, node: ast.Pass) -> None:
         """Do nothing."""
 
-    def _break_statement(self, node: ast.Break) -> bool:
-        self.emit("break;")
+    def _leave_statement(self, node: ast.stmt) -> bool:
+        self.emit(f"{type(node).__name__.lower()};")
         return True
 
-    def _continue_statement(self, node: ast.Continue) -> bool:
-        self.emit("continue;")
-        return True
+    _break_statement = _continue_statement = _leave_statement
 
     def _fresh(self, name: str) -> str:
         """Return a name that the function does not have yet."""

@@ -18,83 +18,71 @@ import numpy as np
 from space_robot_msgs_py.compiled import lanes
 
 from . import language as lang
+from .language import RefusedError, Value, cast, number_of
 
-Word = Callable[[tuple[lang.Value, ...]], lang.Value]
+Word = Callable[[tuple[Value, ...]], Value]
 
 
 def _exact(name: str, kind: Any = lang.FLOAT) -> Word:
-    def word(arguments: tuple[lang.Value, ...]) -> lang.Value:
-        texts = ", ".join(lang.cast(argument, lang.FLOAT).text for argument in arguments)
-        return lang.Value(
-            kind, f"{name}({texts})", lang.ATOM, calls=any(a.calls for a in arguments)
-        )
+    def word(arguments: tuple[Value, ...]) -> Value:
+        texts = ", ".join(cast(argument, lang.FLOAT).text for argument in arguments)
+        return Value(kind, f"{name}({texts})", lang.ATOM, calls=max(a.calls for a in arguments))
 
     return word
 
 
-def _absolute(arguments: tuple[lang.Value, ...]) -> lang.Value:
+def _absolute(arguments: tuple[Value, ...]) -> Value:
     if arguments[0].type != lang.FLOAT:
-        raise lang.RefusedError("abs() of an integer", "write a conditional expression")
+        raise RefusedError("abs() of an integer", "write a conditional expression")
     return _exact("fabs")(arguments)
 
 
 def _extreme(name: str) -> Word:
-    def word(arguments: tuple[lang.Value, ...]) -> lang.Value:
+    def word(arguments: tuple[Value, ...]) -> Value:
         kind = reduce(lang.joined, (argument.type for argument in arguments))
-        pair = lang.Value(kind, f"{name}{'_int' if kind == lang.INT else ''}")
-        values = [lang.cast(argument, kind) for argument in arguments]
+        pair = Value(kind, f"{name}{'_int' if kind == lang.INT else ''}")
+        values = [cast(argument, kind) for argument in arguments]
         if all(value.constant is not None for value in values):
             function = max if name == "sr_max" else min
-            return lang.number_of(function(value.constant for value in values))
+            return number_of(function(value.constant for value in values))
         return reduce(lambda a, b: replace(pair, text=f"{pair.text}({a.text}, {b.text})"), values)
 
     return word
 
 
-def _integer(arguments: tuple[lang.Value, ...]) -> lang.Value:
+def _integer(arguments: tuple[Value, ...]) -> Value:
     (value,) = arguments
     if value.type == lang.INT:
         return value
     if value.constant is not None:
-        return lang.number_of(int(value.constant))
+        return number_of(int(value.constant))
     if value.type == lang.BOOL:
-        return lang.cast(value, lang.INT)
+        return cast(value, lang.INT)
     return replace(value, type=lang.INT, text=f"sr_int({value.text})", rank=lang.ATOM)
 
 
-def _float(arguments: tuple[lang.Value, ...]) -> lang.Value:
-    return lang.cast(arguments[0], lang.FLOAT)
-
-
-def _bool(arguments: tuple[lang.Value, ...]) -> lang.Value:
-    return lang.cast(arguments[0], lang.BOOL)
-
-
-def _itself(arguments: tuple[lang.Value, ...]) -> lang.Value:
-    return arguments[0]
-
-
-def negated(arguments: tuple[lang.Value, ...]) -> lang.Value:
+def negated(arguments: tuple[Value, ...]) -> Value:
     """Return ``not x``."""
-    value = lang.cast(arguments[0], lang.BOOL)
+    value = cast(arguments[0], lang.BOOL)
     constant = None if value.constant is None else not value.constant
     return replace(value, text=f"!{value.at(lang.UNARY)}", rank=lang.UNARY, constant=constant)
 
 
-def chosen(arguments: tuple[lang.Value, ...]) -> lang.Value:
+def chosen(arguments: tuple[Value, ...]) -> Value:
     """Return ``then if condition else otherwise``."""
     condition, then, otherwise = arguments
-    condition = lang.cast(condition, lang.BOOL)
+    condition = cast(condition, lang.BOOL)
     kind = lang.joined(then.type, otherwise.type)
     if not isinstance(kind, lang.TupleOf):
-        then, otherwise = lang.cast(then, kind), lang.cast(otherwise, kind)
+        then, otherwise = cast(then, kind), cast(otherwise, kind)
     if condition.constant is not None:
         return then if condition.constant else otherwise
     if then.text == otherwise.text:
         return then
-    calls = condition.calls or then.calls or otherwise.calls
-    text = f"{condition.at(lang.UNARY)} ? {then.at(lang.TERNARY + 1)} : {otherwise.at(lang.TERNARY + 1)}"
-    return lang.Value(kind, text, lang.TERNARY, calls=calls)
+    calls = max(condition.calls, then.calls, otherwise.calls)
+    both = f"{then.at(lang.TERNARY + 1)} : {otherwise.at(lang.TERNARY + 1)}"
+    text = f"{condition.at(lang.UNARY)} ? {both}"
+    return Value(kind, text, lang.TERNARY, calls=calls)
 
 
 WORDS: dict[Any, Word] = {
@@ -102,8 +90,8 @@ WORDS: dict[Any, Word] = {
     min: _extreme("sr_min"),
     max: _extreme("sr_max"),
     int: _integer,
-    float: _float,
-    bool: _bool,
+    float: lambda a: cast(a[0], lang.FLOAT),
+    bool: lambda a: cast(a[0], lang.BOOL),
     math.sqrt: _exact("sqrt"),
     np.sqrt: _exact("sqrt"),
     np.floor: _exact("floor"),
@@ -115,10 +103,10 @@ WORDS: dict[Any, Word] = {
     np.isnan: _exact("sr_isnan", lang.BOOL),
     math.isnan: _exact("sr_isnan", lang.BOOL),
     lanes.where: chosen,
-    lanes.uniform: _itself,
+    lanes.uniform: lambda a: a[0],
     lanes.whole: _integer,
-    lanes.any_lane: _bool,
-    lanes.all_lanes: _bool,
+    lanes.any_lane: lambda a: cast(a[0], lang.BOOL),
+    lanes.all_lanes: lambda a: cast(a[0], lang.BOOL),
     lanes.negated: negated,
 }
 """Functions that kernels may call beside one another."""

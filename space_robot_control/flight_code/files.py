@@ -7,15 +7,14 @@ import inspect
 import re
 import textwrap
 from collections.abc import Callable, Iterable, Sequence
-from functools import cache
 from typing import Any
 
 from space_robot_msgs_py.compiled.records import Field as RecordField
 from space_robot_msgs_py.compiled.records import Record
 
-from . import language as lang
-from .functions import Function, syntax_of
-from .program import Constant, Program
+from .c99 import language as lang
+from .c99.functions import Function, syntax_of
+from .c99.program import CALL, CONSTANT, FIELD, Constant, Program
 
 WIDTH = 100
 """Longest line."""
@@ -46,7 +45,6 @@ def wrapped(line: str) -> str:
     return "\n".join(f"{indent}{part}" for part in parts).replace("\0", " ")
 
 
-@cache
 def descriptions(record: type[Record]) -> dict[str, str]:
     """Return what is said about each field of a record, in its class and in those above."""
     found: dict[str, str] = {}
@@ -55,12 +53,28 @@ def descriptions(record: type[Record]) -> dict[str, str]:
             continue
         tree: Any = ast.parse(textwrap.dedent(inspect.getsource(owner))).body[0]
         for this, after in zip(tree.body, [*tree.body[1:], None], strict=True):
-            if isinstance(this, ast.AnnAssign) and isinstance(this.target, ast.Name):
-                if isinstance(after, ast.Expr) and isinstance(after.value, ast.Constant):
-                    found[this.target.id] = str(after.value.value)
+            is_said = isinstance(after, ast.Expr) and isinstance(after.value, ast.Constant)
+            if isinstance(this, ast.AnnAssign) and isinstance(this.target, ast.Name) and is_said:
+                found[this.target.id] = str(after.value.value)
         for name, field in owner.fields().items():
             if isinstance(field, RecordField) and field.description:
                 found.setdefault(name, f"{field.description}.")
+    return found
+
+
+def reachable(program: Program, first: Iterable[Function]) -> list[Function]:
+    """Return the functions that are called from the ``first`` ones, callees first."""
+    found: list[Function] = []
+
+    def visit(function: Function) -> None:
+        if function in found:
+            return
+        for number in CALL.findall("\n".join(function.lines)):
+            visit(program.functions[int(number)])
+        found.append(function)
+
+    for function in first:
+        visit(function)
     return found
 
 
@@ -83,8 +97,12 @@ class Files:
             room_of: returns the file, without its ending, of a Python module's functions.
         """
         self.program, self.room_of = program, room_of
-        self.functions = program.reachable(first)
-        self.fields = program.fields_of(self.functions)
+        self.functions = reachable(program, first)
+        self._text = "\n".join("\n".join(function.lines) for function in self.functions)
+        self.fields = {
+            lang.Field(program.records[int(number)], name)
+            for number, name in FIELD.findall(self._text)
+        }
         for record in whole:
             self.fields |= {lang.Field(record, name) for name in record.fields()}
         self._names = self._function_names()
@@ -103,7 +121,14 @@ class Files:
 
     def final(self, text: str) -> str:
         """Return a text with its final names."""
-        return self.program.final(text, self._names, self._constants)
+        text = FIELD.sub(lambda m: m[2], text)
+        text = CALL.sub(lambda m: f"{self._names[int(m[1])]}(", text)
+        return CONSTANT.sub(lambda m: self._constants[int(m[1])], text)
+
+    def _named_numbers(self) -> list[Constant]:
+        """Return the constants that are read."""
+        numbers = {int(number) for number in CONSTANT.findall(self._text)}
+        return [c for c, number in self.program.named_numbers.items() if number in numbers]
 
     def struct(self, record: type[Record]) -> str:
         """Return the definition of a record's struct, without those of its nested records."""
@@ -160,8 +185,8 @@ class Files:
     def constants(self) -> str:
         """Return the definitions of the constants that are read."""
         lines = []
-        for constant in sorted(self.program.constants_of(self.functions)):
-            name = self._constants[self.program.number_of_constant(constant)]
+        for constant in sorted(self._named_numbers()):
+            name = self._constants[self.program.named_numbers[constant]]
             number = constant.number
             value = lang.literal(number) if isinstance(number, float) else f"INT64_C({number})"
             value = f"({value})" if value.startswith("-") else value
@@ -227,7 +252,7 @@ class Files:
         )
 
     def _function_names(self) -> dict[int, str]:
-        """Return names by number: the kernel's, with its module's or its law's where several are."""
+        """Return names by number: the kernel's, with module or law where several have it."""
         bare = {f: f.body.__name__.lstrip("_") for f in self.functions}
         names: dict[int, str] = {}
         taken: set[str] = set()
@@ -252,14 +277,11 @@ class Files:
 
     def _constant_names(self) -> dict[int, str]:
         """Return names by number: the constant's, with its module's where several are."""
-        found = self.program.constants_of(self.functions)
+        found = self._named_numbers()
         names = {}
         for constant in found:
             name = constant.name
             if sum(other.name == name for other in found) > 1:
                 name = f"{self.program.modules[constant].rpartition('.')[2].upper()}_{name}"
-            names[self.program.number_of_constant(constant)] = f"{lang.PREFIX.upper()}{name}"
+            names[self.program.named_numbers[constant]] = f"{lang.PREFIX.upper()}{name}"
         return names
-
-
-__all__ = ["Constant", "Files", "comment", "descriptions", "wrapped"]
