@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from space_robot_control.controller.law_choice import LawChoice
 from space_robot_control.controller.supervision import NEW
@@ -13,6 +14,7 @@ from space_robot_control.flight_code.acceptance import CHOOSE, Recording, Record
 from space_robot_control.flight_code.folder import Exported
 from space_robot_control.flight_code.hostile import SHARE, hostile_ticks, spoil
 from space_robot_msgs_py.errors import FlightError
+from space_robot_msgs_py.samples import RobotState
 
 from ..flight.message_loop import MessageLoop
 from ..flight.plan import Flight, FlightPlan, resolve
@@ -31,7 +33,12 @@ FAULTS = (
     "drop_state@0.82-0.84:1",
 )
 """Of messages: states are lost, late, twice, wrong; the last but one outlasts the holding."""
-FAULTY_S, HOSTILE_TICKS = 1.0, 4000
+FAULTY_S, HOSTILE_TICKS = 1.0, 6000
+REPEATED = 0.03
+"""Share of states without noise, and of those that are judged twice."""
+PHASE, QUIET_TICKS, FIRST_FAILURE = 400, 150, 8
+"""Of the hostile flight: ticks of a phase, those at its beginning without hostile states, and the
+phase after which wheels fail, one after the other."""
 
 
 class RecordedFlight(NamedTuple):
@@ -101,27 +108,53 @@ def _flown(flight: Flight, exported: Exported, place: int = 0, law: str = "") ->
 
 
 def _hostile(plan: FlightPlan, exported: Exported, laws: Sequence[str]) -> Recording:
-    """Record the answers to hostile states beside states of the plant at rest."""
+    """Record the answers to hostile states, between noisy ones of a base that does not move."""
     flight = Flight(resolve(plan))
     recording, random = Recording(exported), np.random.default_rng(20)
-    supervisor = _supervisor(flight, recording)
-    choice, wheels = LawChoice(flight.law, flight.swaps), len(flight.plant.names.wheels)
+    supervisor, wheels = _supervisor(flight, recording), _Wheels(flight)
+    choice = LawChoice(flight.law, flight.swaps)
     references = flight.mission.chunk(0, HOSTILE_TICKS).references()
+    commanded = np.zeros(len(flight.plant.names.commanded))
     for k, tick in enumerate(hostile_ticks(HOSTILE_TICKS, random)):
         if random.random() < 0.005 and len(laws) > 1:
             place = int(random.integers(len(laws)))
             choice.choose(flight.laws[laws[place]])
             supervisor.use(choice.chosen)
             recording.add(CHOOSE, place, supervisor, 0)
+        if random.random() < REPEATED:  # one that is not answered at once
+            supervisor.judge(tick)
         if supervisor.judge(tick) != NEW:
             continue
         if choice.change_at(tick):
             supervisor.use(choice.chosen)
         state = flight.plant.state.copy()
         state.tick = tick
-        state.numbers[:] += 1e-4 * random.normal(size=state.numbers.size)
+        noise = 0.0 if random.random() < REPEATED else 10.0 ** random.uniform(-6, -1)
+        state.numbers[:] += noise * random.normal(size=state.numbers.size)
         state.quaternion[:] /= np.sqrt(state.quaternion @ state.quaternion)
-        spoil(state, wheels, random, is_hostile=random.random() < SHARE)
-        supervisor.answer(state, references[k : k + 1])
+        wheels.measure(state, commanded, k)
+        is_hostile = random.random() < SHARE and k % PHASE > QUIET_TICKS
+        spoil(state, wheels.count, random, is_hostile)
+        commanded = supervisor.answer(state, references[k : k + 1]).torque
     supervisor.finish()
     return recording
+
+
+class _Wheels:
+    """Wheels of a base in the hostile flight: in phases empty, full, and without an answer."""
+
+    def __init__(self, flight: Flight) -> None:
+        names, memory = flight.plant.names, flight.controller.block[0].allocation.wheels
+        self.count, self._first = len(names.wheels), len(names.axes)
+        most = memory.max_momentum[: self.count] / memory.inertia[: self.count]
+        self._fastest = np.where(np.isfinite(most), most, 100.0)
+
+    def measure(self, state: RobotState, commanded: NDArray[np.float64], k: int) -> None:
+        """Write the wheels' speeds and torques at the k-th tick."""
+        phase, count = k // PHASE, self.count
+        share = (0.0, 0.3, 0.9, 1.0)[phase % 4]
+        signs = np.where(np.arange(count) + phase // 4 & 1, -1.0, 1.0)
+        state.wheel_velocities[:count] = share * signs * self._fastest
+        torques = commanded[self._first : self._first + count]
+        is_silent = np.arange(count) < phase - FIRST_FAILURE
+        state.wheel_torques[:count] = np.where(is_silent, 0.0, torques)

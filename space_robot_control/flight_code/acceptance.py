@@ -17,6 +17,8 @@ from ..controller.supervisor import MODES, Supervisor
 from .folder import Exported
 from .library import command_of, fill_measurement, measurement_of
 
+Array = NDArray[np.float64]
+
 JUDGE, STEP, CHOOSE = range(3)
 """Kinds of records: a stamp is judged and its state not answered; a state; a law is chosen."""
 REFUSED = -1
@@ -37,6 +39,7 @@ class Recording:
                 ("reference", reference),
                 ("result", np.int64),
                 ("mode", np.int64),
+                ("telemetry", np.uint64),
                 ("command", command_of(exported).dtype),
             ]
         )
@@ -69,12 +72,22 @@ class Recording:
         if command is not None:
             record["command"]["tick"] = command.tick
             record["command"]["command"] = command.torque
+            record["telemetry"] = sum_of(supervisor.telemetry())
         self._parts.append(record.tobytes())
 
     def write(self, path: Path) -> None:
         """Write the records to a file."""
         head = np.array([MAGIC, self.dtype.itemsize, len(self._parts)], np.int64)
         path.write_bytes(b"".join([head.tobytes(), *self._parts]))
+
+
+def sum_of(telemetry: tuple[Array, ...]) -> np.uint64:
+    """Return a sum over the bits of numbers, each with another weight; NaN counts as zero."""
+    numbers = np.concatenate(telemetry)
+    numbers[np.isnan(numbers)] = 0.0
+    weights = np.arange(1, numbers.size + 1, dtype=np.uint64)
+    total: np.uint64 = (numbers.view(np.uint64) * weights).sum(dtype=np.uint64)
+    return total
 
 
 class RecordingSupervisor(Supervisor):

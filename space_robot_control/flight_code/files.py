@@ -98,6 +98,7 @@ class Files:
         """
         self.program, self.room_of = program, room_of
         self.functions = reachable(program, first)
+        self._roots = {program.functions.index(function) for function in first}
         self._text = "\n".join("\n".join(function.lines) for function in self.functions)
         self.fields = {
             lang.Field(program.records[int(number)], name)
@@ -247,7 +248,7 @@ class Files:
             for caller in self.functions
             if f"\N{CURRENCY SIGN}{number}(" in "\n".join(caller.lines)
         ]
-        return bool(callers) and all(
+        return number not in self._roots and all(
             self.room_of(caller.body.__module__) == home for caller in callers
         )
 

@@ -26,7 +26,7 @@ def spoil(
 ) -> None:
     """Change some numbers of a state; those of wheels that the base does not have become zero."""
     numbers = state.numbers
-    way = random.integers(5) if is_hostile else -1
+    way = random.integers(6) if is_hostile else -1
     if way == 0:  # any numbers
         places = random.integers(numbers.size, size=random.integers(1, 4))
         numbers[places] = random.choice(VALUES, size=places.size)
@@ -39,7 +39,10 @@ def spoil(
         state.quaternion[:] *= random.choice([0.0, 0.9, 0.9996, 1.0004, 1.1, -1.0])
     elif way == 3:  # everything the same number
         numbers[:] = random.choice(VALUES)
-    elif way == 4:  # large but allowed
+    elif way == 4:  # half a turn from what was, exactly, or the same with the other sign
+        w, x, y, z = state.quaternion.copy()
+        state.quaternion[:] = random.choice([[-w, -x, -y, -z], [-x, w, -z, y]])
+    elif way == 5:  # large but allowed
         numbers[:] *= 10.0 ** random.integers(0, 20)
         state.quaternion[:] = [1.0, 0.0, 0.0, 0.0]
     state.wheel_velocities[wheels:] = state.wheel_torques[wheels:] = 0.0
@@ -47,7 +50,7 @@ def spoil(
 
 def hostile_ticks(count: int, random: np.random.Generator) -> Iterator[int]:
     """Return ticks of states, most of them one after the other."""
-    tick = 0
+    tick = 10**6
     for _ in range(count):
         yield tick if random.random() > 0.02 else int(random.choice([LEAST, MOST, -1, 2**52 + 1]))
         step = int(random.choice(JUMPS)) if random.random() < 0.05 else 1

@@ -9,6 +9,7 @@ import numpy as np
 
 from space_robot_msgs_py.compiled.records import Record
 
+from .c99 import language as lang
 from .c99.language import literal
 from .files import comment, descriptions, wrapped
 from .software import Part, Translated, numbers_of
@@ -49,7 +50,8 @@ def _entries(
             yield from _entries(translated, kind, numbers[name], inside, source)
             continue
         kept = numbers_of(kind, numbers[name])
-        if not np.any(kept.view(np.int64)):
+        is_table = lang.Field(record, name) in translated.tables
+        if is_table or not np.any(kept.view(np.int64)):
             continue
         constant = f"SR_{inside.replace('.', '_').upper()}"
         about = comment(f"{inside}: {said.get(name, 'see its struct.')}{source}")

@@ -16,6 +16,7 @@ from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.samples import Reference, State
 
 from ..allocation.allocation import allocate, leave_alone
+from ..allocation.wheel_set import WheelSet, tabulate
 from ..controller.controller import Controller
 from ..controller.kernels import ControllerMemory, engage
 from ..controller.supervision import Supervision, answer_state, judge, swaps_due, takes_over
@@ -155,6 +156,8 @@ class Translated:
     files: Files
     roots: dict[str, str]
     """Names in C of the kernels that are called from outside, by their names here."""
+    tables: frozenset[lang.Field]
+    """Fields that are computed from others when the memory is initialised."""
 
     def kept(self, record: type[Record]) -> Iterator[tuple[str, tuple[int, ...] | type[Record]]]:
         """Return the fields of an exported struct: shapes, or records."""
@@ -187,9 +190,10 @@ def translate(software: FlightSoftware) -> Translated:
     whole: list[type[Record]] = [State, Reference]
     whole += [part.record for part in software.parts if "_" in part.name]
     files = Files(program, list(roots.values()), whole, _room)
-    return Translated(
-        software, program, files, {name: files.name_of(f) for name, f in roots.items()}
-    )
+    names = {name: files.name_of(function) for name, function in roots.items()}
+    tables = reachable(program, [roots["tabulate"]]) if "tabulate" in roots else []
+    stores = frozenset(field for function in tables for field in function.stores)
+    return Translated(software, program, files, names, stores)
 
 
 def _program(software: FlightSoftware, constants: dict[lang.Field, float]) -> tuple[Program, Any]:
@@ -207,6 +211,9 @@ def _program(software: FlightSoftware, constants: dict[lang.Field, float]) -> tu
         "takes_over": (takes_over, (supervision, tick)),
         "engage": (engage, (controller,)),
     }
+    if wheels := software.sizes["MOST_WHEELS"]:
+        axis = _value(lang.ArrayOf((wheels, 3)))
+        calls["tabulate"] = (tabulate, (_value(lang.Pointer(WheelSet)), axis, tick))
     if software.swaps:
         ticks = _value(lang.ArrayOf((len(software.swaps),)))
         calls["swaps_due"] = (swaps_due, (ticks, tick, tick))

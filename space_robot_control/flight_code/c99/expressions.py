@@ -277,29 +277,25 @@ class Expressions:
             return Value(
                 lang.INT, f"{left.at(lang.SHIFT)} {sign} {right.at(lang.SHIFT)}", lang.BITS
             )
+        if right.calls == lang.WRITES:  # which && might not call
+            raise RefusedError("a kernel that writes, beside | or &", "name its result first")
         return self._logic(isinstance(op, ast.BitAnd), [left, right])
 
     def _logic(self, is_and: bool, values: list[Value]) -> Value:
         """Return a conjunction or disjunction; C evaluates no more of it than Python."""
-        rest = []
+        rest: list[Value] = []
         for value in (cast(value, lang.BOOL) for value in values):
             if value.constant is None:
                 rest.append(value)
-            elif value.constant is not is_and:
-                return (
-                    number_of(not is_and)
-                    if not rest
-                    else self._joined(is_and, [*rest, number_of(not is_and)])
-                )
-        return self._joined(is_and, rest) if rest else number_of(is_and)
-
-    @staticmethod
-    def _joined(is_and: bool, values: list[Value]) -> Value:
-        if len(values) == 1:
-            return values[0]
+            elif value.constant is not is_and:  # it decides, but what writes is still to be called
+                if not any(v.calls == lang.WRITES for v in rest):
+                    return number_of(not is_and)
+                rest.append(value)
+        if len(rest) < 2:
+            return rest[0] if rest else number_of(is_and)
         sign, rank = (" && ", lang.AND) if is_and else (" || ", lang.OR)
-        texts = [v.text if v.rank == rank else v.at(lang.UNARY) for v in values]
-        return Value(lang.BOOL, sign.join(texts), rank, calls=max(v.calls for v in values))
+        texts = [v.text if v.rank == rank else v.at(lang.UNARY) for v in rest]
+        return Value(lang.BOOL, sign.join(texts), rank, calls=max(v.calls for v in rest))
 
     def _boolop(self, node: ast.BoolOp) -> Value:
         values = [self.translate(value) for value in node.values]

@@ -63,20 +63,18 @@ class Statements(Expressions):
 
     def _block(self, statements: Sequence[ast.stmt]) -> bool:
         """Translate statements until one leaves the block; return whether one does."""
-        before = dict(self.facts)
-        is_left = False
+        before, is_left = self.facts, False
         for statement in statements:
-            if is_left:
-                break
+            kind = type(statement).__name__.lower()
             try:
-                method = getattr(self, f"_{type(statement).__name__.lower()}_statement", None)
+                method = getattr(self, f"_{kind}_statement", None)
                 if method is None:
-                    raise RefusedError(
-                        f"{type(statement).__name__.lower()}", "use if, for and while"
-                    )
+                    raise RefusedError(kind, "use if, for and while")
                 is_left = bool(method(statement))
             except RefusedError as refusal:
                 raise self.refused(statement, refusal) from None
+            if is_left:
+                break
         self.facts = before
         return is_left
 
@@ -249,6 +247,10 @@ class Statements(Expressions):
         if heads and heads[0][:4] == "if (" and all(head[:1] == "}" for head in heads[1:]):
             lines[first:] = [line.removeprefix(INDENT) for line in lines[first:]]
             lines[first] = f"{INDENT * self._depth}}} else {lines[first].strip()}"
+            if not any(head == "} else {" for head in heads):  # MISRA 15.7
+                lines[-1:] = [f"{INDENT * self._depth}}} else {{"]
+                self.emit(f"{INDENT}/* Nothing. */")
+                self.emit("}")
             return is_left
         if lines[first:]:
             lines.insert(first, f"{INDENT * self._depth}}} else {{")
