@@ -61,18 +61,21 @@ def _entries(
                 inside, f"{about}#define {constant} ({text})\n", f"state->{inside} = {constant};"
             )
             continue
-        flat = kept.reshape(-1)
+        flat, target = kept.reshape(-1), f"state->{inside}"
         if np.all(flat == flat[0]) or np.all(np.isnan(flat)):
-            text = literal(float(flat[0]))
-            loop = f"fill({_first(f'state->{inside}', kind)}, {constant}, {flat.size});"
-            yield Entry(inside, f"{about}#define {constant} ({text})\n", loop)
+            define = f"#define {constant} ({literal(float(flat[0]))})\n"
+            yield Entry(inside, about + define, _by_rows("fill", target, constant, kind))
             continue
         values = wrapped("    " + ", ".join(literal(float(value)) for value in flat))
         table = f"static const double {constant}[{flat.size}] = {{\n{values}\n}};\n"
-        copied = f"copy({_first(f'state->{inside}', kind)}, {constant}, {flat.size});"
-        yield Entry(inside, about + table, copied)
+        yield Entry(inside, about + table, _by_rows("copy", target, constant, kind))
 
 
-def _first(path: str, shape: tuple[int, ...]) -> str:
-    """Return the address of the first number of an array."""
-    return path if len(shape) == 1 else f"&{path}{'[0]' * len(shape)}"
+def _by_rows(function: str, target: str, source: str, shape: tuple[int, ...]) -> str:
+    """Return the call of ``copy`` or ``fill`` for an array, row by row of a matrix."""
+    if len(shape) == 1:
+        return f"{function}({target}, {source}, {shape[0]});"
+    rows, columns = shape
+    part = source if function == "fill" else f"&{source}[row * {columns}]"
+    call = f"{function}({target}[row], {part}, {columns});"
+    return f"for (int64_t row = 0; row < {rows}; ++row) {{\n        {call}\n    }}"

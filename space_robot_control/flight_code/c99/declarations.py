@@ -6,6 +6,7 @@ import ast
 import re
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
+from functools import cache
 
 from .language import RefusedError
 
@@ -14,40 +15,30 @@ MARK = "\N{SECTION SIGN}"
 """Stands around a local name where it gets a value."""
 
 
-def names_in(nodes: Iterable[ast.AST]) -> set[str]:
-    """Return all names mentioned."""
-    return {n.id for node in nodes for n in ast.walk(node) if isinstance(n, ast.Name)}
+def names_in(nodes: Iterable[ast.AST], only: type[ast.expr_context] | None = None) -> Counter[str]:
+    """Return how often names are mentioned; ``only`` ast.Store: how often they get a value."""
+    found = (n for node in nodes for n in ast.walk(node) if isinstance(n, ast.Name))
+    return Counter(n.id for n in found if only is None or isinstance(n.ctx, only))
 
 
-def assignments(nodes: Iterable[ast.AST]) -> Counter[str]:
-    """Return how often names get a value, by loops, too."""
-    stores = (n for node in nodes for n in ast.walk(node) if isinstance(n, ast.Name))
-    return Counter(n.id for n in stores if isinstance(n.ctx, ast.Store))
-
-
-def check_counters(tree: ast.FunctionDef) -> None:
-    """Check that what loops count is only mentioned in them, since it differs behind them in C.
+@cache
+def assigned_in(tree: ast.FunctionDef) -> Counter[str]:
+    """Return how often names get a value in a function.
 
     Raises:
-        RefusedError: a counter is.
+        RefusedError: what a loop counts is mentioned outside of it, where it differs in C.
     """
-    loops = [n for n in ast.walk(tree) if isinstance(n, ast.For)]
     inside: Counter[str] = Counter()
-    for loop in loops:
+    for loop in (n for n in ast.walk(tree) if isinstance(n, ast.For)):
         for name in names_in([loop.target]):
-            outer = [o for o in loops if o is not loop and name in names_in([o.target])]
-            if any(n is loop for o in outer for n in ast.walk(o)):
-                raise RefusedError(f"{name!r} in a loop of its own name", "use another name")
-            if name in assignments(loop.body):
+            if name in names_in(loop.body, ast.Store):
                 raise RefusedError(f"{name!r} set beside its loop", "use another name")
-            inside[name] += _mentions(loop, name)
+            inside[name] += names_in([loop])[name]
+    mentioned = names_in([tree])
     for name, count in inside.items():
-        if _mentions(tree, name) != count and name != "_":
+        if mentioned[name] != count and name != "_":
             raise RefusedError(f"{name!r} outside of its loop", "use another name")
-
-
-def _mentions(node: ast.AST, name: str) -> int:
-    return sum(isinstance(n, ast.Name) and n.id == name for n in ast.walk(node))
+    return names_in([tree], ast.Store)
 
 
 def declared(lines: Sequence[str], declarations: Mapping[str, str]) -> list[str]:

@@ -8,7 +8,7 @@ from dataclasses import replace
 from typing import Any
 
 from . import language as lang
-from .declarations import INDENT, MARK, assignments, check_counters, names_in
+from .declarations import INDENT, MARK, assigned_in, names_in
 from .expressions import Expressions
 from .language import ArrayOf, Known, Pointer, RefusedError, Value, cast, number_of
 
@@ -24,10 +24,9 @@ class Statements(Expressions):
         super().__init__(program, function)
         self.tree, self.file = tree, file
         self.first_line = function.__code__.co_firstlineno
-        self.assigned = assignments([tree])
         self.own = {argument.arg for argument in tree.args.args}
         """Names of its arguments."""
-        self._taken = names_in([tree]) | self.own
+        self._taken = {*names_in([tree]), *self.own}
         self.types: dict[str, lang.Type] = {}
         """Types of local names; they grow from pass to pass until they hold all values."""
         self.result: lang.Type = None
@@ -47,7 +46,7 @@ class Statements(Expressions):
             NotInSubsetError: one has no translation.
         """
         try:
-            check_counters(self.tree)
+            self.assigned = assigned_in(self.tree)
         except RefusedError as refusal:
             raise self.refused(self.tree, refusal) from None
         self._block(self.tree.body)
@@ -89,7 +88,7 @@ class Statements(Expressions):
                 break
         is_plain = not any(isinstance(n, (ast.Call, ast.Attribute)) for n in ast.walk(test))
         names = names_in([test])
-        if is_plain and names <= self.names.keys() and all(map(self._is_steady_name, names)):
+        if is_plain and names.keys() <= self.names.keys() and all(map(self._is_steady_name, names)):
             self.facts = {**self.facts, ast.dump(test): is_true}
 
     def _is_steady_name(self, name: str) -> bool:
@@ -307,7 +306,7 @@ class Statements(Expressions):
         nodes = list(ast.walk(bound))
         if any(isinstance(n, (ast.Attribute, ast.Subscript, ast.Call)) for n in nodes):
             return False
-        return not names_in([bound]) & assignments(loop.body).keys()
+        return not names_in([bound]).keys() & names_in(loop.body, ast.Store).keys()
 
     def _over_tuple(self, node: ast.For, items: ast.Tuple) -> None:
         rows = [row.elts if isinstance(row, ast.Tuple) else [row] for row in items.elts]
