@@ -13,7 +13,7 @@ from space_robot_control.controller.law_choice import LawChoice
 from space_robot_control.controller.reference_buffer import ReferenceBuffer
 from space_robot_control.controller.state_responder import StampStatus, StateResponder
 from space_robot_control.controller.supervisor import Supervisor
-from space_robot_control.flight_code.supervisors import supervisor_of
+from space_robot_control.flight_code.choice import supervisor_of
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.errors import MessageError
 from space_robot_msgs_py.samples import RobotState

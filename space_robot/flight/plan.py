@@ -6,6 +6,7 @@ from functools import cached_property
 from typing import Any
 
 from space_robot_control.controller.controller import Controller
+from space_robot_control.flight_code.choice import supervisor_of
 from space_robot_control.laws import ControlLaw
 from space_robot_msgs_py.errors import InputError
 from space_robot_sim.plant.description import plant_description
@@ -68,9 +69,18 @@ class Flight:
     @property
     def flies_by_messages(self) -> bool:
         """True if the controller has to answer as a node does, state by state."""
-        controller = self.controller_settings
-        is_plain = controller.controller_code == "python" and controller.shadow == "none"
+        is_plain = self.controller_settings.answers_in_python
         return self.plant_settings.has_message_faults or not is_plain
+
+    def prepare_flight_code(self) -> None:
+        """Compile the flight code in C, if it answers in this flight or beside it.
+
+        Raises:
+            InputError: a law cannot be exported, or there is no compiler.
+        """
+        settings = self.controller_settings
+        if not settings.controller_code.startswith("udp:"):
+            supervisor_of(self.controller, list(self.laws.values()), settings)
 
     def check_in_process(self) -> None:
         """Check that the flight can run in one process.

@@ -15,13 +15,14 @@ from space_robot_msgs_py.ros.managed_node import ManagedNode
 from space_robot_msgs_py.ros.paused import PausedInput
 
 from ..allocation.assumed_actuators import assumed_actuators
+from ..flight_code.choice import supervisor_of
 from .controller import Controller
 from .law_set import LawSet
 from .reference_input import ReferenceInput
 from .settings import ControllerNodeSettings
 from .state_input import StateInput
 from .state_responder import StampStatus, StateResponder
-from .supervisor import Mode, Supervisor
+from .supervisor import Mode
 
 FLUSH_S = 1.0
 LOOK_AHEAD_S = 0.02
@@ -63,7 +64,7 @@ class ControllerLoop:
             self._references.buffer,
             settings,
             node.get_fully_qualified_name(),
-            _supervisor(self._controller, self._laws, settings),
+            supervisor_of(self._controller, self._laws.laws, settings),
         )
         self._command_out = RawPublisher(node, topics.COMMAND)
         self._out = {
@@ -191,14 +192,3 @@ class ControllerLoop:
         if self._answering.supervisor.is_new_time and last >= 0:
             self._node.log(f"a new time begins at tick {tick}, after {last}")
         self._state_at = time.monotonic()
-
-
-def _supervisor(
-    controller: Controller, laws: LawSet, settings: ControllerNodeSettings
-) -> Supervisor | None:
-    """Return the supervisor that the settings ask for; None: the usual one."""
-    if settings.controller_code == "python" and settings.shadow == "none":
-        return None
-    from ..flight_code.supervisors import supervisor_of  # most flights need no translator
-
-    return supervisor_of(controller, laws.laws, settings)

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, ClassVar, Literal
 
-from pydantic import Field
+from pydantic import Field, field_validator
 
 from space_robot_model.robot.find import robot_files
 from space_robot_msgs_py import topics
@@ -72,7 +73,6 @@ class ControllerNodeSettings(NodeSettings):
     )
     controller_code: str = Field(
         "python",
-        pattern=r"^(python|c|udp:[^:]+:\d{1,5})$",
         description="what answers: the kernels compiled here (python), the same as C (c), or the "
         "flight computer at udp:HOST:PORT",
     )
@@ -125,6 +125,18 @@ class ControllerNodeSettings(NodeSettings):
     listener_timeout: Annotated[float, Field(ge=0.0, le=1e6)] = Field(
         0.0, description="longest time to wait for wait_for, s of the wall clock (0: no limit)"
     )
+
+    @property
+    def answers_in_python(self) -> bool:
+        """True if nothing but the kernels compiled here answers."""
+        return self.controller_code == "python" and self.shadow == "none"
+
+    @field_validator("controller_code")
+    @classmethod
+    def _is_code(cls, code: str) -> str:
+        if not re.fullmatch(r"python|c|udp:[^:]+:[0-9]{1,5}", code):
+            raise ValueError("python, c or udp:HOST:PORT was expected")
+        return code
 
     @property
     def filter_settings(self) -> NavigationFilterSettings | None:

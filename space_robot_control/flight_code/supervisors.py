@@ -16,10 +16,8 @@ from ..controller.controller import Controller
 from ..controller.settings import ControllerNodeSettings
 from ..controller.supervisor import Supervisor
 from ..laws import ControlLaw
-from .folder import Exported
 from .library import CONDITION, FlightLibrary
 from .remote import FlightComputer
-from .software import FlightSoftware
 
 Array = NDArray[np.float64]
 TELEMETRY = ("s", "u", "N_hat", "e")
@@ -146,30 +144,3 @@ def bits(numbers: Array) -> NDArray[np.int64]:
     copied: Array = np.array(numbers, dtype=np.float64)
     copied[np.isnan(copied)] = np.nan
     return copied.view(np.int64)
-
-
-def supervisor_of(
-    controller: Controller, laws: Sequence[ControlLaw], settings: ControllerNodeSettings
-) -> Supervisor | None:
-    """Return the supervisor that the settings ask for; None: the usual one.
-
-    Args:
-        controller: with the law in force at the start.
-        laws: all laws that it may be given, that one first.
-        settings: of the controller's node.
-
-    Raises:
-        InputError: a law cannot be exported, or there is no compiler.
-    """
-    code = settings.controller_code
-    if code == "python" and settings.shadow == "none":
-        return None
-    limits = settings.hold_ticks, settings.longest_jump
-    software = FlightSoftware.of(controller, laws, [], limits, {})
-    exported = Exported(software, settings.robot)
-    if code.startswith("udp:"):
-        _, host, port = code.split(":")
-        return CodeSupervisor(controller, settings, FlightComputer(exported, host, int(port)))
-    library = FlightLibrary(exported)
-    kind = CodeSupervisor if code == "c" else ShadowSupervisor
-    return kind(controller, settings, library)
