@@ -2,14 +2,20 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import NoReturn
 
 from space_robot_msgs_py.ros.node_host import NodeKind, run_nodes
 
 from .controller.loop import ControllerLoop
 from .controller.settings import ControllerNodeSettings
+from .flight_code.choice import supervisor_of
 
-NODE = NodeKind(ControllerNodeSettings, ControllerLoop, changeable=("controller",))
+NODE = NodeKind(
+    ControllerNodeSettings,
+    partial(ControllerLoop, supervisor_of=supervisor_of),
+    changeable=("controller",),
+)
 
 
 def main() -> NoReturn:

@@ -12,7 +12,7 @@ from space_robot_control.flight_code.folder import Exported
 from ..console.tables import Column, JudgedCell, Table
 from ..console.terminal import say
 from ..console.terminal_tables import print_table
-from ..export.verify import Verdict
+from ..export.verify import ReplayVerdict
 
 
 def print_export(
@@ -34,7 +34,7 @@ def print_export(
     say(console, f"replay them: make -C {folder}")
 
 
-def print_verdicts(verdicts: Sequence[Verdict], console: Console) -> None:
+def print_verdicts(verdicts: Sequence[ReplayVerdict], console: Console) -> None:
     """Print what compilers and processors made of it."""
     if not verdicts:
         return

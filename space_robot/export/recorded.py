@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from space_robot_control.controller.law_choice import LawChoice
 from space_robot_control.controller.supervision import NEW
-from space_robot_control.flight_code.acceptance import CHOOSE, Recording, RecordingSupervisor
+from space_robot_control.flight_code.acceptance import CHOOSE, AnswerRecording, RecordingSupervisor
 from space_robot_control.flight_code.folder import Exported
 from space_robot_control.flight_code.hostile import SHARE, hostile_ticks, spoil
 from space_robot_msgs_py.errors import FlightError
@@ -47,7 +47,7 @@ class RecordedFlight(NamedTuple):
     name: str
     about: str
     """What it is, in a line."""
-    recording: Recording
+    recording: AnswerRecording
 
 
 def recorded_flights(
@@ -83,15 +83,15 @@ def _of_hardware(flight: Flight) -> list[str]:
     return [*faults, *(f"thruster_stuck_off@0.2:{name}" for name in names.thrusters[:1])]
 
 
-def _supervisor(flight: Flight, recording: Recording) -> RecordingSupervisor:
+def _supervisor(flight: Flight, recording: AnswerRecording) -> RecordingSupervisor:
     settings = flight.controller_settings
     return RecordingSupervisor(
         flight.controller, recording, settings.hold_ticks, settings.longest_jump
     )
 
 
-def _flown(flight: Flight, exported: Exported, place: int = 0, law: str = "") -> Recording:
-    recording = Recording(exported)
+def _flown(flight: Flight, exported: Exported, place: int = 0, law: str = "") -> AnswerRecording:
+    recording = AnswerRecording(exported)
     supervisor = _supervisor(flight, recording)
     if law and place:
         recording.add(CHOOSE, place, supervisor, 0)
@@ -107,10 +107,10 @@ def _flown(flight: Flight, exported: Exported, place: int = 0, law: str = "") ->
     return recording
 
 
-def _hostile(plan: FlightPlan, exported: Exported, laws: Sequence[str]) -> Recording:
+def _hostile(plan: FlightPlan, exported: Exported, laws: Sequence[str]) -> AnswerRecording:
     """Record the answers to hostile states, between noisy ones of a base that does not move."""
     flight = Flight(resolve(plan))
-    recording, random = Recording(exported), np.random.default_rng(20)
+    recording, random = AnswerRecording(exported), np.random.default_rng(20)
     supervisor, wheels = _supervisor(flight, recording), _Wheels(flight)
     choice = LawChoice(flight.law, flight.swaps)
     references = flight.mission.chunk(0, HOSTILE_TICKS).references()

@@ -15,7 +15,7 @@ CROSS = {"aarch64": "aarch64-linux-gnu-gcc", "armhf": "arm-linux-gnueabihf-gcc"}
 EMULATORS = {"aarch64": "qemu-aarch64", "armhf": "qemu-arm"}
 
 
-class Verdict(NamedTuple):
+class ReplayVerdict(NamedTuple):
     """Result of the recorded flights on one compiler."""
 
     target: str
@@ -32,30 +32,30 @@ class Verdict(NamedTuple):
 def targets() -> dict[str, list[str]]:
     """Return what can be verified here: the arguments of make by compiler or processor."""
     native = {name: [f"COMPILERS={name}", "figures"] for name in ("gcc", "clang")}
-    found = {name: made for name, made in native.items() if shutil.which(name)}
+    here = {name: made for name, made in native.items() if shutil.which(name)}
     for name, compiler in CROSS.items():
         if shutil.which(compiler) and shutil.which(EMULATORS[name]):
-            found[name] = [name]
-    return found
+            here[name] = [name]
+    return here
 
 
-def verify(folder: Path) -> Iterator[Verdict]:
+def verify(folder: Path) -> Iterator[ReplayVerdict]:
     """Build the folder and replay its flights with all compilers.
 
     Raises:
         InputError: there is no compiler, or no make.
     """
-    found = targets()
-    if not found or not shutil.which("make"):
+    here = targets()
+    if not here or not shutil.which("make"):
         raise InputError("no gcc, clang or make was found to verify the folder with")
-    for target, arguments in found.items():
+    for target, arguments in here.items():
         command = ["make", "--no-print-directory", "-C", str(folder), *arguments]
         run = subprocess.run(command, capture_output=True, text=True, check=False)
         counted = re.findall(r"(\d+) states answered, every bit equal", run.stdout)
         times = re.findall(r"mission\.bin: .* (\d+) ns a tick", run.stdout)
         output = (run.stdout + run.stderr).splitlines()
         wrong = [line for line in output if " instead of " in line or "error:" in line]
-        yield Verdict(
+        yield ReplayVerdict(
             target,
             run.returncode == 0,
             sum(map(int, counted)),

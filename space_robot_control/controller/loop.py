@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 from space_robot_model.robot.find import find_robot
 from space_robot_msgs_py import topics
@@ -15,15 +15,18 @@ from space_robot_msgs_py.ros.managed_node import ManagedNode
 from space_robot_msgs_py.ros.paused import PausedInput
 
 from ..allocation.assumed_actuators import assumed_actuators
-from ..flight_code.choice import supervisor_of
+from ..laws import ControlLaw
 from .controller import Controller
 from .law_set import LawSet
 from .reference_input import ReferenceInput
 from .settings import ControllerNodeSettings
 from .state_input import StateInput
 from .state_responder import StampStatus, StateResponder
-from .supervisor import Mode
+from .supervisor import Mode, Supervisor
 
+SupervisorOf = Callable[
+    [Controller, Sequence[ControlLaw], ControllerNodeSettings], Supervisor | None
+]
 FLUSH_S = 1.0
 LOOK_AHEAD_S = 0.02
 """The reference is looked for this often though it is not needed yet, so that no flood of others'
@@ -38,9 +41,16 @@ class ControllerLoop:
     is_complete = False
 
     def __init__(
-        self, node: ManagedNode[ControllerNodeSettings], settings: ControllerNodeSettings
+        self,
+        node: ManagedNode[ControllerNodeSettings],
+        settings: ControllerNodeSettings,
+        supervisor_of: SupervisorOf = lambda *_: None,
     ) -> None:
-        """Load the laws' compiled code, so that no tick comes late for it."""
+        """Load the laws' compiled code, so that no tick comes late for it.
+
+        ``supervisor_of`` makes the supervisor from the controller, its laws and the settings; None
+        stands for the usual one.
+        """
         self._node, self._settings = node, settings
         robot = find_robot(settings.robot)
         self._laws = LawSet(node, settings, robot.n + 3)

@@ -25,7 +25,7 @@ REFUSED = -1
 MAGIC = 0x5352464C49474854
 
 
-class Recording:
+class AnswerRecording:
     """Requests to the flight software and its answers, in the format of ``acceptance.c``."""
 
     def __init__(self, exported: Exported) -> None:
@@ -94,7 +94,7 @@ class RecordingSupervisor(Supervisor):
     """Supervisor that records all requests and answers."""
 
     def __init__(
-        self, controller: Controller, recording: Recording, hold_ticks: int, longest_jump: int
+        self, controller: Controller, recording: AnswerRecording, hold_ticks: int, longest_jump: int
     ) -> None:
         """Supervise ``controller`` as any supervisor, into ``recording``."""
         super().__init__(controller, len(controller.names.commanded), hold_ticks, longest_jump)

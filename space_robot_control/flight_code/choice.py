@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from space_robot_msgs_py.errors import InputError
+
 from ..controller.controller import Controller
 from ..controller.settings import ControllerNodeSettings
 from ..controller.supervisor import Supervisor
@@ -25,6 +27,11 @@ def supervisor_of(
     """
     if settings.answers_in_python:
         return None
+    if settings.controller_code != "python" and settings.shadow != "none":
+        raise InputError(
+            f"shadow {settings.shadow} compares C with Python: it needs controller_code python, "
+            f"got {settings.controller_code}"
+        )
     # most flights need no translator
     from .folder import Exported
     from .library import FlightLibrary

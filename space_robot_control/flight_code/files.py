@@ -14,7 +14,7 @@ from space_robot_msgs_py.compiled.records import Record
 
 from .c99 import language as lang
 from .c99.functions import Function, syntax_of
-from .c99.program import CALL, CONSTANT, FIELD, Constant, Program
+from .c99.program import CALL, CONSTANT, FIELD, Constant, KernelProgram
 
 WIDTH = 100
 """Longest line."""
@@ -47,7 +47,7 @@ def wrapped(line: str) -> str:
 
 def descriptions(record: type[Record]) -> dict[str, str]:
     """Return what is said about each field of a record, in its class and in those above."""
-    found: dict[str, str] = {}
+    said: dict[str, str] = {}
     for owner in reversed(record.__mro__):
         if not issubclass(owner, Record) or owner is Record:
             continue
@@ -55,27 +55,27 @@ def descriptions(record: type[Record]) -> dict[str, str]:
         for this, after in zip(tree.body, [*tree.body[1:], None], strict=True):
             is_said = isinstance(after, ast.Expr) and isinstance(after.value, ast.Constant)
             if isinstance(this, ast.AnnAssign) and isinstance(this.target, ast.Name) and is_said:
-                found[this.target.id] = str(after.value.value)
+                said[this.target.id] = str(after.value.value)
         for name, field in owner.fields().items():
             if isinstance(field, RecordField) and field.description:
-                found.setdefault(name, f"{field.description}.")
-    return found
+                said.setdefault(name, f"{field.description}.")
+    return said
 
 
-def reachable(program: Program, first: Iterable[Function]) -> list[Function]:
+def reachable(program: KernelProgram, first: Iterable[Function]) -> list[Function]:
     """Return the functions that are called from the ``first`` ones, callees first."""
-    found: list[Function] = []
+    reached: list[Function] = []
 
     def visit(function: Function) -> None:
-        if function in found:
+        if function in reached:
             return
         for number in CALL.findall("\n".join(function.lines)):
             visit(program.functions[int(number)])
-        found.append(function)
+        reached.append(function)
 
     for function in first:
         visit(function)
-    return found
+    return reached
 
 
 class Files:
@@ -83,7 +83,7 @@ class Files:
 
     def __init__(
         self,
-        program: Program,
+        program: KernelProgram,
         first: Sequence[Function],
         whole: Iterable[type[Record]],
         room_of: Callable[[str], str],
@@ -101,11 +101,11 @@ class Files:
         self._roots = {program.functions.index(function) for function in first}
         self._text = "\n".join("\n".join(function.lines) for function in self.functions)
         self.fields = {
-            lang.Field(program.records[int(number)], name)
+            lang.FieldName(program.records[int(number)], name)
             for number, name in FIELD.findall(self._text)
         }
         for record in whole:
-            self.fields |= {lang.Field(record, name) for name in record.fields()}
+            self.fields |= {lang.FieldName(record, name) for name in record.fields()}
         self._names = self._function_names()
         self._constants = self._constant_names()
 
@@ -114,7 +114,9 @@ class Files:
         declared = record.fields()[name]
         if not isinstance(declared, RecordField):
             return any(self.has(declared, inner) for inner in declared.fields())
-        return lang.Field(record, name) in self.fields and 0 not in self.program.shape(record, name)
+        return lang.FieldName(record, name) in self.fields and 0 not in self.program.shape(
+            record, name
+        )
 
     def name_of(self, function: Function) -> str:
         """Return a function's name in C."""
@@ -243,11 +245,7 @@ class Files:
         """Return whether only its own file calls a function."""
         number = self.program.functions.index(function)
         home = self.room_of(function.body.__module__)
-        callers = [
-            caller
-            for caller in self.functions
-            if f"\N{CURRENCY SIGN}{number}(" in "\n".join(caller.lines)
-        ]
+        callers = [caller for caller in self.functions if f"¤{number}(" in "\n".join(caller.lines)]
         return number not in self._roots and all(
             self.room_of(caller.body.__module__) == home for caller in callers
         )
@@ -278,11 +276,11 @@ class Files:
 
     def _constant_names(self) -> dict[int, str]:
         """Return names by number: the constant's, with its module's where several are."""
-        found = self._named_numbers()
+        constants = self._named_numbers()
         names = {}
-        for constant in found:
+        for constant in constants:
             name = constant.name
-            if sum(other.name == name for other in found) > 1:
+            if sum(other.name == name for other in constants) > 1:
                 name = f"{self.program.modules[constant].rpartition('.')[2].upper()}_{name}"
             names[self.program.named_numbers[constant]] = f"{lang.PREFIX.upper()}{name}"
         return names

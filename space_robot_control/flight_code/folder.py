@@ -48,7 +48,7 @@ class Exported:
     @cached_property
     def sources(self) -> dict[PurePosixPath, str]:
         """The text of each file that is compiled, by its path in the folder."""
-        found = self.translated.files
+        written = self.translated.files
         sources = {
             PurePosixPath("include/space_robot_flight.h"): self._header(),
             PurePosixPath("parameters.h"): self.render(
@@ -56,13 +56,13 @@ class Exported:
             ),
             PurePosixPath("src/kernels.h"): self.render(
                 "kernels.h",
-                constants=found.constants(),
-                tuples=found.tuples(),
-                prototypes=found.final(found.prototypes()),
+                constants=written.constants(),
+                tuples=written.tuples(),
+                prototypes=written.final(written.prototypes()),
             ),
             PurePosixPath("src/flight.c"): self._interface(),
         }
-        for room, text in found.rooms().items():
+        for room, text in written.rooms().items():
             sources[PurePosixPath(f"src/{room}.c")] = f'#include "kernels.h"\n{text}'
         return sources
 
@@ -151,7 +151,7 @@ class Exported:
 
     def _arguments(self, law: str) -> str:
         """Return the arguments of a law's kernel in the interface."""
-        given = {
+        arguments = {
             "block": "&state->supervision",
             "controller": "&state->controller",
             "law_gains": f"&state->{law}_gains",
@@ -164,4 +164,4 @@ class Exported:
         name = self.translated.roots[f"answer_state {law}"]
         files_ = self.translated.files
         function = next(f for f in files_.functions if files_.name_of(f) == name)
-        return ", ".join(given[parameter.name] for parameter in function.parameters)
+        return ", ".join(arguments[parameter.name] for parameter in function.parameters)

@@ -50,7 +50,7 @@ def _entries(
             yield from _entries(translated, kind, numbers[name], inside, source)
             continue
         kept = numbers_of(kind, numbers[name])
-        is_table = lang.Field(record, name) in translated.tables
+        is_table = lang.FieldName(record, name) in translated.tables
         if is_table or not np.any(kept.view(np.int64)):
             continue
         constant = f"SR_{inside.replace('.', '_').upper()}"

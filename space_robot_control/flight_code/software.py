@@ -23,7 +23,7 @@ from ..controller.supervision import Supervision, answer_state, judge, swaps_due
 from ..controller.supervisor import Supervisor
 from ..laws import CompiledLaw, ControlLaw
 from .c99 import language as lang
-from .c99.program import Program
+from .c99.program import KernelProgram
 from .files import Files, reachable
 
 ROOMS = {
@@ -152,11 +152,11 @@ class Translated:
     """The flight software's kernels in C."""
 
     software: FlightSoftware
-    program: Program
+    program: KernelProgram
     files: Files
     roots: dict[str, str]
     """Names in C of the kernels that are called from outside, by their names here."""
-    tables: frozenset[lang.Field]
+    tables: frozenset[lang.FieldName]
     """Fields that are computed from others when the memory is initialised."""
 
     def kept(self, record: type[Record]) -> Iterator[tuple[str, tuple[int, ...] | type[Record]]]:
@@ -196,9 +196,11 @@ def translate(software: FlightSoftware) -> Translated:
     return Translated(software, program, files, names, stores)
 
 
-def _program(software: FlightSoftware, constants: dict[lang.Field, float]) -> tuple[Program, Any]:
+def _program(
+    software: FlightSoftware, constants: dict[lang.FieldName, float]
+) -> tuple[KernelProgram, dict[str, Any]]:
     """Return a program, and the functions that are called from outside."""
-    program = Program(software.sizes, software.joints)
+    program = KernelProgram(software.sizes, software.joints)
     program.constants = constants
     supervision, controller, state, reference = (
         _value(lang.BlockOf(record)) for record in (Supervision, ControllerMemory, State, Reference)
@@ -249,23 +251,27 @@ def _law(law: CompiledLaw) -> lang.Value:
 
 
 def _constants(
-    software: FlightSoftware, program: Program, written: set[lang.Field]
-) -> dict[lang.Field, float]:
+    software: FlightSoftware, program: KernelProgram, written: set[lang.FieldName]
+) -> dict[lang.FieldName, float]:
     """Return the fields that no kernel writes and that have one number, wherever they are."""
-    found: dict[lang.Field, set[float | None]] = {}
+    numbers_of_field: dict[lang.FieldName, set[float | None]] = {}
 
     def visit(record: type[Record], numbers: Any) -> None:
         for name, field in record.fields().items():
             if isinstance(field, RecordField):
                 kept = numbers_of(program.shape(record, name), numbers[name])
-                found.setdefault(lang.Field(record, name), set()).add(same_number(kept))
+                numbers_of_field.setdefault(lang.FieldName(record, name), set()).add(
+                    same_number(kept)
+                )
             else:
                 visit(field, numbers[name])
 
     for part in software.parts:
         if part.name in ("supervision", "controller"):  # gains may be changed in flight
             visit(part.record, part.numbers)
-    constants = {field: values.pop() for field, values in found.items() if len(values) == 1}
+    constants = {
+        field: values.pop() for field, values in numbers_of_field.items() if len(values) == 1
+    }
     return {f: c for f, c in constants.items() if c is not None and f not in written}
 
 

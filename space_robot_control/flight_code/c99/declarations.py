@@ -10,15 +10,19 @@ from functools import cache
 
 from .language import RefusedError
 
+RESERVED = re.compile(
+    "auto|case|char|const|default|do|double|enum|extern|goto|inline|long|register|restrict|short|"
+    "signed|sizeof|static|struct|switch|typedef|union|unsigned|void|volatile"
+)
 INDENT = "    "
-MARK = "\N{SECTION SIGN}"
+MARK = "§"
 """Stands around a local name where it gets a value."""
 
 
 def names_in(nodes: Iterable[ast.AST], only: type[ast.expr_context] | None = None) -> Counter[str]:
     """Return how often names are mentioned; ``only`` ast.Store: how often they get a value."""
-    found = (n for node in nodes for n in ast.walk(node) if isinstance(n, ast.Name))
-    return Counter(n.id for n in found if only is None or isinstance(n.ctx, only))
+    names = (n for node in nodes for n in ast.walk(node) if isinstance(n, ast.Name))
+    return Counter(n.id for n in names if only is None or isinstance(n.ctx, only))
 
 
 @cache
@@ -35,6 +39,8 @@ def assigned_in(tree: ast.FunctionDef) -> Counter[str]:
                 raise RefusedError(f"{name!r} set beside its loop", "use another name")
             inside[name] += names_in([loop])[name]
     mentioned = names_in([tree])
+    for name in filter(RESERVED.fullmatch, mentioned):
+        raise RefusedError(f"the name {name!r}", "C has it: use another one")
     for name, count in inside.items():
         if mentioned[name] != count and name != "_":
             raise RefusedError(f"{name!r} outside of its loop", "use another name")

@@ -8,7 +8,7 @@ import operator
 from collections.abc import Callable
 from dataclasses import replace
 from types import ModuleType
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from space_robot_msgs_py.compiled.records import Field as RecordField
 
@@ -16,16 +16,13 @@ from . import language as lang
 from .language import ArrayOf, Known, Pointer, RefusedError, Value, cast, number_of
 from .words import WORDS, chosen, negated
 
-if TYPE_CHECKING:
-    from .program import Program
-
 ARITHMETIC: dict[type[ast.operator], tuple[str, int, Callable[[Any, Any], Any]]] = {
     ast.Add: ("+", lang.SUM, operator.add),
     ast.Sub: ("-", lang.SUM, operator.sub),
     ast.Mult: ("*", lang.PRODUCT, operator.mul),
     ast.Div: ("/", lang.PRODUCT, operator.truediv),
-    ast.FloorDiv: ("sr_floor_divide", lang.ATOM, operator.floordiv),
-    ast.Mod: ("sr_modulo", lang.ATOM, operator.mod),
+    ast.FloorDiv: ("py_floor_divide", lang.ATOM, operator.floordiv),
+    ast.Mod: ("py_modulo", lang.ATOM, operator.mod),
     ast.LShift: ("<<", lang.SHIFT, operator.lshift),
     ast.RShift: (">>", lang.SHIFT, operator.rshift),
 }
@@ -42,7 +39,7 @@ COMPARISONS: dict[type[ast.cmpop], tuple[str, int, Callable[[Any, Any], Any]]] =
 class Expressions:
     """Translator of the expressions of one function."""
 
-    def __init__(self, program: Program, function: Any) -> None:
+    def __init__(self, program: Any, function: Any) -> None:
         """Translate for a kernel, a plain Python function."""
         self.program, self.function = program, function
         self.names: dict[str, Value] = {}
@@ -115,10 +112,9 @@ class Expressions:
         declared = record.fields().get(name)
         if declared is None:
             raise RefusedError(f"attribute {name!r} of {record.__name__}", "declare it as a field")
-        field = lang.Field(record, name)
+        field = lang.FieldName(record, name)
         arrow = "->" if owner.is_pointer else "."
-        text = f"{owner.at(lang.POSTFIX)}{arrow}\N{LEFT-POINTING DOUBLE ANGLE QUOTATION MARK}"
-        text += f"{id(record)}:{name}\N{RIGHT-POINTING DOUBLE ANGLE QUOTATION MARK}"
+        text = f"{owner.at(lang.POSTFIX)}{arrow}«{id(record)}:{name}»"
         if not isinstance(declared, RecordField):
             return Value(Pointer(declared), text, lang.POSTFIX, roots=owner.roots, is_pointer=False)
         shape = self.program.shape(record, name)
@@ -346,4 +342,5 @@ class Expressions:
             raise RefusedError(
                 f"a call of {ast.unparse(node.func)}()", "call kernels and exact functions"
             )
-        return self.program.call(body, arguments, self)
+        call: Value = self.program.call(body, arguments, self)
+        return call

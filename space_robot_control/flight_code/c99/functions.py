@@ -44,7 +44,7 @@ class Function:
     """Names of the parameters that each argument in Python becomes in C."""
     result: lang.Type
     lines: tuple[str, ...]
-    stores: frozenset[lang.Field]
+    stores: frozenset[lang.FieldName]
     """Fields of records that it writes."""
 
 
@@ -153,8 +153,8 @@ def passed(function: Function, arguments: tuple[Value, ...]) -> list[str]:
     for names, argument in zip(function.arguments, arguments, strict=True):
         if isinstance(argument.type, lang.Bundle):
             items = zip(argument.type.items, argument.parts, strict=True)
-            found = {item: part.text for (item, _), part in items}
-            texts += [next(t for item, t in found.items() if n.endswith(f"_{item}")) for n in names]
+            by_name = {f"_{item}": part.text for (item, _), part in items}
+            texts += [next(t for end, t in by_name.items() if n.endswith(end)) for n in names]
         elif names:
             texts.append(argument.address)
     return texts

@@ -121,7 +121,7 @@ class Bundle:
 Type = Any
 
 
-class Field(NamedTuple):
+class FieldName(NamedTuple):
     """A field of a record."""
 
     record: type[Record]
@@ -139,7 +139,7 @@ class Value:
     """Its number, if it is known when the code is exported; the text reads it all the same."""
     roots: frozenset[str] = frozenset()
     """Local names through which its memory is reached."""
-    fields: frozenset[Field] = frozenset()
+    fields: frozenset[FieldName] = frozenset()
     """Of an array or number in a record: its field."""
     offset: str = ""
     """Of an array: index of its first number in ``text``."""

@@ -15,11 +15,8 @@ from . import language as lang
 from .functions import Function, kind_of_argument, passed, syntax_of, translated
 from .language import Known, RefusedError, Value
 
-FIELD = re.compile(
-    "\N{LEFT-POINTING DOUBLE ANGLE QUOTATION MARK}(\\d+):(\\w+)"
-    "\N{RIGHT-POINTING DOUBLE ANGLE QUOTATION MARK}"
-)
-CALL, CONSTANT = re.compile("\N{CURRENCY SIGN}(\\d+)\\("), re.compile("\N{PILCROW SIGN}(\\d+);")
+FIELD, CALL, CONSTANT = map(re.compile, (r"«(\d+):(\w+)»", r"¤(\d+)\(", r"¶(\d+);"))
+"""Markers of fields, calls and constants, whose names are decided at the end."""
 
 
 def _names(function: Function) -> list[tuple[str, bool]]:
@@ -33,7 +30,7 @@ class Constant(NamedTuple):
     number: float
 
 
-class Program:
+class KernelProgram:
     """Translation of kernels and of all that they call.
 
     Functions are translated for the types of their arguments. Numbers that never change are known:
@@ -48,7 +45,7 @@ class Program:
             joints: n, of which the shapes of records are functions.
         """
         self.sizes, self.joints = dict(sizes), joints
-        self.constants: dict[lang.Field, float] = {}
+        self.constants: dict[lang.FieldName, float] = {}
         """Fields that never change; of an array, all of its numbers are the same."""
         self.functions: list[Function] = []
         self.named_numbers: dict[Constant, int] = {}
@@ -73,7 +70,7 @@ class Program:
         numbers: tuple[int, ...] = tuple(resized(self.joints))
         return numbers
 
-    def constant(self, field: lang.Field) -> float | None:
+    def constant(self, field: lang.FieldName) -> float | None:
         """Return the number of a field that never changes; None if it does."""
         return self.constants.get(field)
 
@@ -81,9 +78,7 @@ class Program:
         """Return the text of a module's constant."""
         constant = Constant(name, number)
         self.modules.setdefault(constant, module)
-        return (
-            f"\N{PILCROW SIGN}{self.named_numbers.setdefault(constant, len(self.named_numbers))};"
-        )
+        return f"¶{self.named_numbers.setdefault(constant, len(self.named_numbers))};"
 
     def struct_name(self, record: type[Record]) -> str:
         """Return the name of a record's struct."""
@@ -116,7 +111,7 @@ class Program:
                         inside.write(part)
             elif written & set(names):
                 inside.write(argument)
-        text = f"\N{CURRENCY SIGN}{number}({', '.join(passed(function, arguments))})"
+        text = f"¤{number}({', '.join(passed(function, arguments))})"
         calls = lang.WRITES if written else 1
         return Value(function.result, text, calls=calls)
 

@@ -33,7 +33,7 @@ class Statements(Expressions):
         self.lines: list[str] = []
         self.written: set[str] = set()
         """Local names whose memory is written."""
-        self.stores: set[lang.Field] = set()
+        self.stores: set[lang.FieldName] = set()
         """Fields that are written."""
         self._roots: dict[str, frozenset[str]] = {}
         self._depth = 1

@@ -43,7 +43,7 @@ def _extreme(name: str) -> Word:
         pair = Value(kind, f"{name}{'_int' if kind == lang.INT else ''}")
         values = [cast(argument, kind) for argument in arguments]
         if all(value.constant is not None for value in values):
-            function = max if name == "sr_max" else min
+            function = max if name == "py_max" else min
             return number_of(function(value.constant for value in values))
         return reduce(lambda a, b: replace(pair, text=f"{pair.text}({a.text}, {b.text})"), values)
 
@@ -58,7 +58,7 @@ def _integer(arguments: tuple[Value, ...]) -> Value:
         return number_of(int(value.constant))
     if value.type == lang.BOOL:
         return cast(value, lang.INT)
-    return replace(value, type=lang.INT, text=f"sr_int({value.text})", rank=lang.ATOM)
+    return replace(value, type=lang.INT, text=f"py_int({value.text})", rank=lang.ATOM)
 
 
 def negated(arguments: tuple[Value, ...]) -> Value:
@@ -87,8 +87,8 @@ def chosen(arguments: tuple[Value, ...]) -> Value:
 
 WORDS: dict[Any, Word] = {
     abs: _absolute,
-    min: _extreme("sr_min"),
-    max: _extreme("sr_max"),
+    min: _extreme("py_min"),
+    max: _extreme("py_max"),
     int: _integer,
     float: lambda a: cast(a[0], lang.FLOAT),
     bool: lambda a: cast(a[0], lang.BOOL),
@@ -98,10 +98,10 @@ WORDS: dict[Any, Word] = {
     np.fmod: _exact("fmod"),
     math.copysign: _exact("copysign"),
     np.copysign: _exact("copysign"),
-    np.sign: _exact("sr_sign"),
-    np.isfinite: _exact("sr_isfinite", lang.BOOL),
-    np.isnan: _exact("sr_isnan", lang.BOOL),
-    math.isnan: _exact("sr_isnan", lang.BOOL),
+    np.sign: _exact("py_sign"),
+    np.isfinite: _exact("py_isfinite", lang.BOOL),
+    np.isnan: _exact("py_isnan", lang.BOOL),
+    math.isnan: _exact("py_isnan", lang.BOOL),
     lanes.where: chosen,
     lanes.uniform: lambda a: a[0],
     lanes.whole: _integer,
