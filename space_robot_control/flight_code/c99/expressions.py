@@ -257,6 +257,8 @@ class Expressions:
                 return number_of(constant)
         if kind == lang.INT and sign in "+-" and right.constant == 0:
             return left
+        if kind == lang.INT and sign == "+" and left.constant == 0:
+            return right
         if sign == "<<":
             left = replace(left, text=f"INT64_C({left.text})") if left.text.isdigit() else left
         if rank == lang.ATOM:

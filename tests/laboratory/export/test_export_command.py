@@ -1,0 +1,264 @@
+"""`space-robot export`: the folder, its flights on every compiler and processor, and refusals."""
+
+from __future__ import annotations
+
+import json
+import re
+import shutil
+import subprocess
+from pathlib import Path
+
+import pytest
+from command import Run
+
+from space_robot.export.verify import CROSS, EMULATORS
+
+LAWS = ("ctc", "ctc_smc", "tde_smc", "tde_stc", "tde_tsmc")
+ALLOWED = {"sqrt", "floor", "fmod", "fabs", "copysign", "memset", "memcpy", "__stack_chk_fail"}
+"""Functions of the C library that flight software may call; compilers make copies by memcpy."""
+SCENARIOS = {
+    "wheels": (
+        "--case 3 --sensors fine --navigation filtered --actuators wheels "
+        "--swap 0.1:ctc --swap 0.25:tde_tsmc"
+    ),
+    "seven_joints_on_thrusters": "--robot seven_joint --actuators thrusters --controller tde_smc",
+    "dual_arm": "--robot dual_arm --controller ctc --sensors fine --navigation filtered",
+}
+needs_make = pytest.mark.skipif(
+    not (shutil.which("make") and shutil.which("gcc")), reason="make or gcc is not installed"
+)
+
+
+@pytest.fixture(scope="module")
+def folders(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
+    """A folder for each of `SCENARIOS`, exported when first asked for."""
+    return {name: tmp_path_factory.mktemp("export") / name for name in SCENARIOS}
+
+
+def exported(name: str, folders: dict[str, Path], space_robot: Run) -> Path:
+    folder = folders[name]
+    if not folder.exists():
+        laws = [word for law in LAWS for word in ("--law", law)]
+        options = [*SCENARIOS[name].split(), *laws, "--acceptance-seconds", "0.5"]
+        ran = space_robot("export", "-o", str(folder), *options)
+        assert ran.code == 0, ran.err
+    return folder
+
+
+def make(folder: Path, *arguments: str) -> str:
+    """What make prints; it must succeed without a warning."""
+    command = ["make", "--no-print-directory", "-C", str(folder), *arguments]
+    run = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert run.returncode == 0, run.stdout + run.stderr
+    assert "warning" not in run.stderr
+    return run.stdout
+
+
+def check_flights(output: str) -> None:
+    """All recorded flights were answered, every bit equal."""
+    lines = re.findall(r"acceptance/(\w+)\.bin: (\d+) states answered, every bit equal", output)
+    flights = {name: int(count) for name, count in lines}
+    assert flights.keys() == {"mission", "hostile", *(f"faults_{law}" for law in LAWS)}
+    assert flights["mission"] == 1000
+    assert flights["hostile"] > 5000
+    assert all(flights[f"faults_{law}"] > 1500 for law in LAWS)
+
+
+@needs_make
+@pytest.mark.parametrize("name", SCENARIOS)
+def test_every_bit_is_equal(name: str, folders: dict[str, Path], space_robot: Run) -> None:
+    check_flights(make(exported(name, folders, space_robot), "COMPILERS=gcc"))
+
+
+@pytest.mark.parametrize("target", ["clang", *CROSS])
+def test_on_other_compilers_and_processors(
+    target: str, folders: dict[str, Path], space_robot: Run
+) -> None:
+    for tool in (CROSS[target], EMULATORS[target]) if target in CROSS else (target,):
+        if not shutil.which(tool):
+            pytest.skip(f"{tool} is not installed")
+    folder = exported("wheels", folders, space_robot)
+    check_flights(make(folder, target if target in CROSS else "COMPILERS=clang"))
+
+
+@needs_make
+def test_sanitizers_find_nothing(folders: dict[str, Path], space_robot: Run) -> None:
+    check_flights(make(exported("wheels", folders, space_robot), "sanitize"))
+
+
+@needs_make
+def test_most_branches_are_taken(folders: dict[str, Path], space_robot: Run) -> None:
+    if not shutil.which("gcov"):
+        pytest.skip("gcov is not installed")
+    output = make(exported("wheels", folders, space_robot), "coverage")
+    match = re.search(r"branches taken at least once: ([\d.]+) % of (\d+)", output)
+    assert match is not None
+    assert float(match[1]) >= 95.0
+    assert int(match[2]) > 500
+    assert "branches that were never taken:" in output
+
+
+def test_misra_rules_are_kept_but_for_the_deviations(
+    folders: dict[str, Path], space_robot: Run
+) -> None:
+    if not shutil.which("cppcheck"):
+        pytest.skip("cppcheck is not installed")
+    folder = exported("seven_joints_on_thrusters", folders, space_robot)
+    make(folder, "misra")
+    suppressed = (folder / "misra_deviations.txt").read_text("utf-8").split()
+    table = (folder / "MISRA.md").read_text("utf-8")
+    for rule in suppressed:
+        number = rule.removeprefix("misra-c2012-")
+        assert f"| {number} |" in table or f"`{number}`" in table
+
+
+@needs_make
+def test_it_has_no_globals_and_calls_only_exact_functions(
+    folders: dict[str, Path], space_robot: Run
+) -> None:
+    folder = exported("wheels", folders, space_robot)
+    make(folder, "library")
+    library = str(folder / "build" / "libspace_robot_flight.a")
+    symbols = subprocess.run(["nm", library], capture_output=True, text=True, check=True).stdout
+    kinds = dict(re.findall(r"^[0-9a-f ]{16} (\w) (\S+)$", symbols, re.MULTILINE)[::-1])
+    assert not kinds.keys() & set("BbDdCc"), "variables that are not constant"
+    undefined = set(re.findall(r"^ +U (\S+)$", symbols, re.MULTILINE))
+    own = {name for name in undefined if name.startswith(("sr_", "space_robot_"))}
+    assert undefined - own <= ALLOWED | {"_GLOBAL_OFFSET_TABLE_"}
+    defined = re.findall(r"^[0-9a-f]{16} T (\S+)$", symbols, re.MULTILINE)
+    assert all(name.startswith(("sr_", "space_robot_")) for name in defined)
+
+
+def test_every_function_tells_where_it_is_from(folders: dict[str, Path], space_robot: Run) -> None:
+    folder = exported("wheels", folders, space_robot)
+    root = Path(__file__).parents[3]
+    count = 0
+    for source in (folder / "src").glob("*.c"):
+        text = source.read_text("utf-8")
+        for name, file, line in re.findall(r"Python: (\w+), (\S+), line (\d+)\.", text):
+            lines = (root / file).read_text("utf-8").splitlines()
+            nearby = "\n".join(lines[int(line) - 1 : int(line) + 2])
+            assert f"def {name}(" in nearby, (name, file, line)
+            count += 1
+    assert count > 90
+    law = (folder / "src" / "laws.c").read_text("utf-8")
+    assert "s of (38), psi of (40), u of (42), force of (41)" in law
+
+
+def test_parameters_have_source_and_unit(folders: dict[str, Path], space_robot: Run) -> None:
+    text = (exported("wheels", folders, space_robot) / "parameters.h").read_text("utf-8")
+    assert "tde_stc_gains.h_bar: constant inertia h_bar of (33), kg m2." in text
+    assert "Source: gain set 'default', law tde_stc." in text
+    assert "controller.model.mass: Body masses, kg, base first." in text
+    assert "static const double SR_CONTROLLER_MODEL_MASS[7] = {\n    750.0, 20.0," in text
+
+
+def test_a_folder_is_not_overwritten_unasked(tmp_path: Path, space_robot: Run) -> None:
+    other = tmp_path / "thesis"
+    other.mkdir()
+    (other / "chapter.tex").write_text("mine", "utf-8")
+    ran = space_robot("export", "-o", str(other))
+    assert (ran.code, ran.out) == (2, "")
+    assert "exists; --force replaces it" in ran.err
+    ran = space_robot("export", "-o", str(other), "--force")
+    assert ran.code == 2
+    assert "is not an exported folder" in ran.err
+    assert (other / "chapter.tex").read_text("utf-8") == "mine"
+    ran = space_robot("export", "-o", str(tmp_path / "no" / "folder"))
+    assert ran.code == 2
+    assert "there is no folder" in ran.err
+    assert sorted(tmp_path.iterdir()) == [other]
+
+
+PYTHON_LAW = """
+from space_robot_control.laws import ControlLaw, LawGains
+
+class Mine(ControlLaw):
+    name = "mine"
+    gains_type = LawGains
+
+    def force(self, signals):
+        return self.memory.force
+"""
+WRONG_KERNEL = """
+import numpy as np
+from space_robot_control.laws import CompiledLaw, LawGains, LawMemory, per_axis
+from space_robot_msgs_py.compiled.kernels import kernel
+
+class Gains(LawGains):
+    k_p = per_axis("K_P", "N m")
+
+@kernel
+def proportional(signals, gains, memory, period):
+    for i in range(memory.force.size):
+        memory.force[i] = gains.k_p[i] * np.sin(signals.error[i])
+
+class Mine(CompiledLaw):
+    name = "mine"
+    gains_type = Gains
+    kernel = staticmethod(proportional)
+"""
+
+
+@pytest.mark.parametrize(
+    ("source", "said"),
+    [
+        (PYTHON_LAW, "line 8: the law 'mine' is a Python function and cannot be exported as C"),
+        (WRONG_KERNEL, "line 12: a call of np.sin() cannot be exported as C: call kernels and"),
+    ],
+    ids=["python", "kernel"],
+)
+def test_a_law_without_translation_is_refused(
+    source: str, said: str, tmp_path: Path, space_robot: Run
+) -> None:
+    law, gains = tmp_path / "law.py", tmp_path / "gains"
+    law.write_text(source, "utf-8")
+    gains.mkdir()
+    text = "controller_node:\n  ros__parameters:\n    mine: {k_p: [1.0]}\n"
+    (gains / "mine.yaml").write_text(text, "utf-8")
+    options = ["--gains", f"{gains}/"] if "k_p" in source else []
+    ran = space_robot("export", "--controller", f"{law}:Mine", *options, "-o", str(tmp_path / "o"))
+    assert (ran.code, ran.out) == (2, "")
+    assert said in ran.err
+    assert str(law) in ran.err
+    assert ran.err.count("\n") == 1
+    assert not (tmp_path / "o").exists()
+
+
+@needs_make
+def test_what_is_verified_is_told_in_json(tmp_path: Path, space_robot: Run) -> None:
+    folder = tmp_path / "code"
+    ran = space_robot(
+        "export", "-o", str(folder), "--acceptance-seconds", "0.05", "--verify", "--json"
+    )
+    assert ran.code == 0, ran.err
+    report = json.loads(ran.out)
+    assert report["laws"] == ["tde_stc"]
+    assert [flight["name"] for flight in report["flights"]] == [
+        "mission",
+        "faults_tde_stc",
+        "hostile",
+    ]
+    targets = {verdict["target"]: verdict for verdict in report["verified"]}
+    assert targets["gcc"]["is_accepted"]
+    assert targets["gcc"]["states"] > 6000
+    assert 10.0 < targets["gcc"]["tick_ns"] < 1e6
+    readme = (folder / "README.md").read_text("utf-8")
+    assert f"{report['state_bytes']} bytes" in readme
+
+
+@needs_make
+def test_a_wrong_bit_is_found(tmp_path: Path, space_robot: Run) -> None:
+    """A gain that differs in its last digit."""
+    folder = tmp_path / "code"
+    assert space_robot("export", "-o", str(folder), "--acceptance-seconds", "0.05").code == 0
+    header = folder / "parameters.h"
+    text = header.read_text("utf-8")
+    name = "SR_TDE_STC_GAINS_LAMBDA_"
+    changed = re.sub(rf"({name}[^=(]*(?:= {{\s*|\())([\d.]+)", r"\g<1>\g<2>0000001", text)
+    assert changed != text
+    header.write_text(changed, "utf-8")
+    command = ["make", "-C", str(folder), "COMPILERS=gcc"]
+    run = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert run.returncode != 0
+    assert re.search(r"mission\.bin: tick \d+: ", run.stdout)
