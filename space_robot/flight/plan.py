@@ -73,14 +73,12 @@ class Flight:
         return self.plant_settings.has_message_faults or not is_plain
 
     def prepare_flight_code(self) -> None:
-        """Compile the flight code in C, if it answers in this flight or beside it.
+        """Compile the flight code in C, or greet the flight computer, if one is to answer.
 
         Raises:
-            InputError: a law cannot be exported, or there is no compiler.
+            InputError: a law cannot be exported, or there is no compiler or no flight computer.
         """
-        settings = self.controller_settings
-        if not settings.controller_code.startswith("udp:"):
-            supervisor_of(self.controller, list(self.laws.values()), settings)
+        supervisor_of(self.controller, list(self.laws.values()), self.controller_settings)
 
     def check_in_process(self) -> None:
         """Check that the flight can run in one process.

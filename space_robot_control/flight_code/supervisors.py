@@ -135,7 +135,7 @@ class ShadowSupervisor(Supervisor):
         if different.size:
             k = int(different[0])
             raise ShadowError(
-                f"at tick {tick} the {what} {names[k]} is {python[k]!r} in Python and {c[k]!r} in C"
+                f"at tick {tick} the {what} {names[k]} is {float(python[k])!r} in Python and {float(c[k])!r} in C"
             )
 
 

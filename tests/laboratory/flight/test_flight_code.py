@@ -1,0 +1,197 @@
+"""The flight code in C in the controller's place, beside it, and on a flight computer."""
+
+from __future__ import annotations
+
+import shutil
+import socket
+import subprocess
+import threading
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from bags import COLUMNS
+from exported_kernels import needs_compiler
+
+from space_robot.export.software import export
+from space_robot.flight.bench import check_for_bench
+from space_robot.flight.plan import Flight, FlightPlan, resolve
+from space_robot.flight.simulate import simulate
+from space_robot_control.flight_code.library import FlightLibrary
+from space_robot_control.flight_code.remote import BEGIN, FlightComputer
+from space_robot_control.flight_code.supervisors import ShadowError, bits
+from space_robot_msgs_py.bag.flight_log import FlightLog
+from space_robot_msgs_py.errors import FlightError, InputError
+
+ROOT = Path(__file__).parents[3]
+TICKS = 400
+HARD: dict[str, Any] = {
+    "case": "3",
+    "sensors": "fine",
+    "navigation": "filtered",
+    "swaps": ["0.05:ctc", "0.1:tde_tsmc"],
+    "faults": ["nan_state@0.12-0.13:0.5", "drop_state@0.15-0.16:0.5", "stamp_jump@0.17-0.18:0.5"],
+    "duration": TICKS * 5e-4,
+}
+"""Swaps, sensors and faults of messages."""
+
+
+def flown(**options: Any) -> FlightLog:
+    return simulate(Flight(resolve(FlightPlan(**{**HARD, **options}))))
+
+
+def assert_same(one: FlightLog, other: FlightLog) -> None:
+    for name in COLUMNS:
+        np.testing.assert_array_equal(getattr(one, name), getattr(other, name), name)
+    assert one.laws == other.laws
+
+
+@needs_compiler
+@pytest.mark.parametrize("actuators", ["ideal", "wheels", "thrusters"])
+def test_a_flight_under_c_has_the_same_bits(actuators: str) -> None:
+    python = flown(actuators=actuators)
+    assert_same(flown(actuators=actuators, controller_code="c"), python)
+    assert_same(flown(actuators=actuators, shadow="c"), python)
+
+
+@needs_compiler
+def test_gains_may_be_others_than_the_default_ones() -> None:
+    gains = {"tde_stc": {"k_1": [0.5], "k_2": [0.01]}}
+    python = flown(gains=gains, swaps=[])
+    assert_same(flown(gains=gains, swaps=[], controller_code="c"), python)
+    with pytest.raises(AssertionError):
+        assert_same(flown(swaps=[], controller_code="c"), python)
+
+
+@needs_compiler
+def test_a_difference_ends_the_flight_and_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    answer, answered = FlightLibrary.answer, []
+
+    def wrong(self: FlightLibrary, state: Any, reference: Any) -> int:
+        status = answer(self, state, reference)
+        answered.append(state.tick)
+        if state.tick >= 77:
+            self.command[4] = np.nextafter(self.command[4], np.inf)
+        return status
+
+    monkeypatch.setattr(FlightLibrary, "answer", wrong)
+    with pytest.raises(ShadowError) as error:
+        flown(shadow="c", faults=[])
+    assert "at tick 77 the command of joint2 is " in str(error.value)
+    assert " in Python and " in str(error.value)
+    assert error.value.exit_code == 1
+    assert answered[-1] == 77
+    assert error.value.log is not None
+    assert error.value.log.ticks in (77, 78)
+
+
+@needs_compiler
+def test_a_judgement_that_differs_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    judge = FlightLibrary.judge
+    monkeypatch.setattr(FlightLibrary, "judge", lambda self, tick: judge(self, tick) + (tick == 9))
+    with pytest.raises(ShadowError, match="at tick 9 Python judges the stamp as 1, C as 2"):
+        flown(shadow="c", faults=[])
+
+
+def test_all_nan_are_one() -> None:
+    other = np.array([0xFFF8000000000001], np.uint64).view(np.float64)
+    assert bits(np.array([np.nan]))[0] == bits(other)[0]
+    assert bits(np.array([0.0]))[0] != bits(np.array([-0.0]))[0]
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        ({"controller_code": "cobol"}, "python, c or udp:HOST:PORT was expected, got 'cobol'"),
+        ({"controller_code": "udp:here"}, "python, c or udp:HOST:PORT was expected"),
+        ({"controller_code": "c", "shadow": "c"}, "it needs controller_code python, got c"),
+        ({"shadow": "fortran"}, "shadow"),
+    ],
+)
+def test_what_cannot_answer_is_refused(options: dict[str, Any], said: str) -> None:
+    with pytest.raises((InputError, ValueError), match=said):
+        flown(**options)
+
+
+def test_a_law_in_python_cannot_answer_in_c(tmp_path: Path) -> None:
+    def nothing(signals: Any) -> Any:
+        return 0.0 * signals.error
+
+    with pytest.raises(InputError, match=r"the law 'nothing' is a Python function and cannot"):
+        flown(controller=nothing, swaps=[], controller_code="c")
+
+
+def test_the_bench_has_no_messages() -> None:
+    flight = Flight(resolve(FlightPlan(shadow="c")))
+    with pytest.raises(InputError, match="on the bench are no messages"):
+        check_for_bench(flight)
+
+
+@pytest.fixture
+def flight_computer(tmp_path: Path) -> Iterator[int]:
+    """The example's program for `HARD`, running; its port."""
+    if not shutil.which("cc"):
+        pytest.skip("no C compiler is installed")
+    exported = export(Flight(resolve(FlightPlan(**HARD))), ["ctc_smc", "tde_smc"])
+    sources = []
+    for path, text in exported.sources.items():
+        file = tmp_path / path
+        file.parent.mkdir(parents=True, exist_ok=True)
+        file.write_text(text, "utf-8")
+        sources += [str(file)] if path.suffix == ".c" else []
+    program = tmp_path / "flight_computer"
+    flags = ["-std=c99", "-O2", "-ffp-contract=off", "-Wall", "-Wextra", "-Wpedantic", "-Werror"]
+    own = str(ROOT / "examples" / "flight_computer" / "flight_computer.c")
+    includes = [f"-I{tmp_path / 'include'}", f"-I{tmp_path}"]
+    subprocess.run(["cc", *flags, *includes, "-o", str(program), own, *sources, "-lm"], check=True)
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as free:
+        free.bind(("127.0.0.1", 0))
+        port = free.getsockname()[1]
+    running = subprocess.Popen([str(program), str(port)], stdout=subprocess.PIPE, text=True)
+    assert running.stdout is not None
+    assert running.stdout.readline() == f"flight software of 9 axes listens on 127.0.0.1:{port}\n"
+    yield port
+    running.terminate()
+    answered = running.stdout.read()
+    assert running.wait(10) == 0
+    assert "states answered" in answered
+
+
+def test_a_flight_computer_answers_with_the_same_bits(flight_computer: int) -> None:
+    """Twice: it begins anew with every flight. The laws of the swaps are the node's choice."""
+    python = flown()
+    for _ in range(2):
+        assert_same(flown(controller_code=f"udp:127.0.0.1:{flight_computer}"), python)
+
+
+def test_a_flight_computer_of_another_robot_is_told(flight_computer: int) -> None:
+    code = f"udp:127.0.0.1:{flight_computer}"
+    with pytest.raises(InputError, match="exported for another robot or other actuators"):
+        flown(controller_code=code, robot="seven_joint")
+
+
+def test_no_flight_computer_is_told() -> None:
+    with pytest.raises(InputError, match=r"udp:127\.0\.0\.1:9: .*start the flight computer first"):
+        flown(controller_code="udp:127.0.0.1:9")
+
+
+def test_one_that_falls_silent_ends_the_flight(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("space_robot_control.flight_code.remote.TIMEOUT_S", 0.2)
+    exported = export(Flight(resolve(FlightPlan())))
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as server:
+        server.bind(("127.0.0.1", 0))
+
+        def greet() -> None:
+            data, peer = server.recvfrom(65_507)
+            assert int(np.frombuffer(data[:8], np.int64)[0]) == BEGIN
+            server.sendto(bytes(computer_bytes), peer)
+
+        computer_bytes = 8 * (3 + 1 + 9 + 10 + 36)
+        thread = threading.Thread(target=greet)
+        thread.start()
+        computer = FlightComputer(exported, "127.0.0.1", server.getsockname()[1])
+        thread.join()
+        with pytest.raises(FlightError, match="the flight computer does not answer"):
+            computer.judge(0)
