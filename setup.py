@@ -32,6 +32,7 @@ setup(
         "space_robot.campaign.report": ["templates/*.j2"],
         "space_robot.paper.reproduction": ["templates/*.j2"],
         "space_robot.view": ["templates/*"],
+        "space_robot_control.flight_code": ["templates/*.j2"],
         "space_robot_msgs_py.ros": ["*.xml"],
     },
     python_requires=">=3.10,<3.14",

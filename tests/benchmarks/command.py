@@ -32,6 +32,7 @@ SECTIONS = (
     "start-up",
     "compile",
     "python",
+    "flight-code",
     "peers",
     "growth",
 )

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from space_robot_control.controller.kernels import controller_tick
+from space_robot_control.controller.supervision import NEW, answer_state, judge
 from space_robot_control.laws.compiled import LawCode
 from space_robot_model.dynamics.aba import aba
 from space_robot_model.dynamics.kinematics import forward_kinematics, spatial_velocities
@@ -28,6 +29,23 @@ def plant_steps(
     for k in range(tick, tick + steps):
         fastest = advance(memory, command_delay_buffer, torque, k, period)
     return fastest
+
+
+@kernel
+def answered_states(
+    supervision: Block,
+    controller: Block,
+    law: LawCode,
+    allocate: RecordFunction,
+    states: Block,
+    references: Block,
+    period: float,
+) -> None:
+    """What the flight software answers to states, from tick 0 on."""
+    for k in range(states.size):
+        if judge(supervision, k) == NEW:
+            state, reference = states[k : k + 1], references[k : k + 1]
+            answer_state(supervision, controller, law, allocate, k, state, reference, period)
 
 
 @kernel
