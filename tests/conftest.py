@@ -77,7 +77,9 @@ WITH_ROS = (
 )
 SLOW = (
     "benchmarks/",
+    "control/flight_code/",
     "laboratory/campaign/",
+    "laboratory/export/",
     "laboratory/paper/",
     "laboratory/cli/test_output.py",
     "laboratory/cli/test_view_command.py",

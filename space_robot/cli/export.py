@@ -82,7 +82,7 @@ def export(
 
     from ..console.progress import counting_progress
     from ..console.terminal import echo_json, terminal
-    from ..export.folder import check_folder, write_folder
+    from ..export.folder import check_folder, write_folder, write_readme
     from ..export.recorded import recorded_flights
     from ..export.software import export as exported_of
     from ..export.verify import verify
@@ -101,6 +101,8 @@ def export(
         advance = begin(len(exported.software.laws) + 2)
         written = write_folder(out, exported, flights, advance)
     verdicts = list(verify(out)) if is_verified else []
+    if verdicts:
+        write_readme(out, exported, written, verdicts)
     if as_json:
         echo_json(
             {

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import shutil
 import tempfile
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 
 from space_robot_control.flight_code.compiler import write_sources
@@ -12,6 +12,7 @@ from space_robot_control.flight_code.folder import Exported
 from space_robot_msgs_py.errors import InputError
 
 from .recorded import RecordedFlight
+from .verify import ReplayVerdict
 
 BUILD_FILES = ("Makefile", "CMakeLists.txt", "misra_deviations.txt", "MISRA.md")
 
@@ -62,9 +63,19 @@ def write_folder(
             advance()
         for file in BUILD_FILES:
             (new / file).write_text(exported.render(file), encoding="utf-8")
-        readme = exported.render("README.md", flights=written, **exported.figures())
-        (new / "README.md").write_text(readme, encoding="utf-8")
+        write_readme(new, exported, written)
         if folder.exists():
             shutil.rmtree(folder)
         new.rename(folder)
     return written
+
+
+def write_readme(
+    folder: Path,
+    exported: Exported,
+    flights: Sequence[tuple[str, str, int]],
+    verdicts: Sequence[ReplayVerdict] = (),
+) -> None:
+    """Write the README, with the verdicts of compilers and processors if there are any."""
+    text = exported.render("README.md", flights=flights, verdicts=verdicts, **exported.figures())
+    (folder / "README.md").write_text(text, encoding="utf-8")

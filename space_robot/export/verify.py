@@ -25,6 +25,10 @@ class ReplayVerdict(NamedTuple):
     """Answered, every bit equal."""
     tick_ns: float | None
     """Time of a tick in the first flight, ns; None where it was not taken."""
+    code_bytes: int | None
+    """Code and constants as this compiler makes them with -O2; None where it was not taken."""
+    largest_frame: int | None
+    """Bytes on the stack of the function that needs most."""
     reason: str
     """First line that says why it was not accepted."""
 
@@ -60,5 +64,12 @@ def verify(folder: Path) -> Iterator[ReplayVerdict]:
             run.returncode == 0,
             sum(map(int, counted)),
             float(times[0]) if times else None,
+            _number(r"constants:\s+(\d+)", run.stdout),
+            _number(r"on the stack, bytes:\s+\S+\s+(\d+)", run.stdout),
             "" if run.returncode == 0 else next(iter(wrong), output[-1] if output else "failed"),
         )
+
+
+def _number(pattern: str, output: str) -> int | None:
+    match = re.search(pattern, output)
+    return int(match[1]) if match else None

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+import shutil
 import socket
 from collections.abc import Callable
 from pathlib import Path
@@ -31,6 +33,22 @@ def test_the_flight_code_flies_the_same_bits_on_the_graph(
     for name in COLUMNS:
         np.testing.assert_array_equal(getattr(flown, name), getattr(same, name), name)
     assert [law.name for law in flown.laws] == ["tde_stc", "ctc"]
+
+
+def test_a_difference_ends_the_flight(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """That of a compiler that fuses products and sums, which the flags forbid."""
+    cpu = Path("/proc/cpuinfo")
+    if not shutil.which("gcc") or not cpu.exists() or " fma" not in cpu.read_text():
+        pytest.skip("no gcc, or no processor with fused multiply-add")
+    compiler = tmp_path / "fusing"
+    compiler.write_text('#!/bin/sh\nexec gcc "$@" -mfma -ffp-contract=fast\n')
+    compiler.chmod(0o755)
+    monkeypatch.setenv("CC", str(compiler))
+    bag = tmp_path / "bag"
+    ran = space_robot_here("fly", "--shadow", "c", "--duration", "0.2", "--bag", str(bag))
+    assert ran.returncode == 1
+    assert re.search(r"at tick \d+ the command of \w+ is \S+ in Python and \S+ in C", ran.stderr)
+    assert read_flight(bag, trust=True).ticks < 400
 
 
 def test_without_a_flight_computer_nothing_flies(tmp_path: Path) -> None:

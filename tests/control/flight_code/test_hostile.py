@@ -1,0 +1,62 @@
+"""Whatever is measured, C answers as the supervisor in Python does, to the bit."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+from exported_kernels import needs_compiler
+from hypothesis import example, given, settings
+from hypothesis import strategies as st
+
+from space_robot.export.software import export
+from space_robot.flight.plan import Flight, FlightPlan, resolve
+from space_robot_control.controller.supervision import NEW
+from space_robot_control.controller.supervisor import Supervisor
+from space_robot_control.flight_code.folder import Exported
+from space_robot_control.flight_code.hostile import hostile_ticks, spoil
+from space_robot_control.flight_code.library import CONDITION, FlightLibrary
+from space_robot_control.flight_code.supervisors import bits
+
+pytestmark = needs_compiler
+TICKS = 150
+SETTINGS = {"navigation": "filtered", "sensors": "fine", "actuators": "wheels_and_thrusters"}
+
+
+def flight_of(law: str) -> Flight:
+    return Flight(resolve(FlightPlan(controller=law, **SETTINGS)))
+
+
+@cache
+def exported(law: str) -> Exported:
+    return export(flight_of(law))
+
+
+@settings(max_examples=12)
+@given(st.integers(0, 2**32 - 1), st.sampled_from(["tde_stc", "ctc"]), st.floats(0.0, 1.0))
+@example(0, "tde_stc", 1.0)
+@example(1, "ctc", 0.0)
+def test_c_answers_like_python(seed: int, law: str, share: float) -> None:
+    flight, code, random = flight_of(law), FlightLibrary(exported(law)), np.random.default_rng(seed)
+    limits = flight.controller_settings.hold_ticks, flight.controller_settings.longest_jump
+    supervisor = Supervisor(flight.controller, len(flight.plant.names.commanded), *limits)
+    references = flight.mission.chunk(0, TICKS).references()
+    wheels = len(flight.plant.names.wheels)
+    for k, tick in enumerate(hostile_ticks(TICKS, random)):
+        standing = supervisor.judge(tick)
+        assert code.judge(tick) == standing
+        if standing == NEW:
+            state, reference = flight.plant.state.copy(), references[k : k + 1]
+            state.tick = tick
+            state.numbers[:] += 10.0 ** random.uniform(-8, 0) * random.normal(
+                size=state.numbers.size
+            )
+            state.quaternion[:] /= np.sqrt(state.quaternion @ state.quaternion)
+            spoil(state, wheels, random, is_hostile=random.random() < share)
+            command, status = supervisor.answer(state, reference), code.answer(state, reference)
+            np.testing.assert_array_equal(bits(code.command), bits(command.torque))
+            assert bool(status) == bool(supervisor.reason)
+        condition = dict(zip(CONDITION[:5], code.condition, strict=False))
+        assert condition["answered"] == supervisor.answered
+        assert condition["last_stamp"] == supervisor.last_stamp
+        assert code.condition[5:].sum() == supervisor.rejected.total()

@@ -1,0 +1,55 @@
+"""The page that shows one law three times has what the kernel and its export are."""
+
+from __future__ import annotations
+
+import inspect
+import re
+from typing import Any
+
+import pytest
+from shown import ROOT
+
+from space_robot.export.software import export
+from space_robot.flight.plan import Flight, FlightPlan, resolve
+from space_robot_control.controller import time_delay_estimation
+from space_robot_control.laws import tde_stc
+
+PAGE = "docs/explanation/one_law_three_times.md"
+MARK = r"(line )\d+"
+
+
+@pytest.fixture(scope="module")
+def sources() -> dict[str, str]:
+    exported = export(Flight(resolve(FlightPlan())))
+    return {path.name: text for path, text in exported.sources.items()}
+
+
+def unwrapped(text: str) -> str:
+    return " ".join(text.split())
+
+
+def test_the_listings_are_those_of_kernel_and_export(sources: dict[str, str]) -> None:
+    text = (ROOT / PAGE).read_text("utf-8")
+    (python,) = re.findall(r"```python\n(.*?)```", text, re.DOTALL)
+    law: Any = tde_stc.time_delay_super_twisting
+    assert python == inspect.getsource(law.py_func)
+    (c,) = re.findall(r"```c\n(.*?)```", text, re.DOTALL)
+    assert re.sub(MARK, r"\1", c) in re.sub(MARK, r"\1", sources["laws.c"])
+
+
+def test_every_line_of_the_tables_is_in_both(sources: dict[str, str]) -> None:
+    python = unwrapped(inspect.getsource(tde_stc) + inspect.getsource(time_delay_estimation))
+    c = unwrapped(sources["laws.c"] + sources["estimate.c"])
+    text = (ROOT / PAGE).read_text("utf-8")
+    rows = re.findall(r"^\| \(\d+\) .* \| `(.*)` \| `(.*)` \|$", text, re.MULTILINE)
+    assert len(rows) == 6
+    for left, right in rows:
+        assert left in python
+        assert right in c
+
+
+def test_the_low_pass_is_exported_where_it_is_used(sources: dict[str, str]) -> None:
+    assert "smooth" not in sources["estimate.c"]
+    plan = FlightPlan(parameters={"controller": {"acceleration_filter_hz": 50.0}})
+    with_filter = export(Flight(resolve(plan))).sources
+    assert any("smooth_force" in text for text in with_filter.values())
