@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from space_robot_msgs_py.compiled.records import Block, assign
 from space_robot_msgs_py.errors import FlightError
-from space_robot_msgs_py.samples import Command, RobotState
+from space_robot_msgs_py.samples import Command, RobotNames, RobotState
 
 from ..allocation.diagnosis import Diagnosis
 from ..controller.controller import Controller
@@ -27,8 +27,8 @@ class ShadowError(FlightError):
     """Python and C have answered a state differently."""
 
 
-class CodeSupervisor(Supervisor):
-    """Supervisor whose states are answered by the flight code in C."""
+class _SupervisorWithCode(Supervisor):
+    """Supervisor that knows the flight code in C, too."""
 
     def __init__(
         self,
@@ -36,10 +36,26 @@ class CodeSupervisor(Supervisor):
         settings: ControllerNodeSettings,
         code: FlightLibrary | FlightComputer,
     ) -> None:
-        """Answer by ``code``; ``controller`` only tells what the law in force is."""
         axes = len(controller.names.commanded)
         super().__init__(controller, axes, settings.hold_ticks, settings.longest_jump)
         self._flight_code = code
+
+    def use(self, law: ControlLaw) -> None:
+        """Let a law, whose gains may have changed, answer from the next state on."""
+        super().use(law)
+        self._flight_code.use(law)
+
+    def deactivate(self, tick: int) -> Command:
+        """Return the zero-torque command that ends a flight."""
+        self._flight_code.stand_down(tick)
+        return super().deactivate(tick)
+
+
+class CodeSupervisor(_SupervisorWithCode):
+    """Supervisor whose states are answered by the flight code in C.
+
+    Its controller only tells which law is in force.
+    """
 
     def judge(self, tick: int) -> int:
         """Return the standing of a state by its stamp."""
@@ -55,11 +71,6 @@ class CodeSupervisor(Supervisor):
         self._command.tick = state.tick
         return self._command
 
-    def use(self, law: ControlLaw) -> None:
-        """Let a law answer from the next state on."""
-        super().use(law)
-        self._flight_code.use(law)
-
     def telemetry(self) -> tuple[Array, Array, Array, Array]:
         """Telemetry of the last tick."""
         return self._flight_code.telemetry
@@ -69,11 +80,6 @@ class CodeSupervisor(Supervisor):
         """Empty: the actuators' health is in the memory of the flight code."""
         return Diagnosis((), "", {})
 
-    def deactivate(self, tick: int) -> Command:
-        """Return the zero-torque command that ends a flight."""
-        self._flight_code.stand_down(tick)
-        return super().deactivate(tick)
-
     def _take_condition(self) -> None:
         numbers = self._flight_code.condition
         record, first = self._record, CONDITION.index("rejected")
@@ -82,17 +88,8 @@ class CodeSupervisor(Supervisor):
         assign(record.stamps, last=last, is_new_time=is_new_time)
 
 
-class ShadowSupervisor(Supervisor):
+class ShadowSupervisor(_SupervisorWithCode):
     """Supervisor that compares every answer of the kernels with that of the flight code in C."""
-
-    def __init__(
-        self, controller: Controller, settings: ControllerNodeSettings, code: FlightLibrary
-    ) -> None:
-        """Answer by the kernels, and compare with ``code``."""
-        axes = len(controller.names.commanded)
-        super().__init__(controller, axes, settings.hold_ticks, settings.longest_jump)
-        self._flight_code = code
-        self._names = controller.names
 
     def judge(self, tick: int) -> int:
         """Return the standing of a state by its stamp.
@@ -111,32 +108,24 @@ class ShadowSupervisor(Supervisor):
         Raises:
             ShadowError: C answers differently; names the first number that differs.
         """
-        command, code = super().answer(state, reference), self._flight_code
+        command, code, names = super().answer(state, reference), self._flight_code, self._names
         code.answer(state, reference)
-        self._compare(state.tick, "command of", self._names.commanded, command.torque, code.command)
-        pairs = zip(TELEMETRY, self.telemetry(), code.telemetry, strict=True)
-        for name, python, c in pairs:
-            self._compare(state.tick, f"{name} of", self._names.axes, python, c)
+        self._compare(state.tick, "command of", names.commanded, command.torque, code.command)
+        for name, python, c in zip(TELEMETRY, self.telemetry(), code.telemetry, strict=True):
+            self._compare(state.tick, f"{name} of", names.axes, python, c)
         return command
 
-    def use(self, law: ControlLaw) -> None:
-        """Let a law answer from the next state on."""
-        super().use(law)
-        self._flight_code.use(law)
-
-    def deactivate(self, tick: int) -> Command:
-        """Return the zero-torque command that ends a flight."""
-        self._flight_code.stand_down(tick)
-        return super().deactivate(tick)
+    @property
+    def _names(self) -> RobotNames:
+        return self.controller.names
 
     @staticmethod
     def _compare(tick: int, what: str, names: Sequence[str], python: Array, c: Array) -> None:
         different = np.flatnonzero(bits(python) != bits(c))
         if different.size:
             k = int(different[0])
-            raise ShadowError(
-                f"at tick {tick} the {what} {names[k]} is {float(python[k])!r} in Python and {float(c[k])!r} in C"
-            )
+            values = f"{float(python[k])!r} in Python and {float(c[k])!r} in C"
+            raise ShadowError(f"at tick {tick} the {what} {names[k]} is {values}")
 
 
 def bits(numbers: Array) -> NDArray[np.int64]:
