@@ -45,6 +45,9 @@ BY_THE_MISSION = ("initial_joints_deg", "initial_quaternion")
 OF_PLANT = ("period", "substeps", "command_latency_ticks")
 OF_THE_GRAPH = ("realtime", "paused", "fifo_priority")
 """Options of the plant's node; options of the graph only where they are set."""
+OF_THE_CODE = {"controller_code": "python", "shadow": "none"}
+"""Parameters of the controller's node that change no number, and their defaults; options only where
+they are set."""
 ROBOTS = ("robot", "plant_robot")
 """Options recorded in a bag as ``robot_file`` and ``controller_robot_file``."""
 LABELS = ("robot", "mission", "case", "sensors", "actuators", "gains", "navigation_sensors")
@@ -230,6 +233,11 @@ def _tree(scenario: ResolvedScenario) -> dict[str, Any]:
         **({"faults": list(scenario.faults)} if scenario.faults else {}),
         **({"swaps": scenario.swap_texts} if scenario.swap_texts else {}),
         **{name: numbers[name] for name in OF_THE_GRAPH if numbers[name]},
+        **{
+            name: getattr(controller, name)
+            for name, default in OF_THE_CODE.items()
+            if getattr(controller, name) != default
+        },
         **({"restart_controller": True} if scenario.options.restart_controller else {}),
         "parameters": {
             node: {
@@ -252,6 +260,7 @@ def _rest(node: str, settings: BaseModel) -> dict[str, Any]:
         *BY_THE_MISSION,
         *OF_PLANT,
         *OF_THE_GRAPH,
+        *OF_THE_CODE,
         *LABELS,
         "controller",
         "swaps",

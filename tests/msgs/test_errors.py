@@ -12,6 +12,7 @@ import pytest
 from paths import ROOT
 
 from space_robot.flight.graph.following import InterruptedFlightError
+from space_robot_control.flight_code.c99.language import NotInSubsetError
 from space_robot_msgs_py.errors import (
     DivergedError,
     MessageError,
@@ -26,6 +27,7 @@ MADE: dict[type[SpaceRobotError], SpaceRobotError] = {
     UnusableStateError: UnusableStateError(3, "is not finite", "not finite"),
     SingularAttitudeError: SingularAttitudeError(4, 1e-9),
     MessageError: MessageError("text", "late"),
+    NotInSubsetError: NotInSubsetError("law.py", 12, "recursion", "write a loop"),
     HeldError: HeldError(Path("lock"), Holder("plant (pid 1)", 2)),
     InterruptedFlightError: InterruptedFlightError("stopped", 2),
 }

@@ -112,6 +112,8 @@ AREAS = {
     "campaign": _room("laboratory/campaign", marks="not ros"),
     "cli": _room("laboratory/cli", "test_start_up.py", marks="not ros"),
     "controller": _room("control/controller", *CLOSED_LOOP),
+    "flight_code": _room("control/flight_code", "laboratory/flight/test_flight_code.py"),
+    "export": _room("laboratory/export", marks="not ros"),
     "flight": _files("laboratory/flight", "laboratory/flight/test_*.py"),
     "batch": _room("laboratory/flight/batch", "laboratory/api/test_together.py"),
     "learning": _room("laboratory/learning"),

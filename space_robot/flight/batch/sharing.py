@@ -17,8 +17,10 @@ from ..plan import Flight
 
 def reason_to_fly_alone(flight: Flight) -> str:
     """Return why a flight cannot be in a batch, in a line; empty if it can."""
+    if flight.plant_settings.has_message_faults:
+        return "messages between plant and controller have faults"
     if flight.flies_by_messages:
-        return "messages between plant and controller have faults, or C answers them"
+        return "the flight code in C answers"
     for law in (flight.law, *(law for _, law in flight.swaps)):
         kind: Any = type(law)  # classes are hashable
         if why := _of_law(kind):

@@ -259,6 +259,8 @@ _SPECIAL: dict[str, st.SearchStrategy[Any]] = {
     "allocation.unload_to": st.just(0) | st.floats(0.0, 0.2),
     "waypoint_times": st.just([0, 1.5, 3]),
     "waypoints_deg": st.lists(st.integers(-90, 90), min_size=18, max_size=18),
+    "controller_code": st.sampled_from(["python", "c"]),
+    "shadow": st.sampled_from(["none", "c"]),
     "compression": st.sampled_from(["none", "lz4", "zstd"]),
     "split_size": st.sampled_from([0, 100_000, "2M"]),
     "sensors": st.sampled_from(["ideal", "white_l1"]),
