@@ -17,9 +17,11 @@ from typing import Any, NoReturn
 import numpy as np
 from numpy.typing import NDArray
 
-from space_robot_control.controller.controller import Controller
+from space_robot_control.controller.kernels import USABLE
 from space_robot_control.controller.loop import ControllerLoop
 from space_robot_control.controller.settings import ControllerNodeSettings
+from space_robot_control.controller.supervision import conclude
+from space_robot_control.controller.supervisor import Supervisor
 from space_robot_msgs_py.compiled.records import Block
 from space_robot_msgs_py.ros.managed_node import ManagedNode
 from space_robot_msgs_py.ros.node_host import NodeKind, run_nodes
@@ -75,15 +77,16 @@ def empty_plant(plant: Plant) -> None:
     plant.step = step  # type: ignore[method-assign]
 
 
-def empty_controller(controller: Controller) -> None:
-    """Let ``controller`` answer with no torque always."""
-    command = Command(0, np.zeros_like(controller.signals.error))
+def empty_controller(supervisor: Supervisor) -> None:
+    """Let ``supervisor`` answer with no torque always."""
+    command = Command(0, np.zeros_like(supervisor.controller.signals.error))
 
-    def update(state: RobotState, reference: Block) -> Command:
+    def answer(state: RobotState, reference: Block) -> Command:
+        conclude(supervisor.block, state.tick, USABLE)
         command.tick = state.tick
         return command
 
-    controller.update = update  # type: ignore[method-assign]
+    supervisor.answer = answer  # type: ignore[method-assign]
 
 
 class TimedPlantLoop(PlantLoop):
@@ -135,8 +138,8 @@ class TimedControllerLoop(ControllerLoop):
             watch.attach(entry, "take", f"take {part}")
             watch.attach(self._states.codec.parts[entry.topic], "decode", f"decode {part}")
         if self.is_empty:
-            empty_controller(self._controller)
-        watch.attach(self._controller, "update", "update controller")
+            empty_controller(self._answering.supervisor)
+        watch.attach(self._answering.supervisor, "answer", "update controller")
         watch.attach(self._answering, "encode", "encode command")
         watch.attach(self._command_out, "publish", "publish command")
 
