@@ -176,17 +176,20 @@ class Translated:
 def translate(software: FlightSoftware) -> Translated:
     """Translate the flight software.
 
-    It is translated twice: the first time tells which numbers no kernel writes. Those are known
-    the second time, so branches that they decide for good are left out.
+    Every translation tells which numbers no kernel writes. In the next one they are known, so
+    branches that they decide for good are left out, and what is written only there.
 
     Raises:
         InputError: a kernel has no translation; names file, line and what to write instead.
     """
-    first, roots = _program(software, {})
-    reached = reachable(first, roots.values())
-    written = {field for function in reached for field in function.stores}
-    constants = _constants(software, first, written)
-    program, roots = _program(software, constants)
+    constants: dict[lang.FieldName, float] | None = None
+    known: dict[lang.FieldName, float] = {}
+    while known != constants:
+        constants = known
+        program, roots = _program(software, constants)
+        reached = reachable(program, roots.values())
+        written = {field for function in reached for field in function.stores}
+        known = _constants(software, program, written)
     whole: list[type[Record]] = [State, Reference]
     whole += [part.record for part in software.parts if "_" in part.name]
     files = Files(program, list(roots.values()), whole, _room)
