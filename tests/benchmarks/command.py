@@ -65,8 +65,9 @@ def bench(
     SECTION is one of plant, wheels (beside Basilisk's), laws, simulate, reproduce, campaign, lanes
     (eight flights at a time, beside MuJoCo's rollout); on the ROS 2 graph: graph, composed, clock,
     recorder (10 minutes), start-up; compile (a first start, and one with a robot of another size);
-    python (a tick stepped from Python); flight-code (in C beside the kernels); beside MuJoCo, Pinocchio and Basilisk: peers (one step of
-    the plant) and growth (over the number of joints) [default: all].
+    python (a tick stepped from Python); flight-code (in C, beside its kernels); beside MuJoCo,
+    Pinocchio and Basilisk: peers (one step of the plant) and growth (over the number of joints)
+    [default: all].
     Shown are the median and the spread of several repetitions, how many times better that is than
     what stands beside it, and what was asked. A machine that does other work meanwhile shows in the
     spread.
