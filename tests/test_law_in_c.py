@@ -30,7 +30,7 @@ def unwrapped(text: str) -> str:
 
 def test_the_listings_are_those_of_kernel_and_export(sources: dict[str, str]) -> None:
     text = (ROOT / PAGE).read_text("utf-8")
-    (python,) = re.findall(r"```python\n(.*?)```", text, re.DOTALL)
+    (python,) = re.findall(r"```py\n(.*?)```", text, re.DOTALL)
     law: Any = tde_stc.time_delay_super_twisting
     assert python == inspect.getsource(law.py_func)
     (c,) = re.findall(r"```c\n(.*?)```", text, re.DOTALL)
