@@ -48,7 +48,7 @@ def fly(as_json: bool, bag: Path | None, **options: Any) -> None:
     flight = plan_flight(**options)
     bag = bag or default_bag(flight)
     check_bag_path(bag)
-    flight.prepare_flight_code()
+    _ = flight.supervisor  # compiled, or refused, before anything is begun
     try:
         report = fly_graph(flight, bag, analyze, remarks_on(flight))
     except FlightError as error:

@@ -40,7 +40,7 @@ def simulate(as_json: bool, bag: Path | None, **options: Any) -> None:
             click.echo(remark, err=True)
     for remark in remarks_on(flight):
         click.echo(remark, err=True)
-    flight.prepare_flight_code()
+    _ = flight.supervisor  # compiled, or refused, before anything is begun
     compile_kernels(bool(flight.plant.names.actuators))  # it has a progress line of its own
     began = time.monotonic()
     with flight_progress(flight.ticks * flight.period, flight.law.name) as show:

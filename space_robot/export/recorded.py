@@ -93,7 +93,7 @@ def _supervisor(flight: Flight, recording: AnswerRecording) -> RecordingSupervis
 def _flown(flight: Flight, exported: Exported, place: int = 0, law: str = "") -> AnswerRecording:
     recording = AnswerRecording(exported)
     supervisor = _supervisor(flight, recording)
-    if law and place:
+    if place:
         recording.add(CHOOSE, place, supervisor, 0)
         flight.law = flight.controller.law = flight.laws[law]
     nothing: Callable[..., None] = lambda *_: None  # noqa: E731

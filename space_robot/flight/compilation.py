@@ -108,7 +108,7 @@ def _answer_and_exchange(flight: Flight) -> None:
         states.decode(topic, data, state)
     reference = Reference.at_rest(flight.robot.n)
     flight.controller.update(state, reference)
-    supervisor = Supervisor(flight.controller, len(flight.plant.names.commanded), hold_ticks=0)
+    supervisor = Supervisor(flight.controller, hold_ticks=0)
     supervisor.judge(0)
     command = supervisor.answer(state, reference)
     commands.decode(commands.encode(command), command)

@@ -13,7 +13,6 @@ from space_robot_control.controller.law_choice import LawChoice
 from space_robot_control.controller.reference_buffer import ReferenceBuffer
 from space_robot_control.controller.state_responder import StampStatus, StateResponder
 from space_robot_control.controller.supervisor import Supervisor
-from space_robot_control.flight_code.choice import supervisor_of
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.errors import MessageError
 from space_robot_msgs_py.samples import RobotState
@@ -43,7 +42,7 @@ class MessageLoop:
             flight: to be flown.
             record: called with every message.
             update_true_state: called with each true state that is not the measured one.
-            supervisor: of the flight's controller, to answer (None: as the settings say).
+            supervisor: of the flight's controller, to answer (None: `Flight.supervisor`).
         """
         robot, settings = flight.robot, flight.plant_settings
         names = flight.plant.names
@@ -59,10 +58,7 @@ class MessageLoop:
             LawChoice(flight.law, flight.swaps),
             self._references,
             flight.controller_settings,
-            supervisor=supervisor
-            or supervisor_of(
-                flight.controller, list(flight.laws.values()), flight.controller_settings
-            ),
+            supervisor=supervisor or flight.supervisor,
         )
         self._state = RobotState.allocate(robot.n)
         self._streamed = 0

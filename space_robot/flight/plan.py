@@ -6,6 +6,7 @@ from functools import cached_property
 from typing import Any
 
 from space_robot_control.controller.controller import Controller
+from space_robot_control.controller.supervisor import Supervisor
 from space_robot_control.flight_code.choice import supervisor_of
 from space_robot_control.laws import ControlLaw
 from space_robot_msgs_py.errors import InputError
@@ -72,13 +73,16 @@ class Flight:
         is_plain = self.controller_settings.answers_in_python
         return self.plant_settings.has_message_faults or not is_plain
 
-    def prepare_flight_code(self) -> None:
-        """Compile the flight code in C, or greet the flight computer, if one is to answer.
+    @cached_property
+    def supervisor(self) -> Supervisor | None:
+        """What answers in the place of the usual supervisor; None if that one does.
+
+        The flight code in C is compiled, or the flight computer greeted, at the first request.
 
         Raises:
             InputError: a law cannot be exported, or there is no compiler or no flight computer.
         """
-        supervisor_of(self.controller, list(self.laws.values()), self.controller_settings)
+        return supervisor_of(self.controller, list(self.laws.values()), self.controller_settings)
 
     def check_in_process(self) -> None:
         """Check that the flight can run in one process.

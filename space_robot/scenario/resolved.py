@@ -45,9 +45,8 @@ BY_THE_MISSION = ("initial_joints_deg", "initial_quaternion")
 OF_PLANT = ("period", "substeps", "command_latency_ticks")
 OF_THE_GRAPH = ("realtime", "paused", "fifo_priority")
 """Options of the plant's node; options of the graph only where they are set."""
-OF_THE_CODE = {"controller_code": "python", "shadow": "none"}
-"""Parameters of the controller's node that change no number, and their defaults; options only where
-they are set."""
+OF_THE_CODE = ("controller_code", "shadow")
+"""Parameters of the controller's node that change no number; options only where they are set."""
 ROBOTS = ("robot", "plant_robot")
 """Options recorded in a bag as ``robot_file`` and ``controller_robot_file``."""
 LABELS = ("robot", "mission", "case", "sensors", "actuators", "gains", "navigation_sensors")
@@ -235,8 +234,8 @@ def _tree(scenario: ResolvedScenario) -> dict[str, Any]:
         **{name: numbers[name] for name in OF_THE_GRAPH if numbers[name]},
         **{
             name: getattr(controller, name)
-            for name, default in OF_THE_CODE.items()
-            if getattr(controller, name) != default
+            for name in OF_THE_CODE
+            if getattr(controller, name) != ControllerNodeSettings.model_fields[name].default
         },
         **({"restart_controller": True} if scenario.options.restart_controller else {}),
         "parameters": {

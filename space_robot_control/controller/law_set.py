@@ -55,7 +55,7 @@ class LawSet:
         rest = RobotState.allocate(robot.n)
         for law in self._laws.values():
             controller = Controller(robot, law, self._settings.period, actuators=actuators)
-            supervisor = Supervisor(controller, len(controller.names.commanded), hold_ticks=0)
+            supervisor = Supervisor(controller, hold_ticks=0)
             supervisor.judge(rest.tick)
             supervisor.answer(rest, Reference.at_rest(robot.n))
 

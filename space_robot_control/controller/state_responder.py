@@ -33,9 +33,6 @@ class StampStatus(Enum):
     """The stamp of the state is not plausible."""
 
 
-STANDINGS = tuple(StampStatus)
-
-
 class StateResponder:
     """Answers each state once with the messages of the controller. Independent of ROS."""
 
@@ -56,7 +53,7 @@ class StateResponder:
         self._laws, self._references = laws, references
         names = controller.names
         self.supervisor = supervisor or Supervisor(
-            controller, len(names.commanded), settings.hold_ticks, settings.longest_jump
+            controller, settings.hold_ticks, settings.longest_jump
         )
         self._commands = CommandCodec(names.commanded, settings.timebase)
         self._telemetry = TelemetryCodec(names.axes)
@@ -72,7 +69,7 @@ class StateResponder:
         """Return the status of a received state of ``tick``."""
         supervisor = self.supervisor
         last = supervisor.last_stamp
-        standing = STANDINGS[supervisor.judge(tick)]
+        standing = StampStatus(supervisor.judge(tick))
         if standing is StampStatus.NEW and tick != last:
             if supervisor.is_new_time:
                 self._references.begin(tick)

@@ -54,14 +54,11 @@ KINDS = tuple(unusable(status, 0, np.zeros(4)).kind for status in range(STATUSES
 class Supervisor:
     """Supervisor that answers every state, with the controller's command if it is safe."""
 
-    def __init__(
-        self, controller: Controller, axes: int, hold_ticks: int, longest_jump: int = 2000
-    ) -> None:
+    def __init__(self, controller: Controller, hold_ticks: int, longest_jump: int = 2000) -> None:
         """Supervise a controller.
 
         Args:
             controller: which computes the commands.
-            axes: of a command: axes of the robot, then actuators of its base.
             hold_ticks: invalid states for which the last torque is held.
             longest_jump: largest number of ticks from one state to the next.
         """
@@ -77,7 +74,7 @@ class Supervisor:
             last_tick=-1.0,
         )
         assign(self._record.stamps, longest_jump=longest_jump, last=-1.0, other=-1.0)
-        self._command = Command(-1, self._record.command[:axes])
+        self._command = Command(-1, self._record.command[: len(controller.names.commanded)])
         self._law: CompiledLaw | None = None
         self._code: LawCode
 

@@ -15,7 +15,7 @@ from ..controller.controller import Controller
 from ..controller.supervision import ANSWERED, NEW
 from ..controller.supervisor import MODES, Supervisor
 from .folder import Exported
-from .library import command_of, fill_measurement, measurement_of
+from .library import command_of, fill_measurement, fill_reference, measurement_of
 
 Array = NDArray[np.float64]
 
@@ -31,7 +31,6 @@ class AnswerRecording:
     def __init__(self, exported: Exported) -> None:
         """Begin without any."""
         reference = np.dtype(exported.translated.dtype(Reference))
-        self._references = reference.names or ()
         self.dtype = np.dtype(
             [
                 ("kind", np.int64),
@@ -67,8 +66,7 @@ class AnswerRecording:
         else:
             record["measurement"]["tick"] = state
         if reference is not None:
-            for name in self._references:
-                record["reference"][name] = reference[name]
+            fill_reference(record["reference"], reference)
         if command is not None:
             record["command"]["tick"] = command.tick
             record["command"]["command"] = command.torque
@@ -97,7 +95,7 @@ class RecordingSupervisor(Supervisor):
         self, controller: Controller, recording: AnswerRecording, hold_ticks: int, longest_jump: int
     ) -> None:
         """Supervise ``controller`` as any supervisor, into ``recording``."""
-        super().__init__(controller, len(controller.names.commanded), hold_ticks, longest_jump)
+        super().__init__(controller, hold_ticks, longest_jump)
         self._recording = recording
         self._judged = -1
         """Tick that was judged to be new and is not answered yet; -1: none."""
@@ -105,12 +103,10 @@ class RecordingSupervisor(Supervisor):
     def judge(self, tick: int) -> int:
         """Return the standing of a state by its stamp."""
         self.finish()
-        before = self.mode
         standing = super().judge(tick)
         if standing == NEW:
             self._judged = tick
             return standing
-        assert self.mode is before
         is_known = standing == ANSWERED
         result = int(self._record.reason) if is_known else REFUSED
         command = Command(tick, self._command.torque) if is_known else None

@@ -6,6 +6,7 @@ import ast
 import inspect
 import re
 import textwrap
+from collections import defaultdict
 from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 
@@ -99,6 +100,11 @@ class Files:
         self.program, self.room_of = program, room_of
         self.functions = reachable(program, first)
         self._roots = {program.functions.index(function) for function in first}
+        self._calling_rooms: defaultdict[int, set[str]] = defaultdict(set)
+        """Files that call each function, by its number."""
+        for function in self.functions:
+            for number in CALL.findall("\n".join(function.lines)):
+                self._calling_rooms[int(number)].add(room_of(function.body.__module__))
         self._text = "\n".join("\n".join(function.lines) for function in self.functions)
         self.fields = {
             lang.FieldName(program.records[int(number)], name)
@@ -245,10 +251,7 @@ class Files:
         """Return whether only its own file calls a function."""
         number = self.program.functions.index(function)
         home = self.room_of(function.body.__module__)
-        callers = [caller for caller in self.functions if f"¤{number}(" in "\n".join(caller.lines)]
-        return number not in self._roots and all(
-            self.room_of(caller.body.__module__) == home for caller in callers
-        )
+        return number not in self._roots and self._calling_rooms[number] == {home}
 
     def _function_names(self) -> dict[int, str]:
         """Return names by number: the kernel's, with module or law where several have it."""

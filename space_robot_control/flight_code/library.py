@@ -37,8 +37,6 @@ class FlightLibrary:
         translated = exported.translated
         self._measurement, self._command = measurement_of(exported), command_of(exported)
         self._reference = np.zeros(1, translated.dtype(Reference))
-        self._fields = [name for name, *_ in translated.dtype(State)]
-        self._of_reference = [name for name, *_ in translated.dtype(Reference)]
         self._laws = [law.name for law in exported.software.laws]
         self._axes = exported.software.joints + 3
         self._telemetry = np.zeros((4, self._axes))
@@ -66,8 +64,7 @@ class FlightLibrary:
 
     def _with(self, state: RobotState, reference: Block, function: str) -> int:
         fill_measurement(self._measurement, state)
-        for name in self._of_reference:
-            self._reference[name] = reference[name]
+        fill_reference(self._reference, reference)
         return self._call(function, self._measurement, self._reference, self._command)
 
     @cached_property
@@ -115,6 +112,12 @@ def command_of(exported: Exported) -> NDArray[Any]:
     """Return an empty ``space_robot_command``."""
     count = len(exported.software.controller.names.commanded)
     return np.zeros(1, [("tick", np.int64), ("command", np.float64, (count,))])
+
+
+def fill_reference(wanted: NDArray[Any], reference: Block) -> None:
+    """Write a reference into a ``space_robot_reference``."""
+    for name in wanted.dtype.names or ():
+        wanted[name] = reference[name]
 
 
 def fill_measurement(measurement: NDArray[Any], state: RobotState) -> None:

@@ -17,7 +17,7 @@ from space_robot_msgs_py.samples import Reference, RobotState
 
 from ..laws import ControlLaw
 from .folder import Exported
-from .library import CONDITION, Array, command_of, fill_measurement, measurement_of
+from .library import CONDITION, Array, command_of, fill_measurement, fill_reference, measurement_of
 
 TIMEOUT_S = 2.0
 """Longest wait for an answer, s of the wall clock."""
@@ -56,7 +56,6 @@ class FlightComputer:
         ]
         self._request: NDArray[Any] = np.zeros(1, request)
         self._answer: NDArray[Any] = np.zeros(1, answer)
-        self._fields = [name for name, *_ in reference]
         self._where = f"{host}:{port}"
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self._socket.settimeout(TIMEOUT_S)
@@ -93,8 +92,7 @@ class FlightComputer:
     def answer(self, state: RobotState, reference: Block) -> int:
         """Answer a state that was judged to be new; return its status."""
         fill_measurement(self._request["measurement"], state)
-        for name in self._fields:
-            self._request["reference"][name] = reference[name]
+        fill_reference(self._request["reference"], reference)
         return self._ask(ANSWER, state.tick)
 
     def stand_down(self, tick: int) -> None:

@@ -126,10 +126,7 @@ class FlightSoftware:
     @cached_property
     def parts(self) -> list[Part]:
         """Records of the state struct in order."""
-        names = self.controller.names
-        supervisor = Supervisor(
-            self.controller, len(names.commanded), self.hold_ticks, self.longest_jump
-        )
+        supervisor = Supervisor(self.controller, self.hold_ticks, self.longest_jump)
         self.controller.engage()
         parts = [
             Part("supervision", Supervision, supervisor.block[0], self._source("controller")),

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from space_robot_msgs_py.compiled.records import Block, assign
 from space_robot_msgs_py.errors import FlightError
-from space_robot_msgs_py.samples import Command, RobotNames, RobotState
+from space_robot_msgs_py.samples import Command, RobotState
 
 from ..allocation.diagnosis import Diagnosis
 from ..controller.controller import Controller
@@ -36,8 +36,7 @@ class _SupervisorWithCode(Supervisor):
         settings: ControllerNodeSettings,
         code: FlightLibrary | FlightComputer,
     ) -> None:
-        axes = len(controller.names.commanded)
-        super().__init__(controller, axes, settings.hold_ticks, settings.longest_jump)
+        super().__init__(controller, settings.hold_ticks, settings.longest_jump)
         self._flight_code = code
 
     def use(self, law: ControlLaw) -> None:
@@ -108,16 +107,13 @@ class ShadowSupervisor(_SupervisorWithCode):
         Raises:
             ShadowError: C answers differently; names the first number that differs.
         """
-        command, code, names = super().answer(state, reference), self._flight_code, self._names
+        command, code = super().answer(state, reference), self._flight_code
+        names = self.controller.names
         code.answer(state, reference)
         self._compare(state.tick, "command of", names.commanded, command.torque, code.command)
         for name, python, c in zip(TELEMETRY, self.telemetry(), code.telemetry, strict=True):
             self._compare(state.tick, f"{name} of", names.axes, python, c)
         return command
-
-    @property
-    def _names(self) -> RobotNames:
-        return self.controller.names
 
     @staticmethod
     def _compare(tick: int, what: str, names: Sequence[str], python: Array, c: Array) -> None:

@@ -118,7 +118,7 @@ class Expressions:
         if not isinstance(declared, RecordField):
             return Value(Pointer(declared), text, lang.POSTFIX, roots=owner.roots, is_pointer=False)
         shape = self.program.shape(record, name)
-        constant = self.program.constant(field)
+        constant = self.program.constants.get(field)
         if not shape:
             return Value(lang.FLOAT, text, lang.POSTFIX, constant, owner.roots, frozenset({field}))
         return Value(ArrayOf(shape), text, lang.POSTFIX, constant, owner.roots, frozenset({field}))
@@ -167,7 +167,8 @@ class Expressions:
             text = f"{owner.at(lang.POSTFIX)}.at[{place.text}]"
             return Value(lang.FLOAT, text, lang.POSTFIX, calls=owner.calls)
         k = self._place(index)
-        return Value(owner.type.items[k], f"{owner.at(lang.POSTFIX)}.item_{k}", lang.POSTFIX)
+        text = f"{owner.at(lang.POSTFIX)}.item_{k}"
+        return Value(owner.type.items[k], text, lang.POSTFIX, calls=owner.calls)
 
     def _part(self, owner: Value, index: ast.expr) -> Value:
         if isinstance(index, ast.Slice):
@@ -330,7 +331,6 @@ class Expressions:
             raise RefusedError("a call with keywords or a star", "give arguments by position")
         arguments = tuple(self.translate(argument) for argument in node.args)
         lang.check_order(arguments)
-        known = getattr(known, "kernel", known)  # of a RecordFunction
         if known is len:
             return self.length(arguments[0])
         try:

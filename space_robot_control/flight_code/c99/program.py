@@ -13,7 +13,7 @@ from space_robot_msgs_py.compiled.records import Record
 
 from . import language as lang
 from .functions import Function, kind_of_argument, passed, syntax_of, translated
-from .language import Known, RefusedError, Value
+from .language import RefusedError, Value
 
 FIELD, CALL, CONSTANT = map(re.compile, (r"«(\d+):(\w+)»", r"¤(\d+)\(", r"¶(\d+);"))
 """Markers of fields, calls and constants, whose names are decided at the end."""
@@ -70,10 +70,6 @@ class KernelProgram:
         numbers: tuple[int, ...] = tuple(resized(self.joints))
         return numbers
 
-    def constant(self, field: lang.FieldName) -> float | None:
-        """Return the number of a field that never changes; None if it does."""
-        return self.constants.get(field)
-
     def named(self, module: str, name: str, number: float) -> str:
         """Return the text of a module's constant."""
         constant = Constant(name, number)
@@ -101,7 +97,7 @@ class KernelProgram:
 
     def call(self, body: Callable[..., Any], arguments: tuple[Value, ...], inside: Any) -> Value:
         """Return the call of a kernel by a translation, ``inside`` which it stands."""
-        number = self.function(body, arguments, getattr(inside, "label", ""))
+        number = self.function(body, arguments)
         function = self.functions[number]
         written = {p.name for p in function.parameters if p.is_written}
         for names, argument in zip(function.arguments, arguments, strict=True):
@@ -115,9 +111,7 @@ class KernelProgram:
         calls = lang.WRITES if written else 1
         return Value(function.result, text, calls=calls)
 
-    def function(
-        self, body: Callable[..., Any], arguments: tuple[Value, ...], label: str = ""
-    ) -> int:
+    def function(self, body: Callable[..., Any], arguments: tuple[Value, ...]) -> int:
         """Return the number of the translation of a kernel for arguments.
 
         Translations that differ only in the lengths of arrays that they do not read are one.
@@ -132,9 +126,8 @@ class KernelProgram:
             line = body.__code__.co_firstlineno
             raise lang.NotInSubsetError(file, line, "recursion", "write a loop")
         labels = [kind.label for kind in kinds if isinstance(kind, lang.Bundle)]
-        is_bound = any(isinstance(kind, Known) or kind == lang.EMPTY for kind in kinds)
         self._active.append(body)
-        new = translated(self, body, kinds, labels[0] if labels else label if is_bound else "")
+        new = translated(self, body, kinds, labels[0] if labels else "")
         self._active.pop()
         number = len(self.functions)
         for k, old in enumerate(self.functions):

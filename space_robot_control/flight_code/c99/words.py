@@ -40,7 +40,8 @@ def _absolute(arguments: tuple[Value, ...]) -> Value:
 def _extreme(name: str) -> Word:
     def word(arguments: tuple[Value, ...]) -> Value:
         kind = reduce(lang.joined, (argument.type for argument in arguments))
-        pair = Value(kind, f"{name}{'_int' if kind == lang.INT else ''}")
+        calls = max(argument.calls for argument in arguments)
+        pair = Value(kind, f"{name}{'_int' if kind == lang.INT else ''}", calls=calls)
         values = [cast(argument, kind) for argument in arguments]
         if all(value.constant is not None for value in values):
             function = max if name == "py_max" else min

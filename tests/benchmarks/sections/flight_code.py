@@ -112,8 +112,7 @@ def _numba(plan: FlightPlan, flown: Flown) -> Callable[[int], object]:
     flight = Flight(resolve(plan))
     controller, law = flight.controller, flight.law
     assert isinstance(law, CompiledLaw)
-    axes = len(controller.names.commanded)
-    supervision = Supervisor(controller, axes, hold_ticks=200).block
+    supervision = Supervisor(controller, hold_ticks=200).block
     code, allocate = law.code, controller.allocate
     blocks = (supervision, controller.block, law.memory_block)
     start = [block.copy() for block in blocks]

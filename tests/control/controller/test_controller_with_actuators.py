@@ -76,7 +76,7 @@ def test_thrusters_are_open_or_closed(paper_robot: Robot) -> None:
 
 def test_while_it_holds_its_torque_the_valves_are_closed(paper_robot: Robot) -> None:
     controller = controller_of(paper_robot, wheels=WHEELS, thrusters=THRUSTERS)
-    supervisor = Supervisor(controller, len(controller.names.commanded), hold_ticks=5)
+    supervisor = Supervisor(controller, hold_ticks=5)
     good = supervisor.answer(state_at(0), REST).torque
     good[controller.valves] = 10.0
     wheels = good[9:13].copy()

@@ -26,7 +26,7 @@ REST = Reference.at_rest(6)
 
 
 def supervisor_of(robot: Robot, name: str = "tde_stc", hold_ticks: int = HOLD) -> Supervisor:
-    return Supervisor(Controller(robot, law_of(name), PERIOD), AXES, hold_ticks)
+    return Supervisor(Controller(robot, law_of(name), PERIOD), hold_ticks)
 
 
 def state_at(tick: int, eta: float = 1.0, scale: float = 1.0) -> RobotState:
@@ -218,7 +218,7 @@ class Supervised(Loop):
 
     def __init__(self, robot: Robot, name: str, hold_ticks: int) -> None:
         super().__init__(robot, law_of(name))
-        self.supervisor = Supervisor(self.controller, AXES, hold_ticks)
+        self.supervisor = Supervisor(self.controller, hold_ticks)
 
     def fly_supervised(self, ticks: int, blind: bool = False) -> tuple[Array, Array]:
         """Errors and torques, as `fly`; the errors while blind are the last ones."""

@@ -39,7 +39,7 @@ def exported(law: str) -> Exported:
 def test_c_answers_like_python(seed: int, law: str, share: float) -> None:
     flight, code, random = flight_of(law), FlightLibrary(exported(law)), np.random.default_rng(seed)
     limits = flight.controller_settings.hold_ticks, flight.controller_settings.longest_jump
-    supervisor = Supervisor(flight.controller, len(flight.plant.names.commanded), *limits)
+    supervisor = Supervisor(flight.controller, *limits)
     references = flight.mission.chunk(0, TICKS).references()
     wheels = len(flight.plant.names.wheels)
     for k, tick in enumerate(hostile_ticks(TICKS, random)):

@@ -19,6 +19,7 @@ from space_robot.export.software import export
 from space_robot.flight.bench import check_for_bench
 from space_robot.flight.plan import Flight, FlightPlan, resolve
 from space_robot.flight.simulate import simulate
+from space_robot_control.flight_code.compiler import write_sources
 from space_robot_control.flight_code.library import FlightLibrary
 from space_robot_control.flight_code.remote import BEGIN, FlightComputer
 from space_robot_control.flight_code.supervisors import ShadowError, bits
@@ -135,12 +136,7 @@ def flight_computer(tmp_path: Path) -> Iterator[int]:
     if not shutil.which("cc"):
         pytest.skip("no C compiler is installed")
     exported = export(Flight(resolve(FlightPlan(**HARD))), ["ctc_smc", "tde_smc"])
-    sources = []
-    for path, text in exported.sources.items():
-        file = tmp_path / path
-        file.parent.mkdir(parents=True, exist_ok=True)
-        file.write_text(text, "utf-8")
-        sources += [str(file)] if path.suffix == ".c" else []
+    sources = write_sources(tmp_path, exported.sources)
     program = tmp_path / "flight_computer"
     flags = ["-std=c99", "-O2", "-ffp-contract=off", "-Wall", "-Wextra", "-Wpedantic", "-Werror"]
     own = str(ROOT / "examples" / "flight_computer" / "flight_computer.c")
