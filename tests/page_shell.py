@@ -27,6 +27,7 @@ SHORTER = {
     r"campaign run .*base_actuators": "--runs 6 --workers 0",  # a grid of six
     r"campaign run .*noise": "--runs 2 --workers 0",  # a grid of two
     r"campaign run": "--runs 1 --workers 0",
+    r"export": "--acceptance-seconds 1",
     r"fly .*--scenario": "--help",  # a scenario is read before
     r"fly .*(kill|stop)_": "--duration {}",
     r"fly": "--composed --duration 0.5",
@@ -72,6 +73,7 @@ NOT_RUN = {
     r"(source|python -m colcon|export ROS_|for node in)\b": "ROS 2 from apt",
     r"rerun\b": "a viewer of 100 MB",
     r"(git|mkdir -p ws|cp TraceableRobotModels|pip|python3 -m venv|sudo apt)\b": "from elsewhere",
+    r"for robot in": "18 exports of 30 s: tests/laboratory/export has each kind, shorter",
     r"make\b|BAG_FUZZ_EXAMPLES": "runs these tests, or for long",
     r"nft\b": "the machine's firewall",
     r"dask\b|.*--scheduler": "a cluster: tests/laboratory/processes/pool/test_cluster.py has one",
