@@ -12,7 +12,7 @@ from space_robot_control.controller.law_choice import LawChoice
 from space_robot_control.controller.supervision import NEW
 from space_robot_control.flight_code.acceptance import CHOOSE, AnswerRecording, RecordingSupervisor
 from space_robot_control.flight_code.folder import Exported
-from space_robot_control.flight_code.hostile import SHARE, hostile_ticks, spoil
+from space_robot_control.flight_code.hostile import SHARE, hostile_ticks, shake, spoil
 from space_robot_msgs_py.errors import FlightError
 from space_robot_msgs_py.samples import RobotState
 
@@ -130,8 +130,7 @@ def _hostile(plan: FlightPlan, exported: Exported, laws: Sequence[str]) -> Answe
         state = flight.plant.state.copy()
         state.tick = tick
         noise = 0.0 if random.random() < REPEATED else 10.0 ** random.uniform(-6, -1)
-        state.numbers[:] += noise * random.normal(size=state.numbers.size)
-        state.quaternion[:] /= np.sqrt(state.quaternion @ state.quaternion)
+        shake(state, noise, random)
         wheels.measure(state, commanded, k)
         is_hostile = random.random() < SHARE and k % PHASE > QUIET_TICKS
         spoil(state, wheels.count, random, is_hostile)

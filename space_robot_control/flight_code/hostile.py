@@ -21,6 +21,12 @@ SHARE = 0.3
 """Share of the states that are hostile."""
 
 
+def shake(state: RobotState, size: float, random: np.random.Generator) -> None:
+    """Add noise of a ``size`` to all numbers of a state; its quaternion stays unit."""
+    state.numbers[:] += size * random.normal(size=state.numbers.size)
+    state.quaternion[:] /= np.sqrt(state.quaternion @ state.quaternion)
+
+
 def spoil(
     state: RobotState, wheels: int, random: np.random.Generator, is_hostile: bool = True
 ) -> None:

@@ -58,7 +58,7 @@ def test_the_composed_graph_stands_beside_four_processes(
     assert [row["beside"] for row in rows] == [None, "four processes", None, None]
     answered, punctual = (row["median"] for row in rows[2:])
     assert 0.0 < answered <= 100.0
-    assert 0.0 <= punctual <= 100.0  # zero where other work runs beside it
+    assert 0.0 <= punctual <= answered  # none is in time where other work runs beside it
 
 
 def test_the_clock_section_counts_answers(sections: dict[str, list[dict[str, Any]]]) -> None:

@@ -147,17 +147,17 @@ def _declarations(translation: _Translation, written: set[str]) -> dict[str, str
     return declarations
 
 
-def passed(function: Function, arguments: tuple[Value, ...]) -> list[str]:
-    """Return the texts of the arguments of a call."""
-    texts: list[str] = []
+def passed(function: Function, arguments: tuple[Value, ...]) -> list[Value]:
+    """Return the value of each parameter in a call."""
+    values: list[Value] = []
     for names, argument in zip(function.arguments, arguments, strict=True):
         if isinstance(argument.type, lang.Bundle):
             items = zip(argument.type.items, argument.parts, strict=True)
-            by_name = {f"_{item}": part.text for (item, _), part in items}
-            texts += [next(t for end, t in by_name.items() if n.endswith(end)) for n in names]
+            by_name = {f"_{item}": part for (item, _), part in items}
+            values += [next(v for end, v in by_name.items() if n.endswith(end)) for n in names]
         elif names:
-            texts.append(argument.address)
-    return texts
+            values.append(argument)
+    return values
 
 
 def kind_of_argument(value: Value) -> lang.Type:

@@ -99,16 +99,12 @@ class KernelProgram:
         """Return the call of a kernel by a translation, ``inside`` which it stands."""
         number = self.function(body, arguments)
         function = self.functions[number]
-        written = {p.name for p in function.parameters if p.is_written}
-        for names, argument in zip(function.arguments, arguments, strict=True):
-            if isinstance(argument.type, lang.Bundle):
-                for (item, _), part in zip(argument.type.items, argument.parts, strict=True):
-                    if any(name.endswith(f"_{item}") for name in written & set(names)):
-                        inside.write(part)
-            elif written & set(names):
-                inside.write(argument)
-        text = f"¤{number}({', '.join(passed(function, arguments))})"
-        calls = lang.WRITES if written else 1
+        calls, values = 1, passed(function, arguments)
+        for parameter, value in zip(function.parameters, values, strict=True):
+            if parameter.is_written:
+                inside.write(value)
+                calls = lang.WRITES
+        text = f"¤{number}({', '.join(value.address for value in values)})"
         return Value(function.result, text, calls=calls)
 
     def function(self, body: Callable[..., Any], arguments: tuple[Value, ...]) -> int:

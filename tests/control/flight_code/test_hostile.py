@@ -14,7 +14,7 @@ from space_robot.flight.plan import Flight, FlightPlan, resolve
 from space_robot_control.controller.supervision import NEW
 from space_robot_control.controller.supervisor import Supervisor
 from space_robot_control.flight_code.folder import Exported
-from space_robot_control.flight_code.hostile import hostile_ticks, spoil
+from space_robot_control.flight_code.hostile import hostile_ticks, shake, spoil
 from space_robot_control.flight_code.library import CONDITION, FlightLibrary
 from space_robot_control.flight_code.supervisors import bits
 
@@ -48,10 +48,7 @@ def test_c_answers_like_python(seed: int, law: str, share: float) -> None:
         if standing == NEW:
             state, reference = flight.plant.state.copy(), references[k : k + 1]
             state.tick = tick
-            state.numbers[:] += 10.0 ** random.uniform(-8, 0) * random.normal(
-                size=state.numbers.size
-            )
-            state.quaternion[:] /= np.sqrt(state.quaternion @ state.quaternion)
+            shake(state, 10.0 ** random.uniform(-8, 0), random)
             spoil(state, wheels, random, is_hostile=random.random() < share)
             command, status = supervisor.answer(state, reference), code.answer(state, reference)
             np.testing.assert_array_equal(bits(code.command), bits(command.torque))
