@@ -11,7 +11,7 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from types import GenericAlias
-from typing import Any, get_args, get_origin
+from typing import Annotated, Any, get_args, get_origin
 
 from space_robot.scenario.faults import PROCESS_KINDS
 from space_robot_control.controller.settings import ControllerNodeSettings
@@ -123,6 +123,8 @@ def _rows(fields: Mapping[str, Any], defaults: Mapping[str, Any]) -> Iterator[Se
 def _ros_type(annotation: Any) -> str:
     if get_origin(annotation) is list or isinstance(annotation, GenericAlias):
         return f"{_ros_type(get_args(annotation)[0])}[]"
+    if get_origin(annotation) is Annotated:
+        return _ros_type(get_args(annotation)[0])
     return ROS_TYPES.get(annotation, "string")
 
 
@@ -230,6 +232,12 @@ def _occasion(topic: topics.Topic) -> str:
         return "every 10 ms, or every tick if the period is longer"
     if topic is topics.SIGNALS:
         return "as /controller/telemetry"
+    if topic is topics.MOTORS_STATE:
+        return "each tick, if joints have gears"
+    if topic is topics.MAGNETOMETER:
+        return "each tick, if the base has magnetic torquers"
+    if topic is topics.TRUTH_ORBIT:
+        return "every 20 ticks, if the robot is in an orbit"
     if topic.per_tick and topic.is_optional:
         return "each tick, if the base has them"
     if topic.is_optional:

@@ -19,10 +19,10 @@ from .topics import BASE_AXES
 
 Array = NDArray[np.float64]
 
-MOST_WHEELS, MOST_THRUSTERS, MOST_PASSIVE = 8, 24, 24
-"""The base has no more reaction wheels and thrusters, a robot no more passive joints. A state has
-room for as many, so that their number is no part of its layout, and another number compiles nothing
-anew."""
+MOST_WHEELS, MOST_THRUSTERS, MOST_TORQUERS, MOST_PASSIVE, MOST_GEARS = 8, 24, 6, 24, 64
+"""The base has no more reaction wheels, thrusters and magnetic torquers, a robot no more passive
+joints and gears. Records have room for as many, so that their number is no part of the layout, and
+another number compiles nothing anew."""
 
 
 class RobotNames(NamedTuple):
@@ -34,6 +34,12 @@ class RobotNames(NamedTuple):
     thrusters: tuple[str, ...] = ()
     passive: tuple[str, ...] = ()
     """The joints without motors."""
+    geared: tuple[str, ...] = ()
+    """Those of `joints` with a gear, whose motors move apart from them."""
+    in_orbit: bool = False
+    """True for a robot with an orbit, whose state tells of it."""
+    torquers: tuple[str, ...] = ()
+    """Magnetic torquers of the base."""
 
     @classmethod
     def of(
@@ -42,10 +48,22 @@ class RobotNames(NamedTuple):
         actuators: Sequence[str] = (),
         wheel_count: int = 0,
         passive: Sequence[str] = (),
+        geared: Sequence[str] = (),
+        torquer_count: int = 0,
     ) -> RobotNames:
-        """Take the joints' names and those of the base's ``actuators``: wheels come first."""
-        wheels, thrusters = actuators[:wheel_count], actuators[wheel_count:]
-        return cls(tuple(joints), tuple(wheels), tuple(thrusters), tuple(passive))
+        """Take the joints' names and those of the base's ``actuators``.
+
+        These are wheels, then thrusters, then magnetic torquers.
+        """
+        behind = len(actuators) - torquer_count
+        return cls(
+            tuple(joints),
+            tuple(actuators[:wheel_count]),
+            tuple(actuators[wheel_count:behind]),
+            tuple(passive),
+            tuple(geared),
+            torquers=tuple(actuators[behind:]),
+        )
 
     @property
     def axes(self) -> tuple[str, ...]:
@@ -59,8 +77,8 @@ class RobotNames(NamedTuple):
 
     @property
     def actuators(self) -> tuple[str, ...]:
-        """Those of the base's actuators: wheels, then thrusters."""
-        return (*self.wheels, *self.thrusters)
+        """Those of the base's actuators: wheels, then thrusters, then magnetic torquers."""
+        return (*self.wheels, *self.thrusters, *self.torquers)
 
     @property
     def commanded(self) -> tuple[str, ...]:
@@ -127,15 +145,42 @@ class State(Record):
     """Positions of the joints without motors, rad or m; 0 where the robot has none."""
     passive_velocities: Array = shaped(lambda n: (MOST_PASSIVE,))
     """Their velocities, rad/s or m/s."""
+    motor_positions: Array = shaped(lambda n: (n,))
+    """Positions of the motors of joints with gears, seen through the gears, rad or m, one after the
+    other; the rest is 0."""
+    motor_velocities: Array = shaped(lambda n: (n,))
+    """Their velocities, rad/s or m/s."""
+    orbit_position: Array = shaped(lambda n: (3,))
+    """Position of the inertial frame's origin from the Earth's centre, m; 0 without an orbit."""
+    orbit_velocity: Array = shaped(lambda n: (3,))
+    """Its velocity, m/s."""
+    magnetic_field: Array = shaped(lambda n: (3,))
+    """Magnetic field of the Earth on base axes, T."""
+    external_torques: Array = shaped(lambda n: (12,))
+    """Torques about the robot's centre of mass, inertial axes, N m, by `SOURCES`; that of gravity
+    is computed every 20 ticks."""
 
 
+SOURCES = ("gravity_gradient", "drag", "sunlight", "magnetic")
+"""Sources of the external torques of a state; magnetic is the torque of the base's residual dipole,
+not of magnetic torquers."""
 ALL_FIELDS = tuple(State.__annotations__)
 """Names of all numbers of a state, in their order in memory."""
-ACTUATOR_FIELDS = ("wheel_velocities", "wheel_torques", "thrusts")
-"""Names of those that are of the base's actuators; no sensor spoils them."""
+ACTUATOR_FIELDS = (
+    "wheel_velocities",
+    "wheel_torques",
+    "thrusts",
+    "motor_positions",
+    "motor_velocities",
+)
+"""Names of those that are of the base's actuators and of joints' motors; no sensor spoils them."""
 PASSIVE_FIELDS = ("passive_positions", "passive_velocities")
 """Names of those of the joints without motors; no sensor spoils and no controller reads them."""
-STATE_FIELDS = tuple(n for n in ALL_FIELDS if n not in ACTUATOR_FIELDS + PASSIVE_FIELDS)
+ORBIT_FIELDS = ("orbit_position", "orbit_velocity", "magnetic_field", "external_torques")
+"""Names of those that a robot in orbit has."""
+STATE_FIELDS = tuple(
+    n for n in ALL_FIELDS if n not in ACTUATOR_FIELDS + PASSIVE_FIELDS + ORBIT_FIELDS
+)
 """Names of the others, which come first in memory."""
 
 
@@ -158,6 +203,12 @@ class RobotState:
     thrusts: Array
     passive_positions: Array
     passive_velocities: Array
+    motor_positions: Array
+    motor_velocities: Array
+    orbit_position: Array
+    orbit_velocity: Array
+    magnetic_field: Array
+    external_torques: Array
 
     def __init__(self, tick: int, block: Block) -> None:
         """``block``: (1,) array of a `State`."""
@@ -221,7 +272,8 @@ class Command:
     tick: int
     torque: Array
     """(n+3+A,) N m: base x, y, z (base frame), then joints; then what is asked of each actuator of
-    the base: torques of the wheels' motors, N m, and forces of the thrusters, N."""
+    the base: torques of the wheels' motors, N m, forces of the thrusters, N, and dipoles of the
+    magnetic torquers, A m2."""
 
 
 @dataclass(slots=True)

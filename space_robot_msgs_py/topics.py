@@ -76,6 +76,14 @@ WHEELS_STATE = Topic(
 THRUSTERS_STATE = Topic(
     "thrusters/state", "sensor_msgs/msg/JointState", 10_000, per_tick=True, is_optional=True
 )
+# Motors of joints with gears, seen through them; sent where a robot has any.
+MOTORS_STATE = Topic(
+    "motors/state", "sensor_msgs/msg/JointState", 10_000, per_tick=True, is_optional=True
+)
+# The magnetic field on base axes; sent where the base has magnetic torquers.
+MAGNETOMETER = Topic(
+    "magnetometer", "sensor_msgs/msg/MagneticField", 10_000, per_tick=True, is_optional=True
+)
 COMMAND = Topic("command", "sensor_msgs/msg/JointState", 10_000, per_tick=True)
 # Reference and clock are not transient local: a late joiner would receive the past, and that a
 # message was lost if one is pushed out meanwhile; at depth 1 a slow one would lose some. The
@@ -94,6 +102,7 @@ TRUTH_JOINTS = Topic("truth/joints", "trajectory_msgs/msg/JointTrajectory", 1_00
 TRUTH_BASE = Topic(
     "truth/base", "trajectory_msgs/msg/MultiDOFJointTrajectory", 1_000, is_optional=True
 )
+TRUTH_ORBIT = Topic("truth/orbit", "trajectory_msgs/msg/JointTrajectory", 1_000, is_optional=True)
 
 # What viewers need of the robot. ROS has one /tf for all robots: their frames bear the namespace.
 TF = Topic("/tf", "tf2_msgs/msg/TFMessage", 100, stamp_at=4)
@@ -133,13 +142,16 @@ ALL = (
     TRUTH_BASE,
     WHEELS_STATE,
     THRUSTERS_STATE,
+    MOTORS_STATE,
+    MAGNETOMETER,
+    TRUTH_ORBIT,
 )
 """All that tell of a flight: who reads a bag reads these."""
 SCENE = (TRANSFORMS, TRANSFORMS_STATIC, ROBOT_DESCRIPTION)
 """What viewers show of it; nobody here reads them again."""
 RECORDED = (*ALL, SIGNALS, *SCENE)
 """All that the recorder listens to."""
-STATES = (JOINT_STATES, BASE_STATE, WHEELS_STATE, THRUSTERS_STATE)
+STATES = (JOINT_STATES, BASE_STATE, WHEELS_STATE, THRUSTERS_STATE, MOTORS_STATE, MAGNETOMETER)
 """The parts of a state."""
 TRUTH = (TRUTH_JOINTS, TRUTH_BASE)
 BY_NAME = {topic.full_name: topic for topic in ALL}

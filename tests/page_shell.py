@@ -25,6 +25,7 @@ SHORTER = {
     # a grid of four
     r"campaign run .*(law_league_|sensor_grades|three|tool_errors)": "--runs 4 --workers 0",
     r"campaign run .*base_actuators": "--runs 6 --workers 0",  # a grid of six
+    r"campaign run .*ets_vii": "--runs 6 --workers 0",  # grids of six and of three
     r"campaign run .*noise": "--runs 2 --workers 0",  # a grid of two
     r"campaign run": "--runs 1 --workers 0",
     r"export": "--acceptance-seconds 1",
@@ -78,6 +79,7 @@ NOT_RUN = {
     r"nft\b": "the machine's firewall",
     r"dask\b|.*--scheduler": "a cluster: tests/laboratory/processes/pool/test_cluster.py has one",
     r"python docs/law_league.py": "4,000 flights",
+    r"python docs/ets_vii_tables.py": "450 flights: test_ets_vii.py flies some of them",
     r"python docs/campaign_statistics.py": "a minute: test_share_test.py compares its table",
     r"python tests/hostile": "half an hour",
     r"python docs/view_picture.py": "a browser: tests/laboratory/view has one",

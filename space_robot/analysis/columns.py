@@ -90,12 +90,14 @@ def _columns(log: FlightLog) -> Iterator[tuple[list[str], Array]]:
     if log.commanded_torque is not None:
         yield _with_units("commanded_torque", axes, torques), log.commanded_torque
     wheels, thrusters = log.wheel_velocities.shape[1], log.thrusts.shape[1]
+    torquers = max(0, log.actuator_commands.shape[1] - wheels - thrusters)
     yield _numbered("wheel_velocity", wheels, "rad_s"), log.wheel_velocities
     yield _numbered("wheel_torque", wheels, "n_m"), log.wheel_torques
     yield _numbered("thrust", thrusters, "n"), log.thrusts
     asked = [
         *_numbered("commanded_wheel_torque", wheels, "n_m"),
         *_numbered("commanded_thrust", thrusters, "n"),
+        *_numbered("commanded_dipole", torquers, "a_m2"),
     ]
     if len(asked) == log.actuator_commands.shape[1]:
         yield asked, log.actuator_commands

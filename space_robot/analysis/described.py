@@ -32,6 +32,7 @@ from space_robot_sim.actuators.actuators import ActuatorSettings
 from space_robot_sim.environment.captures import Captures
 from space_robot_sim.environment.environment import EnvironmentSettings
 from space_robot_sim.environment.events import Event, named_targets, parse_events
+from space_robot_sim.environment.orbit_settings import OrbitSettings
 from space_robot_sim.environment.payload import with_payload
 from space_robot_sim.plant.settings import PlantNodeSettings
 
@@ -130,16 +131,44 @@ def environment_of(log: FlightLog) -> EnvironmentSettings:
     return _plant_settings(log)
 
 
+def orbit_of(log: FlightLog) -> OrbitSettings:
+    """Return the orbital environment of the flight; see its ``has_orbit``.
+
+    Raises:
+        InputError: not even the case is named, or it is not here.
+    """
+    return _plant_settings(log, [name for name, _ in leaves(OrbitSettings)])
+
+
 def momentum_of(log: FlightLog) -> MomentumSeries:
     """Return the momentum tracker of a flight from its first rows ``log`` on.
 
     Raises:
         InputError: the robot, its actuators or its environment are not known.
     """
-    environment = environment_of(log)
-    robot = with_payload(robot_of(log), environment.payload)
-    captures = Captures(events_of(log), robot, log.timebase.period)
-    return MomentumSeries(captures, flown_actuators(log), environment.disturbance)
+    settings = _plant_settings(log)
+    if settings.has_orbit and not log.external_torques.shape[1]:
+        raise NotDescribedError("the torques that acted in the orbit were not recorded")
+    return MomentumSeries(captures_of(log), flown_actuators(log), settings.disturbance)
+
+
+def captures_of(log: FlightLog) -> Captures:
+    """Return the captures and releases of the robot that flew.
+
+    Raises:
+        InputError: the robot or its environment are not known.
+    """
+    settings = _plant_settings(log)
+    robot = with_payload(robot_of(log), settings.payload)
+    if robot.geared_names != log.geared_names:
+        own, of_bag = (
+            ", ".join(names) or "none" for names in (robot.geared_names, log.geared_names)
+        )
+        raise NotDescribedError(
+            f"robot {robot.name!r} has gears in the joints {shortened(own, MOST_LETTERS)}, the bag "
+            f"has motors of {shortened(of_bag, MOST_LETTERS)}"
+        )
+    return Captures(events_of(log), robot, log.timebase.period, settings)
 
 
 def events_of(log: FlightLog) -> list[Event]:
@@ -184,7 +213,9 @@ def _plant_settings(log: FlightLog, keys: Sequence[str] = ()) -> PlantNodeSettin
         return validate(PlantNodeSettings, nest(parameters), "plant parameters of the bag")
     if not parameters:
         parameters = {
-            key: log.flight[key] for key in ("robot", "case", "mission") if key in log.flight
+            key: log.flight[key]
+            for key in ("robot", "case", "mission", "orbit")
+            if key in log.flight
         }
     if not parameters:
         raise NotDescribedError("the bag does not say what the plant was told")
@@ -193,10 +224,9 @@ def _plant_settings(log: FlightLog, keys: Sequence[str] = ()) -> PlantNodeSettin
     parameters = _without_told_robot(log, parameters)
     _check_files(log, parameters)
     # their numbers are in the bag, while their files may be elsewhere
-    parameters = {
-        key: value for key, value in parameters.items() if key not in ("actuators", "sensors")
-    }
-    return PlantNodeSettings.resolve(parameters)
+    has_orbit = "orbital_elements.height" in parameters
+    in_bag = ("actuators", "sensors", *(("orbit",) if has_orbit else ()))
+    return PlantNodeSettings.resolve({k: v for k, v in parameters.items() if k not in in_bag})
 
 
 def _without_told_robot(log: FlightLog, parameters: Mapping[str, Any]) -> dict[str, Any]:
@@ -318,7 +348,7 @@ def _described_h_bar(log: FlightLog) -> Array:
 def _check_files(log: FlightLog, parameters: Mapping[str, Any]) -> None:
     """Check that nothing but what is shipped is read, unless the bag is trusted."""
     if not log.trusted:
-        for what in ("robot", "case", "mission", "gains", "sensors", "actuators"):
+        for what in ("robot", "case", "mission", "gains", "sensors", "actuators", "orbit"):
             check_file(what, str(parameters.get(what, "")))
 
 

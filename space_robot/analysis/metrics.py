@@ -25,6 +25,7 @@ Table = dict[str, dict[str, float]]
 AxisIndex = slice | list[int]
 """Some of the n+3 axes, as an index."""
 UNITS = {
+    "attitude_drift": "rad",
     "attitude": "-",
     "joints_prismatic": "m",
     "joints": "rad",

@@ -2,8 +2,9 @@
 
 The base's inertia in the robot's file includes its wheels, locked. So the robot's momentum is
 that of everything with locked wheels, and the wheels' is what their spin relative to the base adds,
-``sum a_k J_k Omega_k``. Motors and joints only move it from one to the other: the sum changes by
-what comes from outside, that is thrusters, the disturbances of (61) and what a captured or released
+``sum a_k J_k Omega_k``. So it is with the rotors of motors behind gears. Motors and joints only
+move it from one to the other: the sum changes by what comes from outside, that is thrusters,
+magnetic torquers, the disturbances of (61), what acts in orbit, and what a captured or released
 target has, and by nothing else.
 """
 
@@ -21,15 +22,35 @@ from space_robot_model.hardware.base_actuators import BaseActuatorSettings
 from space_robot_model.hardware.wheels import WheelSettings
 from space_robot_model.robot import Robot
 from space_robot_model.robot.base_axes import base_axes, cross, to_inertial
+from space_robot_model.robot.gears import motor_momentum
 from space_robot_model.robot.momentum import Motion, robot_momentum
 from space_robot_msgs_py.bag.blocks import Metric, joined, last_rows
 from space_robot_msgs_py.bag.flight_log import FlightLog
+from space_robot_msgs_py.samples import SOURCES
 from space_robot_sim.environment.captures import CaptureEvent, Captures
 from space_robot_sim.environment.disturbance import DisturbanceSettings
+from space_robot_sim.environment.impact import Impact
 
 from .base_demand import axes_of
 
 Array = NDArray[np.float64]
+
+
+def impact_at(exchange: CaptureEvent, row: FlightLog, wheels: WheelSettings) -> Impact:
+    """Return the impact of an event in the configuration of a row."""
+    return exchange.impact(
+        unit_rows(row.quaternion)[0],
+        row.all_positions[0],
+        wheels.unit_axes,
+        wheels.values("rotor_inertia"),
+    )
+
+
+def happens_in(
+    captures: Captures, exchange: CaptureEvent, row: FlightLog, wheels: WheelSettings
+) -> bool:
+    """Return whether an event happens in the configuration of its row, see `Captures.happens`."""
+    return captures.happens(exchange, impact_at(exchange, row, wheels), row.base_position[0])
 
 
 def state_before(exchange: CaptureEvent, row: FlightLog, wheels: WheelSettings) -> FlightLog:
@@ -43,24 +64,23 @@ def state_before(exchange: CaptureEvent, row: FlightLog, wheels: WheelSettings) 
     n, p = len(row.joint_names), len(row.passive_names)
     quaternion = row.quaternion[0] / norm(row.quaternion[0])
     axes = base_axes(quaternion[:, np.newaxis])[:, :, 0]
-    impact = exchange.impact(
-        quaternion, row.all_positions[0], wheels.unit_axes, wheels.values("rotor_inertia")
-    )
     after = np.concatenate(
         [
             row.base_velocity[0],
             product(row.omega_base[0], axes),
             row.all_velocities[0],
             row.wheel_velocities[0],
+            row.motor_velocities[0],
         ]
     )
-    before = exchange.velocity_before(impact, after)
+    before = exchange.velocity_before(impact_at(exchange, row, wheels), after)
     columns: dict[str, Any] = {
         "base_velocity": before[:3],
         "omega_base": product(axes, before[3:6]),
         "joint_velocities": before[6 : 6 + n],
         "passive_velocities": before[6 + n : 6 + n + p],
-        "wheel_velocities": before[6 + n + p :],
+        "wheel_velocities": before[6 + n + p : 6 + n + p + wheels.count],
+        "motor_velocities": before[6 + n + p + wheels.count :],
     }
     return replace(row, **{name: values[np.newaxis] for name, values in columns.items()})
 
@@ -74,6 +94,8 @@ class Momentum(NamedTuple):
     """(N, 3) the share of it that the base has."""
     wheels: Array
     """(N, 3) of the wheels' spin."""
+    motors: Array
+    """(N, 3) of the spin of rotors behind gears."""
     outside: Array
     """(N, 3) N m s that came from outside since the first row."""
     centre_of_mass: Array
@@ -81,8 +103,8 @@ class Momentum(NamedTuple):
 
     @property
     def total(self) -> Array:
-        """(N, 3) robot and wheels; less `outside` it is conserved."""
-        return self.robot + self.wheels
+        """(N, 3) robot, wheels and motors; less `outside` it is conserved."""
+        return self.robot + self.wheels + self.motors
 
 
 class MomentumSeries:
@@ -119,11 +141,18 @@ class MomentumSeries:
 
     def _exchange(self, row: FlightLog) -> Momentum:
         """Take the tick of one event or several, as they happen one after the other."""
-        exchanges = self._captures.at(row.first_tick)
+        wheels = self.flown.wheels
+        exchanges = [
+            exchange
+            for exchange in self._captures.at(row.first_tick)
+            if happens_in(self._captures, exchange, row, wheels)
+        ]
+        assert self._part is not None
+        if not exchanges:
+            return self._part.add(row)
         states = [row]
         for exchange in reversed(exchanges):
-            states.insert(0, state_before(exchange, states[0], self.flown.wheels))
-        assert self._part is not None
+            states.insert(0, state_before(exchange, states[0], wheels))
         for exchange, state, after in zip(exchanges, states[:-1], states[1:], strict=True):
             before = self._part.add(state)
             bare = self._begin(exchange.after, np.zeros(3)).add(after)
@@ -164,6 +193,9 @@ class _OfOneRobot:
             momentum.angular,
             momentum.base,
             to_inertial(axes, spin.T).T,
+            motor_momentum(
+                self._robot, motion.quaternion, motion.joint_positions, rows.motor_velocities
+            ),
             outside,
             rows.base_position + momentum.centre_of_mass,
         )
@@ -173,11 +205,14 @@ class _OfOneRobot:
         """Return the angular impulse up to each row, the first row's known, (N, 3) N m s."""
         period, time = rows.timebase.period, rows.time
         impulse = np.zeros((rows.ticks, 3))
-        if self._flown.thruster_count:
+        if self._flown.thruster_count or self._flown.torquer_count:
             thrusters = self._flown.thrusters
             force = product(rows.thrusts, thrusters.unit_directions)
             arms = np.cross(thrusters.places, thrusters.unit_directions)
             torque = product(rows.thrusts, arms)
+            if self._flown.torquer_count:  # all on the base that is not of the wheels' motors
+                wheels = product(rows.wheel_torques, self._flown.wheels.unit_axes)
+                torque = rows.applied_torque[:, :3] + wheels
             each = [  # turned as the base is before and after the interval
                 _torque(side, centre, force[1:], torque[1:])
                 for side, centre in (
@@ -186,6 +221,9 @@ class _OfOneRobot:
                 )
             ]
             impulse[1:] = 0.5 * period * np.cumsum(each[0] + each[1], axis=0)
+        if rows.external_torques.shape[1]:
+            by_axis = rows.external_torques[:-1].reshape(-1, len(SOURCES), 3).sum(axis=1)
+            impulse[1:] += period * np.cumsum(by_axis, axis=0)
         wave = disturbance_impulse(self._disturbance, time)
         outside: Array = self._outside + impulse + (wave - wave[0])[:, np.newaxis]
         return outside

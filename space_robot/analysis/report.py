@@ -12,15 +12,20 @@ from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.bag.law_history import as_data, within
 from space_robot_msgs_py.config.validation import short
 from space_robot_msgs_py.errors import InputError
+from space_robot_sim.environment.events import Capture
 
 from .actuation import Latency, MissedDeadlines, Saturation, TorqueLimits
 from .attitude_drift import UNAVAILABLE, AttitudeDrift, controls_base
 from .columns import recording
+from .deflection import Deflection
 from .described import (
     actuators_of,
     assumed_robot_of,
+    captures_of,
+    environment_of,
     estimator,
     event_labels,
+    events_of,
     flown_actuators,
     momentum_of,
     navigation_of,
@@ -30,7 +35,9 @@ from .described import (
     torque_limits,
 )
 from .estimate_error import EstimateError
+from .external_torques import DisturbanceBySource
 from .metrics import Chatter, Maxima, Rms, tracking_error
+from .missed_captures import MissedCaptures
 from .momentum import MomentumBudget
 from .navigation import NavigationError
 from .pointing import Pointing
@@ -50,6 +57,12 @@ OF_HARDWARE = ("momentum",)
 """Metrics that only flights have whose base was not turned by ideal torques."""
 OF_WHEELS = ("wheel_saturation",)
 """Metrics that only flights have whose base has reaction wheels."""
+OF_ORBIT = ("disturbance_by_source",)
+"""Metrics that only flights in an orbit have."""
+OF_FREE_TARGETS = ("missed_captures",)
+"""Metrics that only flights have with targets on neighbouring orbits."""
+OF_GEARS = ("deflection",)
+"""Metrics that only flights have whose joints have gears."""
 
 
 def analyze(log: FlightLog, actuators: ActuatorSet | None = None) -> dict[str, Any]:
@@ -145,10 +158,24 @@ class Analysis:
                 continue
             if name in OF_WHEELS and not block.wheel_velocities.shape[1]:
                 continue
+            if name in OF_ORBIT and not block.orbit_position.shape[1]:
+                continue
+            if name in OF_FREE_TARGETS and not _has_free_targets(block):
+                continue
+            if name in OF_GEARS and not block.geared_names:
+                continue
             try:
                 self._metrics[name] = metric(block)
             except InputError as error:
                 self._unavailable[name] = str(error)
+
+
+def _has_free_targets(log: FlightLog) -> bool:
+    try:
+        events = events_of(log)
+    except InputError:
+        return False
+    return any(isinstance(event, Capture) and event.target.is_in_orbit for event in events)
 
 
 def _without_gaps(log: FlightLog) -> FlightLog:
@@ -194,5 +221,8 @@ _METRICS: dict[str, Callable[[FlightLog], Metric]] = {
     "tool": lambda log: ToolError(log, robot_of(log), assumed_robot_of(log)),
     "sizing": lambda log: _sizing(log, None),
     "momentum": lambda log: MomentumBudget(momentum_of(log)),
+    "disturbance_by_source": lambda log: DisturbanceBySource(environment_of(log).disturbance),
+    "deflection": Deflection,
+    "missed_captures": lambda log: MissedCaptures(captures_of(log)),
 }
 """By key of the report, each made from a flight's first block."""

@@ -48,6 +48,9 @@ DEFINITIONS = {
     "momentum": "largest angular momentum about the common centre of mass: of the robot with "
     "its wheels locked, of its base in that, of the wheels' spin, and what came from outside; and "
     "how far robot and wheels together drifted from what is conserved",
+    "disturbance torque": "in orbit, of each source about the common centre of mass: RMS, largest, "
+    "and the impulse, the largest angular momentum that it has given since the first tick",
+    "deflection": "of joints with gears, motor angle less link angle",
     "pushed by thrusters": "of the centre of mass of the whole robot, from where it was at the "
     "first tick",
     "asked of the base": "largest torque commanded on each axis of the base, and the largest "
@@ -180,6 +183,21 @@ def lines(reports: Sequence[Report], brief: bool = False) -> list[Line]:
         label=lambda key: "drift" if key == "n_m_s" else "drift, relative",
     )
     rows += each("pushed by thrusters", ("momentum", "pushed_m"), "m")
+    for key, name, unit in (
+        ("rms_n_m", "RMS", "N m"),
+        ("max_n_m", "max", "N m"),
+        ("impulse_n_m_s", "impulse", "N m s"),
+    ):
+        rows += each(
+            "disturbance torque",
+            ("disturbance_by_source",),
+            unit,
+            text=partial(_of_axis, key=key),
+            label=partial(_named, name=name),
+        )
+    for kind in ("rms", "largest"):
+        label = partial(_named, name=_upper(kind))
+        rows += each("deflection", ("deflection", kind), "rad or m", label=label)
     if not brief:
         for key, name, unit in (
             ("peak_torque_n_m", "torque", "N m"),
@@ -277,12 +295,12 @@ def _drift(value: float | None) -> str:
     return NONE if value is None else f"{value:.2e}"
 
 
-def _of_axis(axis: dict[str, float], key: str) -> str:
-    return _number(axis[key])
+def _of_axis(values: dict[str, float], key: str) -> str:
+    return _number(values[key])
 
 
-def _named(axis: str, name: str) -> str:
-    return f"{axis} {name}"
+def _named(key: str, name: str) -> str:
+    return f"{key} {name}"
 
 
 def _settled(value: float | None) -> str:

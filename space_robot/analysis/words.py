@@ -46,6 +46,10 @@ def remarks(report: Report) -> list[str]:
         remarks.append(sentence(step))
     if report["events"]:
         remarks.append(f"events: {', '.join(report['events'])}")
+    remarks += [
+        f"{event} did not happen: the target was {distance:.3g} m from where the tool holds it"
+        for event, distance in (report["missed_captures"] or {}).items()
+    ]
     if drift := report["attitude_drift"]:
         remarks.append(
             f"{FREE}: its attitude is no error but drift, {drift['max_deg']:.4g} deg at most and "

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from dataclasses import dataclass
+from collections.abc import Iterable, Sequence
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from space_robot_control.controller.gains import available_laws
+from space_robot_control.laws import ControlLaw
 from space_robot_model.dynamics.attitude import SINGULAR_ETA
 from space_robot_msgs_py.config.validation import validate
 from space_robot_msgs_py.errors import FlightError, InputError
@@ -17,14 +18,17 @@ from space_robot_msgs_py.errors import FlightError, InputError
 from ..flight.plan import Flight, FlightPlan, resolve
 from ..flight.simulate import simulate
 from ..scenario.node_settings import FlightSettings
+from ..tuning.flexible import check_flexible, joint_frequencies
 from ..tuning.gain_check import GainCheck, check_gains, pair_corner
-from ..tuning.inertia import inertia_along
+from ..tuning.inertia import inertia_along, sampled_reference
 
 Array = NDArray[np.float64]
 
 ALL = "all"
 HELD = 6.0
 """s of flight to measure ripple in."""
+GEARS_EVERY = 1.0
+"""Time between two configurations in which a robot with gears is checked, s."""
 
 
 @dataclass(frozen=True)
@@ -36,11 +40,26 @@ class Checked:
     ripple: dict[str, Array | None]
     """By law, (m,) N m: the torque's standard deviation with the robot held still, by its sensors'
     noise; None if that diverged. Empty with ideal sensors."""
+    frequencies: dict[str, tuple[float, float]]
+    """By joint with a gear, Hz: lowest and highest frequency of its spring along the mission."""
 
     @property
     def is_sound(self) -> bool:
         """True if every law passes its check."""
         return all(check.is_sound for check in self.checks)
+
+    @property
+    def faults(self) -> list[str]:
+        """What is wrong with which laws, one clause for each kind of fault."""
+        kinds = {
+            "h_bar leaves too little margin in torque scale": [
+                check.law for check in self.checks if not check.has_margin
+            ],
+            "small oscillations of the gears' springs grow": [
+                check.law for check in self.checks if not check.is_stable
+            ],
+        }
+        return [f"{', '.join(laws)}: {fault}" for fault, laws in kinds.items() if laws]
 
 
 def checked(options: dict[str, Any]) -> Checked:
@@ -62,6 +81,9 @@ def checked(options: dict[str, Any]) -> Checked:
     )
     corner = pair_corner(flight.controller_settings)
     checks = [check_gains(law, inertia, quaternion, corner) for law in laws]
+    frequencies: dict[str, tuple[float, float]] = {}
+    if any(flight.plant.robot.gears):
+        checks, frequencies = with_gears(flight, checks, list(laws), quaternion, corner)
     ripple: dict[str, Array | None] = {}
     if flight.plant_settings.sensors != "ideal":
         names = flight.laws if every else [plan.controller]
@@ -69,7 +91,36 @@ def checked(options: dict[str, Any]) -> Checked:
             check.law: held_ripple(flight, plan.model_copy(update={"controller": name}))
             for check, name in zip(checks, names, strict=True)
         }
-    return Checked(flight, checks, ripple)
+    return Checked(flight, checks, ripple, frequencies)
+
+
+def with_gears(
+    flight: Flight,
+    checks: list[GainCheck],
+    laws: Sequence[ControlLaw],
+    quaternion: Array,
+    corner: float,
+) -> tuple[list[GainCheck], dict[str, tuple[float, float]]]:
+    """Add to the checks the laws' stability with the gears of the robot.
+
+    Returns:
+        The checks, and frequencies as in `Checked`.
+    """
+    robot = flight.plant.robot
+    positions = sampled_reference(robot, flight.mission_settings, GEARS_EVERY).joints[:, 0]
+    rest = np.broadcast_to([s.rest for s in robot.springs], (len(positions), len(robot.springs)))
+    frequencies = joint_frequencies(robot, np.hstack([positions, rest]))
+    extremes = zip(frequencies.min(axis=0).tolist(), frequencies.max(axis=0).tolist(), strict=True)
+    with_springs = [
+        replace(
+            check,
+            flexible=check_flexible(
+                law, robot, positions, quaternion, corner, flight.controls_base
+            ),
+        )
+        for check, law in zip(checks, laws, strict=True)
+    ]
+    return with_springs, dict(zip(robot.geared_names, extremes, strict=True))
 
 
 def held_ripple(flight: Flight, plan: FlightPlan) -> Array | None:
@@ -108,6 +159,16 @@ def report_of(checks: Checked) -> dict[str, Any]:
         },
         "axes": flight.robot.axis_names,
         "is_sound": checks.is_sound,
+        **(
+            {
+                "gears": {
+                    name: {"lowest_hz": low, "highest_hz": high}
+                    for name, (low, high) in checks.frequencies.items()
+                }
+            }
+            if checks.frequencies
+            else {}
+        ),
         **({"sensors": flight.plant_settings.sensors} if checks.ripple else {}),
         "laws": {check.law: dict(_of_law(check, checks)) for check in checks.checks},
     }
@@ -124,6 +185,8 @@ def _of_law(check: GainCheck, checks: Checked) -> Iterable[tuple[str, Any]]:
             ("torque_scale_margin", spectrum.margin),
             ("largest_torque_scale", spectrum.largest_scale),
         )
+    if flexible := check.flexible:
+        yield "flexible", {"is_stable": flexible.is_stable, **asdict(flexible)}
     yield "noise_gain", check.noise_gain.tolist()
     if checks.ripple:
         ripple = checks.ripple[check.law]

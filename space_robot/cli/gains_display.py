@@ -21,6 +21,9 @@ def print_checks(checks: Checked, console: Console) -> None:
     )
     if any(check.spectrum for check in checks.checks):
         print_table(_margins(checks), console)
+    if checks.frequencies:
+        print_table(_frequencies(checks), console)
+        print_table(_with_gears(checks), console)
     print_table(_noise_gains(checks), console)
     if checks.ripple:
         print_table(_ripple(checks), console)
@@ -55,6 +58,40 @@ def _margins(checks: Checked) -> Table:
     note = (
         "The margin is the share by which the torque reported may exceed the one commanded "
         "until the time-delay estimate diverges."
+    )
+    return Table(table.title, table.columns, table.groups, [note])
+
+
+def _frequencies(checks: Checked) -> Table:
+    columns = [
+        Column("", is_label=True),
+        Column("lowest", spec=".3f"),
+        Column("highest", spec=".3f"),
+    ]
+    rows = [[name, *extremes] for name, extremes in checks.frequencies.items()]
+    return Table.of("Frequency of each gear's spring along the mission, Hz", columns, rows)
+
+
+def _with_gears(checks: Checked) -> Table:
+    columns = [
+        Column("", is_label=True),
+        Column("radius"),
+        Column("largest\nbandwidth"),
+        Column("largest\nh_bar", spec=".3g"),
+    ]
+    rows = []
+    for check in checks.checks:
+        if flexible := check.flexible:
+            corner = flexible.largest_corner_hz
+            text: str | None = "any" if corner is None else f"{corner:.3g} Hz"
+            text = text if check.spectrum else None
+            stable = JudgedCell(f"{flexible.radius:.6f}", *_holds(flexible.is_stable))
+            rows.append([check.law, stable, text, flexible.largest_h_bar_scale])
+    table = Table.of("Stability with the springs of the gears along the mission", columns, rows)
+    note = (
+        "An oscillation grows by the radius in a tick if it is above 1. The bandwidth is the "
+        "largest controller.acceleration_filter_hz, and h_bar the largest factor on all of h_bar, "
+        "with which it does not; switching terms are not counted."
     )
     return Table(table.title, table.columns, table.groups, [note])
 

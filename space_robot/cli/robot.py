@@ -16,7 +16,7 @@ from .options import BASE, REPAIR, file_option, flight_options
 @file_option("--out", help="Write all numbers as a robot's YAML, to edit it or to fly it.")
 @flight_options("json")
 def robot(robot: str, base: str | None, repair: bool, out: Path | None, as_json: bool) -> None:
-    """Show the bodies, joints, tools, shapes and defects of a robot.
+    """Show the bodies, joints, drives, tools, shapes, plates and defects of a robot.
 
     ROBOT is a name, a URDF, a xacro (where xacro is installed), a YAML file or a folder. A URDF
     with defects is not read unless they are repaired: they are listed, with exit code 2.

@@ -1,4 +1,4 @@
-"""Tables of a robot's bodies, joints, tools and shapes."""
+"""Tables of a robot's bodies, joints, drives, tools, shapes and plates."""
 
 from __future__ import annotations
 
@@ -28,9 +28,13 @@ def print_robot(description: dict[str, Any], findings: Sequence[Finding], consol
         print_defects(findings, console, are_repaired=True)
     print_table(_bodies(description), console)
     print_table(_joints(description), console)
+    if any("drive" in joint for joint in description["joints"]):
+        print_table(_drives(description), console)
     print_table(_tools(description), console)
     if description["shapes"]:
         print_table(_shapes(description), console)
+    if description["plates"]["count"]:
+        print_table(_plates(description), console)
 
 
 def print_defects(
@@ -114,6 +118,37 @@ def _coefficients(description: dict[str, float] | None) -> str | None:
     return ", ".join(f"{value:.4g}" for value in description.values()) if description else None
 
 
+def _drives(description: dict[str, Any]) -> Table:
+    columns = [
+        Column("joint", is_label=True),
+        Column("gear ratio"),
+        *(Column(name) for name in ("rotor inertia", "reflected", "stiffness", "damping")),
+        Column("encoder", is_label=True),
+    ]
+    rows = []
+    for joint in description["joints"]:
+        if drive := joint.get("drive"):
+            slides = joint["kind"] == "prismatic"
+            stiffness = "N/m" if slides else "N m/rad"
+            rows.append(
+                [
+                    joint["name"],
+                    f"{drive['gear_ratio']:.5g}{' rad/m' if slides else ''}",
+                    f"{drive['rotor_inertia']:.4g} kg m2",
+                    f"{drive['reflected_inertia']:.4g} {'kg' if slides else 'kg m2'}",
+                    f"{drive['stiffness']:.4g} {stiffness}",
+                    f"{drive['damping']:.4g} {'N s/m' if slides else 'N m s/rad'}",
+                    drive["encoder"],
+                ]
+            )
+    note = (
+        "Motors on the parent, behind a gear and a spring. Stiffness and damping on the link's "
+        "side; reflected: the rotor's inertia there, times the ratio squared; encoder: the side "
+        "that is measured."
+    )
+    return Table("Drives", columns, [Group(rows)], [note])
+
+
 def _tools(description: dict[str, Any]) -> Table:
     columns = [Column("tool", is_label=True), Column("body", is_label=True), Column("place", "m")]
     rows = [
@@ -139,6 +174,18 @@ def _shapes(description: dict[str, Any]) -> Table:
         for seen in description["shapes"]
     ]
     return Table.of("Shapes", columns, rows)
+
+
+def _plates(description: dict[str, Any]) -> Table:
+    plates = description["plates"]
+    columns = [Column("body", is_label=True), Column("plates", spec="d"), Column("area", "m2")]
+    rows = [[body["name"], body["count"], f"{body['area']:.4g}"] for body in plates["bodies"]]
+    total = ["together", plates["count"], f"{plates['area']:.4g}"]
+    note = (
+        "For drag and sunlight in orbit: "
+        f"{'those of the file' if plates['source'] == 'file' else 'made from the shapes'}."
+    )
+    return Table("Plates", columns, [Group(rows), Group([total])], [note])
 
 
 def _vector(values: Sequence[float]) -> str:

@@ -17,7 +17,9 @@ if TYPE_CHECKING:
 
 
 @click.command()
-@flight_options("controller", "case", "gains", "robot", "mission", "duration", "friction", "json")
+@flight_options(
+    *("controller", "case", "gains", "robot", "mission", "orbit", "duration", "friction", "json")
+)
 @click.option(
     "--initial-error",
     type=FiniteRange(0.0, 0.1, min_open=True),

@@ -76,7 +76,7 @@ class MessageLoop:
             for message in zip(self._states.topics, sent.messages, strict=True):
                 self._record(*message)
             self._deliver(sent, tick)
-        if not plant.measures_truth:
+        if plant.truth_topics:
             self._tell_truth(plant.truth)
         self._exchange.end(tick)
         plant.step(self._guard.act(tick))

@@ -48,7 +48,7 @@ class Messages:
         names, timebase = flight.plant.names, flight.timebase
         self.record, self._flight = recorder.record, flight
         self._states = StateCodec(names, timebase)
-        self._truth = TruthWriter(names, timebase)
+        self._truth = TruthWriter(names, timebase, flight.plant.truth_topics)
         self._commands = CommandCodec(names.commanded, timebase)
         self._references = ReferenceCodec(names.joints, timebase)
         self._telemetry = TelemetryCodec(names.axes)
@@ -103,7 +103,7 @@ class Messages:
             parts = self._states.encode(state)
             for topic, data in zip(self._states.topics, parts, strict=True):
                 record(topic, data)
-            if measured is not log:
+            if flight.plant.truth_topics:
                 self.update_true_state(next(true_states))
             self.show(tick, log.state)
             if tick >= answered:
@@ -167,7 +167,17 @@ def columns_of(
     """Return the columns of a log, see `empty_log`; if ``is_brief``, of true states only."""
     names = flight.plant.names
     counts = len(names.wheels), len(names.thrusters)
-    log = FlightLog.allocate(ticks, names.joints, flight.timebase, *counts, names.passive, new)
+    log = FlightLog.allocate(
+        ticks,
+        names.joints,
+        flight.timebase,
+        *counts,
+        names.passive,
+        names.geared,
+        names.in_orbit,
+        new,
+        len(names.torquers),
+    )
     if is_brief:
         return log
     log.commanded_torque = new(log.applied_torque.shape)

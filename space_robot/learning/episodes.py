@@ -53,7 +53,8 @@ class ReachTask:
 
         Raises:
             InputError: a number is out of its range, or the scenario has what the task has not:
-                sensors with errors, delays, faults, events, or a base with hardware.
+                an orbit, joints with gears, sensors with errors, delays, faults, events, or a base
+                with hardware.
         """
         scenario = Scenario(controller=None) if scenario is None else scenario
         if not isinstance(scenario, Scenario):
@@ -91,7 +92,7 @@ class ReachTask:
         plant[:] = self.begin.block
         rows = 7 + self.begin.memory.model.row[: self.n].astype(int)
         plant["x"][0, rows] = episode.start
-        update_true_state(plant)
+        update_true_state(plant, 0, self.period)
         reach["target"], reach["scale"] = episode.target, self.scale
         reach["attitude"] = self.begin.truth.quaternion
         reach["tick"], reach["ticks"], reach["has_failed"] = 0.0, self.ticks, 0.0
@@ -109,6 +110,10 @@ def _check_simple(flight: Flight) -> None:
     plant, why = flight.plant, ""
     if plant.names.actuators or not flight.controls_base:
         why = "a base without ideal torques"
+    elif plant.names.in_orbit:
+        why = "an orbit"
+    elif any(flight.robot.gears):
+        why = "joints with gears"
     elif not plant.measures_truth:
         why = "sensors, drives or faults with errors"
     elif plant.command_delay_buffer.size:

@@ -161,7 +161,7 @@ def step_in_lanes(
             flies = flies & (fastest <= RATE_LIMIT)
             begin_interval(memory, buffer, task.torque, 0, period)
             move_lanes(memory, alone, (task.tick + k) * period, period, flies)
-            fastest = where(flies, end_interval(memory), fastest)
+            fastest = where(flies, end_interval(memory, 0, period), fastest)
         for i in range(state.size):
             state[i] = memory.x[i]
         judge(task, memory.truth, fastest, ticks, period)

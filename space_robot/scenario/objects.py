@@ -28,6 +28,7 @@ from space_robot_msgs_py.config.validation import StrictModel, validate
 from space_robot_sim.actuators.actuators import ActuatorSettings
 from space_robot_sim.environment.environment import EnvironmentSettings
 from space_robot_sim.environment.events import Capture, Release
+from space_robot_sim.environment.orbit_settings import OrbitSettings
 
 
 def _name(value: Any, otherwise: str) -> str:
@@ -121,6 +122,7 @@ MissionGiven = Annotated[Any, PlainValidator(_mission)]
 Case = Annotated[Any, PlainValidator(_settings(EnvironmentSettings))]
 Sensors = Annotated[Any, PlainValidator(_settings(SensorSettings))]
 Actuators = Annotated[Any, PlainValidator(_settings(ActuatorSettings))]
+OrbitGiven = Annotated[Any, PlainValidator(_settings(OrbitSettings))]
 AssumedActuators = Annotated[Any, PlainValidator(_settings(BaseActuatorSettings))]
 EventText = Annotated[str, BeforeValidator(_plain)]
 

@@ -84,6 +84,20 @@ OPTIONS = (
         folder="actuators",
     ),
     Option(
+        "assumed_actuators",
+        "name",
+        "Actuators of the base as the flight software assumes them",
+        default_text="as they are",
+    ),
+    Option(
+        "orbit",
+        "name",
+        "Orbit, with gravity gradient, drag, sunlight and magnetic field: {names}, or a path to a "
+        "YAML file",
+        "none",
+        folder="orbits",
+    ),
+    Option(
         "gains",
         "name",
         "Gain set: printed, tuned, robust, default (printed where it flies), or a path",
@@ -95,6 +109,12 @@ OPTIONS = (
         "Robot: {names}, or a path to its YAML, URDF or folder",
         "paper",
         folder="robots",
+    ),
+    Option(
+        "plant_robot",
+        "name",
+        "Robot that flies, unknown to the laws and the mission",
+        default_text="the same robot",
     ),
     Option("mission", "name", "Mission by name or path", "", default_text="the robot's"),
     Option(

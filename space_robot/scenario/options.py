@@ -22,6 +22,7 @@ from .objects import (
     Gains,
     LawGiven,
     MissionGiven,
+    OrbitGiven,
     RobotGiven,
     Sensors,
     gains_of,
@@ -56,10 +57,11 @@ class FlightPlan(StrictModel):
     sensors: Sensors = of("sensors")
     actuators: Actuators = of("actuators")
     """Actuators of the base."""
-    assumed_actuators: AssumedActuators | None = None
+    orbit: OrbitGiven = of("orbit")
+    assumed_actuators: AssumedActuators | None = of("assumed_actuators")
     """Actuators that the flight software assumes (None: as in their file)."""
     robot: RobotGiven = of("robot")
-    plant_robot: RobotGiven | None = None
+    plant_robot: RobotGiven | None = of("plant_robot")
     """True robot of the plant; controller and mission know ``robot`` (None: the same)."""
     mission: MissionGiven = of("mission")
     duration: float | None = of("duration")
@@ -98,8 +100,8 @@ class FlightPlan(StrictModel):
         """Return the parameters of each node set by the options, by dotted name."""
         robot = robot_setting(self.robot)
         mission, waypoints, start = mission_of(self.mission)
-        (case, world), (sensors, errors), (actuators, hardware) = (
-            numbers_of(value) for value in (self.case, self.sensors, self.actuators)
+        (case, world), (sensors, errors), (actuators, hardware), (orbit, place) = (
+            numbers_of(value) for value in (self.case, self.sensors, self.actuators, self.orbit)
         )
         law = resolve_law(self.controller)
         gains, values = gains_of(self.gains, law)
@@ -113,8 +115,10 @@ class FlightPlan(StrictModel):
                 "case": case,
                 "sensors": sensors,
                 "actuators": actuators,
+                **({} if orbit == "none" else {"orbit": orbit}),
                 **start,
                 **world,
+                **place,
                 **errors,
                 **hardware,
                 "realtime": self.realtime,

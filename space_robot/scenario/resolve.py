@@ -66,6 +66,11 @@ def _assumed_actuators(
     plan: FlightPlan, settings: FlightSettings, robot: Robot
 ) -> BaseActuatorSettings:
     name = settings.controller.actuators
+    if isinstance(plan.assumed_actuators, str):
+        try:
+            return assumed_actuators(plan.assumed_actuators, robot)
+        except InputError as error:
+            raise InputError(f"assumed_actuators: {error}") from None
     if plan.assumed_actuators is not None:
         own, option = plan.assumed_actuators, "assumed_actuators"
     elif name != GIVEN:
@@ -93,13 +98,14 @@ def _check_composed(plan: FlightPlan) -> None:
 
 def _check_actuators(scenario: ResolvedScenario) -> None:
     both = [
-        (s.base_actuation, s.wheel_count, s.thruster_count)
+        (s.base_actuation, s.wheel_count, s.thruster_count, s.torquer_count)
         for s in (scenario.plant, scenario.assumed_actuators)
     ]
     if both[0] != both[1]:
         kinds = "; ".join(
             f"{node} {actuation}, {wheels} wheels, {thrusters} thrusters"
-            for node, (actuation, wheels, thrusters) in zip(
+            + (f", {torquers} magnetic torquers" if torquers else "")
+            for node, (actuation, wheels, thrusters, torquers) in zip(
                 ("plant", "controller"), both, strict=True
             )
         )

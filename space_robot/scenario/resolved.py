@@ -10,12 +10,14 @@ from typing import Any
 
 from pydantic import BaseModel
 
+from space_robot_control.allocation.settings import AllocationSettings
 from space_robot_control.controller.plain_laws import NoLaw
 from space_robot_control.controller.settings import DEFAULT, ControllerNodeSettings
 from space_robot_control.guidance.mission import Mission, MissionSettings
 from space_robot_control.guidance.settings import MissionNodeSettings
 from space_robot_control.laws import ControlLaw
 from space_robot_model.hardware.base_actuators import BaseActuatorSettings
+from space_robot_model.hardware.magnetic_torquers import MagneticTorquerSettings
 from space_robot_model.hardware.sensors import SensorSettings
 from space_robot_msgs_py.bag.recorder_settings import RecorderNodeSettings
 from space_robot_msgs_py.config.trees import Tree
@@ -23,6 +25,7 @@ from space_robot_msgs_py.errors import InputError
 from space_robot_sim.actuators.actuators import ActuatorSettings
 from space_robot_sim.environment.environment import EnvironmentSettings
 from space_robot_sim.environment.friction import coefficients
+from space_robot_sim.environment.orbit_settings import OrbitSettings
 from space_robot_sim.faults.grammar import Fault
 from space_robot_sim.plant.description import actuators, plant_description
 from space_robot_sim.plant.faults import PLANT_KINDS
@@ -38,8 +41,9 @@ SECTIONS: Mapping[str, type[BaseModel]] = {
     "case": EnvironmentSettings,
     "sensors": SensorSettings,
     "actuators": ActuatorSettings,
+    "orbit": OrbitSettings,
 }
-"""Options that hold numbers of the plant."""
+"""Options that hold numbers of the plant; an orbit only where there is one."""
 BY_THE_MISSION = ("initial_joints_deg", "initial_quaternion")
 """Options that a mission sets for the plant."""
 OF_PLANT = ("period", "substeps", "command_latency_ticks")
@@ -49,7 +53,10 @@ OF_THE_CODE = ("controller_code", "shadow")
 """Parameters of the controller's node that change no number; options only where they are set."""
 ROBOTS = ("robot", "plant_robot")
 """Options recorded in a bag as ``robot_file`` and ``controller_robot_file``."""
-LABELS = ("robot", "mission", "case", "sensors", "actuators", "gains", "navigation_sensors")
+LABELS = (
+    *("robot", "mission", "case", "sensors", "actuators", "orbit", "gains"),
+    "navigation_sensors",
+)
 """Names of files, which the numbers replace."""
 
 
@@ -201,17 +208,18 @@ class ResolvedScenario:
 def _tree(scenario: ResolvedScenario) -> dict[str, Any]:
     settings, laws = scenario.settings, scenario.laws
     plant, controller = settings.plant, settings.controller
-    numbers = plant.model_dump(mode="json")
+    numbers = _numbers(plant)
     sections = {
-        option: {key: numbers[key] for key in schema.model_fields if key not in _ELSEWHERE}
+        option: {k: numbers[k] for k in schema.model_fields if k not in _ELSEWHERE and k in numbers}
         for option, schema in SECTIONS.items()
+        if option != "orbit" or plant.has_orbit
     }
     mission = settings.mission.model_dump(mode="json", include=set(MissionSettings.model_fields))
     navigation: Tree = {}
     if (filtered := controller.filter_settings) is not None:
         navigation = {"navigation_filter": filtered.model_dump(mode="json")}
-    own = scenario.assumed_actuators.model_dump(mode="json")
-    differs = own != {key: sections["actuators"][key] for key in own}
+    own = _numbers(scenario.assumed_actuators)
+    differs = own != {key: sections["actuators"].get(key) for key in own}
     events = [text for text in plant.events if text.strip()]
     return {
         "controller": controller.controller,
@@ -269,4 +277,24 @@ def _rest(node: str, settings: BaseModel) -> dict[str, Any]:
         "fault_seed",
         *(name.partition(".")[2] for name in NOT_TO_BE_SET if name.startswith(f"{node}.")),
     }
-    return {key: v for key, v in settings.model_dump(mode="json").items() if key not in held}
+    return {key: value for key, value in _numbers(settings).items() if key not in held}
+
+
+_LATER: Mapping[str, Any] = {
+    "magnetic_torquers": MagneticTorquerSettings().model_dump(mode="json"),
+    **{key: AllocationSettings.model_fields[key].default for key in ("dump", "magnetic_gain")},
+}
+"""Settings that flights of earlier releases did not have, with their defaults. At these they are
+left out, so that the digest of a flight without them stays."""
+
+
+def _numbers(settings: BaseModel) -> Tree:
+    return _without_defaults(settings.model_dump(mode="json"))
+
+
+def _without_defaults(tree: Tree) -> Tree:
+    return {
+        key: _without_defaults(value) if isinstance(value, dict) else value
+        for key, value in tree.items()
+        if key not in _LATER or value != _LATER[key]
+    }

@@ -28,6 +28,7 @@ from .resolved import ResolvedScenario
 OF_PLANT = frozenset(
     {
         *("friction", "disturbance", "payload", "initial_joints_deg", "initial_quaternion"),
+        *("orbital_elements", "gravity", "atmosphere", "sunlight", "magnetism"),
         *("torque_echo", "echo_scale", "echo_bias", "substeps", "command_latency_ticks"),
         *("drive_scale", "drive_bias", "drive_step", "drive_dead_band", "drive_lag"),
         *("base_torque_limit", "joint_torque_limit", "star_tracker", "gyro", "encoders"),

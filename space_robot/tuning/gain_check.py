@@ -26,6 +26,7 @@ from space_robot_control.controller.settings import ControllerNodeSettings
 from space_robot_control.laws import ControlLaw
 from space_robot_control.navigation.low_pass import low_pass_weight
 
+from .flexible import FlexibleCheck
 from .inertia import attitude_jacobian
 from .spectrum import Spectrum, spectrum
 
@@ -41,11 +42,23 @@ class GainCheck:
     """Eigenvalues and margin; None for a law without time-delay estimation."""
     noise_gain: Array
     """(m,) torque per unit of noise on the rate of the same axis, N m s."""
+    flexible: FlexibleCheck | None = None
+    """Stability on a robot with gears; None for one without."""
 
     @property
     def is_sound(self) -> bool:
+        """False if time-delay estimation has too little margin, or a gear's spring oscillates."""
+        return self.has_margin and self.is_stable
+
+    @property
+    def has_margin(self) -> bool:
         """False if the law uses time-delay estimation with too little margin."""
         return self.spectrum is None or self.spectrum.is_sound
+
+    @property
+    def is_stable(self) -> bool:
+        """False if small oscillations of a gear's spring grow."""
+        return self.flexible is None or self.flexible.is_stable
 
 
 def pair_corner(settings: ControllerNodeSettings) -> float:

@@ -15,6 +15,7 @@ from .browser import FRAME_TIMEOUT_S, headless_browser
 from .film import FilmedFlight, add_flights
 from .local_server import local_server
 from .plots import Plot
+from .stage import Rendering
 
 if TYPE_CHECKING:
     from PIL.Image import Image
@@ -30,6 +31,8 @@ LENGTH_S = 10.0
 """Duration of the animation, independent of the flight's."""
 ASIDE = 0.17
 """Shift of the robot to the left, relative to the picture's width: curves are on the right."""
+PICTURE = Rendering(shadows=False, labels=False, far=1000.0)
+"""viser renders pictures up to that distance, and draws labels in them too large."""
 INK, FAINT = "#c9d1d9", "#57606a"
 TOP, BOTTOM = (13, 17, 23), (27, 35, 48)
 """Colours of the background."""
@@ -62,9 +65,11 @@ def animate(
     overlay = _Overlay(plots, times, caption)
     drawn = []
     with local_server() as server:
-        moves = add_flights(server, [flight], times, False, True, shadows=False)
-        pose = _camera(server.initial_camera.position, server.initial_camera.look_at)
-        fov = float(server.initial_camera.fov)
+        moves = add_flights(server, [flight], times, False, True, PICTURE)
+        camera = server.initial_camera
+        up = np.array([0.0, 0.0, 1.0]) if camera.up is None else camera.up
+        pose = _camera(camera.position, camera.look_at, up)
+        fov = float(camera.fov)
         with headless_browser(server) as client:
 
             def draw(k: int) -> NDArray[np.uint8]:
@@ -109,13 +114,13 @@ def encoded(frames: Sequence[Image], file: Path) -> bytes:
     return written.getvalue()
 
 
-def _camera(position: Array, look_at: Array) -> tuple[Array, Array]:
+def _camera(position: Array, look_at: Array, up: Array) -> tuple[Array, Array]:
     """Return attitude ``[w, x, y, z]`` and position of a camera with the robot on the left."""
     from scipy.spatial.transform import Rotation
 
     back = position - look_at
     forward = -back / np.linalg.norm(back)
-    right = np.cross(forward, [0.0, 0.0, 1.0])
+    right = np.cross(forward, up)
     right /= np.linalg.norm(right)
     aside = ASIDE * np.linalg.norm(back) * right
     x, y, z, w = Rotation.from_matrix(

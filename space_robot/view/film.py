@@ -22,9 +22,12 @@ from ..analysis.tool_error import wanted_poses
 from .frames import Frames
 from .free_body import FreeBody, before_capture
 from .goals import goals
+from .horizon import Horizon
 from .local_server import local_server
+from .orbit_frames import OrbitFrames
+from .orbit_scene import ArrowFrames, earth_frames
 from .scene import RobotScene, SceneStyle, add_shape, rgb, set_pose
-from .stage import extent, set_stage
+from .stage import PAGE, Rendering, extent, set_stage
 from .trails import Move, trails
 
 if TYPE_CHECKING:
@@ -159,7 +162,7 @@ def add_flights(
     times: Array,
     side_by_side: bool,
     dark: bool,
-    shadows: bool = True,
+    rendering: Rendering = PAGE,
 ) -> list[Move]:
     """Add robots, trails and targets to a server's empty scene.
 
@@ -169,7 +172,7 @@ def add_flights(
         times: (K,) of the frames, s.
         side_by_side: whether the robots are side by side.
         dark: whether the page is light on dark.
-        shadows: whether shadows are drawn.
+        rendering: what is drawn.
 
     Returns:
         Functions that move everything to a frame.
@@ -183,11 +186,22 @@ def add_flights(
         for flight, poses in zip(flights, wanted, strict=True)
     ]
     seen = [_seen(flight.robot, of) for flight, of in zip(flights, frames, strict=True)]
-    places = _places(seen) if side_by_side else [np.zeros(3)] * len(flights)
+    orbits = [OrbitFrames.of(flight.log, times) for flight in flights]
+    orbit = next(filter(None, orbits), None)
+    horizon = Horizon.of(orbit) if orbit else None
+    across = horizon.axes[:, 0] if horizon else np.array([1.0, 0.0, 0.0])
+    places = _places(seen, across) if side_by_side else [np.zeros(3)] * len(flights)
     scene = server.scene
     points = np.concatenate([s + p for s, p in zip(seen, places, strict=True)])
-    set_stage(server, points, dark, shadows)
-    moves: list[Move] = []
+    arrows = [
+        ArrowFrames(flight.robot, of, own, points, dark)
+        if own and (side_by_side or own is orbit)
+        else None
+        for flight, of, own, points in zip(flights, frames, orbits, seen, strict=True)
+    ]
+    tips = [a.tips + place for a, place in zip(arrows, places, strict=True) if a]
+    stage = set_stage(server, np.concatenate([points, *tips]), dark, rendering, horizon)
+    moves = [earth_frames(scene, stage, orbit, dark)] if orbit else []
     for index, (flight, of, place) in enumerate(zip(flights, frames, places, strict=True)):
         root = f"/{flight.name.replace('/', '_')}"
         scene.add_frame(root, show_axes=False, position=place)
@@ -200,6 +214,8 @@ def add_flights(
         if (poses := wanted[index]) is not None:
             goals(scene, root, flight.log, poses, 0.04 * size)
         moves += targets(scene, root, robot, flight.log, flight.robot, times)
+        if own := arrows[index]:
+            moves.append(own.add(scene, root, rendering.labels))
     return moves
 
 
@@ -217,13 +233,14 @@ def _seen(robot: Robot, frames: Frames) -> Array:
     )
 
 
-def _places(seen: Sequence[Array]) -> list[Array]:
-    """Return offsets of robots side by side along x, m; that of the first one is zero."""
+def _places(seen: Sequence[Array], across: Array) -> list[Array]:
+    """Return offsets of robots side by side along a unit vector, m; the first one's is zero."""
     places: list[Array] = [np.zeros(3)]
-    end = float(seen[0][:, 0].max())
-    for before, points in pairwise(seen):
-        width = max(float(np.ptp(points[:, 0])), float(np.ptp(before[:, 0])))
-        x = end + GAP * width - float(points[:, 0].min())
-        places.append(np.array([x, 0.0, 0.0]))
-        end = x + float(points[:, 0].max())
+    extents = [points @ across for points in seen]
+    end = float(extents[0].max())
+    for before, along in pairwise(extents):
+        width = max(float(np.ptp(along)), float(np.ptp(before)))
+        x = end + GAP * width - float(along.min())
+        places.append(x * across)
+        end = x + float(along.max())
     return places

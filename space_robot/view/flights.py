@@ -16,16 +16,16 @@ from space_robot_msgs_py.errors import InputError
 
 from ..analysis.described import check_joints, robot_of
 from .animation import animate, encoded
+from .arrows import ArrowKind, arrow_kinds
 from .film import FilmedFlight, film
 from .frames import RATE_HZ, shown_times
 from .marks import shared_marks
 from .meshes import shown_shapes
+from .orbit_frames import is_in_orbit, sun_direction
 from .page import Shown, render
+from .palette import ON_DARK, palette
 from .plots import plots_of
 
-ON_DARK = ("#56B4E9", "#E98FC0", "#2CC295", "#E69F00", "#F0E442", "#FF7F41")
-ON_WHITE = ("#0072B2", "#CC79A7", "#009E73", "#E69F00", "#8A7F00", "#D55E00")
-"""Colours of Okabe and Ito, adapted to dark and light pages."""
 OF_TRAIL = "#FFB000"
 PICTURED, MOST_PLOTS = ("attitude", "base torque", "torque"), 3
 """Prefixes of the titles of plots beside an animated picture."""
@@ -62,7 +62,7 @@ def flights_page(
     Raises:
         InputError: viser is not installed, or a flight has no state.
     """
-    colours = ON_DARK if options.dark else ON_WHITE
+    colours = palette(options.dark)
     flights = [
         FilmedFlight(name, log, robots[name], _law(log), colours[k % len(colours)])
         for k, (name, log) in enumerate(logs.items())
@@ -78,6 +78,7 @@ def flights_page(
         shared_marks(logs),
         float(times[0]),
         options.dark,
+        _legend(logs, options.dark),
     )
 
 
@@ -130,6 +131,13 @@ def remarks_on(logs: Mapping[str, FlightLog], robots: Mapping[str, Robot]) -> li
         if (urdf := _urdf_of(log)) and not robots[name].visuals:
             lines.append(f"bags do not contain the robot's shapes: --robot {urdf} draws them")
     return list(dict.fromkeys(lines))
+
+
+def _legend(logs: Mapping[str, FlightLog], dark: bool) -> list[ArrowKind]:
+    """Return the arrows that are shown; none without an orbit."""
+    in_orbit = [log for log in logs.values() if is_in_orbit(log)]
+    has_sun = any(sun_direction(log) is not None for log in in_orbit)
+    return arrow_kinds(has_sun, dark) if in_orbit else []
 
 
 def _urdf_of(log: FlightLog) -> str:

@@ -26,6 +26,8 @@ MOST_FRAMES = 3000
 """Maximum number of frames of all flights of a page, to keep it below 3 MB."""
 STEP = 2.0**-30
 """Resolution of poses, m: invisible, and halves the size of the page."""
+STATE = ("base_position", "quaternion", "joint_positions", "passive_positions")
+"""Columns of a flight that are needed for a pose."""
 
 
 @dataclass(frozen=True)
@@ -62,15 +64,9 @@ class Frames:
         Raises:
             InputError: no tick of the flight has a complete state.
         """
-        known = np.flatnonzero(
-            log.finite(("base_position", "quaternion", "joint_positions", "passive_positions"))
-        )
-        if not len(known):
+        rows = held_rows(log, STATE, times)
+        if not len(rows):
             raise InputError("no tick of the bag has the complete state of the robot")
-        # times are rounded: the nearest tick is meant
-        due = times + 0.5 * log.timebase.period
-        at = np.searchsorted(tick_times(log)[known], due, side="right") - 1
-        rows = known[np.maximum(at, 0)]
         position, quaternion = log.base_position[rows], unit_rows(log.quaternion[rows])
         angles = log.all_positions[rows]
         tools = {
@@ -78,13 +74,13 @@ class Frames:
             for tool in robot.tools
         }
         joints = [
-            t._replace(position=_rounded(t.position), quaternion=_rounded(t.quaternion))
+            t._replace(position=rounded(t.position), quaternion=rounded(t.quaternion))
             for t in joint_transforms(robot, angles)
         ]
         return cls(
             times,
-            _rounded(position),
-            _rounded(quaternion),
+            rounded(position),
+            rounded(quaternion),
             angles,
             joints,
             tools,
@@ -113,6 +109,26 @@ def shown_times(logs: Sequence[FlightLog], rate: float) -> Array:
     return times
 
 
+def held_rows(log: FlightLog, columns: Sequence[str], times: Array) -> NDArray[np.intp]:
+    """Return the rows of a flight to be shown at some times: the last complete ones.
+
+    Args:
+        log: the flight.
+        columns: that must be finite.
+        times: (K,) s; before the first complete row it is that one.
+
+    Returns:
+        (K,), or (0,) if no row is complete.
+    """
+    known = np.flatnonzero(log.finite(columns))
+    if not len(known):
+        return known
+    # times are rounded: the nearest tick is meant
+    due = times + 0.5 * log.timebase.period
+    at = np.searchsorted(tick_times(log)[known], due, side="right") - 1
+    return np.asarray(known[np.maximum(at, 0)])
+
+
 def _desired(log: FlightLog, robot: Robot, rows: NDArray[np.intp]) -> Array | None:
     """Return the first tool's desired positions, (K, 3) m, with passive joints at rest."""
     if not controls_base(log):
@@ -127,5 +143,6 @@ def _desired(log: FlightLog, robot: Robot, rows: NDArray[np.intp]) -> Array | No
     return log.base_position[rows] + offset
 
 
-def _rounded(values: Array) -> Array:
+def rounded(values: Array) -> Array:
+    """Return values rounded to `STEP`."""
     return np.round(values / STEP) * STEP

@@ -1,4 +1,4 @@
-"""Marks on the time axis of a flight: events, faults, changes of law."""
+"""Marks on the time axis of a flight: events, faults, changes of law, the Earth's shadow."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from space_robot_sim.faults.grammar import Fault, parse_fault
 
 from ..analysis.described import events_of
 from ..scenario.faults import KINDS
+from .orbit_frames import shadow_intervals
 
 
 class Mark(NamedTuple):
@@ -25,7 +26,7 @@ class Mark(NamedTuple):
     """End, s: equal to ``start`` for an instant, infinite for a permanent change."""
     text: str
     kind: str
-    """``event``, ``fault`` or ``law``."""
+    """``event``, ``fault``, ``law`` or ``shadow``."""
 
 
 def marks_of(log: FlightLog) -> list[Mark]:
@@ -38,6 +39,10 @@ def marks_of(log: FlightLog) -> list[Mark]:
     marks += [
         Mark(law.tick * period, law.tick * period, str(LawChange(before, law)), "law")
         for before, law in pairwise(laws_of(log))
+    ]
+    marks += [
+        Mark(begin, stop, "in the Earth's shadow", "shadow")
+        for begin, stop in shadow_intervals(log)
     ]
     return sorted(mark for mark in marks if mark.start < end and mark.stop >= start)
 

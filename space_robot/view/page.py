@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..analysis.template import template
+from .arrows import ArrowKind
 from .marks import Mark
 from .plots import Plot
 
@@ -35,6 +36,7 @@ def render(
     marks: Sequence[Mark],
     start: float,
     dark: bool,
+    arrows: Sequence[ArrowKind] = (),
 ) -> str:
     """Render the self-contained page.
 
@@ -46,6 +48,7 @@ def render(
         marks: on the time axis.
         start: time of the first frame, s.
         dark: whether the page is light on dark.
+        arrows: at the bases of robots in orbit.
     """
     folder = files(__package__).joinpath("templates")
     data = {
@@ -87,6 +90,8 @@ def render(
         uplot=folder.joinpath("uPlot.iife.min.js").read_text("utf-8"),
         uplot_css=folder.joinpath("uPlot.min.css").read_text("utf-8"),
         css=folder.joinpath("view.css").read_text("utf-8"),
+        orbit_css=folder.joinpath("orbit.css").read_text("utf-8") if arrows else "",
+        arrows=arrows,
         script=folder.joinpath("view.js").read_text("utf-8"),
         data=data,
     )

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from space_robot_model.robot import Robot
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.errors import InputError
+from space_robot_msgs_py.samples import SOURCES
 
 from ..analysis.attitude_drift import attitude_drift, controls_base
 from ..analysis.described import assumed_robot_of, flown_actuators
@@ -38,7 +39,7 @@ class PlottedQuantity(NamedTuple):
 
 
 def quantities_of(log: FlightLog, robot: Robot) -> list[PlottedQuantity]:
-    """Return errors, drift of the base, torques, actuators and passive joints of a flight.
+    """Return errors, drift of the base, joints, torques, actuators and surroundings of a flight.
 
     Args:
         log: the flight.
@@ -49,8 +50,10 @@ def quantities_of(log: FlightLog, robot: Robot) -> list[PlottedQuantity]:
         *_tool(log, robot),
         *_drift(log),
         *_passive_joints(log, robot),
+        *_gears(log, robot),
         *_torques(log),
         *_actuators(log),
+        *_surroundings(log),
     ]
 
 
@@ -103,6 +106,41 @@ def _passive_joints(log: FlightLog, robot: Robot) -> Iterator[PlottedQuantity]:
             names = np.array(log.passive_names)[chosen].tolist()
             away = (log.passive_positions - rest)[:, chosen]
             yield PlottedQuantity("deflection", unit, names, away)
+
+
+def _gears(log: FlightLog, robot: Robot) -> Iterator[PlottedQuantity]:
+    """Yield how far the motors behind gears are ahead of their joints, where both are known."""
+    has_truth = log.measured is not None
+    joints = [
+        joint
+        for joint, name in enumerate(log.joint_names)
+        if name in log.geared_names and (has_truth or not _is_motors_encoder(robot, joint))
+    ]
+    motors = [log.geared_names.index(log.joint_names[joint]) for joint in joints]
+    slides = np.array(log.prismatic, dtype=bool)[joints]
+    away = log.motor_positions[:, motors] - log.joint_positions[:, joints]
+    for chosen, unit in ((~slides, "rad"), (slides, "m")):
+        if chosen.any():
+            names = np.array(log.joint_names)[joints][chosen].tolist()
+            yield PlottedQuantity("gear deflection", unit, names, away[:, chosen])
+
+
+def _is_motors_encoder(robot: Robot, joint: int) -> bool:
+    """Return True if a joint's measured position is its motor's."""
+    gear = robot.gears[joint] if robot.gears else None
+    return gear is None or gear.encoder == "motor"
+
+
+def _surroundings(log: FlightLog) -> Iterator[PlottedQuantity]:
+    """Yield the torques from outside that act in orbit, inertial axes, and the magnetic field."""
+    if not log.external_torques.shape[1]:
+        return
+    for number, source in enumerate(SOURCES):
+        torque = log.external_torques[:, 3 * number : 3 * number + 3]
+        if np.nan_to_num(torque).any():
+            yield PlottedQuantity(f"{words(source)} torque", "N m", AXES, torque)
+    if np.nan_to_num(log.magnetic_field).any():
+        yield PlottedQuantity("magnetic field", "T", AXES, log.magnetic_field)
 
 
 def _actuators(log: FlightLog) -> Iterator[PlottedQuantity]:

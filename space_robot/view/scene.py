@@ -111,7 +111,7 @@ class RobotScene:
                 set_pose(frame, "position", link.position[k])
 
 
-def set_pose(frame: FrameHandle, what: str, value: Array) -> None:
+def set_pose(frame: SceneNodeHandle, what: str, value: Array) -> None:
     """Set a frame's pose exactly.
 
     viser ignores changes within the tolerance of `numpy.allclose`, 1e-5.

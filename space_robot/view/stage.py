@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from importlib.util import find_spec
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,11 +17,12 @@ from space_robot_model.robot.transforms import wxyz
 from space_robot_model.robot.tree import Visual
 from space_robot_msgs_py.errors import InputError
 
+from .horizon import Horizon
 from .mesh import Mesh
 from .meshes import shown_shapes
 
 if TYPE_CHECKING:
-    from viser import SceneApi, ViserServer
+    from viser import DirectionalLightHandle, SceneApi, ViserServer
 
 Array = NDArray[np.float64]
 
@@ -36,6 +37,15 @@ STARS_AT, STAR = 40.0, 0.0025
 """Distance of the stars relative to the size of the scene, and their size relative to that."""
 STAR_DARK, STAR_LIGHT = (130, 136, 150), (205, 209, 216)
 """Colours of the stars on dark and on light pages."""
+DISTANCE = 3000.0
+"""Largest distance of the Earth's centre relative to the size of the scene."""
+BEHIND = 2.0
+"""Distance of the stars in orbit relative to that."""
+EARTH_OF_FAR = 0.4
+"""That distance at most, relative to the largest one that is drawn."""
+IN_SHADOW = 0.12
+"""Intensity of the Sun's light in the Earth's shadow, relative to that outside: none would hide
+the robot."""
 CORNERS = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], dtype=float)
 
 
@@ -49,64 +59,139 @@ def check_viser() -> None:
         raise InputError("view needs viser: pip install 'space_robot[view]'")
 
 
-def set_stage(server: ViserServer, points: Array, dark: bool, shadows: bool = True) -> None:
+class Rendering(NamedTuple):
+    """What a renderer of the scene can draw."""
+
+    shadows: bool = True
+    """Whether shadows are drawn; without a graphics card this takes five times as long."""
+    labels: bool = True
+    """Whether text is drawn."""
+    far: float = np.inf
+    """Largest distance of what is drawn, m."""
+
+
+PAGE = Rendering()
+
+
+class Stage(NamedTuple):
+    """A scene without robots."""
+
+    middle: Array
+    """(3,) m, inertial frame."""
+    size: float
+    """m."""
+    earth_distance: float
+    """Largest distance of the Earth's centre in orbit, m."""
+    lamp: DirectionalLightHandle
+    """The brightest light, the Sun in orbit."""
+
+    def shade(self, is_dark: bool) -> None:
+        """Dim the brightest light in the Earth's shadow."""
+        intensity = LAMPS[0][1] * (IN_SHADOW if is_dark else 1.0)
+        if self.lamp.intensity != intensity:
+            self.lamp.intensity = intensity
+
+
+def set_stage(
+    server: ViserServer,
+    points: Array,
+    dark: bool,
+    rendering: Rendering = PAGE,
+    horizon: Horizon | None = None,
+) -> Stage:
     """Add stars, axes, lights and the initial camera for some points.
 
     Args:
         server: of the scene.
         points: (K, 3) that must be visible, m, inertial frame.
         dark: whether the page is light on dark.
-        shadows: whether shadows are drawn; without a graphics card this takes five times as long.
+        rendering: what is drawn.
+        horizon: of a scene in orbit.
     """
     scene, camera = server.scene, server.initial_camera
-    scene.set_up_direction("+z")
+    axes, direction = np.eye(3), DIRECTION
+    if horizon:
+        axes = horizon.axes
+        direction = horizon.camera_direction(DIRECTION, FIELD_OF_VIEW)
+    scene.set_up_direction(axes[:, 2] if horizon else "+z")
     scene.world_axes.visible = False
+    points = points @ axes
     low, high = points.min(axis=0), points.max(axis=0)
     middle, size = 0.5 * (low + high), max(float(np.linalg.norm(high - low)), 0.1)
-    _surround(scene, middle, size, low, dark)
-    _light(scene, shadows)
-    camera.fov, camera.near, camera.far = float(FIELD_OF_VIEW), 0.01 * size, 100.0 * size
-    back = DIRECTION / np.linalg.norm(DIRECTION)
-    camera.look_at = middle
-    camera.position = middle + _distance(points - middle, back) * back
+    earth_at = min(DISTANCE * size, EARTH_OF_FAR * rendering.far)
+    stars_at = BEHIND * earth_at if horizon else STARS_AT * size
+    far = 2.0 * stars_at if horizon else 100.0 * size
+    corner = low - 0.05 * size
+    if horizon:
+        corner[2] = middle[2]  # above the Earth
+        points = np.vstack([points, corner])
+    _inertial_axes(scene, size, axes @ corner, rendering.labels)
+    _stars(scene, axes @ middle, stars_at, dark, "float32" if horizon else "float16")
+    lamp = _light(scene, rendering.shadows, axes, horizon.sun if horizon else None)
+    camera.fov, camera.near, camera.far = float(FIELD_OF_VIEW), 0.01 * size, far
+    back = direction / np.linalg.norm(direction)
+    if horizon or camera.up is not None:  # that of a flight before
+        camera.up = axes[:, 2]
+    camera.look_at = axes @ middle
+    camera.position = axes @ (middle + _distance(points - middle, back) * back)
+    return Stage(axes @ middle, size, earth_at, lamp)
 
 
-def _surround(scene: SceneApi, middle: Array, size: float, low: Array, dark: bool) -> None:
-    """Draw inertial axes of a round length, and stars, which make drift and rotation visible."""
+def _inertial_axes(scene: SceneApi, size: float, corner: Array, is_labelled: bool) -> None:
+    """Draw inertial axes of a round length, which make drift and rotation visible."""
     length = 10.0 ** np.floor(np.log10(0.5 * size))
     scene.add_frame(
         "/inertial",
         axes_length=length,
         axes_radius=0.002 * size,
         origin_radius=0.004 * size,
-        position=low - 0.05 * size,
+        position=corner,
     )
-    scene.add_label("/inertial/length", f"{length:g} m", position=(length, 0.0, 0.0))
+    if is_labelled:
+        scene.add_label("/inertial/length", f"{length:g} m", position=(length, 0.0, 0.0))
+
+
+def _stars(
+    scene: SceneApi,
+    middle: Array,
+    distance: float,
+    dark: bool,
+    precision: Literal["float16", "float32"],
+) -> None:
+    """Draw stars, which make rotation visible; numbers of 16 bits end at 65,504 m."""
     directions = unit_rows(np.random.default_rng(STAR_SEED).normal(size=(STARS, 3)))
     scene.add_point_cloud(
         "/stars",
-        middle + STARS_AT * size * directions,
+        middle + distance * directions,
         STAR_DARK if dark else STAR_LIGHT,
-        point_size=STAR * STARS_AT * size,
+        point_size=STAR * distance,
         point_shape="circle",
+        precision=precision,
     )
 
 
-def _light(scene: SceneApi, shadows: bool) -> None:
+def _light(
+    scene: SceneApi, shadows: bool, axes: Array, sun: Array | None
+) -> DirectionalLightHandle:
     """Add lights instead of viser's environment map, which may load late or not at all."""
     scene.configure_environment_map(None)
     scene.configure_default_lights(False)
     scene.add_light_hemisphere("/sky", ground_color=(110, 112, 125), intensity=SKY)
-    for number, (direction, strength) in enumerate(LAMPS):
+    lamps = []
+    for number, (place, strength) in enumerate(LAMPS):
+        direction = axes @ place if sun is None or number else sun
         turn, _ = Rotation.align_vectors([direction], [[0.0, 0.0, 1.0]])
-        scene.add_light_directional(
-            f"/lamp_{number}",
-            color=(255, 250, 240),
-            intensity=strength,
-            position=direction,
-            cast_shadow=shadows and number == 0,
-            wxyz=wxyz(turn.as_matrix()),
+        lamps.append(
+            scene.add_light_directional(
+                f"/lamp_{number}",
+                color=(255, 250, 240),
+                intensity=strength,
+                position=tuple(direction),
+                cast_shadow=shadows and number == 0,
+                wxyz=wxyz(turn.as_matrix()),
+            )
         )
+    return lamps[0]
 
 
 def _distance(points: Array, back: Array) -> float:
@@ -138,6 +223,17 @@ def extent(robot: Robot, position: Array, quaternion: Array, joint_positions: Ar
             place = frame.on_outer_axes(shape.position + shape.rotation @ corner)
             corners.append(position + (frame.origin + place).T)
     return np.concatenate(corners)
+
+
+def body_reach(robot: Robot, body: int) -> float:
+    """Return the largest distance, m, of a body's shapes from its frame's origin; 0 without."""
+    drawn = shown_shapes(robot)
+    corners = [
+        shape.position + _corners(shape, drawn.meshes.get(shape.mesh)) @ shape.rotation.T
+        for shape in drawn.shapes
+        if shape.body == body
+    ]
+    return float(np.linalg.norm(np.concatenate(corners), axis=1).max()) if corners else 0.0
 
 
 def _corners(shape: Visual, mesh: Mesh | None) -> Array:

@@ -2,6 +2,7 @@
 
     demand --+--> wheels --> motors' torques (and null motion)
              |      ^ less the torque expected of the thrusters
+             |      ^ less the torque expected of the magnetic torquers, which unload them
              +--> what the wheels' axes cannot give, and unloading --> thrusters --> pulses
 
 A base without wheels leaves all to the thrusters. What was given comes back in the reported
@@ -18,14 +19,15 @@ from numpy.typing import NDArray
 from space_robot_model.hardware.base_actuators import BaseActuatorSettings
 from space_robot_msgs_py.compiled.kernels import RecordFunction, kernel, subroutine
 from space_robot_msgs_py.compiled.records import Record, assign, nested, shaped
-from space_robot_msgs_py.samples import MOST_THRUSTERS, MOST_WHEELS
+from space_robot_msgs_py.samples import MOST_THRUSTERS, MOST_TORQUERS, MOST_WHEELS
 
+from .magnetic_torquers import AssumedTorquers, dump_momentum
 from .modulation import Modulation, modulate
 from .null_motion import NullMotion, add_null_motion
 from .settings import AllocationSettings
 from .thrusters import AssumedThrusters, expect_torque
 from .wheel_health import WheelHealth, observe_wheels, remember_asked
-from .wheels import AssumedWheels, share_torque
+from .wheels import AssumedWheels, share_torque, stored_momentum
 
 Array = NDArray[np.float64]
 
@@ -51,7 +53,7 @@ class Unloading(Record):
         unloading = cls.allocate(n)
         assign(
             unloading,
-            above=settings.unload_above,
+            above=settings.unload_above if settings.thrusters_unload else np.inf,
             to=settings.unload_to,
             rate=1.0 / settings.unload_time,
         )
@@ -61,13 +63,10 @@ class Unloading(Record):
 @kernel
 def find_unloading(unloading: Unloading, wheels: AssumedWheels, torque: Array) -> None:
     """Write the unloading ``torque`` (3,) N m for the thrusters, zero if inactive."""
-    fullest, x, y, z = 0.0, 0.0, 0.0, 0.0
+    x, y, z = stored_momentum(wheels)
+    fullest = 0.0
     for k in range(int(wheels.count)):
-        h, axis = wheels.momentum[k], wheels.axis[k]
-        fullest = max(fullest, abs(h) / wheels.max_momentum[k])
-        x += axis[0] * h
-        y += axis[1] * h
-        z += axis[2] * h
+        fullest = max(fullest, abs(wheels.momentum[k]) / wheels.max_momentum[k])
     if fullest > unloading.above:
         unloading.is_active = 1.0
     elif fullest < unloading.to:
@@ -91,6 +90,7 @@ class Allocation(Record):
     health: WheelHealth = nested(WheelHealth)
     null_motion: NullMotion = nested(NullMotion)
     thrusters: AssumedThrusters = nested(AssumedThrusters)
+    torquers: AssumedTorquers = nested(AssumedTorquers)
     modulation: Modulation = nested(Modulation)
     unloading: Unloading = nested(Unloading)
     of_thrusters: Array = shaped(lambda n: (3,))
@@ -105,8 +105,9 @@ class Allocation(Record):
     """Speeds of the wheels at the present tick, rad/s."""
     reported_torques: Array = shaped(lambda n: (MOST_WHEELS,))
     """Torques of the wheels' motors since the last tick, N m."""
-    command: Array = shaped(lambda n: (MOST_WHEELS + MOST_THRUSTERS,))
-    """Torque of each wheel's motor, N m, then force of each thruster, N."""
+    command: Array = shaped(lambda n: (MOST_WHEELS + MOST_THRUSTERS + MOST_TORQUERS,))
+    """Torque of each wheel's motor, N m, force of each thruster, N, dipole of each magnetic
+    torquer, A m2."""
 
     @classmethod
     def build(
@@ -122,6 +123,7 @@ class Allocation(Record):
             wheels=AssumedWheels.build(n, assumed.wheels, settings, period),
             health=WheelHealth.build(n, settings),
             null_motion=NullMotion.build(n, settings),
+            torquers=AssumedTorquers.build(n, assumed.magnetic_torquers, settings),
             modulation=Modulation.build(n, thrusters, settings, period),
             unloading=Unloading.build(n, settings),
         )
@@ -132,10 +134,11 @@ class Allocation(Record):
 def allocate(allocation: Allocation, tick: float) -> None:
     """Write the ``command`` that gives the base what is demanded from ``tick`` to the next.
 
-    ``demand`` and what the wheels report at ``tick`` are read.
+    ``demand``, what the wheels report at ``tick`` and the magnetic field are read.
     """
     wheels, thrusters, command = allocation.wheels, allocation.thrusters, allocation.command
     wheel_count, thruster_count = int(wheels.count), int(thrusters.count)
+    torquers = allocation.torquers
     if wheel_count > 0:
         observe_wheels(
             allocation.health, wheels, tick, allocation.reported_speeds, allocation.reported_torques
@@ -147,6 +150,13 @@ def allocate(allocation: Allocation, tick: float) -> None:
     if wheel_count > 0:
         for i in range(3):
             allocation.of_wheels[i] = allocation.demand[i] - allocation.expected[i]
+        if torquers.count > 0.0:
+            x, y, z = stored_momentum(wheels)
+            dump_momentum(torquers, x, y, z)
+            for i in range(3):
+                allocation.of_wheels[i] -= torquers.torque[i]
+            for j in range(int(torquers.count)):
+                command[wheel_count + thruster_count + j] = torquers.dipole[j]
         share_torque(wheels, allocation.of_wheels)
         add_null_motion(allocation.null_motion, wheels)
         remember_asked(allocation.health, wheels, tick)

@@ -26,7 +26,7 @@ def diagnose(allocation: Allocation) -> Diagnosis:
     """Return the diagnosis from the allocation's memory."""
     if allocation.is_used == 0.0:
         return Diagnosis((), "", {})
-    wheels, thrusters = allocation.wheels, allocation.thrusters
+    wheels, thrusters, torquers = allocation.wheels, allocation.thrusters, allocation.torquers
     count, rank = int(wheels.count), int(wheels.healthy.rank)
     failed = tuple(
         f"wheel_{k + 1}" for k in np.flatnonzero(wheels.healthy.takes_part[:count] == 0.0)
@@ -46,6 +46,8 @@ def diagnose(allocation: Allocation) -> Diagnosis:
         values["pulses"] = int(allocation.modulation.pulses.sum())
     if thrusters.count and count:
         values["unloading"] = "yes" if allocation.unloading.is_active else "no"
+    if torquers.count:
+        values["largest_dipole"] = float(np.abs(torquers.dipole).max())
     return Diagnosis(failed, _summary(failed, rank, bool(thrusters.count)), values)
 
 

@@ -11,6 +11,7 @@ from space_robot_msgs_py.config.validation import StrictModel
 
 WheelAllocation = Literal["pseudo_inverse", "least_largest"]
 Modulation = Literal["pwm", "sigma_delta", "schmitt"]
+Dump = Literal["all", "thrusters", "magnetic", "none"]
 Share = Annotated[float, Field(ge=0.0, le=1.0)]
 
 
@@ -57,6 +58,16 @@ class AllocationSettings(StrictModel):
         description="weight of the thrusters' force times their mean lever arm, relative to their "
         "torque",
     )
+    dump: Dump = Field(
+        "all",
+        description="what takes momentum from the wheels: thrusters, magnetic (torquers), all "
+        "that there are, or none",
+    )
+    magnetic_gain: Annotated[float, Field(ge=0.0, le=10.0)] = Field(
+        0.002,
+        description="rate at which magnetic torquers take the momentum across the magnetic field "
+        "from the wheels, 1/s",
+    )
     unload_above: Share = Field(
         0.7,
         description="share of a wheel's largest momentum above which thrusters unload the wheels",
@@ -67,6 +78,16 @@ class AllocationSettings(StrictModel):
     unload_time: Annotated[float, Field(ge=1e-3, le=1e6)] = Field(
         20.0, description="time constant of unloading, s"
     )
+
+    @property
+    def torquers_unload(self) -> bool:
+        """True if magnetic torquers unload the wheels."""
+        return self.dump in ("all", "magnetic")
+
+    @property
+    def thrusters_unload(self) -> bool:
+        """True if thrusters unload the wheels."""
+        return self.dump in ("all", "thrusters")
 
     @model_validator(mode="after")
     def _thresholds_are_apart(self) -> Self:

@@ -90,6 +90,18 @@ class AssumedWheels(Record):
         return wheels
 
 
+@subroutine
+def stored_momentum(wheels: AssumedWheels) -> tuple[float, float, float]:
+    """Return the momentum of all wheels relative to the base, N m s, base frame."""
+    x, y, z = 0.0, 0.0, 0.0
+    for k in range(int(wheels.count)):
+        h, axis = wheels.momentum[k], wheels.axis[k]
+        x += axis[0] * h
+        y += axis[1] * h
+        z += axis[2] * h
+    return x, y, z
+
+
 @kernel
 def share_torque(wheels: AssumedWheels, demand: Array) -> None:
     """Write the motors' ``torque`` that turns the base with ``demand`` (3,) N m, base frame."""

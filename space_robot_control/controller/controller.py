@@ -202,6 +202,7 @@ class Controller(RecordOwner):
             reported_torques=state.wheel_torques,
             demand=torque[:3],
         )
+        allocation.torquers.magnetic_field[:] = state.magnetic_field
         self.last_command.torque[: len(torque)] = torque
         return self._allocate(state.tick)
 

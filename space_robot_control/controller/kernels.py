@@ -154,6 +154,7 @@ def compute_signals(
         return status
     memory.allocation.reported_speeds[:] = measured.wheel_velocities
     memory.allocation.reported_torques[:] = measured.wheel_torques
+    memory.allocation.torquers.magnetic_field[:] = measured.magnetic_field
     if uniform(memory.navigation.is_filtered) == 1.0:
         navigate(memory.navigation, tick, measured, period)
         measured = memory.navigation.estimate
@@ -214,6 +215,8 @@ def status_of(state: State, controls_base: bool) -> int:
         total += abs(state.applied_torque[i])
     for k in range(MOST_WHEELS):
         total += abs(state.wheel_velocities[k]) + abs(state.wheel_torques[k])
+    for k in range(3):
+        total += abs(state.magnetic_field[k])
     status = USABLE
     if controls_base:
         status = where(abs(quaternion[0]) <= SINGULAR_ETA, SINGULAR, USABLE)

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from space_robot_msgs_py.compiled.kernels import RecordFunction, kernel
 from space_robot_msgs_py.compiled.records import Block, Record, nested, shaped
-from space_robot_msgs_py.samples import MOST_THRUSTERS, MOST_WHEELS
+from space_robot_msgs_py.samples import MOST_THRUSTERS, MOST_TORQUERS, MOST_WHEELS
 from space_robot_msgs_py.wire.stamp_guard import accept
 
 from ..laws.compiled import LawCode
@@ -71,7 +71,7 @@ class Supervision(Record):
     """Tick at which holding began."""
     rejected: Array = shaped(lambda n: (STATUSES,))
     """Number of states not used, by status."""
-    command: Array = shaped(lambda n: (n + 3 + MOST_WHEELS + MOST_THRUSTERS,))
+    command: Array = shaped(lambda n: (n + 3 + MOST_WHEELS + MOST_THRUSTERS + MOST_TORQUERS,))
     """Answer to the last state: torque of every axis, N m, then what is asked of each of the
     base's actuators, N m and N."""
 

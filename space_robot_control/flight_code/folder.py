@@ -81,6 +81,7 @@ class Exported:
             "joints": software.joints,
             "wheels": len(names.wheels),
             "thrusters": len(names.thrusters),
+            "torquers": len(names.torquers),
             "period": repr(software.controller.period),
             "flags": FLAGS,
             "warnings": WARNINGS,

@@ -5,7 +5,8 @@ in inertial axes about one origin, so no frame transformations between links are
 inertia is stored in three blocks: ``[[J, G], [G^T, M]]``, angular part first, J and M symmetric.
 
 A locked joint adds its link's inertia and force to those of the parent (hybrid dynamics,
-Featherstone 2008, chapter 9), which is faster than a free joint. Wheels are leaves on the base.
+Featherstone 2008, chapter 9), which is faster than a free joint. Wheels are leaves on the base,
+rotors of geared joints leaves on the joints' parents.
 """
 
 from __future__ import annotations
@@ -38,6 +39,7 @@ from .algebra import (
 )
 from .branches import accumulate, collect_children, keep_motion, kept_motion
 from .model import Data, Model
+from .rotors import take_rotor, turn_rotor
 from .wheels import take_wheels, turn_wheels
 
 Array = NDArray[np.float64]
@@ -56,8 +58,8 @@ def aba(
 
     Call it after `forward_kinematics` and `spatial_velocities`. ``force`` (N+6,) is
     ``[f0, tau0, tau]``, the base's part in inertial axes, N and N m. Joints locked in ``data`` do
-    not accelerate; the required torque is in ``data.holding``. Wheels come after the joints in
-    velocities, force and ``out``.
+    not accelerate; the required torque is in ``data.holding``. Wheels, then rotors of geared
+    joints, come after the joints in velocities, force and ``out``.
     """
     # inwards: the articulated-body inertia and bias force of each link, free about its joint
     inertia = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
@@ -109,6 +111,8 @@ def aba(
         bias_moment = add(bias_moment, transform(coupling, linear))
         bias_force = add(bias_force, transform_transposed(coupling, angular))
         bias_force = add(bias_force, transform_symmetric(mass, linear))
+        if uniform(model.rotor[j]) != 0.0:
+            inertia, bias_moment = take_rotor(model, j, force, data, inertia, bias_moment)
         if uniform(model.continues[j]) == 0.0:
             row = data.inwards[whole(model.parent[j])]
             accumulate(row, inertia, coupling, mass, bias_moment, bias_force)
@@ -147,6 +151,8 @@ def aba(
         i = j + 1
         if uniform(model.continues[j]) == 0.0:
             angular, linear = kept_motion(data.outwards[whole(model.parent[j])])
+        if uniform(model.rotor[j]) != 0.0:
+            turn_rotor(model, j, angular, force, data, out)
         angular = add(angular, vector(data.coriolis[i], 0))
         linear = add(linear, vector(data.coriolis[i], 3))
         acceleration = data.u_over_d[i] - dot(vector(data.U_over_D[i], 0), angular)

@@ -27,6 +27,7 @@ from .algebra import (
 from .attitude import rotation_matrix
 from .branches import keep_frame, keep_motion, kept_frame, kept_motion
 from .model import Data, Model
+from .rotors import add_rotor_momentum_rate
 
 Array = NDArray[np.float64]
 
@@ -121,7 +122,8 @@ def spatial_velocities(
 
     Velocities are relative to an inertial frame that moves with the base CoM at this instant, so
     the base's linear velocity is zero: H and c do not depend on ``v0`` (no gravity, Galilean
-    invariance). The bias is the rate of a body's momentum without acceleration.
+    invariance). The bias is the rate of a body's momentum without acceleration. With gears,
+    ``joint_velocities`` has those of wheels and rotors after the joints'.
     """
     w = vector(omega_inertial, 0)
     v = (0.0, 0.0, 0.0)
@@ -137,6 +139,8 @@ def spatial_velocities(
         # velocity of the parent times that of the joint: terms of (13), (14) without qdd
         store(cross(w, angular), coriolis, 0)
         store(add(cross(v, angular), cross(w, linear)), coriolis, 3)
+        if uniform(model.rotor[j]) != 0.0:
+            add_rotor_momentum_rate(model, j, w, joint_velocities, data)
         w, v = add(w, angular), add(v, linear)
         _momentum_rate(model, j + 1, w, v, data)
         if uniform(model.branches[j + 1]) != 0.0:

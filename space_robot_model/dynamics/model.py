@@ -19,6 +19,8 @@ Array = NDArray[np.float64]
 MOST_JOINTS = 64
 """Maximum number of moving joints, actuated and passive. The algorithms' memory has this size, so
 that robots of any size use the same code, see `Model.joint_count`."""
+MOST_MOVING = 2 * MOST_JOINTS + MOST_WHEELS
+"""Maximum number of joints, wheels and rotors of geared joints together."""
 
 
 class Model(Record):
@@ -56,17 +58,26 @@ class Model(Record):
     actuated_count: float = shaped(lambda n: (), uniform=True)
     """Number of actuated joints; the passive ones come after them."""
     stiffness: Array = shaped(lambda n: (MOST_JOINTS,))
-    """Stiffness of the passive joints' springs, N m/rad, or N/m for prismatic joints."""
+    """Stiffness of the springs of passive joints, and of the gears of geared ones, N m/rad, or N/m
+    for prismatic joints."""
     damping: Array = shaped(lambda n: (MOST_JOINTS,))
-    """Damping of the passive joints, N m s/rad or N s/m."""
+    """Damping of the same, N m s/rad or N s/m."""
     rest: Array = shaped(lambda n: (MOST_JOINTS,))
-    """Rest position of each spring, rad or m."""
+    """Rest position of each passive joint's spring, rad or m."""
     wheel_count: float = shaped(lambda n: (), uniform=True)
     """Number of reaction wheels (`space_robot_model.dynamics.wheels`), at most MOST_WHEELS."""
     wheel_axis: Array = shaped(lambda n: (MOST_WHEELS, 3))
     """Spin axes of the wheels, unit vectors in the base frame."""
     wheel_inertia: Array = shaped(lambda n: (MOST_WHEELS,))
     """Inertia of each wheel about its axis, kg m2; included in the base's."""
+    rotor_count: float = shaped(lambda n: (), uniform=True)
+    """Number G of joints with gears (`space_robot_model.dynamics.rotors`)."""
+    rotor: Array = shaped(lambda n: (MOST_JOINTS,), uniform=True)
+    """Number of each joint's rotor from 1; 0 for joints without a gear."""
+    rotor_inertia: Array = shaped(lambda n: (MOST_JOINTS,))
+    """Inertia of each joint's rotor about the joint's axis, kg m2; included in the parent's."""
+    gear_ratio: Array = shaped(lambda n: (MOST_JOINTS,))
+    """Turns of each rotor per turn of its joint; rad/m for prismatic joints."""
 
 
 class Data(Record):
@@ -98,9 +109,9 @@ class Data(Record):
     inwards: Array = shaped(lambda n: (MOST_JOINTS + 1, 27))
     """Of the same: what the branches hand in: an articulated inertia (J, G, M) and bias force, or
     what else adds up."""
-    locked: Array = shaped(lambda n: (MOST_JOINTS + MOST_WHEELS,))
-    """1 for locked joints, then wheels; 0 for free ones."""
-    holding: Array = shaped(lambda n: (MOST_JOINTS + MOST_WHEELS,))
-    """Torque of the brake of each locked joint or wheel, N m."""
+    locked: Array = shaped(lambda n: (MOST_MOVING,))
+    """1 for locked joints, then wheels, then rotors; 0 for free ones."""
+    holding: Array = shaped(lambda n: (MOST_MOVING,))
+    """Torque of the brake of each locked joint, wheel or rotor (seen through its gear), N m."""
     wheel_axis: Array = shaped(lambda n: (MOST_WHEELS, 3))
     """Spin axes of the wheels in inertial axes."""

@@ -1,4 +1,4 @@
-"""Actuators of the base: ideal torque, hardware (wheels, thrusters), or none."""
+"""Actuators of the base: ideal torque, hardware (wheels, thrusters, torquers), or none."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.samples import RobotNames
 
 from ..robot import Robot
+from .magnetic_torquers import MagneticTorquerSettings
 from .thrusters import ThrusterSettings
 from .wheels import WheelSettings
 
@@ -33,6 +34,7 @@ class BaseActuatorSettings(StrictModel):
     )
     wheels: WheelSettings = WheelSettings()
     thrusters: ThrusterSettings = ThrusterSettings()
+    magnetic_torquers: MagneticTorquerSettings = MagneticTorquerSettings()
 
     @property
     def controls_base(self) -> bool:
@@ -50,14 +52,30 @@ class BaseActuatorSettings(StrictModel):
         return self.thrusters.count
 
     @property
+    def torquer_count(self) -> int:
+        """Number of magnetic torquers, M."""
+        return self.magnetic_torquers.count
+
+    @property
     def names(self) -> tuple[str, ...]:
-        """Names of the individually commanded actuators: wheels, then thrusters."""
-        wheels = (f"wheel_{i + 1}" for i in range(self.wheel_count))
-        return (*wheels, *(f"thruster_{i + 1}" for i in range(self.thruster_count)))
+        """Names of the individually commanded actuators: wheels, thrusters, magnetic torquers."""
+        counts = (
+            ("wheel", self.wheel_count),
+            ("thruster", self.thruster_count),
+            ("torquer", self.torquer_count),
+        )
+        return tuple(f"{kind}_{i + 1}" for kind, count in counts for i in range(count))
 
     def robot_names(self, robot: Robot) -> RobotNames:
         """Return the names of all measured and commanded quantities of ``robot``."""
-        return RobotNames.of(robot.joint_names, self.names, self.wheel_count, robot.passive_names)
+        return RobotNames.of(
+            robot.joint_names,
+            self.names,
+            self.wheel_count,
+            robot.passive_names,
+            robot.geared_names,
+            self.torquer_count,
+        )
 
     def check(self, robot: Robot, file: str) -> None:
         """Check that the settings are consistent and fit a robot.
@@ -75,17 +93,21 @@ class BaseActuatorSettings(StrictModel):
             raise InputError(f"actuators {file}: {error}") from None
 
     def _check(self, robot: Robot) -> None:
-        parts = [part for part in ("wheels", "thrusters") if getattr(self, part).count]
+        kinds = ("wheels", "thrusters", "magnetic_torquers")
+        parts = [part for part in kinds if getattr(self, part).count]
         if self.base_actuation != "hardware":
             if parts:
                 raise InputError(
                     f"{parts[0]} are for base_actuation hardware, got {self.base_actuation!r}"
                 )
             return
+        if self.torquer_count and not self.wheel_count:
+            raise InputError("magnetic_torquers unload wheels: there are no wheels.axes")
         if not parts:
             raise InputError("base_actuation is hardware: no wheels.axes or thrusters.positions")
         self.wheels.check(robot.inertia[0])
         self.thrusters.check()
+        _ = self.magnetic_torquers.largest  # one value, or one per torquer
         _check_torques(self)
         for name in set(self.names) & set(robot.all_joint_names):
             raise InputError(f"{name!r} is a joint of robot {robot.name!r}, too: rename the joint")

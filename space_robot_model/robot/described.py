@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from .file import drive_of
+from .plates import plates_of
 from .robot import Robot
+from .tree import Gear
 
 Array = NDArray[np.float64]
 
@@ -38,6 +42,7 @@ def describe(robot: Robot) -> dict[str, Any]:
             }
             for seen in robot.visuals
         ],
+        "plates": _plates(robot),
         "repairs": list(robot.repairs),
     }
 
@@ -65,8 +70,32 @@ def _joint(robot: Robot, number: int) -> dict[str, Any]:
         "friction": None if np.isnan(friction.coulomb) else friction._asdict(),
     }
     if is_actuated:
-        return {**entry, "limits": robot.limits[number]._asdict()}
+        gear = robot.gears[number] if robot.gears else None
+        limits = robot.limits[number]._asdict()
+        return {**entry, "limits": limits, **({"drive": _drive(gear)} if gear else {})}
     return {**entry, "spring": robot.springs[number - robot.n]._asdict()}
+
+
+def _drive(gear: Gear) -> dict[str, Any]:
+    """Return the drive as in a robot's file, and its inertia on the link's side."""
+    return {**drive_of(gear), "reflected_inertia": gear.reflected_inertia}
+
+
+def _plates(robot: Robot) -> dict[str, Any]:
+    """Return number and area, m2, of the plates for drag and sunlight, by body and together."""
+    areas: dict[str, list[float]] = {}
+    for plate in plates_of(robot):
+        areas.setdefault(robot.body_names[plate.body], []).append(float(plate.area))
+    return {
+        "source": "file" if robot.plates else "shapes",
+        "count": sum(map(len, areas.values())),
+        "area": math.fsum(area for own in areas.values() for area in own),
+        "bodies": [
+            {"name": name, "count": len(areas[name]), "area": math.fsum(areas[name])}
+            for name in robot.body_names
+            if name in areas
+        ],
+    }
 
 
 def _numbers(values: Array) -> list[float]:

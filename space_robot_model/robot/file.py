@@ -4,20 +4,32 @@ from __future__ import annotations
 
 import itertools
 from dataclasses import replace
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import AfterValidator, Field, ValidationInfo, field_validator, model_validator
 from typing_extensions import Self
 
+from space_robot_msgs_py.config.choices import choices
 from space_robot_msgs_py.config.validation import StrictModel, short
 from space_robot_msgs_py.topics import BASE_AXES
 
 from ..elementary.matrices import norm, product
 from ..elementary.rotations import exact_sines_cosines, rotation_of_rpy
 from .inertia import Inertia, Mass, check_inertia, inertia_tensor
-from .tree import Body, Joint, JointFriction, JointLimits, Spring, Tool, first_repeated
+from .tree import (
+    Body,
+    Encoder,
+    Gear,
+    Joint,
+    JointFriction,
+    JointLimits,
+    Plate,
+    Spring,
+    Tool,
+    first_repeated,
+)
 
 Array = NDArray[np.float64]
 
@@ -29,6 +41,8 @@ BASE = "base"
 """Name of the base in a robot's file."""
 MOST_LINKS = 4000
 """Maximum number of links in a robot's file, including fixed ones."""
+MOST_PLATES = 128
+"""Maximum number of plates of a robot."""
 
 
 class BaseFile(StrictModel):
@@ -104,6 +118,36 @@ class PassiveFile(StrictModel):
     rest_deg: float = 0.0
 
 
+class DriveFile(StrictModel):
+    """Drive of a joint: a motor on the parent, a gear, and a spring towards the link.
+
+    Stiffness and damping are seen on the link's side: N m/rad and N m s/rad, or N/m and N s/m. The
+    rotor's mass and its inertia at rest are part of the parent's.
+    """
+
+    rotor_inertia: Annotated[float, Field(gt=0.0, le=1e6)]
+    """About its axis, kg m2."""
+    gear_ratio: Annotated[float, Field(ge=1e-3, le=1e6)] = 1.0
+    """Turns of the motor per turn of the joint; rad/m for a prismatic joint."""
+    stiffness: Annotated[float, Field(gt=0.0, le=1e12)]
+    damping: Annotated[float, Field(ge=0.0, le=1e9)] = 0.0
+    encoder: Encoder = "motor"
+
+    @property
+    def gear(self) -> Gear:
+        """Return the same for the tree."""
+        return Gear(self.rotor_inertia, self.gear_ratio, self.stiffness, self.damping, self.encoder)
+
+
+def drive_of(gear: Gear) -> dict[str, Any]:
+    """Return the mapping of a `DriveFile` for a gear."""
+    values = gear._asdict()
+    return {
+        "rotor_inertia": values.pop("rotor_inertia"),
+        "gear_ratio": values.pop("ratio"),
+    } | values
+
+
 class LinkFile(FrameFile):
     """One entry of ``robot.links``: a joint, its frame on the parent, and the body it moves.
 
@@ -121,6 +165,7 @@ class LinkFile(FrameFile):
     limits: LimitsFile = LimitsFile()
     friction: FrictionFile | None = None
     passive: PassiveFile | None = None
+    drive: DriveFile | None = None
 
     @field_validator("axis", mode="after")
     @classmethod
@@ -141,12 +186,19 @@ class LinkFile(FrameFile):
     def _is_physical(cls, inertia: list[float], info: ValidationInfo) -> list[float]:
         return inertia if info.data.get("mass") == 0.0 else check_inertia(inertia)
 
-    @field_validator("friction", "passive", mode="after")
+    @field_validator("friction", "passive", "drive", mode="after")
     @classmethod
     def _moves(cls, joint: StrictModel | None, info: ValidationInfo) -> StrictModel | None:
         if joint and info.data.get("joint") == "fixed":
-            raise ValueError("a fixed link cannot have friction or a spring")
+            raise ValueError("a fixed link cannot have friction, a spring or a drive")
         return joint
+
+    @field_validator("drive", mode="after")
+    @classmethod
+    def _has_motor(cls, drive: DriveFile | None, info: ValidationInfo) -> DriveFile | None:
+        if drive and info.data.get("passive"):
+            raise ValueError(f"{info.data.get('name')!r} is passive, only a motor can have a drive")
+        return drive
 
 
 class ToolFile(FrameFile):
@@ -155,6 +207,52 @@ class ToolFile(FrameFile):
     name: Annotated[str, Field(min_length=1)] = "tool"
     link: str = ""
     """Name of the link; the last one in the file if empty."""
+
+
+class PlateFile(StrictModel):
+    """One entry of ``robot.plates``: a flat surface on a link, for drag and sunlight.
+
+    Area in m2, centre in m, both vectors in the link's frame; a panel has one plate a side.
+    """
+
+    link: Annotated[str, Field(min_length=1)] = BASE
+    area: Annotated[float, Field(gt=0.0, le=1e6)]
+    normal: Vector
+    centre: Vector = Field([0.0, 0.0, 0.0])
+    drag_coefficient: Annotated[float, Field(ge=0.0, le=10.0)] = 2.2
+    specular: Annotated[float, Field(ge=0.0, le=1.0)] = 0.2
+    diffuse: Annotated[float, Field(ge=0.0, le=1.0)] = 0.3
+
+    @field_validator("normal", mode="after")
+    @classmethod
+    def _is_direction(cls, normal: list[float]) -> list[float]:
+        if not norm(normal) > 1e-9:
+            raise ValueError("the normal must not be zero")
+        return normal
+
+    @model_validator(mode="after")
+    def _reflects_what_comes(self) -> Self:
+        if self.specular + self.diffuse > 1.0:
+            raise ValueError(
+                "specular and diffuse are shares of the same light: their sum must be at most 1, "
+                f"it is {self.specular + self.diffuse:g}"
+            )
+        return self
+
+    @property
+    def plate(self) -> Plate:
+        """Return the same for the tree."""
+        return Plate(
+            self.area,
+            np.array(self.normal) / norm(self.normal),
+            np.array(self.centre),
+            self.drag_coefficient,
+            self.specular,
+            self.diffuse,
+        )
+
+
+Plates = Annotated[list[PlateFile], Field(max_length=MOST_PLATES)]
 
 
 def _distinct_names(links: list[LinkFile]) -> list[LinkFile]:
@@ -179,19 +277,36 @@ class RobotFile(StrictModel):
     ]
     tool: ToolFile | None = None
     tools: list[ToolFile] = Field([])
+    plates: Plates = Field([])
+
+    @field_validator("plates", mode="after")
+    @classmethod
+    def _are_on_links(cls, plates: list[PlateFile], info: ValidationInfo) -> list[PlateFile]:
+        if (links := info.data.get("links")) is None:  # they are wrong themselves
+            return plates
+        names = [BASE, *(link.name for link in links)]
+        for number, plate in enumerate(plates):
+            if plate.link not in names:
+                advice = choices(plate.link, names)
+                raise ValueError(f"unknown link {short(plate.link)} of plate {number}: {advice}")
+        return plates
 
     def bodies(self) -> list[Body]:
         """Return the bodies of the tree defined by the file."""
         tools = [*([self.tool] if self.tool else []), *self.tools] or [ToolFile()]
         last = self.links[-1].name
         base = Body(BASE, self.base.mass, inertia_tensor(self.base.inertia), np.zeros(3))
-        bodies = [replace(base, tools=_tools_of(BASE, tools, last))]
+        bodies = [replace(base, tools=_tools_of(BASE, tools, last), plates=self._plates(BASE))]
         for above, link in itertools.pairwise((None, *self.links)):
             assert link
             above_name = above.name if above else BASE
             body = _body(link, link.parent or above_name)
-            bodies.append(replace(body, tools=_tools_of(link.name, tools, last)))
+            on_link = _tools_of(link.name, tools, last)
+            bodies.append(replace(body, tools=on_link, plates=self._plates(link.name)))
         return bodies
+
+    def _plates(self, link: str) -> tuple[Plate, ...]:
+        return tuple(plate.plate for plate in self.plates if plate.link == link)
 
 
 def _tools_of(body: str, tools: list[ToolFile], last: str) -> tuple[Tool, ...]:
@@ -228,7 +343,17 @@ def _body(link: LinkFile, parent: str) -> Body:
         inertia_tensor(link.inertia),
         np.array(link.com),
         parent,
-        Joint(link.name, kind, link.rotation, link.offset, axis, limits, friction, spring),
+        Joint(
+            link.name,
+            kind,
+            link.rotation,
+            link.offset,
+            axis,
+            limits,
+            friction,
+            spring,
+            link.drive.gear if link.drive else None,
+        ),
     )
 
 

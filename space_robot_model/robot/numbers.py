@@ -17,7 +17,8 @@ from pydantic import Field
 from space_robot_msgs_py.config.validation import StrictModel
 
 from ..dynamics.model import MOST_JOINTS
-from .tree import Body, Joint, JointFriction, JointLimits, Spring, Tool
+from .file import DriveFile, drive_of
+from .tree import Body, Joint, JointFriction, JointLimits, Plate, Spring, Tool
 
 Array = NDArray[np.float64]
 Vector = Annotated[list[float], Field(min_length=3, max_length=3)]
@@ -43,6 +44,30 @@ class JointNumbers(StrictModel):
     limits: Annotated[list[float | None], Field(min_length=4, max_length=4)]
     friction: Annotated[list[float | None], Field(min_length=2, max_length=2)]
     spring: Annotated[list[float], Field(min_length=3, max_length=3)] | None
+    drive: DriveFile | None = None
+
+
+class PlateNumbers(StrictModel):
+    """A `Plate` of a body."""
+
+    area: float
+    normal: Vector
+    centre: Vector
+    drag_coefficient: float
+    specular: float
+    diffuse: float
+
+    @property
+    def plate(self) -> Plate:
+        """Return the plate with these numbers."""
+        return Plate(
+            self.area,
+            np.array(self.normal),
+            np.array(self.centre),
+            self.drag_coefficient,
+            self.specular,
+            self.diffuse,
+        )
 
 
 class BodyNumbers(StrictModel):
@@ -55,6 +80,7 @@ class BodyNumbers(StrictModel):
     parent: str
     joint: JointNumbers | None
     tools: list[ToolNumbers]
+    plates: list[PlateNumbers] = Field([])
 
     @property
     def body(self) -> Body:
@@ -69,6 +95,7 @@ class BodyNumbers(StrictModel):
                 limits=JointLimits(*_or(own.limits, JointLimits())),
                 friction=JointFriction(*_or(own.friction, JointFriction())),
                 spring=Spring(*own.spring) if own.spring else None,
+                gear=own.drive.gear if own.drive else None,
             )
         tools = (
             Tool(t.name, np.array(t.rotation), np.array(t.position), rank=t.rank)
@@ -82,6 +109,7 @@ class BodyNumbers(StrictModel):
             self.parent,
             joint,
             tuple(tools),
+            plates=tuple(plate.plate for plate in self.plates),
         )
 
 
@@ -119,6 +147,7 @@ def _body_numbers(body: Body) -> dict[str, Any]:
         "limits": _known(body.joint.limits),
         "friction": _known(body.joint.friction),
         "spring": [float(v) for v in body.joint.spring] if body.joint.spring else None,
+        **({"drive": drive_of(body.joint.gear)} if body.joint.gear else {}),
     }
     tools = [
         {
@@ -137,6 +166,18 @@ def _body_numbers(body: Body) -> dict[str, Any]:
         "parent": body.parent,
         "joint": joint,
         "tools": tools,
+        **({"plates": [_plate_numbers(plate) for plate in body.plates]} if body.plates else {}),
+    }
+
+
+def _plate_numbers(plate: Plate) -> dict[str, Any]:
+    return {
+        "area": float(plate.area),
+        "normal": plate.normal.tolist(),
+        "centre": plate.centre.tolist(),
+        "drag_coefficient": float(plate.drag_coefficient),
+        "specular": float(plate.specular),
+        "diffuse": float(plate.diffuse),
     }
 
 

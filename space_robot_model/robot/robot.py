@@ -36,6 +36,13 @@ class Robot(TreeArrays):
 
     repairs: tuple[str, ...] = ()
     """Repairs of defects in its file, a line each."""
+    source: str = ""
+    """Name of its file, for errors; empty: it was made by a program."""
+
+    @property
+    def where(self) -> str:
+        """Its file for errors, or its name."""
+        return self.source or f"robot {self.name!r}"
 
     @property
     def axis_names(self) -> tuple[str, ...]:
@@ -74,9 +81,11 @@ class Robot(TreeArrays):
             return cls._of_urdf(read_urdf_content(content, folder or Path(), where), where)
         if are_numbers(content):
             numbers = validate(Document, content, where).robot
-            return cls.of_tree(numbers.name, [b.body for b in numbers.bodies], where)
-        file = validate(_RobotDocument, content, where).robot
-        return cls.of_tree(file.name, file.bodies(), where)
+            robot = cls.of_tree(numbers.name, [b.body for b in numbers.bodies], where)
+        else:
+            file = validate(_RobotDocument, content, where).robot
+            robot = cls.of_tree(file.name, file.bodies(), where)
+        return replace(robot, source=where)
 
     @classmethod
     def from_urdf(cls, path: str | Path, base: str | None = None, repair: bool = False) -> Robot:
@@ -98,7 +107,7 @@ class Robot(TreeArrays):
     @classmethod
     def _of_urdf(cls, urdf: UrdfRobot, where: str) -> Robot:
         robot = cls.of_tree(urdf.name, urdf.bodies, where)
-        return replace(robot, repairs=tuple(map(str, urdf.findings)))
+        return replace(robot, repairs=tuple(map(str, urdf.findings)), source=where)
 
     @property
     def content(self) -> dict[str, Any]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from pathlib import Path
@@ -17,7 +18,7 @@ from space_robot_msgs_py.errors import InputError
 
 from ..elementary.matrices import product
 from ..elementary.rotations import rpy_of_rotation
-from .file import BASE
+from .file import BASE, drive_of
 from .inertia import inertia_elements
 from .robot import Robot
 from .tree import Visual
@@ -50,6 +51,7 @@ def document_of(robot: Robot) -> dict[str, Any]:
                 }
                 for tool in robot.tools
             ],
+            **({"plates": _plates(robot, carriers)} if robot.plates else {}),
         }
     }
 
@@ -72,11 +74,28 @@ def _link(robot: Robot, joint: int) -> dict[str, Any]:
     if joint < robot.n:
         if limits := _limits(robot, joint):
             link["limits"] = limits
+        if robot.gears and (gear := robot.gears[joint]):
+            link["drive"] = drive_of(gear)
         return link
     spring = robot.springs[joint - robot.n]
     rest = spring.rest if is_prismatic else float(np.degrees(spring.rest))
     link["passive"] = {"stiffness": spring.stiffness, "damping": spring.damping, "rest_deg": rest}
     return link
+
+
+def _plates(robot: Robot, carriers: Sequence[str]) -> list[dict[str, Any]]:
+    return [
+        {
+            "link": carriers[plate.body],
+            "area": plate.area,
+            "normal": _numbers(plate.normal),
+            "centre": _numbers(plate.centre),
+            "drag_coefficient": plate.drag_coefficient,
+            "specular": plate.specular,
+            "diffuse": plate.diffuse,
+        }
+        for plate in robot.plates
+    ]
 
 
 def _limits(robot: Robot, joint: int) -> dict[str, Any]:

@@ -12,9 +12,9 @@ from typing_extensions import Self
 
 from space_robot_msgs_py.config.validation import StrictModel, validate
 
-from .file import PassiveFile
+from .file import BASE, DriveFile, PassiveFile, Plates
 from .tree import Spring
-from .urdf.read import UrdfRobot, parse_urdf, read_urdf, with_springs
+from .urdf.read import UrdfRobot, parse_urdf, read_urdf, with_gears, with_plates, with_springs
 
 KEYS = ("urdf", "urdf_text")
 """Keys in ``robot`` that refer to a URDF."""
@@ -35,6 +35,10 @@ class UrdfFile(StrictModel):
     """True to repair defects."""
     passive: Annotated[dict[str, PassiveFile], Field(default_factory=dict)]
     """Springs of the passive joints, by joint name."""
+    drives: Annotated[dict[str, DriveFile], Field(default_factory=dict)]
+    """Drives of joints with gears, by joint name."""
+    plates: Plates = Field([])
+    """Surfaces for drag and sunlight; `link` is the URDF's, or base for the satellite."""
     tools: list[str] | None = None
     """Links whose frames are tools, in order of rank; default: the ends of the branches."""
 
@@ -45,7 +49,7 @@ class UrdfFile(StrictModel):
         return self
 
     def read(self, folder: Path, where: str) -> UrdfRobot:
-        """Read the URDF, with a path relative to ``folder``, and add springs and name."""
+        """Read the URDF, with a path relative to ``folder``, and add what the YAML has."""
         if self.urdf:
             urdf = read_urdf(folder / self.urdf, self.base, self.repair, self.tools)
         else:
@@ -65,6 +69,13 @@ class UrdfFile(StrictModel):
             for name, springs_of_joint in self.passive.items()
         }
         urdf = with_springs(urdf, springs, where)
+        urdf = with_gears(urdf, {name: drive.gear for name, drive in self.drives.items()}, where)
+        links = [body.name for body in urdf.bodies]
+        plates = [
+            (links[0] if plate.link == BASE and BASE not in links else plate.link, plate.plate)
+            for plate in self.plates
+        ]
+        urdf = with_plates(urdf, plates, where)
         return replace(urdf, name=self.name or urdf.name)
 
 

@@ -4,8 +4,8 @@ Frames of links are those of `space_robot_model.robot.transforms`: the root is t
 centre of mass, and the z axis of every other frame is the axis of its joint. A tool is a massless
 link on a fixed joint.
 
-URDF has no elements for springs (their damping becomes the joint's), wheels, thrusters and sensors,
-nor for the rank of tools.
+URDF has no elements for springs (their damping becomes the joint's), gears, plates, wheels,
+thrusters and sensors, nor for the rank of tools.
 """
 
 from __future__ import annotations

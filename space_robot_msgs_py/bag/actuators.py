@@ -1,10 +1,18 @@
-"""Names and number of the base's actuators, from the messages in a bag."""
+"""Names and number of the base's actuators and of motors behind gears, from a bag's messages."""
 
 from __future__ import annotations
 
 from .. import topics
 from ..errors import MessageError
-from ..samples import ACTUATOR_FIELDS, MOST_THRUSTERS, MOST_WHEELS, RobotNames, Timebase
+from ..samples import (
+    ACTUATOR_FIELDS,
+    MOST_GEARS,
+    MOST_THRUSTERS,
+    MOST_TORQUERS,
+    MOST_WHEELS,
+    RobotNames,
+    Timebase,
+)
 from ..wire.definitions import decode
 from ..wire.message import MessageDescription, description
 from .batch import Batch
@@ -12,7 +20,8 @@ from .batch import Batch
 MOST_ACTUATORS = {
     topics.WHEELS_STATE: MOST_WHEELS,
     topics.THRUSTERS_STATE: MOST_THRUSTERS,
-    topics.COMMAND: MOST_WHEELS + MOST_THRUSTERS,
+    topics.MOTORS_STATE: MOST_GEARS,
+    topics.COMMAND: MOST_WHEELS + MOST_THRUSTERS + MOST_TORQUERS,
 }
 """Topics whose messages name actuators, and the largest number of each."""
 ACTUATOR_COLUMNS = (*ACTUATOR_FIELDS, "actuator_commands")
@@ -41,6 +50,13 @@ def described(
     describe = description(topic)
     if describe is None or not 0 < len(names) <= MOST_ACTUATORS[topic]:
         return None
-    wheels = names if topic is not topics.THRUSTERS_STATE else ()
-    thrusters = names if topic is topics.THRUSTERS_STATE else ()
-    return describe.of_robot(RobotNames(joints, wheels, thrusters), timebase)
+    robot = RobotNames(joints)
+    if topic is topics.MOTORS_STATE and not set(names) <= set(joints):
+        return None
+    if topic is topics.THRUSTERS_STATE:
+        robot = robot._replace(thrusters=names)
+    elif topic is topics.MOTORS_STATE:
+        robot = robot._replace(geared=names)
+    else:
+        robot = robot._replace(wheels=names)
+    return describe.of_robot(robot, timebase)

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from ..compiled.records import Block
 from ..samples import (
     ALL_FIELDS,
+    ORBIT_FIELDS,
     PASSIVE_FIELDS,
     STATE_FIELDS,
     LawInForce,
@@ -23,6 +24,8 @@ from ..samples import (
 
 Array = NDArray[np.float64]
 
+ORBIT_WIDTHS = {name: width for name, width in zip(ORBIT_FIELDS, (3, 3, 3, 12), strict=True)}
+"""Columns of a flight in orbit, and their widths."""
 REFERENCE = ("reference_joints", "reference_base")
 """The columns the desired motion fills."""
 MEASURED_COLUMNS = STATE_FIELDS + PASSIVE_FIELDS
@@ -121,14 +124,30 @@ class FlightLog:
     thrusts: Array
     """(N, T) N, means over the interval that ended at the tick, as many as there are thrusters."""
     actuator_commands: Array
-    """(N, W+T) the controller's answer to the tick: torques of the wheels' motors, N m, then forces
-    of the thrusters, N (NaN: none)."""
+    """(N, W+T+M) the controller's answer to the tick: torques of the wheels' motors, N m, then
+    forces of the thrusters, N, then dipoles of magnetic torquers, A m2 (NaN: none)."""
     passive_positions: Array
     """(N, p) rad, of prismatic joints m, as many as the robot has joints without motors."""
     passive_velocities: Array
     """(N, p) rad/s, of prismatic joints m/s."""
+    motor_positions: Array
+    """(N, G) rad or m, of the motors behind gears, as many as there are; seen through the gears."""
+    motor_velocities: Array
+    """(N, G) rad/s or m/s, of the same."""
+    orbit_position: Array
+    """(N, 3) m, of the inertial frame's origin from the Earth's centre; (N, 0) without an orbit, as
+    all that follows."""
+    orbit_velocity: Array
+    """(N, 3) m/s."""
+    magnetic_field: Array
+    """(N, 3) T, base frame."""
+    external_torques: Array
+    """(N, 12) N m about the robot's centre of mass over the interval that begins, inertial axes, by
+    `space_robot_msgs_py.samples.SOURCES`."""
     passive_names: tuple[str, ...] = ()
     """Names of the joints without motors."""
+    geared_names: tuple[str, ...] = ()
+    """Names of the joints with gears."""
     flight: dict[str, Any] = field(default_factory=dict)
     """The flight as recorded: controller, case, ..."""
     lost: dict[str, int] = field(default_factory=dict)
@@ -175,21 +194,25 @@ class FlightLog:
         wheels: int = 0,
         thrusters: int = 0,
         passive_names: tuple[str, ...] = (),
+        geared_names: tuple[str, ...] = (),
+        in_orbit: bool = False,
         new: Callable[[tuple[int, ...]], Array] = of_nan,
+        torquers: int = 0,
     ) -> FlightLog:
-        """A log of ``ticks`` rows of NaN, for a base with so many wheels and thrusters.
+        """A log of ``ticks`` rows of NaN, for a base with so many wheels, thrusters and torquers.
 
         ``new`` makes a column of a shape; it may be one of other numbers, to be written later.
         """
-        n, passive = len(joint_names), len(passive_names)
+        n, passive, geared = len(joint_names), len(passive_names), len(geared_names)
         shapes = [
             *((3,), (4,), (3,), (3,), (n,), (n,), (n + 3,), (3, n), (10,)),
-            *((wheels,), (wheels,), (thrusters,), (wheels + thrusters,)),
-            *((passive,), (passive,)),
+            *((wheels,), (wheels,), (thrusters,), (wheels + thrusters + torquers,)),
+            *((passive,), (passive,), (geared,), (geared,)),
+            *((size if in_orbit else 0,) for size in ORBIT_WIDTHS.values()),
         ]
         columns: list[Any] = [new((ticks, *shape)) for shape in shapes]
         log = cls(timebase, joint_names, *columns)
-        log.passive_names = passive_names
+        log.passive_names, log.geared_names = passive_names, geared_names
         return log
 
     @property
@@ -228,8 +251,12 @@ class FlightLog:
         return finite_rows(getattr(self, name) for name in columns)
 
     def longest_stretch(self) -> FlightLog:
-        """Longest stretch of `whole` rows, for methods that need no gaps; views, not copies."""
-        edges = np.diff(np.concatenate(([False], self.whole, [False])).astype(np.int8))
+        """Longest stretch of `whole` rows, for methods that need no gaps; views, not copies.
+
+        In an orbit its torques are known, too.
+        """
+        known = self.whole & self.finite(ORBIT_FIELDS)
+        edges = np.diff(np.concatenate(([False], known, [False])).astype(np.int8))
         starts, stops = np.flatnonzero(edges > 0), np.flatnonzero(edges < 0)
         if not len(starts):
             return self.rows(0, 0)
@@ -276,7 +303,7 @@ class FlightLog:
             _put(self.measured, start - self.first_tick, states, MEASURED_COLUMNS)
 
     def put_commands(self, start: int, torques: Array) -> None:
-        """Copy the commands (k, n+3+W+T) of each tick from ``start`` on, see `Command`."""
+        """Copy the commands (k, n+3+W+T+M) of each tick from ``start`` on, see `Command`."""
         assert self.commanded_torque is not None
         row = start - self.first_tick
         rows = slice(row, row + len(torques))

@@ -18,7 +18,7 @@ from ..wire.message import description
 from .actuators import ACTUATOR_COLUMNS, MOST_ACTUATORS, described, names_in
 from .batch import Batch
 from .field_reader import Array, FieldReader, Places
-from .flight_log import FlightLog, MeasuredStates
+from .flight_log import ORBIT_WIDTHS, FlightLog, MeasuredStates
 from .kernels import NO_STAMP, read_stamps
 from .message_accounting import LONGEST_JUMP, MessageAccounting
 
@@ -64,7 +64,7 @@ class Rows:
         self._readers = {
             topic: FieldReader(describe.of_robot(names, timebase))
             for topic, describe in descriptions.items()
-            if describe
+            if describe and topic is not topics.MAGNETOMETER  # /truth/orbit has the same numbers
         }
         self._unnamed = set(MOST_ACTUATORS)
         """Topics whose actuators' names are still unknown."""
@@ -111,6 +111,9 @@ class Rows:
         self._grow(counted.last + 1)
         if topic in self._unnamed:
             self._learn_actuators(topic, batch)
+        if topic is topics.TRUTH_ORBIT and not self.log.orbit_position.shape[1]:
+            for name, width in ORBIT_WIDTHS.items():
+                setattr(self.log, name, np.full((self._rows, width), np.nan))
         reader = self._readers.get(topic)
         if reader and reader.columns:
             if topic.per_tick:
@@ -130,6 +133,8 @@ class Rows:
         if (describe := described(topic, names, log.joint_names, log.timebase)) is None:
             return
         self._readers[topic] = FieldReader(describe)
+        if topic is topics.MOTORS_STATE:
+            log.geared_names = names
         for name, _, width in describe.columns:
             if name in ACTUATOR_COLUMNS:
                 setattr(log, name, np.full((self._rows, width), np.nan))

@@ -22,6 +22,8 @@ from .files import node_parameters
 from .trees import Tree, merge, nest
 from .validation import StrictModel, short, validate
 
+SHORTEST_PERIOD = 1e-5
+"""Shortest tick, s."""
 Texts = Annotated[list[str], AfterValidator(lambda texts: texts or [""])]
 """List of texts; empty texts are ignored, because ROS has no empty list of strings."""
 
@@ -39,7 +41,7 @@ class NodeSettings(StrictModel):
     robot: str = Field(
         "paper", description="a robot of config/robots, or a path to its YAML, URDF or folder"
     )
-    period: Annotated[float, Field(ge=1e-5, le=0.1)] = Field(
+    period: Annotated[float, Field(ge=SHORTEST_PERIOD, le=0.1)] = Field(
         0.0005, description="length of a tick, s; the same for all nodes"
     )
     fifo_priority: Annotated[int, Field(ge=0, le=98)] = Field(

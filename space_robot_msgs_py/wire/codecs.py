@@ -10,21 +10,30 @@ from .base_state import BaseState
 from .command import Commands
 from .compiled_codec import CompiledCodec
 from .joint_states import JointStates
+from .magnetometer import Magnetometer
 from .message import MessageDescription
+from .motors_state import MotorsState
 from .thrusters_state import ThrustersState
 from .wheels_state import WheelsState
 
-PARTS: tuple[type[MessageDescription], ...] = (JointStates, WheelsState, BaseState, ThrustersState)
+PARTS: tuple[type[MessageDescription], ...] = (
+    JointStates,
+    WheelsState,
+    BaseState,
+    ThrustersState,
+    MotorsState,
+    Magnetometer,
+)
 """Messages of a state in the order of sending."""
 
-FOR_THE_RECORD = (ThrustersState.topic,)
+FOR_THE_RECORD = (ThrustersState.topic, MotorsState.topic)
 
 
 class StateCodec:
-    """Converts `RobotState` to messages for joints, base, wheels and thrusters, and back."""
+    """Converts `RobotState` to the messages of its parts, see `PARTS`, and back."""
 
     def __init__(self, names: RobotNames, timebase: Timebase) -> None:
-        """Create the codecs; wheels and thrusters only if ``names`` has any."""
+        """Create the codecs; of parts that not every robot has only if ``names`` has any."""
         self._timebase, record = timebase, State.dtype(len(names.joints))
         parts = [part.of_robot(names, timebase) for part in PARTS]
         self.parts = {

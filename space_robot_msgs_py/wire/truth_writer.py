@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 
 import numpy as np
 
@@ -12,6 +12,7 @@ from .codec import Codec
 from .message import MessageDescription
 from .truth_base import TruthBase
 from .truth_joints import TruthJoints
+from .truth_orbit import TruthOrbit
 
 CHUNK_TICKS = 20
 """Ticks per message, hence the maximum number of ticks lost with a killed plant."""
@@ -19,14 +20,17 @@ CHUNK_TICKS = 20
 Messages = Iterable[tuple[topics.Topic, bytes]]
 
 
-class TruthWriter:
-    """Collects the true state of every tick for /truth/joints and /truth/base."""
+PARTS: tuple[type[MessageDescription], ...] = (TruthJoints, TruthBase, TruthOrbit)
 
-    def __init__(self, names: RobotNames, timebase: Timebase) -> None:
-        descriptions: tuple[MessageDescription, ...] = (
-            TruthJoints.of_robot(names, timebase),
-            TruthBase.of_robot(names, timebase),
-        )
+
+class TruthWriter:
+    """Collects the true state of every tick for the topics of the truth."""
+
+    def __init__(
+        self, names: RobotNames, timebase: Timebase, wanted: Collection[topics.Topic]
+    ) -> None:
+        """``wanted``: topics whose messages are to be written."""
+        descriptions = [part.of_robot(names, timebase) for part in PARTS if part.topic in wanted]
         self._codecs = [(describe, Codec(describe)) for describe in descriptions]
         self._timebase = timebase
         self._rows = np.empty(CHUNK_TICKS, State.dtype(len(names.joints)))

@@ -12,8 +12,8 @@ The flight software receives only the reported torque. By default that is the co
 and limits, so errors of the drives are unknown to it.
 
 This path applies to joints, and to a base with ideal torque. A base with hardware is turned by
-its wheels and thrusters, each with its own value in the command; limits and drives of base axes
-have no effect. The torque of wheels and thrusters is then the given torque, from which the echo's
+its wheels, thrusters and magnetic torquers, each with its own value in the command; limits and
+drives of base axes have no effect. Their torque is then the given torque, from which the echo's
 scale and bias make the reported one. A base without actuators receives no torque.
 """
 
@@ -33,10 +33,11 @@ from space_robot_msgs_py.compiled.lanes import uniform, whole
 from space_robot_msgs_py.compiled.records import Record, assign, nested, shaped
 from space_robot_msgs_py.config.validation import StrictModel
 from space_robot_msgs_py.errors import InputError
-from space_robot_msgs_py.samples import MOST_THRUSTERS, MOST_WHEELS, State
+from space_robot_msgs_py.samples import MOST_THRUSTERS, MOST_TORQUERS, MOST_WHEELS, State
 
 from ..faults.schedule import PartFault, Schedule
 from .drive import Drive, WrongDrive, drive_torque
+from .magnetic_torquers import MagneticTorquers, magnetise
 from .thrusters import StuckThruster, Thrusters, fire
 from .torque_echo import TorqueEcho, TorqueEchoSettings, WrongEcho, report_torque
 from .torque_limit import (
@@ -115,13 +116,16 @@ class Actuators(Record):
     torque_echo: TorqueEcho = nested(TorqueEcho)
     wheels: Wheels = nested(Wheels)
     thrusters: Thrusters = nested(Thrusters)
+    magnetic_torquers: MagneticTorquers = nested(MagneticTorquers)
     base_is_ideal: float = shaped(lambda n: (), uniform=True)
     """1 if the base receives the commanded torque; 0 if it has hardware or no actuators."""
     saturated_ticks: float = shaped(lambda n: ())
     """Number of ticks in which a torque was at its limit."""
-    latency: Array = shaped(lambda n: (n + 3 + MOST_WHEELS + MOST_THRUSTERS,), uniform=True)
+    latency: Array = shaped(
+        lambda n: (n + 3 + MOST_WHEELS + MOST_THRUSTERS + MOST_TORQUERS,), uniform=True
+    )
     """Ticks by which each number of a command is late."""
-    due: Array = shaped(lambda n: (n + 3 + MOST_WHEELS + MOST_THRUSTERS,))
+    due: Array = shaped(lambda n: (n + 3 + MOST_WHEELS + MOST_THRUSTERS + MOST_TORQUERS,))
     """The command due at the current tick."""
     base_wrench: Array = shaped(lambda n: (6,))
     """Force, N, and torque, N m, on base axes, of all that acts on the base but the wheels."""
@@ -141,6 +145,7 @@ class Actuators(Record):
             torque_echo=TorqueEcho.build(n, settings),
             wheels=Wheels.build(n, settings.wheels),
             thrusters=Thrusters.build(n, settings.thrusters, period),
+            magnetic_torquers=MagneticTorquers.build(n, settings.magnetic_torquers),
             base_is_ideal=settings.base_actuation == "ideal",
             latency=settings.command_latency_ticks,
         )
@@ -201,11 +206,12 @@ def actuate(
         actuators: of the robot; ``base_wrench`` is written.
         command_delay_buffer: ring buffer of commands in transit.
         command: (n+3+A,) N m: base x, y, z (base frame), then joints; then of the base's hardware:
-            torques of wheels' motors, N m, forces of thrusters, N.
+            torques of wheels' motors, N m, forces of thrusters, N, dipoles of magnetic torquers,
+            A m2.
         tick: at which it is given.
         period: of a tick, s.
-        truth: ``wheel_velocities`` at ``tick`` are read; ``applied_torque`` (the one that acts on
-            the robot), ``wheel_torques`` and ``thrusts`` are written.
+        truth: ``wheel_velocities`` and ``magnetic_field`` at ``tick`` are read; ``applied_torque``
+            (the one that acts on the robot), ``wheel_torques`` and ``thrusts`` are written.
         measured: the same are written; ``applied_torque`` is the reported torque.
     """
     applied, reported = truth.applied_torque, measured.applied_torque
@@ -220,6 +226,8 @@ def actuate(
         wrench[:] = 0.0
         wheels, axes = whole(actuators.wheels.count), applied.size
         fire(actuators.thrusters, due[axes + wheels :], period, truth.thrusts, wrench)
+        behind = axes + wheels + whole(actuators.thrusters.count)
+        magnetise(actuators.magnetic_torquers, due[behind:], truth.magnetic_field, wrench)
         applied[:3] = wrench[3:]
         saturated += drive_wheels(
             actuators.wheels,

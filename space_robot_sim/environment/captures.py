@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from space_robot_model.dynamics.model import Model
+from space_robot_model.elementary.matrices import norm
 from space_robot_model.robot import Robot
 from space_robot_model.robot.dynamics import generalised_rows
 from space_robot_msgs_py.simulated_time import tick_from
@@ -17,6 +18,9 @@ from space_robot_msgs_py.simulated_time import tick_from
 from .events import Capture, Event, in_order
 from .grasp import Grasp
 from .impact import Impact
+from .neighbouring_orbit import Meeting, meet
+from .orbit_settings import OrbitSettings
+from .target import TargetMotion
 
 Array = NDArray[np.float64]
 
@@ -30,6 +34,8 @@ class CaptureEvent(NamedTuple):
     after: Robot
     grasp: Grasp
     """Grasp of the target that is captured or released."""
+    meeting: Meeting | None = None
+    """Where a target on a neighbouring orbit is then."""
 
     def impact(
         self, quaternion: Array, joint_positions: Array, wheel_axes: Array, wheel_inertia: Array
@@ -41,33 +47,50 @@ class CaptureEvent(NamedTuple):
     def velocity_after(self, impact: Impact, velocity: Array) -> Array:
         """Return the velocities after the event, as in `Impact`."""
         if isinstance(self.event, Capture):
-            return impact.capture(self.event.target.motion, velocity)
+            return impact.capture(self._motion(self.event), velocity)
         return impact.release(self.event.speed, velocity)
 
     def velocity_before(self, impact: Impact, velocity: Array) -> Array:
         """Invert `velocity_after`."""
         if isinstance(self.event, Capture):
-            return impact.before_capture(self.event.target.motion, velocity)
+            return impact.before_capture(self._motion(self.event), velocity)
         return impact.before_release(self.event.speed, velocity)
+
+    def miss(self, impact: Impact, base_position: Array) -> float:
+        """Return by how much the tool misses the target, m; 0 if it reaches it."""
+        if self.meeting is None:
+            return 0.0
+        distance = norm(base_position + impact.place - self.meeting.position)
+        return distance if distance > self.meeting.reach else 0.0
+
+    def _motion(self, event: Capture) -> TargetMotion:
+        return self.meeting.motion if self.meeting else event.target.motion
 
 
 class Captures:
     """Events of one flight of a robot; their effect depends only on tick and state."""
 
-    def __init__(self, events: Sequence[Event], robot: Robot, period: float) -> None:
+    def __init__(
+        self, events: Sequence[Event], robot: Robot, period: float, orbit: OrbitSettings
+    ) -> None:
         """Place the events in ticks of ``period`` seconds.
 
         Raises:
-            InputError: the order of events is invalid, or ``robot`` lacks a tool.
+            InputError: the order of events is invalid, ``robot`` lacks a tool, or ``orbit`` is none
+                where a target is on a neighbouring one.
         """
         self._robot = robot
+        self.misses: dict[float, float] = {}
+        """Distances, m, by tick, of captures that have missed their target."""
         self.exchanges: list[CaptureEvent] = []
         """By their ticks."""
         for event in in_order(events):
             tick = tick_from(event.time_s, period)
             if isinstance(event, Capture):
                 grasp = Grasp.of(robot, event.target)
-                exchange = CaptureEvent(tick, event, robot, grasp.holding(robot), grasp)
+                target = event.target
+                meeting = meet(target, orbit, tick * period) if target.is_in_orbit else None
+                exchange = CaptureEvent(tick, event, robot, grasp.holding(robot), grasp, meeting)
             else:
                 last = self.exchanges[-1]
                 exchange = CaptureEvent(tick, event, last.after, robot, last.grasp)
@@ -95,25 +118,44 @@ class Captures:
     def robot_at(self, tick: float) -> Robot:
         """Return the robot, with its captured target, after the begin of ``tick``."""
         past = [exchange for exchange in self.exchanges if exchange.tick <= tick]
+        if past and isinstance(past[-1].event, Capture) and past[-1].tick in self.misses:
+            return past[-1].before
         return past[-1].after if past else self._robot
 
     def apply(self, tick: int, model: Model, x: Array) -> bool:
         """Apply the events of ``tick`` to a plant's ``model`` and its state ``x``.
 
-        ``x`` is as in `space_robot_sim.plant.integrator.Stages`. Returns whether there are any.
+        ``x`` is as in `space_robot_sim.plant.integrator.Stages`. Returns whether any happened.
         """
-        exchanges = self.at(tick)
-        for exchange in exchanges:
+        happened = False
+        for exchange in self.at(tick):
             n, wheels = self._robot.joint_count, int(model.wheel_count)
             row = model.row[:n].astype(np.intp)
-            velocities = x[7 + n : 13 + 2 * n + wheels]
-            places = [*generalised_rows(self._robot), *range(6 + n, 6 + n + wheels)]
+            others = wheels + int(model.rotor_count)
+            velocities = x[7 + n : 13 + 2 * n + others]
+            places = [*generalised_rows(self._robot), *range(6 + n, 6 + n + others)]
             impact = exchange.impact(
                 x[3:7], x[7 : 7 + n][row], model.wheel_axis[:wheels], model.wheel_inertia[:wheels]
             )
+            if not self.happens(exchange, impact, x[:3]):
+                continue
+            happened = True
             velocities[places] = exchange.velocity_after(impact, velocities[places])
             body, of_robot = exchange.grasp.body, exchange.after.model
             body = 1 + int(row[body - 1]) if body else 0
             for name in ("mass", "inertia", "com"):
                 getattr(model, name)[body] = getattr(of_robot, name)[body]
-        return bool(exchanges)
+        return happened
+
+    def happens(self, exchange: CaptureEvent, impact: Impact, base_position: Array) -> bool:
+        """Return whether an event happens: a capture if the tool is at the target.
+
+        A release after a capture that missed its target does not. Misses are remembered.
+        """
+        if isinstance(exchange.event, Capture):
+            self.misses.pop(exchange.tick, None)
+            if distance := exchange.miss(impact, base_position):
+                self.misses[exchange.tick] = distance
+            return not distance
+        capture = self.exchanges[self.exchanges.index(exchange) - 1]
+        return capture.tick not in self.misses

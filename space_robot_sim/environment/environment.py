@@ -14,7 +14,10 @@ from ..faults.schedule import PartFault
 from .disturbance import Disturbance, DisturbanceSettings
 from .events import Event, EventTexts, parse_events
 from .friction import Friction, FrictionSettings, StuckJoint
+from .orbit import Orbit
+from .orbit_settings import OrbitSettings
 from .payload import PayloadSettings
+from .surfaces import Surfaces
 
 
 class EnvironmentSettings(StrictModel):
@@ -49,15 +52,25 @@ class Environment(Record):
 
     friction: Friction = nested(Friction)
     disturbance: Disturbance = nested(Disturbance)
+    orbit: Orbit = nested(Orbit)
+    surfaces: Surfaces = nested(Surfaces)
 
     @classmethod
-    def build(cls, robot: Robot, settings: EnvironmentSettings) -> Environment:
-        """Read the numbers of the settings for a robot."""
+    def build(
+        cls, robot: Robot, settings: EnvironmentSettings, orbit: OrbitSettings
+    ) -> Environment:
+        """Read the numbers of the settings for a robot.
+
+        Raises:
+            InputError: see `Surfaces`.
+        """
         environment = cls.allocate(robot.n)
         assign(
             environment,
             friction=Friction.build(robot, settings.friction),
             disturbance=Disturbance.build(robot.n, settings.disturbance),
+            orbit=Orbit.build(robot.n, orbit),
+            **({"surfaces": Surfaces.build(robot)} if orbit.has_surfaces else {}),
         )
         return environment
 

@@ -13,13 +13,12 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from space_robot_model.dynamics.model import MOST_JOINTS
+from space_robot_model.dynamics.model import MOST_JOINTS, MOST_MOVING
 from space_robot_model.robot import Robot
 from space_robot_msgs_py.compiled.kernels import kernel
 from space_robot_msgs_py.compiled.lanes import uniform, whole
 from space_robot_msgs_py.compiled.records import Record, assign, shaped
 from space_robot_msgs_py.config.validation import StrictModel
-from space_robot_msgs_py.samples import MOST_WHEELS
 from space_robot_msgs_py.topics import BASE_AXES
 
 from ..faults.axes import About
@@ -62,9 +61,9 @@ class Friction(Record):
     """Number of joints and wheels; the rest of the arrays is unused."""
     row: Array = shaped(lambda n: (MOST_JOINTS,))
     """Row of each joint in the other arrays, which are in the order of `Model`."""
-    coulomb: Array = shaped(lambda n: (MOST_JOINTS + MOST_WHEELS,))
+    coulomb: Array = shaped(lambda n: (MOST_MOVING,))
     """f_C, N m."""
-    viscous: Array = shaped(lambda n: (MOST_JOINTS + MOST_WHEELS,))
+    viscous: Array = shaped(lambda n: (MOST_MOVING,))
     """f_V, N m s/rad."""
     set_valued: float = shaped(lambda n: (), uniform=True)
     """0 for the sign alone, 1 for friction that holds joints at rest."""

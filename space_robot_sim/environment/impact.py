@@ -24,6 +24,7 @@ from space_robot_model.robot import Robot
 from space_robot_model.robot.base_axes import base_axes
 from space_robot_model.robot.dynamics import mass_matrix
 from space_robot_model.robot.frames import BodyFrame, body_frames
+from space_robot_model.robot.gears import rotor_rows
 
 from .grasp import Grasp
 from .target import TargetMotion
@@ -32,10 +33,10 @@ Array = NDArray[np.float64]
 
 
 class Impact:
-    """A robot of N joints and W wheels at the instant at which it takes or lets go a target.
+    """A robot of N joints, W wheels and G gears when it takes or lets go a target.
 
-    Velocities are ``qdot = [v0, w0, thetadot, Omega]`` (N+6+W,), the base's on inertial axes, m/s
-    and rad/s; spatial ones have their linear part first, on inertial axes.
+    Velocities are ``qdot = [v0, w0, thetadot, Omega, thetadot_m]`` (N+6+W+G,), the base's on
+    inertial axes, m/s and rad/s; spatial ones have their linear part first, on inertial axes.
     """
 
     def __init__(
@@ -63,20 +64,25 @@ class Impact:
         carrier = frames[grasp.body]
         axes = _axes(carrier)
         self._tool_axes = product(axes, grasp.tool_axes)
+        self.place: Array = (carrier.origin + carrier.on_outer_axes(grasp.com))[:, 0]
+        """(3,) of the target's CoM from the base's, m, inertial axes."""
         self._size = holding.joint_count + 6
-        self.jacobian = np.zeros((6, self._size + len(wheel_inertia)))
-        """(6, N+6+W) velocity of the target, as a part of the robot, by qdot."""
+        rotors, reflected = rotor_rows(holding, frames)
+        self.jacobian = np.zeros((6, self._size + len(wheel_inertia) + len(rotors)))
+        """(6, N+6+W+G) velocity of the target, as a part of the robot, by qdot."""
         self._fill_jacobian(holding, frames, grasp)
         mass = np.zeros((6, 6))
         mass[:3, :3] = grasp.mass * np.eye(3)
         mass[3:, 3:] = rotate_tensor(axes, grasp.inertia)
-        inertia = _with_wheels(
+        wheels = np.zeros((len(wheel_inertia), self._size))
+        wheels[:, 3:6] = wheel_inertia[:, np.newaxis] * product(wheel_axes, base[:, :, 0])
+        inertia = _with_leaves(
             mass_matrix(holding, quaternion, joint_positions),
-            product(wheel_axes, base[:, :, 0]),
-            wheel_inertia,
+            np.vstack((wheels, rotors)),
+            np.concatenate((wheel_inertia, reflected)),
         )
         self._gain = solve(inertia, product(mass, self.jacobian).T)
-        """(N+6+W, 6) change of qdot by u."""
+        """(N+6+W+G, 6) change of qdot by u."""
 
     def capture(self, motion: TargetMotion, velocity: Array) -> Array:
         """Return qdot after a capture at ``velocity``."""
@@ -111,8 +117,7 @@ class Impact:
 
     def _fill_jacobian(self, robot: Robot, frames: dict[int, BodyFrame], grasp: Grasp) -> None:
         """Write the columns of the base and of the joints between it and the hand."""
-        carrier = frames[grasp.body]
-        place = (carrier.origin + carrier.on_outer_axes(grasp.com))[:, 0]
+        place = self.place
         self.jacobian[:, :6] = np.eye(6)
         self.jacobian[:3, 3:6] = np.cross(np.eye(3), place).T
         body = grasp.body
@@ -135,12 +140,11 @@ def _spatial(motion: TargetMotion) -> Array:
     return np.array([*motion.velocity, *motion.angular_velocity])
 
 
-def _with_wheels(inertia: Array, axes: Array, rotors: Array) -> Array:
-    """Return the inertia with rows for the wheels, whose axes (W, 3) are on inertial axes."""
-    size, count = len(inertia), len(rotors)
-    wheels = np.zeros((size + count, size + count))
-    wheels[:size, :size] = inertia
-    wheels[3:6, size:] = (rotors[:, np.newaxis] * axes).T
-    wheels[size:, 3:6] = wheels[3:6, size:].T
-    wheels[size:, size:] = np.diag(rotors)
-    return wheels
+def _with_leaves(inertia: Array, rows: Array, own: Array) -> Array:
+    """Return the inertia with those of wheels and rotors: couplings (K, N+6) and their own (K,)."""
+    size, count = len(inertia), len(own)
+    whole = np.zeros((size + count, size + count))
+    whole[:size, :size] = inertia
+    whole[size:, :size], whole[:size, size:] = rows, rows.T
+    whole[size:, size:] = np.diag(own)
+    return whole

@@ -8,7 +8,8 @@ from typing import Annotated, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import AfterValidator, Field
+from pydantic import AfterValidator, Field, model_validator
+from typing_extensions import Self
 
 from space_robot_model.dynamics.attitude import rotation_matrix
 from space_robot_model.elementary.matrices import norm
@@ -46,14 +47,32 @@ class TargetMotion(StrictModel):
     """``target.motion``: how the target moves when it is grasped.
 
     On inertial axes, as seen from the inertial frame; or on the tool's axes, as seen from a tool
-    that moves and turns itself (by default it stands still there).
+    that moves and turns itself (by default it stands still there). Relative to the orbit it is the
+    motion at tick 0, from which the target falls freely: position and velocity on the orbit's axes
+    (radial, along the path, along the normal), as seen from these turning axes.
     """
 
-    relative_to: Literal["tool", "inertial"] = "tool"
+    relative_to: Literal["tool", "inertial", "orbit"] = "tool"
     velocity: Speeds = Field([0.0, 0.0, 0.0])
     """Velocity of the centre of mass, m/s."""
     angular_velocity: Speeds = Field([0.0, 0.0, 0.0])
-    """rad/s."""
+    """rad/s; relative to the orbit on the target's own axes, as seen from the inertial frame."""
+    position: Vector = Field([0.0, 0.0, 0.0])
+    """Position of the centre of mass from the inertial frame's origin at tick 0, m."""
+    quaternion: Quaternion = Field([1.0, 0.0, 0.0, 0.0])
+    """``[w, x, y, z]`` of the target's axes at tick 0, to the inertial frame."""
+    reach: Annotated[float, Field(gt=0.0, le=1e3)] = 0.05
+    """Largest distance, m, between the target and where the tool would hold it, of a capture that
+    does not miss."""
+
+    @model_validator(mode="after")
+    def _only_in_orbit(self) -> Self:
+        keys = ("position", "quaternion", "reach")
+        if self.relative_to != "orbit" and (unused := self.model_fields_set & {*keys}):
+            raise ValueError(
+                f"{', '.join(sorted(unused))} are for relative_to orbit, got {self.relative_to!r}"
+            )
+        return self
 
 
 class Target(StrictModel):
@@ -80,6 +99,11 @@ class Target(StrictModel):
     def from_dict(cls, content: dict[str, Any], where: str = "target") -> Target:
         """Build from the mapping a target's file holds (key ``target`` at its top)."""
         return validate(_TargetDocument, content, where).target
+
+    @property
+    def is_in_orbit(self) -> bool:
+        """True if the target is on an orbit of its own until its capture."""
+        return self.motion.relative_to == "orbit"
 
     @property
     def inline(self) -> str:

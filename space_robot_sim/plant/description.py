@@ -41,6 +41,7 @@ def plant_description(
         "seed": settings.fault_seed,
         **({"faults": faults} if faults else {}),
         **({"events": events} if events else {}),
+        **({"orbit": settings.orbit} if settings.has_orbit else {}),
         **({"prismatic_joints": prismatic} if prismatic else {}),
         **({"branches": list(branches)} if len(branches := robot.branches) > 1 else {}),
         "robot_file": dict(content),

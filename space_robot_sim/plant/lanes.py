@@ -10,18 +10,20 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from space_robot_msgs_py.compiled.kernels import kernel
+from space_robot_msgs_py.compiled.kernels import kernel, subroutine
 from space_robot_msgs_py.compiled.lanes import (
     WIDTH,
     all_lanes,
     lane_of,
     negated,
+    uniform,
     where,
     whole,
     with_lane,
 )
 from space_robot_msgs_py.compiled.records import Block
 
+from ..environment.environment import Environment
 from .integrator import state_size
 from .plant import PlantMemory, begin_interval, end_interval
 from .stick_slip import glide, integrate
@@ -52,7 +54,7 @@ def advance_lanes(
     """
     begin_interval(memory, command_delay_buffer, torque, tick, period)
     move_lanes(memory, alone, tick * period, period, flies)
-    fastest: float = end_interval(memory)
+    fastest: float = end_interval(memory, tick + 1, period)
     return fastest
 
 
@@ -69,7 +71,7 @@ def move_lanes(memory: PlantMemory, alone: Block, start: float, period: float, f
         time = start + k * step
         goes_on = glide(model, memory.environment, x, time, step, stages)
         moves = goes_on & flies
-        for i in range(state_size(model)):
+        for i in range(state_size(model, memory.environment)):
             x[i] = where(moves, stages.end[i], x[i])
         if not all_lanes(goes_on | negated(flies)):
             for lane in range(WIDTH):
@@ -84,10 +86,23 @@ def _move_alone(
     """Integrate the flight of one lane over a step."""
     x, stages = memory.x, alone.stages
     actuation = memory.stages.actuation
-    for i in range(state_size(alone.model)):
+    for i in range(state_size(alone.model, alone.environment)):
         alone.x[i] = lane_of(x[i], lane)
     for i in range(6 + whole(alone.environment.friction.count)):
         stages.actuation[i] = lane_of(actuation[i], lane)
+    _hold_alone(memory.environment, alone.environment, whole(alone.model.joint_count) + 1, lane)
     integrate(alone.model, alone.environment, alone.x, time, step, stages)
-    for i in range(state_size(alone.model)):
+    for i in range(state_size(alone.model, alone.environment)):
         x[i] = with_lane(x[i], lane, alone.x[i])
+
+
+@subroutine
+def _hold_alone(in_lanes: Environment, alone: Environment, bodies: int, lane: int) -> None:
+    """Copy what acts in an orbit over a tick to the flight of one lane."""
+    for k in range(3):
+        alone.orbit.magnetic_torque[k] = lane_of(in_lanes.orbit.magnetic_torque[k], lane)
+    if uniform(in_lanes.surfaces.count) > 0.0:
+        for i in range(bodies):
+            for k in range(6):
+                wrench = lane_of(in_lanes.surfaces.wrench[i, k], lane)
+                alone.surfaces.wrench[i, k] = wrench

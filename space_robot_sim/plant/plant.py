@@ -14,6 +14,7 @@ from space_robot_model.dynamics.model import Model
 from space_robot_model.elementary.matrices import norm
 from space_robot_model.hardware.sensors import SensorSettings
 from space_robot_model.robot import Robot
+from space_robot_msgs_py import topics
 from space_robot_msgs_py.compiled.kernels import kernel
 from space_robot_msgs_py.compiled.lanes import where, whole
 from space_robot_msgs_py.compiled.records import Record, RecordOwner, assign, nested, shaped
@@ -30,11 +31,14 @@ from ..actuators.actuators import (
 )
 from ..environment.captures import Captures
 from ..environment.environment import Environment, EnvironmentSettings
+from ..environment.orbit_settings import OrbitSettings
 from ..environment.payload import with_payload
 from ..sensors.sensors import Sensors, sense
 from .faults import FaultSettings, PartFaults
-from .integrator import MOST_NUMBERS, Stages, state_size
+from .gear_mounting import MOST_SUBSTEPS, check_springs, measured_motors, mount_gears
+from .integrator import MOST_NUMBERS, Stages, first_motor_angle
 from .stick_slip import integrate
+from .surroundings import meet_surroundings
 from .truth import write_truth
 from .wheel_mounting import mount_wheels
 
@@ -45,7 +49,9 @@ RATE_LIMIT = 1e4
 """rad/s; a body that turns faster has left the physics (a diverged loop)."""
 
 
-class PlantSettings(ActuatorSettings, EnvironmentSettings, SensorSettings, FaultSettings):
+class PlantSettings(
+    ActuatorSettings, EnvironmentSettings, OrbitSettings, SensorSettings, FaultSettings
+):
     """Settings of the plant's world, beside the robot's own file."""
 
     initial_joints_deg: list[float] = Field(
@@ -55,9 +61,22 @@ class PlantSettings(ActuatorSettings, EnvironmentSettings, SensorSettings, Fault
     initial_quaternion: Annotated[list[float], Field(min_length=4, max_length=4)] = Field(
         [1.0, 0.0, 0.0, 0.0], description="base attitude at tick 0: w, x, y, z"
     )
-    substeps: Annotated[int, Field(ge=1, le=1000)] = Field(
+    substeps: Annotated[int, Field(ge=1, le=MOST_SUBSTEPS)] = Field(
         1, description="integration steps per tick; the command is held over all of them"
     )
+
+    def check(self, robot: Robot, file: str) -> None:
+        """Check the actuators and what they need, see `ActuatorSettings.check`.
+
+        Raises:
+            InputError: the settings do not fit.
+        """
+        super().check(robot, file)
+        if self.torquer_count and not (self.has_orbit and self.magnetism.strength):
+            raise InputError(
+                f"actuators {file}: magnetic_torquers need an orbit with a magnetic field: "
+                "--orbit NAME, with magnetism.strength above 0"
+            )
 
 
 class PlantMemory(Record):
@@ -89,6 +108,8 @@ class PlantSnapshot(NamedTuple):
     command_delay_buffer: Array
     next_change: float
     part_faults: PartFaults
+    misses: dict[float, float]
+    """See `space_robot_sim.environment.captures.Captures`."""
 
 
 class Plant(RecordOwner):
@@ -119,10 +140,10 @@ class Plant(RecordOwner):
         if not 1e-3 <= length <= 1e3:
             raise InputError(f"initial_quaternion must have a norm near 1, got {length:g}")
         settings.check(robot, getattr(settings, "actuators", "given"))
-        self.names = settings.robot_names(robot)
+        self.names = settings.robot_names(robot)._replace(in_orbit=settings.has_orbit)
         """Names of all measured and commanded quantities."""
         robot = with_payload(robot, settings.payload)
-        self.captures = Captures(settings.parsed_events, robot, period)
+        self.captures = Captures(settings.parsed_events, robot, period, settings)
         """Captures and releases of the flight."""
         self.period = period
         self.block = PlantMemory.block(n)
@@ -131,7 +152,7 @@ class Plant(RecordOwner):
         assign(
             memory,
             model=robot.model,
-            environment=Environment.build(robot, settings),
+            environment=Environment.build(robot, settings, settings),
             actuators=Actuators.build(n, settings, period),
             substeps=settings.substeps,
         )
@@ -146,16 +167,22 @@ class Plant(RecordOwner):
         memory.x[7 : 7 + robot.joint_count] = positions[list(robot.order)]
         speeds = memory.x[13 + 2 * robot.joint_count :][:MOST_WHEELS]
         mount_wheels(settings.wheels, memory.model, memory.environment.friction, speeds)
+        mount_gears(robot, memory.model, memory.environment.friction, memory.x)
+        check_springs(robot, positions, period / settings.substeps, settings.substeps)
         self._look_into_blocks()
         # at rest: what `write_truth` would say, without waiting for compiled code
         self.truth.quaternion[:] = memory.x[3:7]
         self.truth.joint_positions[:] = positions[:n]
         self.truth.passive_positions[: len(robot.springs)] = positions[n:]
         self.truth.wheel_velocities[:] = speeds
-        if self.captures.exchanges:  # so that no tick has to wait for it
-            update_true_state(self.block)
+        geared = [position for position, gear in zip(positions, robot.gears, strict=False) if gear]
+        self.truth.motor_positions[: len(geared)] = geared
+        self._put_into_orbit(robot)
+        if self.captures.exchanges or settings.has_orbit:  # so that no tick has to wait for it
+            update_true_state(self.block, 0, period)
+        motors = measured_motors(robot)
         sensors = Sensors.build(
-            n, settings, period, memory.truth, robot.is_prismatic[:n], settings.fault_seed
+            n, settings, period, memory.truth, robot.is_prismatic[:n], settings.fault_seed, motors
         )
         schedule = settings.schedule(self.names, period)
         check_faults(schedule, settings)
@@ -165,17 +192,29 @@ class Plant(RecordOwner):
         assign(memory, sensors=sensors)
         self.measures_truth = (
             bool(sensors.are_ideal)
+            and not any(motors)
             and reports_given(memory.actuators)
             and not self._part_faults.are_in("actuators")
             and not settings.has_message_faults
         )
         """True if what comes of `state` can never differ from `truth`."""
+        self.truth_topics = (
+            *(() if self.measures_truth else topics.TRUTH),
+            *((topics.TRUTH_ORBIT,) if settings.has_orbit else ()),
+        )
+        """Topics of what of the truth `state` does not tell."""
         self.next_change = math.inf
         """The first tick to come at which an event happens, or a fault begins or ends.
 
         It needs `begin_tick`: compiled code may fly up to there.
         """
         self.begin_tick(0)
+
+    def _put_into_orbit(self, robot: Robot) -> None:
+        """Put the origin's position and velocity at tick 0 into the state."""
+        orbit, model = self.memory.environment.orbit, self.memory.model
+        at = 13 + 2 * robot.joint_count + int(model.wheel_count) + 2 * int(model.rotor_count)
+        self.memory.x[at : at + 3], self.memory.x[at + 3 : at + 6] = orbit.position, orbit.velocity
 
     def _look_into_blocks(self) -> None:
         self.truth = RobotState(0, self.block["truth"])
@@ -254,7 +293,7 @@ class Plant(RecordOwner):
         self.state.tick = self.truth.tick = tick
         memory = self.memory
         if self.captures.apply(tick, memory.model, memory.x):
-            update_true_state(self.block)
+            update_true_state(self.block, tick, self.period)
         self.next_change = min(self._part_faults.apply(tick, memory), self.captures.next_tick(tick))
 
     def save(self) -> PlantSnapshot:
@@ -265,6 +304,7 @@ class Plant(RecordOwner):
             self.command_delay_buffer.copy(),
             self.next_change,
             copy.deepcopy(self._part_faults),
+            dict(self.captures.misses),
         )
 
     def restore(self, snapshot: PlantSnapshot) -> None:
@@ -274,6 +314,7 @@ class Plant(RecordOwner):
         self.state.tick = self.truth.tick = snapshot.tick
         self.next_change = snapshot.next_change
         self._part_faults = copy.deepcopy(snapshot.part_faults)
+        self.captures.misses = dict(snapshot.misses)
 
     def diverged(self, fastest: float) -> DivergedError:
         """Return the error for a fastest rate after a step of ``fastest``, rad/s."""
@@ -299,10 +340,9 @@ def step(
 
 
 @kernel
-def update_true_state(block: Block) -> None:
-    """Call `write_truth` from Python."""
-    memory = block[0]
-    write_truth(memory.model, memory.x, memory.rotation, memory.truth)
+def update_true_state(block: Block, tick: int, period: float) -> None:
+    """Call `look` from Python."""
+    look(block[0], tick, period)
 
 
 @kernel
@@ -335,7 +375,7 @@ def advance(
             step,
             memory.stages,
         )
-    fastest: float = end_interval(memory)
+    fastest: float = end_interval(memory, tick + 1, period)
     return fastest
 
 
@@ -354,18 +394,27 @@ def begin_interval(
 
 
 @kernel
-def end_interval(memory: PlantMemory) -> float:
-    """Write the true state reached, and return its `fastest_rate`."""
+def look(memory: PlantMemory, tick: int, period: float) -> None:
+    """Write the true state of ``tick``, and what the robot meets there."""
     write_truth(memory.model, memory.x, memory.rotation, memory.truth)
+    meet_surroundings(
+        memory.model, memory.environment, memory.x, memory.stages.data, tick, period, memory.truth
+    )
+
+
+@kernel
+def end_interval(memory: PlantMemory, tick: int, period: float) -> float:
+    """Write the true state of ``tick``, which is reached, and return its `fastest_rate`."""
+    look(memory, tick, period)
     fastest: float = fastest_rate(memory.model, memory.x)
     return fastest
 
 
 @kernel
 def fastest_rate(model: Model, x: Array) -> float:
-    """Return the fastest velocity of base axes, joints and wheels, rad/s (NaN if any is)."""
+    """Return the fastest rate of base axes, joints, wheels and motors, rad/s (NaN if any is)."""
     fastest = 0.0
-    for i in range(10 + whole(model.joint_count), state_size(model)):
+    for i in range(10 + whole(model.joint_count), first_motor_angle(model)):
         speed = abs(x[i])  # NaN stays
         fastest = where((speed <= fastest) | np.isnan(fastest), fastest, speed)
     return fastest

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, ClassVar
+from typing import Annotated, Any, ClassVar
 
 from pydantic import Field
+from typing_extensions import Self
 
 from space_robot_model.robot.find import mission_layers
 from space_robot_model.robot.mission_document import mission_layer
@@ -15,6 +16,7 @@ from space_robot_msgs_py.config.files import named_layers
 from space_robot_msgs_py.config.settings import NodeSettings, Texts
 from space_robot_msgs_py.config.trees import Tree
 
+from ..environment.orbit_file import orbit_layers
 from .plant import PlantSettings
 
 MOST_TICKS = 10**10
@@ -25,14 +27,24 @@ class PlantNodeSettings(PlantSettings, NodeSettings):
     """Parameters of plant_node."""
 
     node: ClassVar[str] = "plant"
-    selectors: ClassVar[tuple[str, ...]] = ("robot", "mission", "case", "sensors", "actuators")
+    selectors: ClassVar[tuple[str, ...]] = (
+        "robot",
+        "mission",
+        "case",
+        "sensors",
+        "actuators",
+        "orbit",
+    )
     sends: ClassVar[tuple[topics.Topic, ...]] = (
         topics.JOINT_STATES,
         topics.BASE_STATE,
         topics.CLOCK,
         *topics.TRUTH,
+        topics.TRUTH_ORBIT,
         topics.WHEELS_STATE,
         topics.THRUSTERS_STATE,
+        topics.MOTORS_STATE,
+        topics.MAGNETOMETER,
         *topics.SCENE,
         topics.PLANT_DESCRIPTION,
     )
@@ -48,6 +60,7 @@ class PlantNodeSettings(PlantSettings, NodeSettings):
         "ideal",
         description="the base's actuators: a name of config/actuators, or a path to a YAML file",
     )
+    orbit: str = Field("none", description="an orbit of config/orbits, or a path to its YAML")
     ticks: Annotated[int, Field(ge=0, le=MOST_TICKS)] = Field(
         0, description="ticks to fly, then exit (0: until stopped)"
     )
@@ -86,14 +99,26 @@ class PlantNodeSettings(PlantSettings, NodeSettings):
 
     @classmethod
     def layers(cls, selected: Mapping[str, str]) -> list[Path]:
-        """Add mission (where the arm starts), case (what disturbs it), sensors and actuators."""
+        """Add mission (where the arm starts), case (what disturbs it), hardware and orbit."""
         return [
             *super().layers(selected),
             *mission_layers(selected["robot"], selected["mission"]),
             *named_layers("cases", selected["case"]),
             *named_layers("sensors", selected["sensors"]),
             *named_layers("actuators", selected["actuators"]),
+            *orbit_layers(selected["orbit"]),
         ]
+
+    @classmethod
+    def resolve(cls, overrides: Mapping[str, Any]) -> Self:
+        """Read the settings as `NodeSettings.resolve`.
+
+        Raises:
+            InputError: also if something is set that needs an orbit, without one.
+        """
+        settings = super().resolve(overrides)
+        settings.check_orbit(f"{cls.node} parameters")
+        return settings
 
     @classmethod
     def read_layer(cls, path: Path) -> Tree:

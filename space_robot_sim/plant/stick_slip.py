@@ -51,7 +51,7 @@ def integrate(
         rk4_step(model, environment, x, time, left, stages)
         joint = first_at_rest(model, environment, x, stages)
         if joint == NONE:
-            _take(model, stages, x)
+            _take(model, environment, stages, x)
             return
         velocity = first_velocity(model) + joint
         if x[velocity] == 0.0:  # broke away and came back
@@ -65,18 +65,18 @@ def integrate(
             joint = first_at_rest(model, environment, x, stages)
             if joint == NONE:
                 break
-        _take(model, stages, x)
+        _take(model, environment, stages, x)
         stages.held[: whole(environment.friction.count)] = 0.0
         time += length
         left -= length
     slip_or_stick(model, environment, x, time, stages)
     rk4_step(model, environment, x, time, left, stages)
-    _take(model, stages, x)
+    _take(model, environment, stages, x)
 
 
 @subroutine
-def _take(model: Model, stages: Stages, x: Array) -> None:
-    for i in range(state_size(model)):
+def _take(model: Model, environment: Environment, stages: Stages, x: Array) -> None:
+    for i in range(state_size(model, environment)):
         x[i] = stages.end[i]
 
 

@@ -39,3 +39,7 @@ def write_truth(model: Model, x: Array, rotation: Array, truth: State) -> None:
         truth.passive_positions[k], truth.passive_velocities[k] = positions[j], velocities[j]
     for k in range(whole(model.wheel_count)):
         truth.wheel_velocities[k] = x[13 + 2 * n + k]
+    velocity = 13 + 2 * n + whole(model.wheel_count)
+    angle = velocity + whole(model.rotor_count)
+    for k in range(whole(model.rotor_count)):
+        truth.motor_positions[k], truth.motor_velocities[k] = x[angle + k], x[velocity + k]

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from rclpy.node import Node
 
-from space_robot_msgs_py import topics
 from space_robot_msgs_py.ros.endpoints import RawPublisher
 from space_robot_msgs_py.samples import RobotState, Timebase
 from space_robot_msgs_py.wire.truth_writer import Messages, TruthWriter
@@ -13,14 +12,12 @@ from .plant import Plant
 
 
 class TruthOutput:
-    """Publisher of the true state of a tick, if measurements can differ from it."""
+    """Publisher of what of the true state of a tick its measurements cannot tell."""
 
     def __init__(self, node: Node, plant: Plant, timebase: Timebase) -> None:
         """Open the topics, or none."""
-        self._writer = TruthWriter(plant.names, timebase)
-        self._outputs: dict[topics.Topic, RawPublisher] = {}
-        if not plant.measures_truth:
-            self._outputs = {topic: RawPublisher(node, topic) for topic in topics.TRUTH}
+        self._writer = TruthWriter(plant.names, timebase, plant.truth_topics)
+        self._outputs = {topic: RawPublisher(node, topic) for topic in plant.truth_topics}
         self.outputs = tuple(self._outputs.values())
 
     def send(self, truth: RobotState) -> None:

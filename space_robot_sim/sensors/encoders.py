@@ -54,6 +54,8 @@ class Encoders(Record):
     """White noise of each rate, rad/s."""
     velocity_step: Array = shaped(lambda n: (n,))
     """Distance of two rates, rad/s (0: none)."""
+    motor: Array = shaped(lambda n: (n,), uniform=True)
+    """Number from 1 of the motor that a joint's encoder measures; 0: it measures the link."""
     stuck: Array = shaped(lambda n: (n,))
     """1 for each joint with a stuck encoder."""
     draws: Array = shaped(lambda n: (BLOCK_TICKS, 2, n))
@@ -69,10 +71,12 @@ class Encoders(Record):
         period: float,
         truth: State,
         is_prismatic: Sequence[bool] | NDArray[np.bool_] = (),
+        motors: Sequence[int] = (),
     ) -> Encoders:
         """Read the settings; before tick 0 the robot was at rest at ``truth``.
 
-        ``is_prismatic`` (n,): which joints slide (empty: none).
+        ``is_prismatic`` (n,): which joints slide (empty: none); ``motors`` (n,): see ``motor``
+        (empty: all are 0).
         """
         encoders = cls.allocate(n)
         whole = np.full(n, 2.0 * np.pi)
@@ -86,6 +90,7 @@ class Encoders(Record):
             difference_ticks=settings.difference_ticks,
             velocity_sigma=settings.velocity_noise,
             velocity_step=settings.velocity_step,
+            motor=motors if len(motors) else np.zeros(n),
             history=step * np.floor(at_rest / step + 0.5) if settings.bits else at_rest,
         )
         return encoders
@@ -104,15 +109,30 @@ def read_encoders(
     then = encoders.history[(tick - lag) % MOST_DIFFERENCED]
     now = encoders.history[tick % MOST_DIFFERENCED]
     for i in range(now.size):
-        angle = truth.joint_positions[i] + encoders.sigma[i] * draws[0, i]
+        true_angle, true_rate = truth.joint_positions[i], truth.joint_velocities[i]
+        motor = whole(encoders.motor[i])
+        if motor > 0:
+            true_angle = truth.motor_positions[motor - 1]
+            true_rate = truth.motor_velocities[motor - 1]
+        angle = true_angle + encoders.sigma[i] * draws[0, i]
         angle = in_steps(angle, encoders.step[i])
-        rate = (angle - then[i]) / (lag * period) if lag > 0 else truth.joint_velocities[i]
+        rate = (angle - then[i]) / (lag * period) if lag > 0 else true_rate
         rate = in_steps(rate + encoders.velocity_sigma[i] * draws[1, i], encoders.velocity_step[i])
         is_stuck = encoders.stuck[i] == 1.0
         angle, rate = where(is_stuck, before[i], angle), where(is_stuck, 0.0, rate)
         now[i] = angle
         measured.joint_positions[i] = angle
         measured.joint_velocities[i] = rate
+
+
+@kernel
+def see_motors(encoders: Encoders, truth: State, measured: State) -> None:
+    """Write angles and rates of the motors for joints whose encoders are on the motor's side."""
+    for i in range(measured.joint_positions.size):
+        motor = whole(encoders.motor[i])
+        if motor > 0:
+            measured.joint_positions[i] = truth.motor_positions[motor - 1]
+            measured.joint_velocities[i] = truth.motor_velocities[motor - 1]
 
 
 def _hold(stuck: Array, fault: ScheduledFault) -> None:

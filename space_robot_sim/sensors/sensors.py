@@ -17,7 +17,7 @@ from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.samples import State
 
 from ..faults.schedule import BLOCK_TICKS, PartFault
-from .encoders import EncoderFault, Encoders, read_encoders
+from .encoders import EncoderFault, Encoders, read_encoders, see_motors
 from .gyro import Gyro, GyroFault, read_gyro
 from .star_tracker import StarTracker, StarTrackerFault, track_stars
 
@@ -46,11 +46,12 @@ class Sensors(Record):
         truth: State,
         is_prismatic: Sequence[bool] | NDArray[np.bool_] = (),
         seed: int = 0,
+        motors: Sequence[int] = (),
     ) -> Sensors:
         """Read the numbers of the settings for a robot of ``n`` joints, at rest at ``truth``.
 
         ``is_prismatic`` (n,): which joints slide (empty: none); ``seed``: of the random numbers,
-        below 2**32.
+        below 2**32; ``motors`` (n,): see `Encoders`.
 
         Raises:
             InputError: they do not fit one another or the period.
@@ -61,7 +62,7 @@ class Sensors(Record):
                 sensors,
                 star_tracker=StarTracker.build(n, settings.star_tracker, period, truth),
                 gyro=Gyro.build(n, settings.gyro, period, truth),
-                encoders=Encoders.build(n, settings.encoders, period, truth, is_prismatic),
+                encoders=Encoders.build(n, settings.encoders, period, truth, is_prismatic, motors),
                 are_ideal=all(getattr(settings, name) == default for name, default in IDEAL),
                 seed=seed,
                 drawn=-1.0,
@@ -92,18 +93,26 @@ def sense(sensors: Sensors, truth: State, tick: int, period: float, measured: St
     """Write the measurements of ``truth`` at ``tick`` into ``measured``; call once a tick.
 
     The torques in ``measured`` are left alone; position and velocity of the base, the speeds of its
-    wheels, and the motion of joints without motors have no error.
+    wheels, the motion of joints without motors and of motors behind gears, and what there is to
+    know of an orbit have no error.
     """
     measured.base_position[:] = truth.base_position
     measured.base_velocity[:] = truth.base_velocity
     measured.wheel_velocities[:] = truth.wheel_velocities
     measured.passive_positions[:] = truth.passive_positions
     measured.passive_velocities[:] = truth.passive_velocities
+    measured.motor_positions[:] = truth.motor_positions
+    measured.motor_velocities[:] = truth.motor_velocities
+    measured.orbit_position[:] = truth.orbit_position
+    measured.orbit_velocity[:] = truth.orbit_velocity
+    measured.magnetic_field[:] = truth.magnetic_field
+    measured.external_torques[:] = truth.external_torques
     if uniform(sensors.are_ideal) == 1.0:
         measured.quaternion[:] = truth.quaternion
         measured.omega_base[:] = truth.omega_base
         measured.joint_positions[:] = truth.joint_positions
         measured.joint_velocities[:] = truth.joint_velocities
+        see_motors(sensors.encoders, truth, measured)
     else:
         _draw(sensors, tick)
         track_stars(sensors.star_tracker, truth, tick, measured)

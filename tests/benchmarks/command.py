@@ -20,6 +20,7 @@ from space_robot_msgs_py.errors import SpaceRobotError
 SECTIONS = (
     "plant",
     "wheels",
+    "orbit",
     "laws",
     "simulate",
     "reproduce",
@@ -36,7 +37,7 @@ SECTIONS = (
     "peers",
     "growth",
 )
-BESIDE_PEERS = {"peers", "growth"}
+BESIDE_PEERS = {"orbit", "peers", "growth"}
 
 
 @click.command()
@@ -62,12 +63,12 @@ def bench(
 ) -> None:
     """Measure how fast it is on this machine, each figure beside its competitor in the same run.
 
-    SECTION is one of plant, wheels (beside Basilisk's), laws, simulate, reproduce, campaign, lanes
-    (eight flights at a time, beside MuJoCo's rollout); on the ROS 2 graph: graph, composed, clock,
-    recorder (10 minutes), start-up; compile (a first start, and one with a robot of another size);
-    python (a tick stepped from Python); flight-code (in C, beside its kernels); beside MuJoCo,
-    Pinocchio and Basilisk: peers (one step of the plant) and growth (over the number of joints)
-    [default: all].
+    SECTION is one of plant, wheels (beside Basilisk's), orbit (its torques beside Basilisk's),
+    laws, simulate, reproduce, campaign, lanes (eight flights at a time, beside MuJoCo's rollout);
+    on the ROS 2 graph: graph, composed, clock, recorder (10 minutes), start-up; compile (a first
+    start, and one with a robot of another size); python (a tick stepped from Python); flight-code
+    (in C, beside its kernels); beside MuJoCo, Pinocchio and Basilisk: peers (one step of the plant)
+    and growth (over the number of joints) [default: all].
     Shown are the median and the spread of several repetitions, how many times better that is than
     what stands beside it, and what was asked. A machine that does other work meanwhile shows in the
     spread.
@@ -143,6 +144,9 @@ def _that_can_run(names: tuple[str, ...]) -> Iterator[str]:
     for name in dict.fromkeys(names):
         if name in BESIDE_PEERS and missing:
             _say(f"{name} is left out: no {' and no '.join(missing)} here (extra `bench`)")
+            continue
+        if name == "orbit" and not is_installed("Basilisk"):
+            _say("orbit is left out: no Basilisk here (bsk, extra `bench`)")
             continue
         if name in {"wheels", *BESIDE_PEERS} and not is_installed("Basilisk"):
             _say(f"{name}: without Basilisk, which is not installed (bsk, extra `bench`)")

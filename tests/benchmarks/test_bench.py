@@ -17,7 +17,7 @@ from click.testing import CliRunner
 from paths import TESTS
 from rich.console import Console
 
-from benchmarks.command import SECTIONS, bench
+from benchmarks.command import BESIDE_PEERS, SECTIONS, bench
 from benchmarks.display import print_section
 from benchmarks.measure import Options, interleave, repeated
 from benchmarks.result import Result, Target
@@ -238,6 +238,28 @@ def test_a_step_with_wheels_stands_beside_one_without() -> None:
     assert [row["reached"] for row in checks] == [True] * len(checks)
 
 
+@pytest.mark.skipif(
+    any(importlib.util.find_spec(name) is None for name in ("Basilisk", "mujoco", "pinocchio")),
+    reason="needs bsk, mujoco and pin",
+)
+def test_torques_in_orbit_stand_beside_basilisks() -> None:
+    result = CliRunner().invoke(bench, ["orbit", "--short", "--json"], catch_exceptions=False)
+    assert result.exit_code == 0, result.output
+    rows = {row["name"]: row for row in json.loads(result.stdout)["sections"]["orbit"]}
+    for source in ("gravity gradient", "drag", "sunlight"):
+        assert rows[f"{source}: torque apart"]["reached"]
+        assert rows[f"{source}: attitude apart, 2 min"]["reached"]
+    assert rows["drag: torque apart where the air stands still"]["median"] > 0.05
+
+
+def test_the_orbit_is_left_out_without_basilisk(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("benchmarks.peers.is_installed", lambda module: module != "Basilisk")
+    result = CliRunner().invoke(bench, ["orbit", "--short", "--json"])
+    assert result.exit_code == 0
+    assert json.loads(result.stdout)["sections"] == {}
+    assert "orbit is left out: no Basilisk here" in result.stderr
+
+
 def test_a_peer_that_is_another_robot_ends_the_command_with_exit_code_1(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
@@ -252,7 +274,7 @@ def test_every_section_is_a_function_of_its_file() -> None:
     folder = TESTS / "benchmarks/sections"
     files = {path.stem for path in folder.glob("*.py")} - {"__init__"}
     assert files == {name.replace("-", "_") for name in SECTIONS}
-    for name in set(SECTIONS) - {"peers", "growth"}:
+    for name in set(SECTIONS) - BESIDE_PEERS:
         assert callable(section(name))
 
 

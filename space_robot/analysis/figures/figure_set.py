@@ -15,7 +15,8 @@ from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.bag.law_history import as_data, laws_of
 from space_robot_msgs_py.errors import InputError
 
-from ..described import flown_actuators, momentum_of
+from ..described import environment_of, flown_actuators, momentum_of
+from ..external_torques import torques_by_source
 from ..plot_series import PlotSeries
 from ..words import flown
 from .base_actuators import momentum, thrusters, wheels
@@ -24,6 +25,7 @@ from .overlay import errors_and_torques, latency_histogram, pointing
 from .ripple import ripple
 from .single_flight import control_results, desired_joints
 from .style import save_figure
+from .surroundings import deflections, torques_from_outside
 
 
 class SavedFigure(NamedTuple):
@@ -76,8 +78,8 @@ class FigureSet:
         self._flights: dict[str, PlotSeries] = {}
         self._missions: dict[bytes, tuple[str, Figure]] = {}
         self._first: Figure | None = None
-        self._hardware: dict[str, dict[str, tuple[str, Figure]]] = {}
-        """Caption and figure by file name, of each flight without ideal base actuators."""
+        self._parts: dict[str, dict[str, tuple[str, Figure]]] = {}
+        """Caption and figure by file name, of what each flight has: actuators, an orbit, gears."""
 
     def add(self, name: str, log: FlightLog) -> None:
         """Add a flight."""
@@ -86,9 +88,14 @@ class FigureSet:
         if not self._flights:
             self._first = control_results(log, title(name, log))
         self._flights[name] = PlotSeries.of(log)
-        if log.flight.get("base_actuators"):
+        kinds = {
+            _of_gears: bool(log.geared_names),
+            _of_orbit: log.orbit_position.shape[1] > 0,
+            _of_hardware: bool(log.flight.get("base_actuators")),
+        }
+        for draw in (draw for draw, is_there in kinds.items() if is_there):
             with suppress(InputError):
-                self._hardware[name] = dict(_of_hardware(log.longest_stretch()))
+                self._parts[name] = self._parts.get(name, {}) | dict(draw(log.longest_stretch()))
 
     def save(self, folder: Path) -> list[SavedFigure]:
         """Draw all figures into ``folder`` as PNG and SVG; existing files are replaced.
@@ -126,7 +133,7 @@ class FigureSet:
             caption = "A stretch of base torque, and its spectrum"
             drawings["chatter"] = Drawing(caption, partial(chatter, torques))
         drawings["ripple"] = Drawing("Spectrum of the torques' ripple", partial(ripple, flights))
-        for number, (name, figures) in enumerate(self._hardware.items(), start=1):
+        for number, (name, figures) in enumerate(self._parts.items(), start=1):
             suffix, of = (f"_{number}", f" of {name}") if len(flights) > 1 else ("", "")
             for stem, (caption, figure) in figures.items():
                 drawings[f"{stem}{suffix}"] = Drawing(f"{caption}{of}", partial(_drawn, figure))
@@ -139,6 +146,22 @@ class FigureSet:
 
 def _drawn(figure: Figure) -> Figure:
     return figure
+
+
+def _of_gears(log: FlightLog) -> Iterator[tuple[str, tuple[str, Figure]]]:
+    """Yield file name, caption and figure of the joints with gears."""
+    yield "deflections", ("Deflection of the joints with gears", deflections(log))
+
+
+def _of_orbit(log: FlightLog) -> Iterator[tuple[str, tuple[str, Figure]]]:
+    """Yield file name, caption and figure of what acts in an orbit.
+
+    Raises:
+        InputError: the environment is unknown.
+    """
+    torques = torques_by_source(log, environment_of(log).disturbance)
+    caption = "Torques from outside about the common centre of mass"
+    yield "torques_from_outside", (caption, torques_from_outside(log, torques))
 
 
 def _of_hardware(log: FlightLog) -> Iterator[tuple[str, tuple[str, Figure]]]:

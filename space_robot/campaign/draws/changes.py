@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from collections import defaultdict
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -13,7 +15,10 @@ from typing_extensions import Self
 from space_robot_model.elementary.matrices import product, rotate_tensor
 from space_robot_model.elementary.symmetric import principal_axes
 from space_robot_model.robot import Robot
+from space_robot_model.robot.plates import plates_of
+from space_robot_model.robot.tree import Plate
 from space_robot_msgs_py.config.trees import flatten
+from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.samples import RobotNames
 
 from ...api import Scenario
@@ -70,18 +75,34 @@ class Spread:
 class RobotArrays:
     """Copies of a robot's arrays; body 0 is the base, body j + 1 is moved by joint j."""
 
-    def __init__(self, robot: Robot) -> None:
-        self.nominal = robot
+    def __init__(self, robot: Robot, has_surfaces: bool) -> None:
+        """Copy the arrays; with the plates of its shapes if drag or sunlight act on them.
+
+        So these keep their place, whatever becomes of masses and inertias.
+        """
+        self.nominal, self._has_surfaces = robot, has_surfaces
         self.mass = robot.mass.copy()
         self.inertia = robot.inertia.copy()
         self.com = robot.com.copy()
         self.friction = list(robot.friction)
         self.springs = list(robot.springs)
+        self.gears = list(robot.gears)
         self.spreads: defaultdict[int, Spread] = defaultdict(Spread)
         """By index of the body."""
 
+    @cached_property
+    def plates(self) -> list[Plate]:
+        """The plates for drag and sunlight; callers may change them."""
+        return list(plates_of(self.nominal))
+
     def robot(self) -> Robot:
-        """Build the robot."""
+        """Build the robot.
+
+        Raises:
+            InputError: its plates reflect more light than falls on them.
+        """
+        plates = self.plates if self._has_surfaces or "plates" in vars(self) else ()
+        _check_shares(plates)
         inertia, shift = self.inertia.copy(), -self.com[0]
         for body, own in self.spreads.items():
             inertia[body] = spread(inertia[body], own.factors, own.turn)
@@ -92,8 +113,19 @@ class RobotArrays:
             com=self.com,
             friction=tuple(self.friction),
             springs=tuple(self.springs),
+            gears=tuple(self.gears),
+            plates=tuple(plates) or self.nominal.plates,
         )
         return _with_base_moved(changed, shift) if shift.any() else changed
+
+
+def _check_shares(plates: Sequence[Plate]) -> None:
+    for number, plate in enumerate(plates, 1):
+        if plate.specular + plate.diffuse > 1.0 + 1e-12:
+            raise InputError(
+                f"plate {number}: specular {plate.specular:g} and diffuse {plate.diffuse:g} are "
+                "shares of the same light: their sum must be at most 1"
+            )
 
 
 def _with_base_moved(robot: Robot, shift: Array) -> Robot:
@@ -105,7 +137,8 @@ def _with_base_moved(robot: Robot, shift: Array) -> Robot:
         offset[joint] += np.sum(robot.rotation[joint].T * shift, axis=1)
     tools = tuple(t if t.body else replace(t, position=t.position + shift) for t in robot.tools)
     visuals = tuple(v if v.body else replace(v, position=v.position + shift) for v in robot.visuals)
-    return replace(robot, com=com, offset=offset, tools=tools, visuals=visuals)
+    plates = tuple(p if p.body else replace(p, centre=p.centre + shift) for p in robot.plates)
+    return replace(robot, com=com, offset=offset, tools=tools, visuals=visuals, plates=plates)
 
 
 class Nominal(NamedTuple):
@@ -162,7 +195,8 @@ class Changes:
     def robot(self) -> RobotArrays:
         """The plant's robot; callers may change it."""
         if self._robot is None:
-            self._robot = RobotArrays(self.nominal.robot)
+            nominal = self.nominal
+            self._robot = RobotArrays(nominal.robot, nominal.resolved.plant.has_surfaces)
         return self._robot
 
     def parameter(self, node: str, name: str) -> Any:

@@ -1,9 +1,9 @@
-"""Variables of the plant's robot: masses, inertias, centres of mass, friction, springs."""
+"""Variables of the plant's robot: masses, inertias, centres of mass, friction, springs, gears."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Hashable
+from collections.abc import Hashable, Sequence
 from dataclasses import dataclass
 from typing import Annotated, Any
 
@@ -16,27 +16,17 @@ from space_robot_msgs_py.config.validation import StrictModel, one_of, validate
 from space_robot_msgs_py.errors import InputError
 
 from .changes import Changes
-from .distributions import Distribution, Normal, Value, read_distribution
+from .distributions import Normal, Value
+from .drive_variables import OF_DRIVES, OF_PLATES, drive_variables, plate_variables
 from .names import NamePart, chosen
+from .robot_numbers import OfRobot, read_not_negative, read_number, read_positive
 from .variable import Variable
 
-LEAST = 0.01
-"""Lower bound of masses and inertias, as a factor of the nominal ones."""
 OF_BODIES = ("mass", "inertia", "com")
-OF_JOINTS = ("friction.coulomb", "friction.viscous", "stiffness", "damping")
+OF_JOINTS = ("friction.coulomb", "friction.viscous", "stiffness", "damping", *OF_DRIVES)
+GROUPS = ("base", "links", "joints", "plates")
+ALLOWED = {"joints": OF_JOINTS, "plates": OF_PLATES}
 XYZ = ("x", "y", "z")
-
-
-@dataclass(frozen=True)
-class OfRobot(Variable):
-    """Base class of variables of a body, or of the joint that moves it."""
-
-    body: int
-
-    @property
-    def is_of_plant_robot(self) -> bool:
-        """Return whether the variable changes the plant's robot alone."""
-        return True
 
 
 @dataclass(frozen=True)
@@ -142,7 +132,7 @@ class SpreadFile(StrictModel):
 
 def robot_variables(
     key: str, parts: list[NamePart], value: Any, where: str, robot: Robot
-) -> list[OfRobot]:
+) -> Sequence[Variable]:
     """Return the variables of ``robot.*``.
 
     Args:
@@ -155,10 +145,14 @@ def robot_variables(
     Raises:
         InputError: the robot has no such parameter, or the parameter cannot have such values.
     """
-    group = one_of(parts[0].word if parts else "", ("base", "links", "joints"), "part of the robot")
+    group = one_of(parts[0].word if parts else "", GROUPS, "part of the robot")
     what = ".".join(part.word for part in parts[1:])
-    allowed = OF_JOINTS if group == "joints" else OF_BODIES
+    allowed = ALLOWED.get(group, OF_BODIES)
     one_of(what, allowed, f"number of robot.{group}{'' if group == 'base' else '[...]'}")
+    if what != "com" and any(part.element for part in parts[1:]):
+        raise InputError(f"{what} has no elements")
+    if group == "plates":
+        return plate_variables(key, what, parts[0].element, value, where, robot)
     if group == "base":
         if parts[0].element:
             raise InputError(f"there is only one base: robot.base.{what}")
@@ -166,14 +160,14 @@ def robot_variables(
     else:
         if not parts[0].element:
             raise InputError(f"an element is missing: robot.{group}[*].{what}, or [NAME]")
+        if what in OF_DRIVES:
+            return drive_variables(key, what, parts[0].element, value, where, robot)
         names = robot.body_names[1:] if group == "links" else robot.all_joint_names
         kind = group.rstrip("s")
         bodies = [
             (number + 1, f"robot.{group}[{name}]")
             for number, name in _chosen(parts[0].element, names, robot, kind)
         ]
-    if group != "joints" and parts[-1].element and what != "com":
-        raise InputError(f"{what} has no elements")
     if group == "joints":
         return [
             _of_joint(f"{name}.{what}", key, value, where, robot, body, what)
@@ -182,7 +176,7 @@ def robot_variables(
     if what == "com":
         if not parts[-1].element:
             raise InputError(f"the axis is missing: {key}[x], [y], [z] or [*]")
-        distribution = _number(value, where)
+        distribution = read_number(value, where)
         return [
             CentreOfMass(f"{name}.com[{axis_name}]", key, distribution, body, axis)
             for body, name in bodies
@@ -190,7 +184,7 @@ def robot_variables(
         ]
     if what == "mass":
         return [
-            Mass(f"{name}.mass", key, _positive(value, where, float(robot.mass[body])), body)
+            Mass(f"{name}.mass", key, read_positive(value, where, float(robot.mass[body])), body)
             for body, name in bodies
         ]
     return [
@@ -228,7 +222,7 @@ def _of_inertia(name: str, key: str, value: Any, where: str, body: int) -> list[
             if spread.rotate_deg
         ]
         return [*factors, *turns]
-    distribution = _positive(value, where, 1.0)
+    distribution = read_positive(value, where, 1.0)
     if not distribution.relative:
         raise InputError(f"{where}: a factor of an inertia needs relative: true")
     return [InertiaScale(name, key, distribution, body)]
@@ -249,30 +243,4 @@ def _of_joint(
         raise InputError(f"joint {robot.all_joint_names[joint]} has a motor and no spring")
     else:
         nominal = getattr(robot.springs[joint - robot.n], what)
-    distribution = _number(value, where)
-    least = 0.0 if not distribution.offset else -nominal
-    return OfJoint(name, key, _at_least(distribution, least, where), body, what)
-
-
-def _number(value: Any, where: str) -> Distribution:
-    distribution = read_distribution(value, where)
-    if not distribution.is_number:
-        raise InputError(f"{where}: numbers were expected")
-    return distribution
-
-
-def _positive(value: Any, where: str, nominal: float) -> Distribution:
-    """Read the distribution of a positive quantity; a normal one is truncated."""
-    distribution = _number(value, where)
-    if distribution.relative:
-        least = LEAST
-    else:
-        least = (LEAST - 1.0) * nominal if distribution.offset else LEAST * nominal
-    return _at_least(distribution, least, where)
-
-
-def _at_least(distribution: Distribution, least: float, where: str) -> Distribution:
-    try:
-        return distribution.at_least(least)
-    except ValueError as error:
-        raise InputError(f"{where}: {' '.join(str(error).split())}") from None
+    return OfJoint(name, key, read_not_negative(value, where, nominal), body, what)

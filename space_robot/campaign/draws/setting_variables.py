@@ -16,7 +16,10 @@ from .names import ALL, NamePart, chosen
 from .variable import Variable
 
 START, START_PARAMETER = "start_deg", "initial_joints_deg"
-BY_OPTION = ("robot", "mission", "case", "sensors", "actuators", "period", "controller", "gains")
+BY_OPTION = (
+    *("robot", "mission", "case", "sensors", "actuators", "orbit", "period", "controller"),
+    "gains",
+)
 """Parameters that select files or laws; scenario options set them."""
 
 

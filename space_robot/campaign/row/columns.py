@@ -20,6 +20,8 @@ Array = NDArray[np.float64]
 
 RIPPLE, FAST_RIPPLE = "ripple_", "fast_ripple_"
 """Prefixes of the names of ripple metrics; a torque column follows."""
+DRIFT = "attitude_drift"
+"""Angle by which a base without attitude control has turned since the first tick, rad."""
 TOOL = ("tool", "tool_rotation")
 """Distance of the tool from its path, m, and angle to its orientation there, rad."""
 OF_BASE = ("attitude", "base_torque")
@@ -31,6 +33,8 @@ class Columns(NamedTuple):
 
     errors: dict[str, AxisIndex]
     torques: dict[str, AxisIndex]
+    drift: tuple[str, ...] = ()
+    """`DRIFT` if nothing controls the base's attitude."""
     tool: tuple[str, ...] = ()
     """`TOOL` if the mission has segments: the tool's error, see `ToolError`."""
 
@@ -39,19 +43,27 @@ class Columns(NamedTuple):
         """Return the columns of a flight before it is flown."""
         robot = flight.robot
         kinds = robot.n + 3, flight.controls_base, tuple(robot.is_prismatic), robot.branches
+        drift = () if flight.controls_base else (DRIFT,)
         tool = TOOL if flight.mission_settings.has_segments else ()
-        return cls(error_columns(*kinds), torque_columns(*kinds), tool)
+        return cls(error_columns(*kinds), torque_columns(*kinds), drift, tool)
 
     @classmethod
     def of_log(cls, log: FlightLog) -> Columns:
         """Return the columns of a flight log."""
-        kinds = log.axes, controls_base(log), log.prismatic, log.branches
-        return cls(error_columns(*kinds), torque_columns(*kinds))
+        is_controlled = controls_base(log)
+        kinds = log.axes, is_controlled, log.prismatic, log.branches
+        drift = () if is_controlled else (DRIFT,)
+        return cls(error_columns(*kinds), torque_columns(*kinds), drift)
 
     @property
     def names(self) -> tuple[str, ...]:
-        """All columns: errors, then torques, then those of the tool."""
-        return (*self.errors, *self.torques, *self.tool)
+        """All columns: errors, then torques, the drift, and those of the tool."""
+        return (*self.errors, *self.torques, *self.of_poses)
+
+    @property
+    def of_poses(self) -> tuple[str, ...]:
+        """Columns that are magnitudes already, and of no axes: drift and tool."""
+        return (*self.drift, *self.tool)
 
     @property
     def metrics(self) -> tuple[str, ...]:

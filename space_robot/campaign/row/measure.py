@@ -8,15 +8,17 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from space_robot_model.elementary.matrices import norms
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.errors import InputError
 
+from ...analysis.attitude_drift import attitude_drift
 from ...analysis.metrics import tracking_error
 from ...analysis.tool_error import ToolError
 from ...flight.plan import Flight
 from ..study import Requirement
 from .bands import Bands
-from .columns import Columns, missing_for_ripple
+from .columns import DRIFT, Columns, missing_for_ripple
 from .window import Window, WindowMetrics
 
 
@@ -28,6 +30,8 @@ class Measure:
         self._robot, columns = flight.robot, Columns.of_flight(flight)
         self._columns = columns
         self._assumed = flight.scenario.robots.controller
+        self._start: NDArray[np.float64] | None = None
+        """(4,) attitude at the first tick."""
         self._tool: ToolError | None = None
         self._whole = WindowMetrics(Window(), columns.metrics, columns)
         self._require = {
@@ -42,6 +46,9 @@ class Measure:
         """Add the next block of the flight."""
         error = tracking_error(block)
         sizes = self._columns.sizes(block, error)
+        if self._columns.drift:
+            self._start = block.quaternion[0].copy() if self._start is None else self._start
+            sizes[DRIFT] = np.radians(norms(attitude_drift(block, self._start)))
         if self._columns.tool:
             self._tool = self._tool or ToolError(block, self._robot, self._assumed)
             sizes |= zip(self._columns.tool, self._tool.errors(block).T, strict=True)

@@ -57,7 +57,7 @@ class WindowMetrics:
         """
         self._window, self._wanted, self._columns = window, wanted, columns
         self._rms: tuple[AxisRms, AxisRms] | None = None
-        self._of_tool = AxisRms(len(columns.tool))
+        self._of_poses = AxisRms(len(columns.of_poses))
         self._largest: dict[str, float] = {}
         self._ripple: Ripple | None = None
         self._ticks, self._period = 0, 0.0
@@ -82,8 +82,8 @@ class WindowMetrics:
             self._rms = self._rms or (AxisRms(log.axes), AxisRms(log.axes))
             for rms, values in zip(self._rms, (error, log.applied_torque), strict=True):
                 rms.add(values)
-            if tool := self._columns.tool:
-                self._of_tool.add(np.column_stack([sizes[name][rows] for name in tool]))
+            if names := self._columns.of_poses:
+                self._of_poses.add(np.column_stack([sizes[name][rows] for name in names]))
         for name, size in sizes.items():
             if f"{name}_max" in self._wanted:
                 self._largest[name] = max(
@@ -107,8 +107,8 @@ class WindowMetrics:
                 values_by_name |= {
                     f"{name}_rms": float(np.mean(values[ax])) for name, ax in columns.items()
                 }
-            tool = zip(self._columns.tool, self._of_tool.value, strict=True)
-            values_by_name |= {f"{name}_rms": float(value) for name, value in tool}
+            of_poses = zip(self._columns.of_poses, self._of_poses.value, strict=True)
+            values_by_name |= {f"{name}_rms": float(value) for name, value in of_poses}
         return {
             name: values_by_name[name]
             for name in self._wanted

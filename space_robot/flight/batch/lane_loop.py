@@ -205,6 +205,12 @@ def _log_state(columns: Any, row: int, state: State) -> None:
     spread(state.thrusts, columns[9][:, row])
     spread(state.passive_positions, columns[10][:, row])
     spread(state.passive_velocities, columns[11][:, row])
+    spread(state.motor_positions, columns[12][:, row])
+    spread(state.motor_velocities, columns[13][:, row])
+    spread(state.orbit_position, columns[14][:, row])
+    spread(state.orbit_velocity, columns[15][:, row])
+    spread(state.magnetic_field, columns[16][:, row])
+    spread(state.external_torques, columns[17][:, row])
 
 
 @kernel
@@ -232,6 +238,9 @@ def _allocate(
             for i in range(in_lanes.reported_speeds.size):
                 allocation.reported_speeds[i] = lane_of(in_lanes.reported_speeds[i], lane)
                 allocation.reported_torques[i] = lane_of(in_lanes.reported_torques[i], lane)
+            for i in range(3):
+                of_lane = lane_of(in_lanes.torquers.magnetic_field[i], lane)
+                allocation.torquers.magnetic_field[i] = of_lane
             allocate(allocation, float(tick))
             for i in range(axes, torque.size):
                 torque[i] = with_lane(torque[i], lane, allocation.command[i - axes])

@@ -23,8 +23,11 @@ LISTENERS = {
     topics.CLOCK: ("mission_node", "recorder_node"),
     topics.TRUTH_JOINTS: ("recorder_node",),
     topics.TRUTH_BASE: ("recorder_node",),
+    topics.TRUTH_ORBIT: ("recorder_node",),
     topics.WHEELS_STATE: _TO_CONTROLLER,
     topics.THRUSTERS_STATE: ("recorder_node",),
+    topics.MOTORS_STATE: ("recorder_node",),
+    topics.MAGNETOMETER: _TO_CONTROLLER,
     **dict.fromkeys((*topics.SCENE, topics.PLANT_DESCRIPTION), ("recorder_node",)),
 }
 """Nodes of the graph that subscribe to each topic."""

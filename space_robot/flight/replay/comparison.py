@@ -50,6 +50,7 @@ class Comparison:
         recorded: ReplayedCommands,
         replayed: ReplayedCommands,
         forces: Collection[str] = (),
+        dipoles: Collection[str] = (),
     ) -> None:
         """Compare recorded and replayed commands.
 
@@ -59,9 +60,11 @@ class Comparison:
             recorded: in flight.
             replayed: now.
             forces: the axes whose commands are in N: of prismatic joints and thrusters.
+            dipoles: those whose commands are in A m2: magnetic torquers.
         """
         self.axis_names = axis_names
-        self.units = tuple("N" if name in forces else "N m" for name in axis_names)
+        units = {**dict.fromkeys(forces, "N"), **dict.fromkeys(dipoles, "A m2")}
+        self.units = tuple(units.get(name, "N m") for name in axis_names)
         """Of each axis."""
         self._recorded, self._replayed = recorded, replayed
         self._played = np.unique(played)

@@ -162,7 +162,12 @@ class _Run:
             raise error
         forces = *choice.names.thrusters, *recording.flight.get("prismatic_joints", ())
         comparison = Comparison(
-            names, played, self._recorded_until(played, error), answers.commands(), forces
+            names,
+            played,
+            self._recorded_until(played, error),
+            answers.commands(),
+            forces,
+            choice.names.torquers,
         )
         return Replay(
             options, choice, recording, comparison, self._laws, self._skipped, elapsed, error

@@ -11,83 +11,34 @@ from numpy.typing import NDArray
 from space_robot_model.robot import Robot
 from space_robot_model.robot.find import find_robot
 from space_robot_msgs_py import topics
+from space_robot_msgs_py.config.settings import leaves
+from space_robot_msgs_py.config.trees import nest
+from space_robot_msgs_py.config.validation import validate
 from space_robot_msgs_py.errors import InputError, MessageError
 from space_robot_msgs_py.samples import RobotNames, RobotState, Timebase
 from space_robot_msgs_py.wire.base_state import BaseState
-from space_robot_msgs_py.wire.codec import Codec
 from space_robot_msgs_py.wire.controller_law import LawCodec
 from space_robot_msgs_py.wire.joint_states import JointStates
 from space_robot_msgs_py.wire.message import MessageDescription
 from space_robot_msgs_py.wire.truth_base import TruthBase
 from space_robot_msgs_py.wire.truth_joints import TruthJoints
+from space_robot_msgs_py.wire.truth_orbit import TruthOrbit
+from space_robot_sim.environment.orbit import state_of
+from space_robot_sim.environment.orbit_settings import OrbitSettings
 
 from ...flight.graph.monitor import Event, Monitor
 from ...flight.graph.node_names import PLANT
 from ...flight.graph.node_services import get_parameters
 from .finder import FlightPlace
+from .state_topic import StateTopic
 
 if TYPE_CHECKING:
-    from rclpy.node import Node
-
-    from space_robot_msgs_py.ros.endpoints import PolledCallbackGroup
+    pass
 
 Array = NDArray[np.float64]
 
 MEASURED: tuple[type[MessageDescription], ...] = (JointStates, BaseState)
 TRUE: tuple[type[MessageDescription], ...] = (TruthJoints, TruthBase)
-
-
-KEPT = 4
-"""Number of kept messages per topic, so that all topics have one of the same tick."""
-
-
-class StateTopic:
-    """Subscription to a topic that keeps the last row of the newest messages."""
-
-    def __init__(
-        self, node: Node, group: PolledCallbackGroup, kind: type[MessageDescription]
-    ) -> None:
-        """Subscribe to the messages of a kind, with best effort.
-
-        They can be read after `describe` was called; earlier messages are kept.
-        """
-        from space_robot_msgs_py.ros.endpoints import RawSubscription
-
-        self._kind = kind
-        self._subscription = RawSubscription(node, kind.topic, group, KEPT, best_effort=True)
-        self.rows: dict[int, Array] = {}
-        """Last row of each of the newest messages, by its stamp, ns."""
-
-    def describe(self, names: RobotNames, timebase: Timebase) -> None:
-        """Set the robot of the messages, and the period of its ticks."""
-        self._describe = self._kind.of_robot(names, timebase)
-        self._codec = Codec(self._describe)
-        self._width = sum(column.length for column in self._describe.columns)
-        self._period_ns = timebase.period_ns
-
-    def take(self) -> None:
-        """Read received messages; those of other robots are ignored."""
-        while (data := self._subscription.take()) is not None:
-            try:
-                stamp_ns, numbers = self._codec.decode(data)
-            except MessageError:
-                continue
-            rows = numbers.reshape(-1, self._width)
-            self.rows[stamp_ns + (len(rows) - 1) * self._period_ns] = rows[-1].copy()
-        while len(self.rows) > KEPT:
-            del self.rows[next(iter(self.rows))]
-
-    def fill(self, state: RobotState, stamp_ns: int) -> None:
-        """Write the row with a stamp into the topic's columns of ``state``."""
-        row, at = self.rows[stamp_ns], 0
-        for column in self._describe.columns:
-            target = getattr(state, column.name)
-            target[column.first : column.first + column.length] = row[at : at + column.length]
-            at += column.length
-
-    def close(self) -> None:
-        """End the subscription."""
-        self._subscription.close()
 
 
 class Sample(NamedTuple):
@@ -105,6 +56,8 @@ class Sample(NamedTuple):
     """(n+3,) torque applied over the last tick, N m; base, then joints."""
     error: Array | None
     """(n+3,) tracking error of the law; None: not received yet."""
+    orbit: Array | None
+    """(6,) newest position, m, and velocity, m/s, of the origin in its orbit; None: no orbit."""
 
 
 class Listener:
@@ -133,6 +86,7 @@ class Listener:
                 self._topics[kind] = StateTopic(self._monitor.node, self._group, kind)
             self._law = RawSubscription(self._monitor.node, topics.LAW, self._group)
             self.robot, period = self._ask_plant(robot, check)
+            self.orbit = self._ask_orbit(check)
         except BaseException:
             self.close()
             raise
@@ -140,7 +94,11 @@ class Listener:
         self._names = RobotNames.of(self.robot.joint_names, passive=self.robot.passive_names)
         for topic in self._topics.values():
             topic.describe(self._names, self._timebase)
+        self._orbit_topic: StateTopic | None = None
         self._state = RobotState.allocate(self.robot.n)
+        if self.orbit:
+            start = state_of(self.orbit.orbital_elements)
+            self._state.orbit_position[:], self._state.orbit_velocity[:] = start
         self._stamp_ns: int | None = None
         """Time of the newest sample."""
         self.law = ""
@@ -157,6 +115,16 @@ class Listener:
             if robot:
                 raise
             raise InputError(f"the plant's robot: {error}; choose it with --robot") from None
+
+    def _ask_orbit(self, check: Callable[[], None]) -> OrbitSettings | None:
+        """Return the orbit of the plant; None: it has none, or is of a version without."""
+        names = [name for name, _ in leaves(OrbitSettings)]
+        values = get_parameters(self._monitor.node, PLANT, names, check)
+        if any(value is None for value in values):
+            return None
+        tree = nest(dict(zip(names, values, strict=True)))
+        orbit = validate(OrbitSettings, tree, "the plant's orbit")
+        return orbit if orbit.has_orbit else None
 
     def poll(self, with_states: bool, events: list[Event]) -> Sample | None:
         """Return the newest sample; None if there is no new one.
@@ -184,7 +152,20 @@ class Listener:
             angles,
             state.applied_torque.copy(),
             self._monitor.error,
+            self._poll_orbit(),
         )
+
+    def _poll_orbit(self) -> Array | None:
+        """Return position and velocity (6,) in the orbit: they change little in a few ticks."""
+        if self.orbit is None:
+            return None
+        if self._orbit_topic is None:
+            self._orbit_topic = StateTopic(self._monitor.node, self._group, TruthOrbit)
+            self._orbit_topic.describe(self._names, self._timebase)
+        self._orbit_topic.take()
+        if rows := self._orbit_topic.rows:
+            self._orbit_topic.fill(self._state, max(rows))
+        return np.concatenate([self._state.orbit_position, self._state.orbit_velocity])
 
     @property
     def time(self) -> float:
@@ -207,6 +188,9 @@ class Listener:
         kinds = (TRUE if is_sent or heard else MEASURED) if with_states else ()
         for kind in [kind for kind in self._topics if kind not in kinds]:
             self._topics.pop(kind).close()
+        if self._orbit_topic and not with_states:
+            self._orbit_topic.close()
+            self._orbit_topic = None
         for kind in kinds:
             if kind not in self._topics:
                 topic = StateTopic(self._monitor.node, self._group, kind)

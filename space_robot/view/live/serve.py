@@ -135,7 +135,9 @@ class Follower:
                 if self._view:
                     self._view.close()
                 self._waiting.visible = False
-                self._view = LiveView(self._server, listener.robot, sample, self._options.dark)
+                self._view = LiveView(
+                    self._server, listener.robot, sample, self._options.dark, listener.orbit
+                )
             say(f"showing it from {sample.time:.2f} s on")
             self._began = time.monotonic()
             self._view.note(events)

@@ -17,13 +17,16 @@ from space_robot_model.robot.tool import tool_pose
 from space_robot_model.robot.transforms import joint_transforms
 
 from ...flight.graph.monitor import Event
-from ..flights import ON_DARK, ON_WHITE
+from ..palette import palette
 from ..scene import RobotScene, rgb
 from ..stage import extent, set_stage
+from .orbit import LiveOrbit
 from .window import Curves
 
 if TYPE_CHECKING:
     from viser import LineSegmentsHandle, SceneApi, ViserServer
+
+    from space_robot_sim.environment.orbit_settings import OrbitSettings
 
     from .listener import Listener, Sample
 
@@ -101,7 +104,14 @@ class Trail:
 class LiveView:
     """Scene and panel of one robot."""
 
-    def __init__(self, server: ViserServer, robot: Robot, sample: Sample, dark: bool) -> None:
+    def __init__(
+        self,
+        server: ViserServer,
+        robot: Robot,
+        sample: Sample,
+        dark: bool,
+        orbit: OrbitSettings | None = None,
+    ) -> None:
         """Add the robot to the empty scene.
 
         Args:
@@ -109,17 +119,24 @@ class LiveView:
             robot: of the flight.
             sample: its pose.
             dark: whether the page is light on dark.
+            orbit: of the flight; None: none.
         """
         self._server, self._robot = server, robot
-        colours, ink = (ON_DARK, "#c9d1d9") if dark else (ON_WHITE, "#333333")
+        colours, ink = palette(dark), "#c9d1d9" if dark else "#333333"
         points = extent(
             robot, sample.base_position[np.newaxis], _unit(sample), sample.angles[np.newaxis]
         )
         middle = points.mean(axis=0)
-        set_stage(server, middle + ROOM * (points - middle), dark)
+        self._orbit: LiveOrbit | None = None
+        if orbit and sample.orbit is not None:
+            self._orbit = LiveOrbit(orbit, sample.orbit, robot, points, dark)
+        horizon = self._orbit.horizon if self._orbit else None
+        stage = set_stage(server, middle + ROOM * (points - middle), dark, horizon=horizon)
         width = TRAIL * float(np.ptp(points, axis=0).max())
         self._root = server.scene.add_frame(ROOT, show_axes=False)
         self._scene = RobotScene(server.scene, ROOT, robot)
+        if self._orbit:
+            self._orbit.draw(server.scene, stage, ROOT)
         self._tools = [replace(robot, tools=(tool,)) for tool in robot.tools]
         self._trails = [
             Trail(server.scene, f"{ROOT}/trail of {tool.name}", rgb(colour), width)
@@ -137,6 +154,8 @@ class LiveView:
         links = joint_transforms(self._robot, np.tile(sample.angles, (2, 1)))
         with self._server.atomic():
             self._scene.move(position, quaternion[0], links, 0)
+            if self._orbit and sample.orbit is not None:
+                self._orbit.move(position, sample.orbit)
             for robot, trail in zip(self._tools, self._trails, strict=True):
                 _, place = tool_pose(robot, quaternion, sample.angles[np.newaxis])
                 trail.add(sample.time, position + place[0])
@@ -173,6 +192,8 @@ class LiveView:
         """Remove it from the scene."""
         for trail in self._trails:
             trail.clear()
+        if self._orbit:
+            self._orbit.close()
         self._root.remove()
         self._words.remove()
         self._curves.remove()

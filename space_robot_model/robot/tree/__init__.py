@@ -1,15 +1,30 @@
 """A robot as a tree of bodies: as in its file, and flattened for the algorithms."""
 
 from .arrays import TreeArrays
-from .bodies import Body, Joint, JointFriction, JointKind, JointLimits, Spring, Tool, Visual
+from .bodies import (
+    Body,
+    Encoder,
+    Gear,
+    Joint,
+    JointFriction,
+    JointKind,
+    JointLimits,
+    Plate,
+    Spring,
+    Tool,
+    Visual,
+)
 from .flatten import axes_with_z, first_repeated, flatten, parallel_axes
 
 __all__ = [
     "Body",
+    "Encoder",
+    "Gear",
     "Joint",
     "JointFriction",
     "JointKind",
     "JointLimits",
+    "Plate",
     "Spring",
     "Tool",
     "TreeArrays",

@@ -13,7 +13,7 @@ from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.samples import MOST_PASSIVE
 
 from ...dynamics.model import MOST_JOINTS
-from .bodies import Body, Joint, JointFriction, JointLimits, Spring, Tool, Visual
+from .bodies import Body, Gear, Joint, JointFriction, JointLimits, Plate, Spring, Tool, Visual
 from .flatten import Moved, flatten
 
 Array = NDArray[np.float64]
@@ -58,6 +58,9 @@ class TreeArrays:
     visuals: tuple[Visual, ...] = ()
     order: tuple[int, ...] = ()
     """Order of all joints branch by branch: parents before children."""
+    gears: tuple[Gear | None, ...] = ()
+    """Gears of the n actuated joints, None for rigid ones; empty: all are rigid."""
+    plates: tuple[Plate, ...] = ()
 
     @property
     def n(self) -> int:
@@ -86,6 +89,12 @@ class TreeArrays:
         return self.joint_names + self.passive_names
 
     @property
+    def geared_names(self) -> tuple[str, ...]:
+        """Names of the joints with gears."""
+        pairs = zip(self.joint_names, self.gears, strict=False)
+        return tuple(name for name, gear in pairs if gear)
+
+    @property
     def tool(self) -> Tool:
         """The end effector."""
         return self.tools[0]
@@ -102,6 +111,7 @@ class TreeArrays:
         joints = [_joint(m) for m in moved]
         actuated = tuple(joint for joint in joints if not joint.spring)
         springs = tuple(joint.spring for joint in joints if joint.spring)
+        gears = [joint.gear for joint in actuated]
         for number, most, what in (
             (len(joints), MOST_JOINTS, "moving joints"),
             (len(springs), MOST_PASSIVE, "passive joints"),
@@ -135,6 +145,12 @@ class TreeArrays:
                 for visual in body.visuals
             ),
             order=tuple(number_of[id(m)] - 1 for m in walked[1:]),
+            gears=tuple(gears) if any(gears) else (),
+            plates=tuple(
+                replace(plate, body=number)
+                for number, body in enumerate(members)
+                for plate in body.plates
+            ),
         )
 
     def bodies(self) -> list[Body]:
@@ -149,6 +165,7 @@ class TreeArrays:
                 self.com[number],
                 tools=tuple(tool for tool in self.tools if tool.body == number),
                 visuals=tuple(visual for visual in self.visuals if visual.body == number),
+                plates=tuple(plate for plate in self.plates if plate.body == number),
             )
             if number:
                 j = number - 1
@@ -161,6 +178,7 @@ class TreeArrays:
                     limits=self.limits[j] if passive < 0 else JointLimits(),
                     friction=self.friction[j],
                     spring=self.springs[passive] if passive >= 0 else None,
+                    gear=self.gears[j] if passive < 0 and self.gears else None,
                 )
                 body = replace(body, parent=self.body_names[self.parent[j]], joint=joint)
             bodies.append(body)

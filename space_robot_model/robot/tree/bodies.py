@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 JointKind = Literal["revolute", "prismatic", "fixed"]
+Encoder = Literal["motor", "link", "both"]
 
 
 class JointLimits(NamedTuple):
@@ -45,6 +46,26 @@ class Spring(NamedTuple):
     """rad or m."""
 
 
+class Gear(NamedTuple):
+    """Drive of a joint with a motor on the parent, a gear and a spring (dynamics.rotors)."""
+
+    rotor_inertia: float
+    """Inertia of the rotor about its axis, kg m2; its mass and static inertia are the parent's."""
+    ratio: float
+    """Turns of the rotor per turn of the joint; rad/m for a prismatic joint."""
+    stiffness: float
+    """Stiffness between motor and link, seen on the link's side, N m/rad or N/m."""
+    damping: float = 0.0
+    """N m s/rad or N s/m."""
+    encoder: Encoder = "motor"
+    """Side on which the joint is measured; both: the laws see the link's."""
+
+    @property
+    def reflected_inertia(self) -> float:
+        """``N^2 J``, kg m2 or kg."""
+        return self.ratio**2 * self.rotor_inertia
+
+
 NO_LIMITS, USUAL_FRICTION = JointLimits(), JointFriction()
 
 
@@ -65,6 +86,8 @@ class Joint:
     friction: JointFriction = USUAL_FRICTION
     spring: Spring | None = None
     """Spring of a passive joint; None for actuated and fixed joints."""
+    gear: Gear | None = None
+    """Gear of an actuated joint; None: the joint is rigid."""
 
 
 @dataclass(frozen=True)
@@ -102,6 +125,25 @@ class Visual:
 
 
 @dataclass(frozen=True)
+class Plate:
+    """A flat surface of a body, seen from one side, for drag and sunlight."""
+
+    area: float
+    """m2."""
+    normal: Array
+    """(3,) unit vector outwards, in body axes."""
+    centre: Array
+    """(3,) m, in body axes."""
+    drag_coefficient: float = 2.2
+    specular: float = 0.2
+    """Share of the light that is reflected as by a mirror."""
+    diffuse: float = 0.3
+    """Share that is scattered; the rest is absorbed."""
+    body: int = 0
+    """Number of its body; set by `flatten`."""
+
+
+@dataclass(frozen=True)
 class Body:
     """A rigid body; all vectors are in the axes of its frame."""
 
@@ -118,3 +160,4 @@ class Body:
     """Joint to the parent; None for the base."""
     tools: tuple[Tool, ...] = ()
     visuals: tuple[Visual, ...] = ()
+    plates: tuple[Plate, ...] = ()

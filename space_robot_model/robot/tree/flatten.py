@@ -154,6 +154,10 @@ def _moved_to(body: Body, rotation: Array, position: Array) -> Body:
             replace(seen, rotation=product(rotation, seen.rotation), position=at(seen.position))
             for seen in body.visuals
         ),
+        plates=tuple(
+            replace(plate, normal=product(rotation, plate.normal), centre=at(plate.centre))
+            for plate in body.plates
+        ),
     )
 
 
@@ -179,6 +183,7 @@ def _merged(first: Body, members: list[Body], where: str) -> Body:
         inertia=inertia,
         tools=tuple(tool for body in members for tool in body.tools),
         visuals=tuple(visual for body in members for visual in body.visuals),
+        plates=tuple(plate for body in members for plate in body.plates),
     )
 
 

@@ -134,11 +134,7 @@ def make_bodies(links: Mapping[str, UrdfLink], tree: Tree, tools: Sequence[str])
         tree: of links and joints.
         tools: links whose frames are tools, in order of rank.
     """
-    # the axis of a reversed joint passes through the frame of its new parent, so its new child gets
-    # its frame there; all other links keep theirs
-    frames = {
-        edge.joint.parent: edge.joint.frame for edge in tree.edges.values() if edge.is_reversed
-    }
+    frames = moved_frames(tree)
     ranks = {name: rank for rank, name in enumerate(tools)}
     bodies = [_body(links[tree.base], HERE, None, "", ranks.get(tree.base))]
     for name, edge in tree.edges.items():
@@ -146,6 +142,15 @@ def make_bodies(links: Mapping[str, UrdfLink], tree: Tree, tools: Sequence[str])
         frame = frames.get(name, HERE)
         bodies.append(_body(links[name], frame, joint, edge.parent, ranks.get(name)))
     return bodies
+
+
+def moved_frames(tree: Tree) -> dict[str, UrdfFrame]:
+    """Return the frames of bodies relative to their links', where they differ.
+
+    The axis of a reversed joint passes through the frame of its new parent, so its new child gets
+    its frame there; all other bodies have the frames of their links.
+    """
+    return {edge.joint.parent: edge.joint.frame for edge in tree.edges.values() if edge.is_reversed}
 
 
 def end_frames(links: Mapping[str, UrdfLink], tree: Tree) -> list[str]:

@@ -9,15 +9,18 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from space_robot_msgs_py.config.choices import choices
 from space_robot_msgs_py.config.validation import one_of, short
 from space_robot_msgs_py.config.yaml_text import check_file, read_file
 from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.topics import BASE_AXES
 
 from ...dynamics.model import MOST_JOINTS
-from ..tree import Body, JointFriction, Spring
-from .bodies import check_kinds, end_frames, make_bodies, mend_inertias, mend_massless
+from ...elementary.matrices import product
+from ..tree import Body, Gear, JointFriction, Plate, Spring
+from .bodies import check_kinds, end_frames, make_bodies, mend_inertias, mend_massless, moved_frames
 from .elements import Element, parse_xml
+from .fields import HERE, UrdfFrame
 from .findings import Finding, Report, short_tag
 from .graph import Tree, build_tree
 from .joints import read_joints
@@ -41,6 +44,8 @@ class UrdfRobot:
     """Repaired defects."""
     text: str
     """Text of the URDF, expanded if it was xacro."""
+    frames: Mapping[str, UrdfFrame]
+    """Frames of bodies relative to their links', where they differ."""
 
 
 def read_urdf(
@@ -93,7 +98,7 @@ def parse_urdf(
         report.refuse_defects()
     frames = end_frames(links, tree) if tools is None else tools
     bodies = make_bodies(links, tree, frames)
-    return UrdfRobot(name, bodies, tuple(report.sorted()), text)
+    return UrdfRobot(name, bodies, tuple(report.sorted()), text, moved_frames(tree))
 
 
 def with_springs(urdf: UrdfRobot, springs: Mapping[str, Spring], where: str) -> UrdfRobot:
@@ -118,6 +123,53 @@ def with_springs(urdf: UrdfRobot, springs: Mapping[str, Spring], where: str) -> 
             )
             body = replace(body, joint=joint)
         bodies.append(body)
+    return replace(urdf, bodies=bodies)
+
+
+def with_gears(urdf: UrdfRobot, gears: Mapping[str, Gear], where: str) -> UrdfRobot:
+    """Return the robot with gears in some joints with motors.
+
+    Raises:
+        InputError: one of the names is not a joint with a motor.
+    """
+    joints = {body.joint.name: body.joint for body in urdf.bodies if body.joint}
+    motors = [name for name, joint in joints.items() if joint.kind != "fixed" and not joint.spring]
+    for name in gears:
+        if name not in motors:
+            what = "a joint without a motor" if name in joints else "not a joint of the URDF"
+            advice = choices(name, motors)
+            raise InputError(f"{where}: robot.drives: {short(name)} is {what}: {advice}")
+    bodies = [
+        replace(body, joint=replace(body.joint, gear=gears.get(body.joint.name)))
+        if body.joint
+        else body
+        for body in urdf.bodies
+    ]
+    return replace(urdf, bodies=bodies)
+
+
+def with_plates(urdf: UrdfRobot, plates: Sequence[tuple[str, Plate]], where: str) -> UrdfRobot:
+    """Return the robot with plates on links.
+
+    Args:
+        urdf: the robot.
+        plates: with the names of their links, in whose frames they are.
+        where: name of the file, for errors.
+
+    Raises:
+        InputError: there is no such link.
+    """
+    links = [body.name for body in urdf.bodies]
+    by_link: dict[str, list[Plate]] = {link: [] for link in links}
+    for number, (name, plate) in enumerate(plates):
+        if name not in links:
+            key, advice = f"robot.plates.{number}.link", choices(name, links)
+            raise InputError(f"{where}: {key}: no link {short(name)}: {advice}")
+        frame = urdf.frames.get(name, HERE)
+        turn = frame.rotation.T
+        normal, centre = product(turn, plate.normal), product(turn, plate.centre - frame.position)
+        by_link[name].append(replace(plate, normal=normal, centre=centre))
+    bodies = [replace(body, plates=tuple(by_link[body.name])) for body in urdf.bodies]
     return replace(urdf, bodies=bodies)
 
 

@@ -1,4 +1,4 @@
-"""A controller whose base has wheels and thrusters: what it commands, holds and tells."""
+"""A controller whose base has wheels, thrusters and torquers: what it commands, holds, tells."""
 
 from __future__ import annotations
 
@@ -33,6 +33,11 @@ THRUSTERS: dict[str, Any] = {
     "force": [10.0],
     "shortest_pulse": [0.01],
 }
+
+
+TORQUERS: dict[str, Any] = {"axes": np.eye(3).ravel().tolist(), "max_dipole": [400.0]}
+FIELD = np.array([1e-5, -2e-5, 3e-5])
+"""T, base axes."""
 
 
 def controller_of(robot: Robot, law: str = "ctc", **hardware: Any) -> Controller:
@@ -92,6 +97,56 @@ def test_while_it_holds_its_torque_the_valves_are_closed(paper_robot: Robot) -> 
         held = supervisor.answer(bad, REST)
     assert supervisor.mode is Mode.SAFE
     assert not held.torque.any()
+
+
+def with_torquers(tick: int) -> RobotState:
+    """Return a state in a magnetic field, whose wheels store a momentum."""
+    state = state_at(tick)
+    state.wheel_velocities[:4] = [10.0, 20.0, -5.0, 40.0]
+    state.magnetic_field[:] = FIELD
+    return state
+
+
+def test_torquers_and_wheels_are_asked_for_the_torque_of_the_base(paper_robot: Robot) -> None:
+    controller = controller_of(paper_robot, wheels=WHEELS, magnetic_torquers=TORQUERS)
+    ideal = Controller(paper_robot, law_of("ctc"), PERIOD).update(with_torquers(0), REST).torque
+    command = controller.update(with_torquers(0), REST)
+    assert controller.names.commanded[13:] == ("torquer_1", "torquer_2", "torquer_3")
+    np.testing.assert_array_equal(command.torque[:9], ideal)
+    axes = np.reshape(CORNERS, (4, 3)) / np.sqrt(3.0)
+    momentum = 0.05 * np.array([10.0, 20.0, -5.0, 40.0]) @ axes
+    dipoles = command.torque[13:]
+    expected = 0.002 * np.cross(momentum, FIELD) / (FIELD @ FIELD)
+    np.testing.assert_allclose(dipoles, expected, rtol=1e-12)
+    torque = np.cross(dipoles, FIELD) - command.torque[9:13] @ axes
+    np.testing.assert_allclose(torque, ideal[:3], atol=1e-9)
+    assert controller.allocation.values["largest_dipole"] == np.abs(dipoles).max()
+
+
+def test_without_a_law_the_field_is_read_too(paper_robot: Robot) -> None:
+    controller = controller_of(paper_robot, wheels=WHEELS, magnetic_torquers=TORQUERS)
+    by_law = controller.update(with_torquers(0), REST).torque[13:].copy()
+    other = controller_of(paper_robot, wheels=WHEELS, magnetic_torquers=TORQUERS)
+    command = other.allocate_torque(with_torquers(0), np.zeros(9))
+    np.testing.assert_array_equal(command.torque[13:], by_law)
+
+
+@pytest.mark.parametrize("wrong", [np.nan, np.inf, -1e31])
+def test_while_the_magnetometer_is_wrong_no_dipole_is_commanded(
+    paper_robot: Robot, wrong: float
+) -> None:
+    """The torque of the wheels is held, then all are switched off."""
+    controller = controller_of(paper_robot, wheels=WHEELS, magnetic_torquers=TORQUERS)
+    supervisor = Supervisor(controller, hold_ticks=5)
+    wheels = supervisor.answer(with_torquers(0), REST).torque[9:13].copy()
+    for tick in range(1, 8):
+        bad = with_torquers(tick)
+        bad.magnetic_field[1] = wrong
+        held = supervisor.answer(bad, REST)
+        assert not held.torque[13:].any()
+        assert supervisor.mode is (Mode.HOLDING if tick < 6 else Mode.SAFE)
+        np.testing.assert_array_equal(held.torque[9:13], wheels if tick < 6 else np.zeros(4))
+    assert supervisor.answer(with_torquers(8), REST).torque[13:].all()
 
 
 def test_failed_wheels_are_told(paper_robot: Robot) -> None:

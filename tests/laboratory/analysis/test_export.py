@@ -140,8 +140,8 @@ def test_a_folder_that_cannot_be_is_named(log: FlightLog, tmp_path: Path) -> Non
         write_parquet(log, tmp_path / "file" / "flight.parquet")
 
 
-def test_every_wheel_and_thruster_has_its_columns(tmp_path: Path) -> None:
-    log = FlightLog.allocate(3, ("a",), Timebase(500_000), wheels=2, thrusters=1)
+def test_every_actuator_has_its_columns(tmp_path: Path) -> None:
+    log = FlightLog.allocate(3, ("a",), Timebase(500_000), wheels=2, thrusters=1, torquers=3)
     log.commanded_torque = np.zeros((3, 4))
     for k, values in enumerate(log.columns.values()):
         values[:] = np.arange(values.size).reshape(values.shape) + 100.0 * k
@@ -153,6 +153,8 @@ def test_every_wheel_and_thruster_has_its_columns(tmp_path: Path) -> None:
         "thrust_1_n": log.thrusts[:, 0],
         "commanded_wheel_torque_2_n_m": log.actuator_commands[:, 1],
         "commanded_thrust_1_n": log.actuator_commands[:, 2],
+        "commanded_dipole_1_a_m2": log.actuator_commands[:, 3],
+        "commanded_dipole_3_a_m2": log.actuator_commands[:, 5],
     }.items():
         np.testing.assert_array_equal(column(table, name), expected, err_msg=name)
     assert not any("wheel_velocity_3" in name for name in table.column_names)

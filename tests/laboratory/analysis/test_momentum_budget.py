@@ -23,6 +23,7 @@ from space_robot_model.robot import Robot
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_sim.environment.captures import Captures
 from space_robot_sim.environment.disturbance import DisturbanceSettings
+from space_robot_sim.environment.orbit_settings import OrbitSettings
 
 Array = NDArray[np.float64]
 POSTURE = np.array([0.3, -0.8, 1.1, 0.2, -0.5, 0.9])
@@ -91,7 +92,9 @@ def _turned(quaternion: Array, vector: Array) -> Array:
 
 
 def budget(log: FlightLog, robot: Robot, actuators: BaseActuatorSettings, *cuts: int) -> Any:
-    metric = MomentumBudget(MomentumSeries(Captures((), robot, PERIOD), actuators, NO_DISTURBANCE))
+    metric = MomentumBudget(
+        MomentumSeries(Captures((), robot, PERIOD, OrbitSettings()), actuators, NO_DISTURBANCE)
+    )
     for start, stop in zip((0, *cuts), (*cuts, log.ticks), strict=True):
         metric.add(log.rows(start, stop), np.empty(0))
     return metric.result()

@@ -128,6 +128,87 @@ def test_robots_that_are_no_urdf(tmp_path: Path) -> None:
     assert "not a URDF" in str(result.exception)
 
 
+GEARED = """
+robot:
+  name: lift
+  base: {mass: 200.0, inertia: [20.0, 20.0, 20.0, 0, 0, 0]}
+  links:
+    - {name: slide, joint: prismatic, mass: 5.0, inertia: [0.1, 0.1, 0.1, 0, 0, 0], com: [0, 0, 0],
+       drive: {rotor_inertia: 2.0e-4, gear_ratio: 500.0, stiffness: 3.0e4, encoder: link}}
+    - {name: turn, mass: 4.0, inertia: [0.1, 0.1, 0.1, 0, 0, 0], com: [0, 0, 0],
+       drive: {rotor_inertia: 1.5e-5, gear_ratio: 120.0, stiffness: 8000.0, damping: 12.0}}
+    - {name: rigid, mass: 3.0, inertia: [0.1, 0.1, 0.1, 0, 0, 0], com: [0, 0, 0]}
+"""
+PLATES = """
+  plates:
+    - {area: 2.5, normal: [1, 0, 0]}
+    - {area: 1.25, normal: [0, 1, 0]}
+    - {area: 0.5, normal: [0, 0, 1], link: turn}
+"""
+
+
+def test_drives(tmp_path: Path) -> None:
+    yaml = tmp_path / "lift.yaml"
+    yaml.write_text(GEARED)
+    slide, turn, rigid = report(yaml)["joints"]
+    assert slide["drive"] == {
+        "rotor_inertia": 2.0e-4,
+        "gear_ratio": 500.0,
+        "stiffness": 3.0e4,
+        "damping": 0.0,
+        "encoder": "link",
+        "reflected_inertia": pytest.approx(50.0),  # kg
+    }
+    assert turn["drive"]["reflected_inertia"] == pytest.approx(0.216)
+    assert turn["drive"]["encoder"] == "motor"
+    assert "drive" not in rigid
+    lines = run(yaml).stdout.partition("Drives")[2].splitlines()
+    rows = {row[0]: row[1:] for line in lines if len(row := cells(line)) == 7}
+    assert rows["slide"] == ["500 rad/m", "0.0002 kg m2", "50 kg", "3e+04 N/m", "0 N s/m", "link"]
+    assert rows["turn"] == [
+        *("120", "1.5e-05 kg m2", "0.216 kg m2", "8000 N m/rad", "12 N m s/rad", "motor")
+    ]
+    assert "rigid" not in rows
+    assert "Drives" not in run("paper").stdout
+
+
+def cells(line: str) -> list[str]:
+    """The cells of a line of a table."""
+    return [cell.strip() for cell in line.strip("│┃").split("│")] if "│" in line else []
+
+
+def test_plates_of_the_file_and_of_the_shapes(tmp_path: Path) -> None:
+    yaml = tmp_path / "lift.yaml"
+    yaml.write_text(GEARED + PLATES)
+    assert report(yaml)["plates"] == {
+        "source": "file",
+        "count": 3,
+        "area": 4.25,
+        "bodies": [
+            {"name": "base", "count": 2, "area": 3.75},
+            {"name": "turn", "count": 1, "area": 0.5},
+        ],
+    }
+    shown = run(yaml).stdout.partition("Plates")[2]
+    assert [cells(line) for line in shown.splitlines() if "together" in line] == [
+        ["together", "3", "4.25"]
+    ]
+    assert "those of the file" in shown
+    assert "made from the shapes" in run(ARM).stdout
+
+
+def test_the_plates_of_shapes_have_their_surface(tmp_path: Path) -> None:
+    """A box, a cylinder, a box in the mesh's place, and a sphere."""
+    urdf, mesh = tmp_path / "boxes.urdf", '<mesh filename="package://arm/fore.stl" scale="2 2 2"/>'
+    assert mesh in ARM.read_text()
+    urdf.write_text(ARM.read_text().replace(mesh, '<box size="0.2 0.2 0.5"/>'))
+    plates = report(urdf)["plates"]
+    assert plates["source"] == "shapes"
+    assert plates["count"] == 6 + 8 + 6 + 6
+    areas = [10.0, 2.0 * np.pi * 0.1 * (0.1 + 0.8), 0.48, 4.0 * np.pi * 0.1**2]
+    assert plates["area"] == pytest.approx(sum(areas))
+
+
 @pytest.mark.parametrize("name", DEFECTS)
 def test_every_defect_is_one_line_of_every_command(
     name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]

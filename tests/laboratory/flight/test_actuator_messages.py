@@ -1,4 +1,4 @@
-"""Wheels and thrusters in a bag, in compiled code and message by message: one flight."""
+"""Wheels, thrusters and torquers: one flight in a bag, compiled, and message by message."""
 
 from __future__ import annotations
 
@@ -14,17 +14,21 @@ from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.bag.folder import open_bag
 from space_robot_msgs_py.bag.reader import read_flight
 from space_robot_msgs_py.errors import SingularAttitudeError
-from space_robot_msgs_py.samples import ACTUATOR_FIELDS, STATE_FIELDS
+from space_robot_msgs_py.samples import ACTUATOR_FIELDS, ORBIT_FIELDS, STATE_FIELDS
 
 NOTHING = "drop_state@0:0"
 """A fault of messages that never happens."""
-COLUMNS = (*STATE_FIELDS, *ACTUATOR_FIELDS, "commanded_torque", "actuator_commands")
-KINDS = ("wheels", "thrusters", "wheels_and_thrusters", "none")
+COLUMNS = (
+    *(*STATE_FIELDS, *ACTUATOR_FIELDS, *ORBIT_FIELDS),
+    *("commanded_torque", "actuator_commands"),
+)
+KINDS = ("wheels", "thrusters", "wheels_and_thrusters", "wheels_and_torquers", "none")
 LAWS = ("tde_stc", "ctc")
 
 
 def plan(actuators: str, law: str = "tde_stc", **options: object) -> FlightPlan:
-    given = {"controller": law, "actuators": actuators, "duration": 0.1}
+    orbit = "iss" if actuators == "wheels_and_torquers" else "none"
+    given = {"controller": law, "actuators": actuators, "orbit": orbit, "duration": 0.1}
     return FlightPlan.model_validate({**given, **options})
 
 
@@ -47,13 +51,14 @@ def test_its_bag_and_its_messages_are_the_flight(actuators: str, law: str, tmp_p
     sent = {name for name, _ in open_bag(tmp_path / "bag").messages(*topics.STATES)}
     assert (topics.WHEELS_STATE.full_name in sent) is bool(names.wheels)
     assert (topics.THRUSTERS_STATE.full_name in sent) is bool(names.thrusters)
+    assert (topics.MAGNETOMETER.full_name in sent) is bool(names.torquers)
     assert log.wheel_velocities.shape == (200, len(names.wheels))
     assert log.actuator_commands.shape == (200, len(names.actuators))
     assert np.isfinite(log.actuator_commands).all()
     assert log.wheel_torques.any() == bool(names.wheels)
 
 
-@pytest.mark.parametrize("actuators", ["wheels", "wheels_and_thrusters"])
+@pytest.mark.parametrize("actuators", ["wheels", "wheels_and_thrusters", "wheels_and_torquers"])
 def test_faults_of_messages_strike_all_parts_of_a_state_alike(
     actuators: str, tmp_path: Path
 ) -> None:
@@ -67,6 +72,8 @@ def test_faults_of_messages_strike_all_parts_of_a_state_alike(
         for topic in topics.STATES
     }
     assert stamps[topics.WHEELS_STATE] == stamps[topics.BASE_STATE] == stamps[topics.JOINT_STATES]
+    if actuators == "wheels_and_torquers":
+        assert stamps[topics.MAGNETOMETER] == stamps[topics.BASE_STATE]
     assert 0 < len(stamps[topics.BASE_STATE]) < 200
 
 
@@ -77,10 +84,11 @@ def test_thrusters_that_fire_are_in_the_bag(tmp_path: Path) -> None:
     assert_same(read_flight(tmp_path / "bag"), log)
 
 
-def test_late_commands_of_actuators_are_a_plant_that_applies_them_late() -> None:
+@pytest.mark.parametrize("actuators", ["wheels_and_thrusters", "wheels_and_torquers"])
+def test_late_commands_of_actuators_are_a_plant_that_applies_them_late(actuators: str) -> None:
     """All numbers of a command come late as one."""
-    late = simulate(Flight(resolve(plan("wheels_and_thrusters", faults=["delay_command@0:2"]))))
-    slow = simulate(Flight(resolve(plan("wheels_and_thrusters", command_latency_ticks=2))))
+    late = simulate(Flight(resolve(plan(actuators, faults=["delay_command@0:2"]))))
+    slow = simulate(Flight(resolve(plan(actuators, command_latency_ticks=2))))
     assert_same(late, slow)
 
 

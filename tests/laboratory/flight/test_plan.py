@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
+from operator import or_
 from pathlib import Path
 from typing import Any
 
@@ -33,6 +34,7 @@ from space_robot_msgs_py.config.directory import config_directory
 from space_robot_msgs_py.config.files import named_file
 from space_robot_msgs_py.config.settings import leaves
 from space_robot_msgs_py.errors import InputError
+from space_robot_sim.environment.orbit_settings import OrbitSettings
 from space_robot_sim.plant.plant import Plant
 from space_robot_sim.plant.settings import PlantNodeSettings
 
@@ -229,11 +231,20 @@ _SPECIAL: dict[str, st.SearchStrategy[Any]] = {
         ),
         st.lists(st.integers(0, 3) | st.floats(0.0, 1.0), min_size=1, max_size=1),
     ),
+    "orbit": st.sampled_from(["iss", "sso_700"]),
+    "orbital_elements.height": st.integers(400_000, 10**9) | st.floats(4e5, 1e9),
+    "orbital_elements.eccentricity": st.just(0) | st.floats(0.0, 0.05),
+    "magnetism.residual_dipole": _AXIS,
     "torque_echo": st.sampled_from(["command", "given"]),
     "actuators": st.just("wheels"),
     "base_actuation": st.just("hardware"),
     "base_torque_limit": st.just(0),
     "wheels.axes": st.just([1, 0, 0, 0, 1.5, 0, 0, 0, 1, 1, 1, 1]),
+    "magnetic_torquers.axes": st.just([0.0]),
+    "magnetic_torquers.max_dipole": st.lists(
+        st.just(1) | st.floats(0.5, 5.0), min_size=1, max_size=1
+    ),
+    "allocation.dump": st.sampled_from(["all", "none", "thrusters", "magnetic"]),
     "thrusters.positions": st.just([0.0]),
     "thrusters.directions": st.just([0.0]),
     **dict.fromkeys(
@@ -269,6 +280,8 @@ _SPECIAL: dict[str, st.SearchStrategy[Any]] = {
     "navigation_filter.tracker_boresight": st.sampled_from([[0, 0, 0], [1, 0, 2.5]]),
 }
 _NOT_ALONE = {"waypoint_times", "waypoints_deg"}
+_OF_ORBIT = {name for name, _ in leaves(OrbitSettings)}
+"""What can be set only for a robot in an orbit."""
 
 
 def _values(name: str, field: Any) -> st.SearchStrategy[Any]:
@@ -298,7 +311,12 @@ def _any_parameters() -> st.SearchStrategy[Parameters]:
             if name not in _NOT_ALONE and f"{schema.node}.{name}" not in NOT_TO_BE_SET
         }
         allowed |= gains if schema is ControllerNodeSettings else {}
+        of_orbit = {name: allowed.pop(name) for name in _OF_ORBIT & allowed.keys()}
+        orbit = {"orbit": allowed.pop("orbit")} if of_orbit else {}
         nodes[schema.node] = st.fixed_dictionaries({}, optional=allowed)
+        if of_orbit:
+            in_orbit = st.just({}) | st.fixed_dictionaries(orbit, optional=of_orbit)
+            nodes[schema.node] = st.builds(or_, nodes[schema.node], in_orbit)
     return st.fixed_dictionaries({}, optional=nodes)
 
 

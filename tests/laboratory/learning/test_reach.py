@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from driven_robots import driven_paper
 
 import space_robot as sr
 from space_robot_msgs_py.errors import InputError
@@ -16,6 +17,7 @@ from gymnasium.vector import AutoresetMode, SyncVectorEnv  # noqa: E402
 
 from space_robot.learning.reach_env import NAME, ReachEnv, ReachVectorEnv  # noqa: E402
 
+DRIVEN = sr.Robot.from_dict(driven_paper())
 SHORT: dict[str, Any] = {"duration": 0.03, "ticks_per_step": 2}
 
 
@@ -88,6 +90,8 @@ def test_a_failure_costs_the_rest_of_the_episode() -> None:
         ({"scenario": sr.Scenario(sensors="fine")}, "scenario: sensors, drives or faults"),
         ({"scenario": sr.Scenario(actuators="wheels")}, "scenario: a base without ideal torques"),
         ({"scenario": sr.Scenario(command_latency_ticks=2)}, "scenario: delayed commands"),
+        ({"scenario": sr.Scenario(orbit="iss")}, "scenario: an orbit: the task reach has none"),
+        ({"scenario": sr.Scenario(robot=DRIVEN)}, "scenario: joints with gears"),
         ({"scenario": 3}, "scenario: a Scenario was expected"),
         ({"duration": 0.0}, "duration: a number above 0 was expected"),
         ({"reach": -1.0}, "reach: a number 0 or more was expected"),

@@ -11,8 +11,8 @@ from space_robot.cli.simulate import simulate
 from space_robot.scenario.option_table import OPTIONS, Option, names
 from space_robot.scenario.options import FlightPlan
 
-NOT_TYPED = {"plant_robot", "assumed_actuators", "parameters"}
-"""Options of scenarios and files alone, or with a form of their own on the command line."""
+NOT_TYPED = {"parameters"}
+"""With a form of its own on the command line."""
 
 
 def test_the_plan_has_the_options_of_the_table() -> None:

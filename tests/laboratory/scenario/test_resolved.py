@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 import yaml
+from driven_robots import driven_paper
 from flights import space_robot_here
 
 from space_robot.api import Scenario
@@ -18,9 +19,15 @@ from space_robot.flight.simulate import simulate
 from space_robot.scenario.comparison import differences, recorded_scenario
 from space_robot.scenario.node_settings import FlightSettings
 from space_robot.scenario.options import FlightPlan
+from space_robot_model.robot import Robot
 from space_robot_msgs_py.config.directory import GRAPH_FILE, config_directory
 from space_robot_msgs_py.errors import InputError
+from space_robot_msgs_py.samples import ORBIT_FIELDS
 
+COLUMNS = (
+    *("quaternion", "joint_positions", "applied_torque", "commanded_torque"),
+    *("motor_positions", "motor_velocities", *ORBIT_FIELDS),
+)
 SCENARIOS: dict[str, dict[str, Any]] = {
     "sensors and filter": {"case": "3", "sensors": "fine", "navigation": "filtered", "seed": 5},
     "another robot": {"robot": "seven_joint", "case": "2", "friction": False},
@@ -41,6 +48,11 @@ SCENARIOS: dict[str, dict[str, Any]] = {
             "plant": {"wheels.max_torque": [0.1]},
         },
     },
+    "orbit": {"orbit": "iss", "case": "3", "actuators": "wheels"},
+    "gears and plates": {
+        "robot": Robot.from_dict(driven_paper()),
+        "orbit": {"orbital_elements": {"height": 400e3}, "atmosphere": {"density": 4e-12}},
+    },
     "another plant": {"robot": "paper", "plant_robot": "paper", "parameters": {"plant": {}}},
 }
 
@@ -60,7 +72,7 @@ def test_resolved_numbers_as_yaml_fly_the_same_bits(options: dict[str, Any]) -> 
     assert differences(again.scenario.tree, flight.scenario.tree) == []
     assert again.ticks == flight.ticks
     one, other = simulate(again), simulate(flight)
-    for name in ("quaternion", "joint_positions", "applied_torque", "commanded_torque"):
+    for name in COLUMNS:
         assert np.array_equal(getattr(one, name), getattr(other, name)), name
 
 

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import io
 import shutil
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from space_robot.cli.main import main
@@ -67,18 +69,22 @@ class Seen:
         return found
 
 
+def shown(folder: Path, browser: Any, **plan: Any) -> Seen:
+    """Fly, make the page of the flight, and open it."""
+    simulate(Flight(resolve(FlightPlan(**plan))), folder / "bag")
+    with pytest.raises(SystemExit):
+        main(["view", str(folder / "bag"), "--no-open", "--out", str(folder / "page.html")])
+    return Seen(browser, folder / "page.html")
+
+
 @pytest.fixture(scope="module")
 def seen(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Seen]:
     playwright = pytest.importorskip("playwright.sync_api")
     pytest.importorskip("viser")
     folder = tmp_path_factory.mktemp("page")
-    plan = FlightPlan(duration=4.0, faults=["drive_scale@2-3:all=0.9"])
-    simulate(Flight(resolve(plan)), folder / "bag")
-    with pytest.raises(SystemExit):
-        main(["view", str(folder / "bag"), "--no-open", "--out", str(folder / "page.html")])
     with playwright.sync_playwright() as started:
         browser = started.chromium.launch(executable_path=CHROMIUM, args=ARGUMENTS)
-        yield Seen(browser, folder / "page.html")
+        yield shown(folder, browser, duration=4.0, faults=["drive_scale@2-3:all=0.9"])
         browser.close()
 
 
@@ -136,9 +142,38 @@ def test_the_robot_is_drawn_and_moves(seen: Seen) -> None:
     assert pictures[0] != pictures[1]
 
 
-def test_nothing_was_asked_of_the_network_and_nothing_went_wrong(seen: Seen) -> None:
+def assert_whole(seen: Seen) -> None:
+    """Nothing was asked of the network, and nothing went wrong."""
     assert [
         url[:80] for url in seen.requests if not url.startswith(("file:", "data:", "blob:"))
     ] == []
     assert [url for url in seen.requests if url.startswith("file:")] == [seen.page.url]
     assert seen.errors == []
+
+
+def test_nothing_was_asked_of_the_network_and_nothing_went_wrong(seen: Seen) -> None:
+    assert_whole(seen)
+
+
+def test_in_orbit_the_earth_is_below(seen: Seen, tmp_path: Path) -> None:
+    """By day it is blue; above it is the sky, which is as dark as the page."""
+    image = pytest.importorskip("PIL.Image")
+    orbit = shown(tmp_path, seen.page.context.browser, duration=0.5, orbit="iss")
+    orbit.page.keyboard.press("Space")
+    orbit.page.wait_for_timeout(1500)
+    data = orbit.page.locator("#scene").screenshot(timeout=PATIENCE_MS)
+    picture = np.asarray(image.open(io.BytesIO(data)).convert("RGB"), float)
+    height, width, _ = picture.shape
+    part = slice(int(0.80 * height), int(0.86 * height))  # above the time line
+    red, _, blue = np.median(picture[part, width // 2 :], axis=(0, 1))
+    assert blue > 100.0
+    assert blue > 2.0 * red
+    sky = np.median(picture[: height // 8], axis=(0, 1))
+    assert sky.max() < 40.0
+    assert orbit.page.locator("#arrows").inner_text().split("\n") == [
+        "nadir",
+        "orbital velocity",
+        "Sun",
+    ]
+    assert_whole(orbit)
+    orbit.page.close()

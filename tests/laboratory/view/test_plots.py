@@ -22,6 +22,7 @@ from space_robot_control.allocation.assumed_actuators import assumed_actuators
 from space_robot_model.hardware.base_actuators import BaseActuatorSettings
 from space_robot_model.robot import Robot
 from space_robot_model.robot.find import find_robot
+from space_robot_model.robot.tree import Gear
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.samples import Timebase
 
@@ -109,6 +110,43 @@ def test_passive_joints_are_counted_from_their_rest() -> None:
     assert (turning.unit, sliding.unit, sliding.labels) == ("rad", "m", [robot.passive_names[1]])
     np.testing.assert_array_equal(turning.values, np.delete(away, 1, axis=1))
     np.testing.assert_array_equal(sliding.values, away[:, 1:2])
+
+
+def geared(robot: Robot, encoder: Any) -> Robot:
+    """The robot with gears in its first, third and last joint; the first is on this side."""
+    gears: list[Gear | None] = [None] * robot.n
+    gears[0] = Gear(1e-4, 100.0, 2e4, 10.0, encoder)
+    gears[2] = gears[-1] = Gear(1e-4, 50.0, 1e4)
+    return replace(robot, gears=tuple(gears))
+
+
+@pytest.mark.parametrize("encoder", ["motor", "link"])
+@pytest.mark.parametrize("has_truth", [True, False])
+def test_motors_are_ahead_of_their_joints_by_the_gears_deflection(
+    paper_robot: Robot, encoder: str, has_truth: bool
+) -> None:
+    """What a motor's encoder says is no joint's position: without the truth nothing is known."""
+    robot = geared(paper_robot, encoder)
+    log, names = flight(robot, ""), paper_robot.joint_names
+    log.geared_names = (names[0], names[2], names[-1])
+    log.motor_positions = np.random.default_rng(2).normal(size=(30, 3))
+    log.flight = {"prismatic_joints": [names[2]]}
+    if has_truth:
+        log.record_measured()
+    shown = [q for q in quantities_of(log, robot) if q.title == "gear deflection"]
+    away = log.motor_positions - log.joint_positions[:, [0, 2, 5]]
+    if has_truth:
+        turning, sliding = shown
+        assert (turning.unit, turning.labels) == ("rad", [names[0], names[-1]])
+        assert (sliding.unit, sliding.labels) == ("m", [names[2]])
+        np.testing.assert_array_equal(turning.values, away[:, [0, 2]])
+        np.testing.assert_array_equal(sliding.values, away[:, 1:2])
+    elif encoder == "link":
+        (turning,) = shown
+        assert turning.labels == [names[0]]
+        np.testing.assert_array_equal(turning.values, away[:, :1])
+    else:
+        assert not shown
 
 
 def test_of_several_flights_each_has_the_size_of_each_quantity(paper_robot: Robot) -> None:

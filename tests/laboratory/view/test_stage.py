@@ -6,20 +6,31 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from numpy.typing import NDArray
+from orbiting_logs import EARTH_RADIUS, CircularOrbit
 
-from space_robot.view.stage import DIRECTION, FIELD_OF_VIEW, set_stage
+from space_robot.view.horizon import Horizon
+from space_robot.view.orbit_frames import OrbitFrames
+from space_robot.view.stage import DIRECTION, FIELD_OF_VIEW, LAMPS, Rendering, set_stage
 
 viser = pytest.importorskip("viser")
+
+Array = NDArray[np.float64]
+
+
+def random_points(seed: int, size: float) -> Array:
+    random = np.random.default_rng(seed)
+    points: Array = random.uniform(-size, size, (20, 3)) + random.uniform(-9.0, 9.0, 3)
+    return points
 
 
 @settings(max_examples=10)
 @given(st.integers(0, 2**32 - 1), st.floats(0.1, 50.0))
 def test_the_camera_sees_every_point_and_no_more_than_it_must(seed: int, size: float) -> None:
-    random = np.random.default_rng(seed)
-    points = random.uniform(-size, size, (20, 3)) + random.uniform(-9.0, 9.0, 3)
+    points = random_points(seed, size)
     server = viser.ViserServer(port=0, verbose=False)
     try:
-        set_stage(server, points, dark=False, shadows=False)
+        set_stage(server, points, dark=False, rendering=Rendering(shadows=False))
         camera = server.initial_camera
         position, target = np.array(camera.position), np.array(camera.look_at)
     finally:
@@ -40,3 +51,51 @@ def test_the_camera_sees_every_point_and_no_more_than_it_must(seed: int, size: f
     assert 0.7 < max(high.max(), wide.max()) < 1.0
     assert camera.near < depth.min()
     assert depth.max() < camera.far
+
+
+@settings(max_examples=10)
+@given(
+    st.integers(0, 2**32 - 1),
+    st.floats(0.1, 50.0),
+    st.floats(300e3, 1200e3),
+    st.floats(0.0, np.pi),
+    st.floats(-np.pi, np.pi),
+)
+def test_in_orbit_the_camera_sees_every_point_and_the_earth_below(
+    seed: int, size: float, height: float, inclination: float, start: float
+) -> None:
+    points = random_points(seed, size)
+    orbit = CircularOrbit(height, inclination, start)
+    now = np.zeros(1)
+    frames = OrbitFrames(orbit.position(now), orbit.velocity(now), orbit.sun, np.zeros(1, bool))
+    server = viser.ViserServer(port=0, verbose=False)
+    try:
+        stage = set_stage(server, points, dark=False, horizon=Horizon.of(frames))
+        camera, lamp = server.initial_camera, stage.lamp
+        position, up, far = np.array(camera.position), np.array(camera.up), camera.far
+        np.testing.assert_allclose(np.array(camera.look_at), stage.middle)
+        np.testing.assert_allclose(lamp.position, orbit.sun, atol=1e-12)
+        bright = lamp.intensity
+        stage.shade(True)
+        assert 0.0 < lamp.intensity < 0.3 * bright
+        stage.shade(False)
+        assert lamp.intensity == bright == LAMPS[0][1]
+    finally:
+        server.stop()
+    local_up = orbit.position(now)[0] / orbit.radius
+    np.testing.assert_allclose(up, local_up, atol=1e-12)
+    forward = (stage.middle - position) / np.linalg.norm(stage.middle - position)
+    right = np.cross(forward, up)
+    right /= np.linalg.norm(right)
+    assert right @ orbit.velocity(now)[0] > 0.0  # it flies to the right
+    above = np.cross(right, forward)
+    depth, slope = (points - position) @ forward, np.tan(0.5 * FIELD_OF_VIEW)
+    assert np.all(depth > 0.0)
+    assert np.abs((points - position) @ above / depth / slope).max() < 1.0
+    assert np.abs((points - position) @ right / depth / slope / 1.1).max() < 1.0
+    # the limb, straight ahead, is in the lower half of the picture
+    ahead = np.cross(local_up, right)
+    dip = np.arccos(EARTH_RADIUS / orbit.radius)
+    limb = np.cos(dip) * ahead - np.sin(dip) * local_up
+    assert -1.0 < (limb @ above) / (limb @ forward) / slope < -0.2
+    assert far > 2.0 * stage.earth_distance > 5000.0 * stage.size

@@ -31,7 +31,9 @@ def of(name: str, **overrides: Any) -> PlantNodeSettings:
 
 
 def test_there_are_the_files_that_the_manual_names() -> None:
-    hardware = {"wheels", "small_wheels", "thrusters", "wheels_and_thrusters"}
+    hardware = {
+        *("wheels", "small_wheels", "thrusters", "wheels_and_thrusters", "wheels_and_torquers")
+    }
     assert set(FILES) == {"ideal", "none", *hardware}
 
 
@@ -42,7 +44,7 @@ def test_a_file_is_about_the_base_alone_and_makes_a_plant(robot: Robot, name: st
     assert set(sections) <= {"plant_node", "controller_node"}
     assert set(sections["plant_node"]["ros__parameters"]) <= set(BaseActuatorSettings.model_fields)
     assert set(sections.get("controller_node", {}).get("ros__parameters", {})) <= {"allocation"}
-    settings = of(name, robot=robot.name)
+    settings = of(name, robot=robot.name, orbit="iss")
     plant = Plant(robot, settings, 5e-4)
     assert plant.names.actuators == settings.names
     assert of(str(FILES[name])).wheels == settings.wheels
@@ -54,6 +56,7 @@ def test_a_file_is_about_the_base_alone_and_makes_a_plant(robot: Robot, name: st
     [
         *(("wheels", key, True) for key in ("max_torque", "max_momentum", "coulomb", "viscous")),
         ("wheels", "rotor_inertia", False),
+        ("magnetic_torquers", "max_dipole", False),
         *(("thrusters", key, True) for key in ("shortest_pulse", "delay")),
         *(("thrusters", key, False) for key in ("force", "specific_impulse")),
     ],
@@ -121,6 +124,27 @@ def test_single_numbers_come_over_those_of_the_file() -> None:
         ("thrusters: {directions: [0, 0, 0]}", "thrusters.directions: the norm of each must be "),
         ("thrusters: {force: [0]}", "thrusters.force.0: Input should be greater than 0, got 0"),
         ("thrusters: {force: 4}", "thrusters.force: Input should be a valid list, got 4$"),
+        (
+            "magnetic_torquers: {dipole: [1]}",
+            r"magnetic_torquers.dipole: unknown key, got \[1\]: choose one of axes, max_dipole ",
+        ),
+        (
+            "magnetic_torquers: {axes: [1, 0, 0, 0]}",
+            r"magnetic_torquers.axes: x, y, z of at most 6 vectors were expected,"
+            r" or \[0.0\] for none: 4 numbers, got",
+        ),
+        (
+            "magnetic_torquers: {axes: [0, 1, 0, 0, 0, 0]}",
+            "magnetic_torquers.axes: the norm of each must be near 1, that of number 2 is 0, got",
+        ),
+        (
+            "magnetic_torquers: {max_dipole: [.inf]}",
+            "magnetic_torquers.max_dipole.0: Input should be ",
+        ),
+        (
+            "magnetic_torquers: {max_dipole: 400}",
+            "magnetic_torquers.max_dipole: Input should be a valid list, got 400$",
+        ),
         ("thrusters: {propellant: -1}", "thrusters.propellant: Input should be greater than or"),
         ("thrusters: {force: [1], force: [1]}", "line 1: not YAML .the key 'force' occurs twice"),
     ],
@@ -135,6 +159,25 @@ def test_a_bad_number_is_one_line_with_file_and_key(tmp_path: Path, text: str, w
         (HARDWARE, "base_actuation is hardware: no wheels.axes or thrusters.positions$"),
         ("wheels: {axes: [1, 0, 0]}", "wheels are for base_actuation hardware, got 'ideal'$"),
         ("base_actuation: none, thrusters: {positions: [1, 0, 0]}", "thrusters are for base_actu"),
+        (
+            "magnetic_torquers: {axes: [1, 0, 0]}",
+            "magnetic_torquers are for base_actuation hardware, got 'ideal'$",
+        ),
+        (
+            HARDWARE + f"magnetic_torquers: {{axes: {CROSS}}}",
+            "magnetic_torquers unload wheels: there are no wheels.axes$",
+        ),
+        (
+            HARDWARE + f"wheels: {{axes: {CROSS}}}, "
+            f"magnetic_torquers: {{axes: {CROSS}, max_dipole: [1, 2]}}",
+            "magnetic_torquers.max_dipole has 2 values, one for all or 3 are allowed: one per "
+            "magnetic torquer$",
+        ),
+        (
+            HARDWARE + f"wheels: {{axes: {CROSS}}}, magnetic_torquers: {{axes: {CROSS}}}",
+            "magnetic_torquers need an orbit with a magnetic field: --orbit NAME, with "
+            "magnetism.strength above 0$",
+        ),
         (
             HARDWARE + "wheels: {axes: [1, 0, 0, 0, 1, 0, 1, 1, 0]}",
             "wheels.axes must span all directions: the wheels cannot produce all torques$",
@@ -202,11 +245,14 @@ def test_a_limit_of_an_ideal_base_is_refused_with_any_other(name: str) -> None:
         Plant(PAPER, of(name, faults=["saturate_base@1:0.5"]), 5e-4)
 
 
-def test_a_joint_that_is_called_like_a_wheel() -> None:
+@pytest.mark.parametrize(
+    ("name", "file"), [("wheel_2", "wheels"), ("torquer_3", "wheels_and_torquers")]
+)
+def test_a_joint_that_is_called_like_an_actuator(name: str, file: str) -> None:
     content = yaml.safe_load((CONFIG / "robots/paper.yaml").read_text("utf-8"))
-    content["robot"]["links"][2]["name"] = "wheel_2"
-    with pytest.raises(InputError, match="actuators wheels: 'wheel_2' is a joint of robot 'paper'"):
-        of("wheels").check(Robot.from_dict(content), "wheels")
+    content["robot"]["links"][2]["name"] = name
+    with pytest.raises(InputError, match=f"actuators {file}: '{name}' is a joint of robot 'paper'"):
+        of(file, orbit="iss").check(Robot.from_dict(content), file)
 
 
 def test_a_name_that_is_none_is_told_with_those_there_are() -> None:
@@ -236,7 +282,9 @@ _VALUES = st.recursive(
     max_leaves=8,
 )
 _SOME = st.dictionaries(
-    st.sampled_from([*KEYS, "wheels", "thrusters"]) | st.text(max_size=9), _VALUES, max_size=4
+    st.sampled_from([*KEYS, "wheels", "thrusters", "magnetic_torquers"]) | st.text(max_size=9),
+    _VALUES,
+    max_size=4,
 )
 
 
@@ -245,7 +293,7 @@ def test_any_file_makes_actuators_or_one_line(content: dict[str, Any], name: str
     """Whatever stands in it, alone or over a good one: what cannot be flown is refused."""
     content.pop("actuators", None)
     try:
-        settings = PlantNodeSettings.resolve({"actuators": name, **content})
+        settings = PlantNodeSettings.resolve({"actuators": name, "orbit": "iss", **content})
         settings.check(PAPER, name)
         Plant(PAPER, settings, 5e-4)
     except InputError as error:

@@ -23,7 +23,7 @@ KINDS = ("revolute", "prismatic", "fixed", "passive revolute", "passive prismati
 
 def same(one: Robot, other: Robot) -> None:
     for field in fields(Robot):
-        if field.name in ("visuals", "repairs"):
+        if field.name in ("visuals", "repairs", "source"):
             continue
         a, b = getattr(one, field.name), getattr(other, field.name)
         if isinstance(a, np.ndarray):

@@ -33,7 +33,9 @@ def flown(names: RobotNames = NAMES) -> FlightLog:
     """A flight by hand, another number everywhere."""
     rng = np.random.default_rng(3)
     counts = len(names.wheels), len(names.thrusters)
-    log = FlightLog.allocate(TICKS, names.joints, TIMEBASE, *counts, names.passive)
+    log = FlightLog.allocate(
+        TICKS, names.joints, TIMEBASE, *counts, names.passive, torquers=len(names.torquers)
+    )
     log.commanded_torque = np.empty((TICKS, len(names.axes)))
     for column in log.columns.values():
         column[:] = rng.normal(size=column.shape)
@@ -78,8 +80,14 @@ def assert_same(log: FlightLog, expected: FlightLog) -> None:
 
 @pytest.mark.parametrize(
     "names",
-    [NAMES, NAMES._replace(thrusters=()), NAMES._replace(wheels=()), RobotNames(NAMES.joints)],
-    ids=["both", "wheels", "thrusters", "none"],
+    [
+        NAMES,
+        NAMES._replace(thrusters=()),
+        NAMES._replace(wheels=()),
+        NAMES._replace(torquers=("torquer_1", "torquer_2")),
+        RobotNames(NAMES.joints),
+    ],
+    ids=["both", "wheels", "thrusters", "torquers", "none"],
 )
 def test_a_log_has_a_column_for_each_actuator(names: RobotNames, tmp_path: Path) -> None:
     log = flown(names)

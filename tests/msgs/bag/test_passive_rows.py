@@ -53,7 +53,7 @@ def states_of(log: FlightLog, names: RobotNames = NAMES) -> Iterator[Message]:
 
 
 def truth_of(log: FlightLog) -> Iterator[Message]:
-    writer = TruthWriter(NAMES, TIMEBASE)
+    writer = TruthWriter(NAMES, TIMEBASE, topics.TRUTH)
     for tick in range(log.ticks):
         yield from writer.add(log.state(tick))
     yield from writer.flush()

@@ -78,9 +78,10 @@ def test_a_node_waits_for_listeners_to_what_it_sends_alone() -> None:
         (
             PlantNodeSettings,
             "recorder_node:/command",
-            "joint_states, base/state, clock, truth/joints, truth/base, wheels/state, "
-            "thrusters/state, _transforms, _transforms/static, robot_description, "
-            "_plant_description",
+            "joint_states, base/state, clock, truth/joints, truth/base, truth/orbit, "
+            "wheels/state, thrusters/state, motors/state, magnetometer, _transforms, "
+            "_transforms/static, "
+            "robot_description, _plant_description",
         ),
         (
             ControllerNodeSettings,

@@ -39,7 +39,8 @@ def state_of(names: RobotNames, seed: int, tick: int) -> RobotState:
     state.tick = tick
     for name in STATE_FIELDS:
         getattr(state, name)[:] = rng.normal(size=getattr(state, name).shape)
-    counts = (len(names.wheels), len(names.wheels), len(names.thrusters))
+    geared = len(names.geared)
+    counts = (len(names.wheels), len(names.wheels), len(names.thrusters), geared, geared)
     for name, count in zip(ACTUATOR_FIELDS, counts, strict=True):
         getattr(state, name)[:count] = rng.normal(size=count)
     return state

@@ -98,7 +98,7 @@ def test_they_are_taken_by_name_and_none_may_lack() -> None:
 
 def test_the_truth_tells_them_too() -> None:
     names = names_of(2, 3)
-    writer, state = TruthWriter(names, TIMEBASE), state_of(names, 4)
+    writer, state = TruthWriter(names, TIMEBASE, topics.TRUTH), state_of(names, 4)
     assert writer.add(state) == ()
     (topic, data), _ = writer.flush()
     message = STORE.deserialize_cdr(data, topic.type)

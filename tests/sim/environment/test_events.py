@@ -17,6 +17,7 @@ from space_robot_msgs_py.errors import InputError
 from space_robot_sim.environment.captures import Captures
 from space_robot_sim.environment.environment import EnvironmentSettings
 from space_robot_sim.environment.events import Capture, Release, named_targets, parse_events
+from space_robot_sim.environment.orbit_settings import OrbitSettings
 from space_robot_sim.environment.target import Target, TargetPlace
 
 BODY: dict[str, Any] = {"mass": 2.0, "inertia": [1.0, 1.0, 1.0, 0.0, 0.0, 0.0]}
@@ -84,7 +85,7 @@ def test_a_target_is_a_shipped_one_or_a_file(
         (["capture@-1:small_satellite"], "expected, as capture@10:small_satellite"),
         (["capture@1e999:small_satellite"], "T must be from 0 to "),
         (["capture@1"], "a target is needed"),
-        (["capture@1:moon"], "choose one of small_satellite, tumbling_satellite"),
+        (["capture@1:moon"], "choose one of neighbouring_satellite, small_satellite, tumbling"),
         (["capture@1:no/such.yaml"], "no/such.yaml"),
         (["capture@1:{mass: -1}"], "mass"),
         (["capture@1:{mass: 1"], "capture@1:{mass: 1"),
@@ -130,7 +131,7 @@ def test_a_tool_that_the_robot_has_not_is_refused() -> None:
     robot = random_robot(np.random.default_rng(1), 2)
     event = Capture(1.0, Target.from_dict({"target": {**BODY, "tool": "left"}}))
     with pytest.raises(InputError, match="unknown tool 'left' of robot 'random2' for target"):
-        Captures([event], robot, 5e-4)
+        Captures([event], robot, 5e-4, OrbitSettings())
 
 
 @settings(max_examples=300)

@@ -21,6 +21,7 @@ from space_robot_sim.environment.captures import Captures
 from space_robot_sim.environment.events import Capture, Release
 from space_robot_sim.environment.grasp import Grasp
 from space_robot_sim.environment.impact import Impact
+from space_robot_sim.environment.orbit_settings import OrbitSettings
 from space_robot_sim.environment.target import Target
 
 Array = NDArray[np.float64]
@@ -335,7 +336,7 @@ def test_robots_follow_one_another_and_the_bare_one_comes_back_exactly() -> None
     robot = random_robot(np.random.default_rng(2), 3)
     target = random_target(np.random.default_rng(3), "tool")
     events = [Capture(1.0, target), Release(2.0), Capture(3.0, target)]
-    captures = Captures(list(reversed(events)), robot, 5e-4)
+    captures = Captures(list(reversed(events)), robot, 5e-4, OrbitSettings())
     masses = [float(captures.robot_at(tick).mass[-1]) for tick in (1999, 2000, 3999, 4000, 6000)]
     bare = float(robot.mass[-1])
     assert masses == [bare, bare + target.mass, bare + target.mass, bare, bare + target.mass]

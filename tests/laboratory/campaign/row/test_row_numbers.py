@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 
 from space_robot import FlownFlight, Scenario
 from space_robot.analysis import tracking_error
+from space_robot.analysis.attitude_drift import attitude_drift
 from space_robot.campaign.row.bands import Bands
 from space_robot.campaign.row.columns import Columns, missing_for_ripple
 from space_robot.campaign.row.measure import Measure, check_requirements
@@ -80,6 +81,28 @@ def test_bands_hold_the_largest_of_each_bin(flown: FlownFlight, measured: Measur
     norms = np.linalg.norm(tracking_error(flown.log)[:, :3], axis=1)
     expected = norms.reshape(100, 24).max(axis=1)
     np.testing.assert_allclose(measured.bands()["attitude"], expected, rtol=1e-6)
+
+
+@pytest.mark.parametrize("ticks", [600, 170])
+def test_the_drift_of_a_free_base_is_that_of_the_report(ticks: int) -> None:
+    """In one block and in several; without attitude control there is no attitude error."""
+    flown = Scenario(actuators="none", controller="ctc", duration=0.3).fly()
+    demand = {"metric": "attitude_drift_max", "to_s": 0.2, "below": 1.0, "in": 0.9}
+    measure = Measure(flown.flight, {"band": Requirement.model_validate(demand)})
+    for start in range(0, 600, ticks):
+        measure.add(flown.log.rows(start, min(start + ticks, 600)))
+    angle = np.radians(np.linalg.norm(attitude_drift(flown.log), axis=1))
+    metrics = measure.metrics()
+    largest = np.radians(flown.report()["attitude_drift"]["max_deg"])
+    assert metrics["attitude_drift_max"] == pytest.approx(largest, rel=1e-12)
+    assert metrics["attitude_drift_rms"] == pytest.approx(np.sqrt(np.mean(angle**2)), rel=1e-9)
+    assert measure.require()["band"] == pytest.approx(angle[:401].max(), rel=1e-12)
+    assert "attitude_max" not in metrics
+    assert list(metrics) == [
+        name for name in Columns.of_log(flown.log).metrics if "ripple" not in name
+    ]
+    expected = angle.reshape(100, 6).max(axis=1)
+    np.testing.assert_allclose(measure.bands()["attitude_drift"], expected, rtol=1e-6)
 
 
 @given(

@@ -17,11 +17,14 @@ from space_robot.flight.replay.outcome import ReplayOptions
 from space_robot.flight.replay.run import replay
 from space_robot.flight.simulate import simulate
 from space_robot_msgs_py.bag.reader import read_flight
-from space_robot_msgs_py.samples import ACTUATOR_FIELDS, STATE_FIELDS
+from space_robot_msgs_py.samples import ACTUATOR_FIELDS, ORBIT_FIELDS, STATE_FIELDS
 
 pytest.importorskip("rclpy")
 
-COLUMNS = (*STATE_FIELDS, *ACTUATOR_FIELDS, "commanded_torque", "actuator_commands")
+COLUMNS = (
+    *(*STATE_FIELDS, *ACTUATOR_FIELDS, *ORBIT_FIELDS),
+    *("commanded_torque", "actuator_commands"),
+)
 MESSAGE_FAULTS = ("drop_state@0.05-0.1:0.2", "delay_command@0.15-0.2:2", "nan_state@0.25-0.3:0.3")
 PART_FAULTS = ("wheel_fail@0.2:2", "thruster_stuck_on@0.1-0.2:thruster_1")
 EVENTS = ["capture@0.15:tumbling_satellite", "release@0.3:0.05"]
@@ -29,6 +32,7 @@ FLIGHTS: dict[str, tuple[dict[str, Any], tuple[str, ...]]] = {
     "wheels": ({"actuators": "wheels", "events": EVENTS}, ()),
     "thrusters": ({"actuators": "thrusters", "controller": "ctc"}, ("--composed",)),
     "both": ({"actuators": "wheels_and_thrusters", "sensors": "fine"}, ("--composed",)),
+    "torquers": ({"actuators": "wheels_and_torquers", "orbit": "iss"}, ()),
     "faults": (
         {
             "actuators": "wheels_and_thrusters",
@@ -75,3 +79,6 @@ def test_a_flight_with_actuators_is_replayed_to_the_bit(
     assert report["equal"] == report["compared"] > 0
     assert set(report["axes"]) == {*names.axes, *names.actuators}
     assert not any(axis["difference_max"] for axis in report["axes"].values())
+    units = {"thruster": "N", "torquer": "A m2"}
+    for name, axis in report["axes"].items():
+        assert axis["unit"] == units.get(name.partition("_")[0], "N m"), name

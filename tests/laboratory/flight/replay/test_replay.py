@@ -14,6 +14,7 @@ import numpy as np
 import psutil
 import pytest
 from command import Run
+from driven_robots import driven_paper
 from flights import Flown, forked_space_robot, space_robot_here
 
 from space_robot.flight.plan import Flight, FlightPlan, resolve
@@ -21,6 +22,7 @@ from space_robot.flight.replay.outcome import Replay, ReplayOptions
 from space_robot.flight.replay.run import replay
 from space_robot.flight.simulate import simulate
 from space_robot_control.laws import laws
+from space_robot_model.robot import Robot
 from space_robot_model.robot.find import find_robot
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.bag.folder import open_bag
@@ -98,6 +100,16 @@ def test_a_flight_with_a_free_base_gives_the_same_bits(
     """The node that is played to learns of it from the bag."""
     done = play(recorded(actuators="none", swaps=["0.05:ctc", "0.1:tde_smc"]))
     assert done.comparison.is_identical, done.report()["first_difference"]
+
+
+@pytest.mark.parametrize("orbit", ["none", "iss"])
+def test_gears_and_an_orbit_give_the_same_bits(
+    recorded: Callable[..., Path], play: Callable[..., Replay], orbit: str
+) -> None:
+    """The controller gets what the encoders on the motors' and on the links' side measured."""
+    done = play(recorded(robot=Robot.from_dict(driven_paper()), orbit=orbit, case="3"))
+    assert done.comparison.is_identical, done.report()["first_difference"]
+    assert len(done.comparison.ticks) == TICKS
 
 
 def test_swaps_are_made_again_at_their_ticks(

@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 from flights import COMMAND, forked_space_robot, ros_environment, space_robot_here
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
 from space_robot.view.live import serve as serving
 from space_robot.view.live.serve import LiveOptions, serve
@@ -32,6 +33,7 @@ Poses = dict[str, tuple[float, ...]]
 TIMEOUT_S = 120.0
 CLOSE = 3e-5
 """viser sends no pose again that has changed by less than a hundred-thousandth."""
+Z = np.array([0.0, 0.0, 1.0])
 ORIGIN, UNTURNED = (0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0)
 """Of a frame whose position or attitude nobody has sent."""
 CAMERA = {
@@ -162,6 +164,10 @@ def shown_rows(log: FlightLog, shown: list[Poses]) -> list[int]:
     return rows
 
 
+def unit_rows(vectors: Array) -> Array:
+    return np.asarray(vectors / np.linalg.norm(vectors, axis=-1, keepdims=True))
+
+
 def test_two_flights_one_after_the_other(tmp_path: Path, free_domain: int) -> None:
     # the second one's sensors are so far off that their poses are none of the truth's
     given = ((), ("--sensors", "tactical"))
@@ -213,3 +219,30 @@ def test_ctrl_c_ends_it(free_domain: int) -> None:
         process.send_signal(signal.SIGINT)
         assert process.stderr.read().strip() == "ended"
         assert process.wait(TIMEOUT_S) == 0
+
+
+def test_a_flight_in_orbit_has_the_earth_below(tmp_path: Path, free_domain: int) -> None:
+    server = Server(free_domain, 1)
+    server.start()
+    assert server.waits.wait(TIMEOUT_S)
+    collected: list[Poses] = []
+
+    def watch() -> None:
+        for poses in frames(server):
+            collected.append(poses)
+
+    threading.Thread(target=watch, daemon=True).start()
+    log = fly(free_domain, tmp_path / "bag", collected, "--orbit", "iss")
+    server.join(TIMEOUT_S)
+    last = collected[-1]
+    nadir, velocity = (
+        Rotation.from_quat(last[f"Ori/robot/orbit/{name}"], scalar_first=True).apply(Z)
+        for name in ("nadir", "orbital_velocity")
+    )
+    away = np.abs(nadir + unit_rows(log.orbit_position)).max(axis=1)
+    row = int(away.argmin())
+    assert row > log.ticks // 2
+    assert away[row] < CLOSE
+    np.testing.assert_allclose(velocity, unit_rows(log.orbit_velocity)[row], atol=CLOSE)
+    earth = np.array(last["Pos/earth"])  # from the middle of the scene
+    np.testing.assert_allclose(unit_rows(earth), nadir, atol=1e-3)

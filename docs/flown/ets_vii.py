@@ -1,0 +1,89 @@
+"""What is flown for docs/explanation/ets_vii.md."""
+
+from __future__ import annotations
+
+import re
+from typing import Any
+
+import yaml
+from flown_tables import DOCS, Number, Options, Page, Table, Text
+
+PATH = "explanation/ets_vii.md"
+MISSIONS = ("ets_vii_out_and_back", "ets_vii_lift", "ets_vii_reactionless")
+LARGEST, END = "attitude_drift.max_deg", "attitude_drift.end_deg"
+ROBOT: Options = {"robot": "ets_vii", "controller": "ctc", "period": 0.002}
+FREE: Options = {**ROBOT, "actuators": "none"}
+READINGS = {"OnOrbitROS": "onorbitros.yaml", "TraceableRobotModels": "traceable.yaml"}
+"""Files that the page shows."""
+DURATIONS = (300.0, 600.0)
+ANOMALIES = (0.0, 45.0, 90.0)
+
+
+def _robot_of(file: str) -> dict[str, Any]:
+    """Return the robot of a file that the page shows."""
+    text = (DOCS / PATH).read_text("utf-8")
+    block = re.search(rf"```yaml\n(# {file}\n.*?)```", text, re.DOTALL)
+    assert block is not None
+    content: dict[str, Any] = yaml.safe_load(block[1])
+    return content
+
+
+def _nominal(mission: str) -> list[str | Number | Text]:
+    free = {**FREE, "mission": mission}
+    orbit, wheels = {**free, "orbit": "ets_vii"}, {**ROBOT, "actuators": "wheels"}
+    held = {**wheels, "mission": mission}
+    return [
+        f"`{mission}`",
+        Number(free, LARGEST, ".3g"),
+        Number(free, END),
+        Number(orbit, LARGEST, ".3g"),
+        Number(orbit, END),
+        Number(held, "maxima.base_torque", ".3g"),
+        Number(held, "sizing.peak_momentum_n_m_s", ".3g"),
+        Number(held, "maxima.attitude"),
+    ]
+
+
+def _read(mission: str) -> list[str | Number]:
+    shipped = {**FREE, "mission": mission}
+    numbers = [shipped, *({**shipped, "plant_robot": _robot_of(f)} for f in READINGS.values())]
+    return [f"`{mission}`", *(Number(options, LARGEST, ".3g") for options in numbers)]
+
+
+def _left_alone(anomaly: float) -> list[str | Number]:
+    turned = {"plant": {"orbital_elements.anomaly_deg": anomaly}}
+    options = {**FREE, "mission": MISSIONS[-1], "orbit": "ets_vii", "parameters": turned}
+    numbers = [options, *({**options, "duration": duration} for duration in DURATIONS)]
+    return [f"{anomaly:g}", *(Number(own, END, ".3g") for own in numbers)]
+
+
+PAGE = Page(
+    "ets_vii",
+    PATH,
+    (
+        Table(
+            "nominal",
+            (
+                "mission",
+                "base free: largest drift, °",
+                "at the end",
+                "in orbit: largest",
+                "at the end",
+                "wheels: torque, N m",
+                "momentum, N m s",
+                "attitude error",
+            ),
+            [_nominal(mission) for mission in MISSIONS],
+        ),
+        Table(
+            "readings",
+            ("mission", *(f"{reading}, °" for reading in ("shipped", *READINGS))),
+            [_read(mission) for mission in MISSIONS],
+        ),
+        Table(
+            "alone",
+            ("anomaly at the start, °", "55.2 s", *(f"{d:g} s" for d in DURATIONS)),
+            [_left_alone(anomaly) for anomaly in ANOMALIES],
+        ),
+    ),
+)

@@ -1,0 +1,86 @@
+"""What is flown for docs/manual/orbit.md."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from flown_tables import Number, Options, Page, Table
+
+from space_robot.api.flown_flight import FlownFlight
+
+ORBIT_S = 5560.0
+SOURCES = {
+    "gravity_gradient": "gravity gradient",
+    "drag": "drag",
+    "sunlight": "sunlight",
+    "sines": "sines of case 3",
+}
+AT_400_KM: Options = {
+    "orbit": "iss",
+    "case": "3",
+    "period": 0.002,
+    "duration": ORBIT_S,
+    "parameters": {"plant": {"orbital_elements.height": 400e3}},
+}
+AT_700_KM: Options = {
+    **AT_400_KM,
+    "orbit": "sso_700",
+    "parameters": {"plant": {"orbital_elements.height": 700e3}},
+}
+DUMPS = {"none": "nothing", "magnetic": "magnetic torquers"}
+
+
+def _unloaded(dump: str) -> Options:
+    return {
+        "orbit": "iss",
+        "actuators": "wheels_and_torquers",
+        "period": 0.002,
+        "duration": ORBIT_S,
+        "parameters": {"controller": {"allocation.dump": dump}},
+    }
+
+
+def stored(share: float) -> Callable[[FlownFlight], float]:
+    """Return the momentum that all wheels together hold at a share of the flight, N m s."""
+
+    def momentum(flown: FlownFlight) -> float:
+        row = round(share * (flown.log.ticks - 1))
+        axes = np.array([[1, 1, 1], [-1, 1, 1], [-1, -1, 1], [1, -1, 1]]) / np.sqrt(3.0)
+        return float(np.linalg.norm(0.0318 * flown.log.wheel_velocities[row] @ axes))
+
+    momentum.__name__ = f"stored_at_{share:g}"
+    return momentum
+
+
+def _source(key: str, label: str) -> list[str | Number]:
+    quantities = [f"disturbance_by_source.{key}.{name}" for name in ("rms_n_m", "max_n_m")]
+    quantities.append(f"disturbance_by_source.{key}.impulse_n_m_s")
+    return [label, *(Number(o, q, ".2g") for o in (AT_400_KM, AT_700_KM) for q in quantities)]
+
+
+PAGE = Page(
+    "orbit",
+    "manual/orbit.md",
+    (
+        Table(
+            "sources",
+            ("", "400 km: RMS, N m", "max", "N m s", "700 km: RMS, N m", "max", "N m s"),
+            [_source(key, label) for key, label in SOURCES.items()],
+        ),
+        Table(
+            "unloading",
+            ("unloaded by", "at the start, N m s", "1/4", "1/2", "3/4", "at the end"),
+            [
+                [
+                    label,
+                    *(
+                        Number(_unloaded(dump), stored(share), ".2f")
+                        for share in (0.0, 0.25, 0.5, 0.75, 1.0)
+                    ),
+                ]
+                for dump, label in DUMPS.items()
+            ],
+        ),
+    ),
+)

@@ -1,0 +1,259 @@
+"""Small motions of a robot with gears under the linear part of a law, in discrete time.
+
+The laws believe that a joint turns as its motor does. With springs between them the loop is closed
+over the motions of `space_robot_model.robot.gears.FlexibleModel`, of which the momentum of what
+floats freely is eliminated. Between two ticks the torque is held; with r and p the measured rates
+and positions in rho, w the weight of the pair's low-pass and T the period, a law with time-delay
+estimation is
+
+    N_k = (1 - w) N_k-1 + w (F_k-1 - h_bar (r_k - r_k-1) / T)
+    F_k = N_k - h_bar (K_D r_k + K_P p_k)
+
+and one with a model ``F_k = -H_S (K_D r_k + K_P p_k)``. The slope of a sliding surface has the role
+of K_D; switching terms are left out, a boundary layer counts with its slope. An absolute eigenvalue
+above 1 says by how much an oscillation grows in a tick. Modes slower than half of the slowest
+spring are those of the rigid robot, which the switching terms decide; they do not count.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from space_robot_control.laws import ControlLaw
+from space_robot_control.navigation.low_pass import low_pass_weight
+from space_robot_model.robot import Robot
+from space_robot_model.robot.gears import FlexibleModel, flexible_model, geared_joints
+
+from .inertia import attitude_jacobian, free_inertia, inertia_in_rho, semi_floating_inertia
+
+Array = NDArray[np.float64]
+
+SLOWEST_GROWTH = 1e-6
+"""Growth in a tick up to which a loop counts as stable: that of rounding errors."""
+RIGID = 0.5
+"""Share of the slowest spring's rate below which a mode is one of the rigid robot."""
+LOWEST_HZ = 0.01
+"""Lowest corner of a low-pass that is tried."""
+SCALES = (1e-3, 1e3)
+"""Factors on h_bar between which its limit is searched."""
+HALVINGS = 14
+"""Of the searched interval's logarithm: the limit is known to a thousandth."""
+
+
+@dataclass(frozen=True)
+class FlexibleCheck:
+    """Stability of a law on a robot with gears, along a mission."""
+
+    radius: float
+    """Largest absolute eigenvalue of all configurations; 0: there is none that counts."""
+    largest_corner_hz: float | None
+    """Largest corner of ``acceleration_filter_hz`` with which the law is stable: the bandwidth that
+    its estimate may have. 0: none helps; None: no low-pass is needed."""
+    largest_h_bar_scale: float | None
+    """Largest factor on all of h_bar with which the law is stable; None: no estimate."""
+
+    @property
+    def is_stable(self) -> bool:
+        """True if no small oscillation grows."""
+        return self.radius <= 1.0 + SLOWEST_GROWTH
+
+
+def joint_frequencies(robot: Robot, joint_positions: Array) -> Array:
+    """Return the frequency of each of G gears' springs, the others rigid, (K, G) Hz.
+
+    The base floats freely and no motor is held: of one joint on a fixed base it is that of the
+    two-mass oscillator, ``sqrt(K (1 / B + 1 / I)) / 2 pi``.
+
+    Args:
+        robot: with gears.
+        joint_positions: (K, N) of all joints, rad or m.
+    """
+    joints, size = geared_joints(robot), 6 + robot.joint_count
+    frequencies = np.zeros((len(joint_positions), len(joints)))
+    for row, positions in enumerate(joint_positions):
+        model = flexible_model(robot, positions)
+        for k, joint in enumerate(joints):
+            merged = np.zeros((size + len(joints), size + 1))
+            merged[:size, :size] = np.eye(size)
+            for other, moved in enumerate(joints):
+                merged[size + other, size if other == k else 6 + moved] = 1.0
+            compliance = np.linalg.inv(merged.T @ model.inertia @ merged)
+            spring = np.zeros(size + 1)
+            spring[6 + joint], spring[size] = 1.0, -1.0
+            gear = robot.gears[joint]
+            assert gear
+            square = gear.stiffness * float(spring @ compliance @ spring)
+            frequencies[row, k] = np.sqrt(square) / (2.0 * np.pi)
+    return frequencies
+
+
+def check_flexible(
+    law: ControlLaw,
+    robot: Robot,
+    joint_positions: Array,
+    quaternion: Array,
+    corner_hz: float,
+    controls_base: bool,
+) -> FlexibleCheck:
+    """Check the stability of a law on a robot with gears.
+
+    Args:
+        law: with its gains and period.
+        robot: with gears.
+        joint_positions: (K, n) of the actuated joints in all configurations, rad or m.
+        quaternion: (4,) attitude of the base.
+        corner_hz: of the low-pass of the time-delay pair, Hz (0: none).
+        controls_base: whether the base has attitude actuators.
+    """
+    rest = np.tile([spring.rest for spring in robot.springs], (len(joint_positions), 1))
+    slowest = joint_frequencies(robot, np.hstack([joint_positions, rest])).min()
+    least = RIGID * 2.0 * np.pi * float(slowest)
+    loops = [
+        _Loop(law, robot, positions, quaternion, controls_base, least)
+        for positions in joint_positions
+    ]
+    period = law.period
+
+    def is_stable(corner: float, scale: float) -> bool:
+        weight = low_pass_weight(corner, period) or 1.0
+        return all(loop.radius(weight, scale) <= 1.0 + SLOWEST_GROWTH for loop in loops)
+
+    radius = max(loop.radius(low_pass_weight(corner_hz, period) or 1.0) for loop in loops)
+    if not law.h_bar.size:
+        return FlexibleCheck(radius, None, None)
+    corner: float | None = None
+    if not is_stable(0.0, 1.0):
+        corner = _largest(LOWEST_HZ, 0.5 / period, lambda value: is_stable(value, 1.0))
+    return FlexibleCheck(radius, corner, _largest(*SCALES, lambda x: is_stable(corner_hz, x)))
+
+
+def _largest(low: float, high: float, is_stable: Callable[[float], bool]) -> float:
+    """Return the largest value that is stable, by bisection; 0: none is."""
+    if not is_stable(low):
+        return 0.0
+    if is_stable(high):
+        return high
+    for _ in range(HALVINGS):
+        middle = float(np.sqrt(low * high))
+        low, high = (middle, high) if is_stable(middle) else (low, middle)
+    return low
+
+
+class _Loop:
+    """A law on a robot with gears near a configuration."""
+
+    def __init__(
+        self,
+        law: ControlLaw,
+        robot: Robot,
+        positions: Array,
+        quaternion: Array,
+        controls_base: bool,
+        least: float,
+    ) -> None:
+        """``least``: rate of the slowest mode that counts, rad/s; see `check_flexible`."""
+        self._least = least
+        rest = [spring.rest for spring in robot.springs]
+        self._model = flexible_model(robot, np.concatenate((positions, rest)))
+        self._period = law.period
+        base = 3 if controls_base else 0
+        axes = base + robot.n
+        self._h_bar = law.h_bar[-axes:]
+        self._rows = np.arange(3 if controls_base else 6, len(self._model.inertia))
+        force, rate = _axes_of(robot, len(self._model.inertia), base)
+        jacobian = np.eye(axes)
+        if base:
+            jacobian[:3, :3] = attitude_jacobian(quaternion)
+        self._rate = jacobian @ rate[:, self._rows]
+        self._step, self._by_force = self._discrete(force[self._rows] @ jacobian.T)
+        inertia = semi_floating_inertia(robot.nominal, positions[np.newaxis])
+        inertia = inertia_in_rho(quaternion, inertia) if base else free_inertia(inertia)
+        self._damping, self._stiffness = _linear_gains(law, inertia[0], axes)
+
+    def radius(self, weight: float, scale: float = 1.0) -> float:
+        """Return the largest absolute eigenvalue with h_bar times ``scale``."""
+        count, axes = len(self._rows), len(self._rate)
+        r = np.hstack([np.zeros((axes, count)), self._rate])
+        p = np.hstack([self._rate, np.zeros((axes, count))])
+        pd = self._damping @ r + self._stiffness @ p
+        if not self._h_bar.size:
+            return self._largest(self._step - self._by_force @ pd)
+        h_bar = scale * np.diag(self._h_bar)
+        one, none = np.eye(axes), np.zeros((axes, axes))
+        acceleration = weight * h_bar / self._period
+        estimate = np.hstack([-acceleration @ r, (1.0 - weight) * one, weight * one, acceleration])
+        force = estimate.copy()
+        force[:, : 2 * count] -= scale * pd
+        whole = np.vstack(
+            [
+                np.hstack([self._step, np.zeros((2 * count, 3 * axes))]) + self._by_force @ force,
+                estimate,
+                force,
+                np.hstack([r, none, none, none]),
+            ]
+        )
+        return self._largest(whole)
+
+    def _largest(self, matrix: Array) -> float:
+        """Return the largest absolute eigenvalue of modes that count."""
+        values = np.linalg.eigvals(matrix)
+        with np.errstate(divide="ignore"):
+            rates = np.abs(np.log(values.astype(complex))) / self._period
+        return float(np.abs(values[rates >= self._least]).max(initial=0.0))
+
+    def _discrete(self, force: Array) -> tuple[Array, Array]:
+        """Return the state a period later by the state ``[q, qdot]``, and by a held force."""
+        from scipy.linalg import expm  # slow to import
+
+        reduced = _reduced(self._model, self._rows)
+        count, axes = len(self._rows), force.shape[1]
+        rates = np.zeros((2 * count + axes, 2 * count + axes))
+        rates[:count, count : 2 * count] = np.eye(count)
+        rates[count : 2 * count, :count] = -np.linalg.solve(reduced.inertia, reduced.stiffness)
+        rates[count : 2 * count, count : 2 * count] = -np.linalg.solve(
+            reduced.inertia, reduced.damping
+        )
+        rates[count : 2 * count, 2 * count :] = np.linalg.solve(reduced.inertia, force)
+        whole = expm(rates * self._period)
+        return whole[: 2 * count, : 2 * count], whole[: 2 * count, 2 * count :]
+
+
+def _reduced(model: FlexibleModel, rows: NDArray[np.intp]) -> FlexibleModel:
+    """Eliminate all but some rows, which have no stiffness: their momentum is zero."""
+    free = np.setdiff1d(np.arange(len(model.inertia)), rows)
+    of = model.inertia
+    share = np.linalg.solve(of[np.ix_(free, free)], of[np.ix_(free, rows)])
+    inertia = of[np.ix_(rows, rows)] - of[np.ix_(rows, free)] @ share
+    square = np.ix_(rows, rows)
+    return FlexibleModel(inertia, model.stiffness[square], model.damping[square])
+
+
+def _axes_of(robot: Robot, size: int, base: int) -> tuple[Array, Array]:
+    """Return forces (size, m) by those of the axes, and rates (m, size) as encoders see them."""
+    force, rate = np.zeros((size, base + robot.n)), np.zeros((base + robot.n, size))
+    for axis in range(base):
+        force[3 + axis, axis] = rate[axis, 3 + axis] = 1.0
+    motors = {joint: 6 + robot.joint_count + k for k, joint in enumerate(geared_joints(robot))}
+    for joint in range(robot.n):
+        gear, link = robot.gears[joint], 6 + joint
+        motor = motors.get(joint, link)
+        force[motor, base + joint] = 1.0
+        rate[base + joint, motor if gear and gear.encoder == "motor" else link] = 1.0
+    return force, rate
+
+
+def _linear_gains(law: ControlLaw, inertia: Array, axes: int) -> tuple[Array, Array]:
+    """Return forces (m, m) by rates and by positions, but for the estimate."""
+    gains = {name: values[-axes:] for name, values in law.gain_values.items()}
+    none = np.zeros(axes)
+    damping = gains.get("k_d", gains.get("lambda", none))
+    mass = np.diag(law.h_bar[-axes:]) if law.h_bar.size else inertia
+    by_rate, by_position = mass * damping, mass * gains.get("k_p", none)
+    if {"g", "delta", "lambda"} <= gains.keys():
+        slope = np.diag(gains["g"] / gains["delta"])
+        by_rate, by_position = by_rate + slope, by_position + slope * gains["lambda"]
+    return by_rate, by_position

@@ -1,0 +1,144 @@
+"""A target on a neighbouring orbit, from tick 0 to its capture.
+
+It falls freely beside the reference point and tumbles under the gravity gradient. For distances far
+below that from the Earth's centre its motion is that of Hill's equations (Clohessy & Wiltshire,
+"Terminal guidance system for satellite rendezvous", J. Aerospace Sciences 27(9), 1960).
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from space_robot_model.dynamics.attitude import quaternion_rate, rotation_matrix
+from space_robot_model.elementary.matrices import norm, product, solve
+from space_robot_model.robot.inertia import inertia_tensor
+from space_robot_msgs_py.errors import InputError
+
+from .gravity import MU, gravity
+from .orbit import state_of
+from .orbit_settings import OrbitSettings
+from .target import Target, TargetMotion
+
+Array = NDArray[np.float64]
+
+STEP, LONGEST_STEP = 0.1, 1.0
+"""Usual and longest step of the integrator, s."""
+TURN, LARGEST_TURN = 0.02, 0.1
+"""Usual and largest angle by which a target turns in a step, rad."""
+MOST_STEPS = 50_000
+
+
+class Meeting(NamedTuple):
+    """A target at its capture."""
+
+    position: Array
+    """(3,) of its centre of mass from the inertial frame's origin, m, inertial axes."""
+    motion: TargetMotion
+    """Relative to the inertial frame."""
+    reach: float
+    """Largest distance from where the tool holds it, m."""
+
+
+def hill_axes(position: Array, velocity: Array) -> Array:
+    """Return the axes of an orbit as columns (3, 3): radial, along the path, along the normal.
+
+    Args:
+        position: (3,) from the Earth's centre, m.
+        velocity: (3,) m/s.
+    """
+    radial, normal = position / norm(position), np.cross(position, velocity)
+    normal = normal / norm(normal)
+    return np.column_stack([radial, np.cross(normal, radial), normal])
+
+
+def meet(target: Target, orbit: OrbitSettings, time: float) -> Meeting:
+    """Return where ``target`` is at ``time``, s, and how it moves.
+
+    Raises:
+        InputError: there is no orbit, or the target turns too fast to be followed for so long.
+    """
+    if not orbit.has_orbit:
+        raise InputError(
+            f"target {target.name!r}: motion.relative_to orbit needs an orbit: --orbit NAME"
+        )
+    motion = target.motion
+    origin, velocity = state_of(orbit.orbital_elements)
+    axes = hill_axes(origin, velocity)
+    rate = np.array([0.0, 0.0, norm(np.cross(origin, velocity)) / norm(origin) ** 2])
+    relative = np.array(motion.velocity) + np.cross(rate, motion.position)
+    quaternion = np.array(motion.quaternion)
+    x = np.concatenate(
+        [
+            *(origin, velocity, product(axes, motion.position), product(axes, relative)),
+            *(quaternion / norm(quaternion), motion.angular_velocity),
+        ]
+    )
+    inertia, has_j2 = inertia_tensor(target.inertia), float(orbit.gravity.j2)
+    steps = _steps(target, time)
+    for _ in range(steps):
+        x = _step(x, time / steps, inertia, has_j2)
+    rotation = np.empty((3, 3))
+    rotation_matrix(x[12:16], rotation)
+    return Meeting(
+        x[6:9],
+        TargetMotion.model_construct(  # it may be faster by now than a file may say
+            relative_to="inertial",
+            velocity=x[9:12].tolist(),
+            angular_velocity=product(rotation, x[16:19]).tolist(),
+        ),
+        motion.reach,
+    )
+
+
+def _steps(target: Target, time: float) -> int:
+    """Return the number of steps to ``time``, s.
+
+    Raises:
+        InputError: even the most of them are too long.
+    """
+    rate = norm(target.motion.angular_velocity)
+    usual = min(STEP, TURN / rate) if rate else STEP
+    steps = math.ceil(time / usual)
+    if steps <= MOST_STEPS:
+        return steps
+    step = time / MOST_STEPS
+    if step > LONGEST_STEP or step * rate > LARGEST_TURN:
+        raise InputError(
+            f"target {target.name!r}: motion.angular_velocity: a target that turns with {rate:g} "
+            f"rad/s cannot be followed for {time:g} s: capture it before "
+            f"{MOST_STEPS * min(LONGEST_STEP, LARGEST_TURN / rate if rate else math.inf):.3g} s"
+        )
+    return MOST_STEPS
+
+
+def _step(x: Array, step: float, inertia: Array, has_j2: float) -> Array:
+    """Return the state a step of Runge and Kutta's method later."""
+    first = _rates(x, inertia, has_j2)
+    second = _rates(x + 0.5 * step * first, inertia, has_j2)
+    third = _rates(x + 0.5 * step * second, inertia, has_j2)
+    fourth = _rates(x + step * third, inertia, has_j2)
+    after: Array = x + step / 6.0 * (first + 2.0 * (second + third) + fourth)
+    after[12:16] /= norm(after[12:16])
+    return after
+
+
+def _rates(x: Array, inertia: Array, has_j2: float) -> Array:
+    """Return xdot of ``[R, V, d, ddot, quaternion, omega]``; omega on the target's axes."""
+    out, rotation = np.empty(19), np.empty((3, 3))
+    quaternion, omega = x[12:16], x[16:19]
+    rotation_matrix(quaternion / norm(quaternion), rotation)
+    out[0:3], out[6:9] = x[3:6], x[9:12]
+    place = x[0:3] + x[6:9]
+    gravity(np.ascontiguousarray(x[0:3]), has_j2, out[3:6])
+    gravity(place, has_j2, out[9:12])
+    out[9:12] -= out[3:6]
+    distance = norm(place)
+    up = product(place / distance, rotation)
+    torque = 3.0 * MU / distance**3 * np.cross(up, product(inertia, up))
+    quaternion_rate(quaternion, product(rotation, omega), out[12:16])
+    out[16:19] = solve(inertia, torque - np.cross(omega, product(inertia, omega)))
+    return out
