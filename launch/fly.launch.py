@@ -9,6 +9,7 @@ exit code 0, or when any node ends before, with exit code 1.
 
 import sys
 from pathlib import Path
+from shutil import rmtree
 from tempfile import mkdtemp
 
 from launch import LaunchContext, LaunchDescription
@@ -80,7 +81,7 @@ def fly(context: LaunchContext) -> list:
         for name in NODE_NAMES
     ]
     return [
-        RegisterEventHandler(OnShutdown(on_shutdown=lambda *_: file.unlink() or folder.rmdir())),
+        RegisterEventHandler(OnShutdown(on_shutdown=lambda *_: rmtree(folder))),
         LogInfo(msg=f"recording to {bag}"),
         *(RegisterEventHandler(OnProcessExit(target_action=n, on_exit=ended)) for n in nodes),
         *nodes,

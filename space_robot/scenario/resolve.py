@@ -80,7 +80,7 @@ def _assumed_actuators(
         own = {key: numbers[key] for key in BaseActuatorSettings.model_fields if key in numbers}
         option = "actuators"
     assumed = validate(BaseActuatorSettings, own, option)
-    assumed.check(robot, GIVEN)
+    assumed.check(robot, GIVEN if option == "actuators" else f"{GIVEN} as {option}")
     return assumed
 
 

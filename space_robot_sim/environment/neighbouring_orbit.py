@@ -25,9 +25,9 @@ from .target import Target, TargetMotion
 
 Array = NDArray[np.float64]
 
-STEP, LONGEST_STEP = 0.1, 1.0
+STEP, LONGEST_STEP = 5.0, 20.0
 """Usual and longest step of the integrator, s."""
-TURN, LARGEST_TURN = 0.02, 0.1
+TURN, LARGEST_TURN = 0.05, 0.1
 """Usual and largest angle by which a target turns in a step, rad."""
 MOST_STEPS = 50_000
 

@@ -8,7 +8,7 @@ from ..bag_path import check_bag_path
 from ..compilation import compile_kernels
 from ..plan import Flight
 from .composed import write_parameters
-from .orchestrator import flight_parameters
+from .orchestrator import flight_parameters, with_files
 
 
 def launched_parameters(flight: Flight, bag: Path, autostart: bool, folder: Path) -> Path:
@@ -20,13 +20,13 @@ def launched_parameters(flight: Flight, bag: Path, autostart: bool, folder: Path
         flight: a checked plan.
         bag: the folder to record to.
         autostart: whether the nodes configure and activate themselves; they wait for one another.
-        folder: for the file.
+        folder: for this file, and those that it names.
 
     Raises:
         InputError: the bag cannot be made.
     """
     check_bag_path(bag)
     compile_kernels(bool(flight.plant.names.actuators))
-    parameters = flight_parameters(flight, bag)
+    parameters = with_files(flight_parameters(flight, bag), flight, folder)
     started = {node: {**values, "autostart": autostart} for node, values in parameters.items()}
     return write_parameters(started, folder)

@@ -14,6 +14,7 @@ import click
 import yaml
 
 from space_robot_control.allocation.assumed_actuators import OWNER
+from space_robot_model.robot.find import robot_files
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.bag.folder import open_bag
@@ -196,8 +197,11 @@ def with_files(parameters: Parameters, flight: Flight, folder: Path) -> dict[str
     named = {node: dict(values) for node, values in parameters.items()}
     numbers = flight.scenario.tree
     for node in ("plant", "controller", "mission"):
-        if named[node].get("robot") == GIVEN:
-            option = "plant_robot" if node == "plant" and "plant_robot" in numbers else "robot"
+        option = "plant_robot" if node == "plant" and "plant_robot" in numbers else "robot"
+        robot = named[node].get("robot")
+        if option == "plant_robot" or robot == GIVEN:
+            if node == "plant" and not named[node].get("mission"):  # that of the assumed robot
+                named[node]["mission"] = str(robot_files(str(robot)).mission or "")
             named[node]["robot"] = _write(folder / f"{option}.yaml", numbers[option])
     if named["controller"].get("actuators") == GIVEN or "assumed_actuators" in numbers:
         assumed = flight.scenario.assumed_actuators.model_dump(mode="json")
