@@ -153,10 +153,10 @@ def momentum_of(log: FlightLog) -> MomentumSeries:
 
 
 def captures_of(log: FlightLog) -> Captures:
-    """Return the captures and releases of the robot that flew.
+    """Return the captures and releases of the robot that flew, from the first rows ``log`` on.
 
     Raises:
-        InputError: the robot or its environment are not known.
+        InputError: the robot or its environment are not known, or whether a target was reached.
     """
     settings = _plant_settings(log)
     robot = with_payload(robot_of(log), settings.payload)
@@ -168,7 +168,14 @@ def captures_of(log: FlightLog) -> Captures:
             f"robot {robot.name!r} has gears in the joints {shortened(own, MOST_LETTERS)}, the bag "
             f"has motors of {shortened(of_bag, MOST_LETTERS)}"
         )
-    return Captures(events_of(log), robot, log.timebase.period, settings)
+    captures = Captures(events_of(log), robot, log.timebase.period, settings)
+    for exchange in captures.exchanges:
+        if exchange.meeting and exchange.tick < log.first_tick:
+            raise NotDescribedError(
+                f"whether {exchange.event.label} reached its target was before the first tick that "
+                "is analyzed"
+            )
+    return captures
 
 
 def events_of(log: FlightLog) -> list[Event]:

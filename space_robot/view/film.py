@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from itertools import pairwise
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from space_robot_model.hardware.wheels import WheelSettings
 from space_robot_model.robot import Robot
 from space_robot_model.robot.shapes import Colour, even_box
 from space_robot_msgs_py.bag.flight_log import FlightLog
@@ -17,7 +19,8 @@ from space_robot_msgs_py.simulated_time import tick_from
 from space_robot_sim.environment.events import Capture
 from space_robot_sim.environment.grasp import Grasp
 
-from ..analysis.described import events_of
+from ..analysis.described import captures_of, events_of
+from ..analysis.momentum import happens_in
 from ..analysis.tool_error import wanted_poses
 from .frames import Frames
 from .free_body import FreeBody, before_capture
@@ -61,9 +64,9 @@ def targets(
     """
     try:
         captures = [
-            (event, Grasp.of(robot, event.target), after.time_s if after else np.inf)
+            (met, Grasp.of(robot, met.target), after.time_s if after else np.inf)
             for event, after in pairwise([*events_of(log), None])
-            if isinstance(event, Capture)
+            if isinstance(event, Capture) and (met := _as_met(event, log))
         ]
     except InputError:
         return []
@@ -78,6 +81,25 @@ def targets(
             moment = tick_from(event.time_s, period) * period
             moves.append(_drifting(scene, path, grasp, free, times[:start] - moment))
     return moves
+
+
+def _as_met(event: Capture, log: FlightLog) -> Capture | None:
+    """Return a capture with the motion that its target has then; None if it misses its target.
+
+    Raises:
+        InputError: the robot or its environment are not known.
+    """
+    if not event.target.is_in_orbit:
+        return event
+    captures = captures_of(log)
+    exchange = next(exchange for exchange in captures.exchanges if exchange.event == event)
+    row = int(exchange.tick) - log.first_tick
+    if 0 <= row < log.ticks:
+        happens_in(captures, exchange, log.rows(row, row + 1), WheelSettings())
+    if exchange.tick in captures.misses or exchange.meeting is None:
+        return None
+    motion = {"motion": exchange.meeting.motion}
+    return replace(event, target=event.target.model_copy(update=motion))
 
 
 def _holding(scene: RobotScene, name: str, grasp: Grasp, start: int, stop: int) -> Move:
