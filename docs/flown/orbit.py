@@ -7,6 +7,7 @@ from collections.abc import Callable
 import numpy as np
 from flown_tables import Number, Options, Page, Table
 
+from space_robot.analysis.described import base_actuators_of
 from space_robot.api.flown_flight import FlownFlight
 
 ORBIT_S = 5560.0
@@ -46,8 +47,9 @@ def stored(share: float) -> Callable[[FlownFlight], float]:
 
     def momentum(flown: FlownFlight) -> float:
         row = round(share * (flown.log.ticks - 1))
-        axes = np.array([[1, 1, 1], [-1, 1, 1], [-1, -1, 1], [1, -1, 1]]) / np.sqrt(3.0)
-        return float(np.linalg.norm(0.0318 * flown.log.wheel_velocities[row] @ axes))
+        wheels = base_actuators_of(flown.log).wheels
+        spin = wheels.spin_momenta(flown.log.wheel_velocities[row])
+        return float(np.linalg.norm(spin @ wheels.unit_axes))
 
     momentum.__name__ = f"stored_at_{share:g}"
     return momentum

@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from space_robot_model.hardware.wheels import WheelSettings
 from space_robot_msgs_py.bag.blocks import Metric
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_sim.environment.captures import Captures
@@ -28,7 +27,7 @@ class MissedCaptures(Metric):
         for tick in self._captures.ticks(start, stop):
             row = log.rows(tick - start, tick - start + 1)
             for exchange in self._captures.at(tick):
-                happens_in(self._captures, exchange, row, WheelSettings())
+                happens_in(self._captures, exchange, row)
 
     def result(self) -> dict[str, float]:
         """Return distances by event, m: of the target from where the tool would have held it."""

@@ -46,11 +46,13 @@ def impact_at(exchange: CaptureEvent, row: FlightLog, wheels: WheelSettings) -> 
     )
 
 
-def happens_in(
-    captures: Captures, exchange: CaptureEvent, row: FlightLog, wheels: WheelSettings
-) -> bool:
-    """Return whether an event happens in the configuration of its row, see `Captures.happens`."""
-    return captures.happens(exchange, impact_at(exchange, row, wheels), row.base_position[0])
+def happens_in(captures: Captures, exchange: CaptureEvent, row: FlightLog) -> bool:
+    """Return whether an event happens in the configuration of its row, see `Captures.happens`.
+
+    That depends on places alone, so that no wheels are needed.
+    """
+    impact = impact_at(exchange, row, WheelSettings())
+    return captures.happens(exchange, impact, row.base_position[0])
 
 
 def state_before(exchange: CaptureEvent, row: FlightLog, wheels: WheelSettings) -> FlightLog:
@@ -141,18 +143,17 @@ class MomentumSeries:
 
     def _exchange(self, row: FlightLog) -> Momentum:
         """Take the tick of one event or several, as they happen one after the other."""
-        wheels = self.flown.wheels
         exchanges = [
             exchange
             for exchange in self._captures.at(row.first_tick)
-            if happens_in(self._captures, exchange, row, wheels)
+            if happens_in(self._captures, exchange, row)
         ]
         assert self._part is not None
         if not exchanges:
             return self._part.add(row)
         states = [row]
         for exchange in reversed(exchanges):
-            states.insert(0, state_before(exchange, states[0], wheels))
+            states.insert(0, state_before(exchange, states[0], self.flown.wheels))
         for exchange, state, after in zip(exchanges, states[:-1], states[1:], strict=True):
             before = self._part.add(state)
             bare = self._begin(exchange.after, np.zeros(3)).add(after)

@@ -18,7 +18,7 @@ from space_robot_msgs_py.errors import FlightError, InputError
 from ..flight.plan import Flight, FlightPlan, resolve
 from ..flight.simulate import simulate
 from ..scenario.node_settings import FlightSettings
-from ..tuning.flexible import check_flexible, joint_frequencies
+from ..tuning.flexible import FlexibleMotions, check_flexible
 from ..tuning.gain_check import GainCheck, check_gains, pair_corner
 from ..tuning.inertia import inertia_along, sampled_reference
 
@@ -108,16 +108,13 @@ def with_gears(
     """
     robot = flight.plant.robot
     positions = sampled_reference(robot, flight.mission_settings, GEARS_EVERY).joints[:, 0]
-    rest = np.broadcast_to([s.rest for s in robot.springs], (len(positions), len(robot.springs)))
-    frequencies = joint_frequencies(robot, np.hstack([positions, rest]))
-    extremes = zip(frequencies.min(axis=0).tolist(), frequencies.max(axis=0).tolist(), strict=True)
+    motions = FlexibleMotions(
+        robot, positions, quaternion, flight.plant.period, flight.controls_base
+    )
+    lowest, highest = motions.frequencies.min(axis=0), motions.frequencies.max(axis=0)
+    extremes = zip(lowest.tolist(), highest.tolist(), strict=True)
     with_springs = [
-        replace(
-            check,
-            flexible=check_flexible(
-                law, robot, positions, quaternion, corner, flight.controls_base
-            ),
-        )
+        replace(check, flexible=check_flexible(law, motions, corner))
         for check, law in zip(checks, laws, strict=True)
     ]
     return with_springs, dict(zip(robot.geared_names, extremes, strict=True))

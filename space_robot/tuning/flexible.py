@@ -19,6 +19,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -91,32 +92,54 @@ def joint_frequencies(robot: Robot, joint_positions: Array) -> Array:
     return frequencies
 
 
-def check_flexible(
-    law: ControlLaw,
-    robot: Robot,
-    joint_positions: Array,
-    quaternion: Array,
-    corner_hz: float,
-    controls_base: bool,
-) -> FlexibleCheck:
+class FlexibleMotions:
+    """Small motions of a robot with gears along a mission, whatever law controls it."""
+
+    def __init__(
+        self,
+        robot: Robot,
+        joint_positions: Array,
+        quaternion: Array,
+        period: float,
+        controls_base: bool,
+    ) -> None:
+        """Linearise the robot.
+
+        Args:
+            robot: with gears.
+            joint_positions: (K, n) of the actuated joints in all configurations, rad or m.
+            quaternion: (4,) attitude of the base.
+            period: of a tick, s.
+            controls_base: whether the base has attitude actuators.
+        """
+        rest = np.tile([spring.rest for spring in robot.springs], (len(joint_positions), 1))
+        positions = np.hstack([joint_positions, rest])
+        self.frequencies = joint_frequencies(robot, positions)
+        """(K, G) Hz, see `joint_frequencies`."""
+        self.period = period
+        inertia = semi_floating_inertia(robot.nominal, joint_positions)
+        inertia = inertia_in_rho(quaternion, inertia) if controls_base else free_inertia(inertia)
+        jacobian = np.eye(inertia.shape[-1])
+        if controls_base:
+            jacobian[:3, :3] = attitude_jacobian(quaternion)
+        self.configurations = [
+            _motion(robot, row, jacobian, own, period)
+            for row, own in zip(positions, inertia, strict=True)
+        ]
+        """Motions in each configuration."""
+
+
+def check_flexible(law: ControlLaw, motions: FlexibleMotions, corner_hz: float) -> FlexibleCheck:
     """Check the stability of a law on a robot with gears.
 
     Args:
-        law: with its gains and period.
-        robot: with gears.
-        joint_positions: (K, n) of the actuated joints in all configurations, rad or m.
-        quaternion: (4,) attitude of the base.
+        law: with its gains, and the period of ``motions``.
+        motions: of the robot.
         corner_hz: of the low-pass of the time-delay pair, Hz (0: none).
-        controls_base: whether the base has attitude actuators.
     """
-    rest = np.tile([spring.rest for spring in robot.springs], (len(joint_positions), 1))
-    slowest = joint_frequencies(robot, np.hstack([joint_positions, rest])).min()
-    least = RIGID * 2.0 * np.pi * float(slowest)
-    loops = [
-        _Loop(law, robot, positions, quaternion, controls_base, least)
-        for positions in joint_positions
-    ]
-    period = law.period
+    least = RIGID * 2.0 * np.pi * float(motions.frequencies.min())
+    loops = [_Loop(law, motion, least) for motion in motions.configurations]
+    period = motions.period
 
     def is_stable(corner: float, scale: float) -> bool:
         weight = low_pass_weight(corner, period) or 1.0
@@ -143,45 +166,57 @@ def _largest(low: float, high: float, is_stable: Callable[[float], bool]) -> flo
     return low
 
 
+class _Motion(NamedTuple):
+    """Motions near a configuration, with states ``[q, qdot]`` and forces in rho."""
+
+    step: Array
+    """(2k, 2k) state a period later, by the state."""
+    by_force: Array
+    """(2k, m) the same by a force that is held."""
+    rate: Array
+    """(m, k) rates in rho that encoders and gyro measure, by qdot."""
+    inertia: Array
+    """(m, m) H_S, or H_f, of the rigid robot that laws with a model know."""
+
+
+def _motion(
+    robot: Robot, positions: Array, jacobian: Array, inertia: Array, period: float
+) -> _Motion:
+    """Return the motions near a configuration.
+
+    Args:
+        robot: with gears.
+        positions: (N,) of all joints, rad or m.
+        jacobian: (m, m) rates in rho by those of base and joints.
+        inertia: (m, m), see `_Motion`.
+        period: s.
+    """
+    model, base = flexible_model(robot, positions), len(jacobian) - robot.n
+    rows = np.arange(3 if base else 6, len(model.inertia))
+    force, rate = _axes_of(robot, len(model.inertia), base)
+    step, by_force = _discrete(_reduced(model, rows), force[rows] @ jacobian.T, period)
+    return _Motion(step, by_force, jacobian @ rate[:, rows], inertia)
+
+
 class _Loop:
     """A law on a robot with gears near a configuration."""
 
-    def __init__(
-        self,
-        law: ControlLaw,
-        robot: Robot,
-        positions: Array,
-        quaternion: Array,
-        controls_base: bool,
-        least: float,
-    ) -> None:
+    def __init__(self, law: ControlLaw, motion: _Motion, least: float) -> None:
         """``least``: rate of the slowest mode that counts, rad/s; see `check_flexible`."""
-        self._least = least
-        rest = [spring.rest for spring in robot.springs]
-        self._model = flexible_model(robot, np.concatenate((positions, rest)))
-        self._period = law.period
-        base = 3 if controls_base else 0
-        axes = base + robot.n
+        self._motion, self._least, self._period = motion, least, law.period
+        axes = len(motion.inertia)
         self._h_bar = law.h_bar[-axes:]
-        self._rows = np.arange(3 if controls_base else 6, len(self._model.inertia))
-        force, rate = _axes_of(robot, len(self._model.inertia), base)
-        jacobian = np.eye(axes)
-        if base:
-            jacobian[:3, :3] = attitude_jacobian(quaternion)
-        self._rate = jacobian @ rate[:, self._rows]
-        self._step, self._by_force = self._discrete(force[self._rows] @ jacobian.T)
-        inertia = semi_floating_inertia(robot.nominal, positions[np.newaxis])
-        inertia = inertia_in_rho(quaternion, inertia) if base else free_inertia(inertia)
-        self._damping, self._stiffness = _linear_gains(law, inertia[0], axes)
+        self._damping, self._stiffness = _linear_gains(law, motion.inertia, axes)
 
     def radius(self, weight: float, scale: float = 1.0) -> float:
         """Return the largest absolute eigenvalue with h_bar times ``scale``."""
-        count, axes = len(self._rows), len(self._rate)
-        r = np.hstack([np.zeros((axes, count)), self._rate])
-        p = np.hstack([self._rate, np.zeros((axes, count))])
+        step, by_force, rate, _ = self._motion
+        axes, count = rate.shape
+        r = np.hstack([np.zeros((axes, count)), rate])
+        p = np.hstack([rate, np.zeros((axes, count))])
         pd = self._damping @ r + self._stiffness @ p
         if not self._h_bar.size:
-            return self._largest(self._step - self._by_force @ pd)
+            return self._largest(step - by_force @ pd)
         h_bar = scale * np.diag(self._h_bar)
         one, none = np.eye(axes), np.zeros((axes, axes))
         acceleration = weight * h_bar / self._period
@@ -190,7 +225,7 @@ class _Loop:
         force[:, : 2 * count] -= scale * pd
         whole = np.vstack(
             [
-                np.hstack([self._step, np.zeros((2 * count, 3 * axes))]) + self._by_force @ force,
+                np.hstack([step, np.zeros((2 * count, 3 * axes))]) + by_force @ force,
                 estimate,
                 force,
                 np.hstack([r, none, none, none]),
@@ -205,21 +240,21 @@ class _Loop:
             rates = np.abs(np.log(values.astype(complex))) / self._period
         return float(np.abs(values[rates >= self._least]).max(initial=0.0))
 
-    def _discrete(self, force: Array) -> tuple[Array, Array]:
-        """Return the state a period later by the state ``[q, qdot]``, and by a held force."""
-        from scipy.linalg import expm  # slow to import
 
-        reduced = _reduced(self._model, self._rows)
-        count, axes = len(self._rows), force.shape[1]
-        rates = np.zeros((2 * count + axes, 2 * count + axes))
-        rates[:count, count : 2 * count] = np.eye(count)
-        rates[count : 2 * count, :count] = -np.linalg.solve(reduced.inertia, reduced.stiffness)
-        rates[count : 2 * count, count : 2 * count] = -np.linalg.solve(
-            reduced.inertia, reduced.damping
-        )
-        rates[count : 2 * count, 2 * count :] = np.linalg.solve(reduced.inertia, force)
-        whole = expm(rates * self._period)
-        return whole[: 2 * count, : 2 * count], whole[: 2 * count, 2 * count :]
+def _discrete(model: FlexibleModel, force: Array, period: float) -> tuple[Array, Array]:
+    """Return the state a period later by the state ``[q, qdot]``, and by a held force.
+
+    ``force``: (k, m) on the coordinates of ``model``, by the held ones.
+    """
+    from scipy.linalg import expm  # slow to import
+
+    count, axes = force.shape
+    rates = np.zeros((2 * count + axes, 2 * count + axes))
+    rates[:count, count : 2 * count] = np.eye(count)
+    sides = np.hstack([-model.stiffness, -model.damping, force])
+    rates[count : 2 * count] = np.linalg.solve(model.inertia, sides)
+    whole = expm(rates * period)
+    return whole[: 2 * count, : 2 * count], whole[: 2 * count, 2 * count :]
 
 
 def _reduced(model: FlexibleModel, rows: NDArray[np.intp]) -> FlexibleModel:

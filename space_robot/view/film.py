@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from space_robot_model.hardware.wheels import WheelSettings
 from space_robot_model.robot import Robot
 from space_robot_model.robot.shapes import Colour, even_box
 from space_robot_msgs_py.bag.flight_log import FlightLog
@@ -95,7 +94,7 @@ def _as_met(event: Capture, log: FlightLog) -> Capture | None:
     exchange = next(exchange for exchange in captures.exchanges if exchange.event == event)
     row = int(exchange.tick) - log.first_tick
     if 0 <= row < log.ticks:
-        happens_in(captures, exchange, log.rows(row, row + 1), WheelSettings())
+        happens_in(captures, exchange, log.rows(row, row + 1))
     if exchange.tick in captures.misses or exchange.meeting is None:
         return None
     motion = {"motion": exchange.meeting.motion}

@@ -5,7 +5,16 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from space_robot_model.dynamics.algebra import Vector, add, cross, scale, store, subtract, vector
+from space_robot_model.dynamics.algebra import (
+    Vector,
+    add,
+    cross,
+    dot,
+    scale,
+    store,
+    subtract,
+    vector,
+)
 from space_robot_model.dynamics.attitude import rotate, rotate_back
 from space_robot_model.dynamics.kinematics import forward_kinematics
 from space_robot_model.dynamics.model import Data, Model
@@ -60,7 +69,7 @@ def meet_surroundings(
         place = add(vector(position, 0), vector(x, 0))
         motion = add(vector(velocity, 0), vector(x, 7 + n))
         store(wind(place, motion), orbit.wind, 0)
-        density = density_at(orbit, np.sqrt(_square(place)))
+        density = density_at(orbit, np.sqrt(dot(place, place)))
         pressure = orbit.pressure * light(orbit, place)
         press_on_surfaces(surfaces, model, orbit.wind, density, orbit.sun, pressure, data)
         store(_about(com, surfaces.drag), torques, 3)
@@ -78,11 +87,6 @@ def meet_surroundings(
             moment = subtract(moment, vector(data.bias[i], 0))
             force = subtract(force, vector(data.bias[i], 3))
         store(subtract(moment, cross(com, force)), torques, 0)
-
-
-@subroutine
-def _square(a: Vector) -> float:
-    return a[0] * a[0] + a[1] * a[1] + a[2] * a[2]
 
 
 @subroutine

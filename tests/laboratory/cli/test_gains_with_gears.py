@@ -16,7 +16,7 @@ from paths import CONFIG
 
 from space_robot.cli.main import cli
 from space_robot.flight.plan import Flight, FlightPlan, resolve
-from space_robot.tuning.flexible import check_flexible, joint_frequencies
+from space_robot.tuning.flexible import FlexibleMotions, check_flexible, joint_frequencies
 from space_robot.tuning.inertia import sampled_reference
 from space_robot_model.robot import Robot
 from space_robot_msgs_py.errors import SpaceRobotError
@@ -108,7 +108,8 @@ def test_numbers_are_those_of_the_functions(motor: str) -> None:
         assert report["gears"][name] == pytest.approx(expected, rel=1e-12)
     quaternion = np.array([1.0, 0.0, 0.0, 0.0])
     corner = flight.controller_settings.acceleration_filter_hz
-    expected = check_flexible(flight.law, robot, positions, quaternion, corner, True)
+    motions = FlexibleMotions(robot, positions, quaternion, flight.law.period, True)
+    expected = check_flexible(flight.law, motions, corner)
     flexible = report["laws"]["tde_stc"]["flexible"]
     assert flexible["radius"] == pytest.approx(expected.radius, rel=1e-12)
     assert flexible["largest_h_bar_scale"] == expected.largest_h_bar_scale

@@ -27,7 +27,12 @@ from rotor_oracles import (
 
 from space_robot.flight.plan import Flight, FlightPlan, resolve
 from space_robot.flight.simulate import simulate
-from space_robot.tuning.flexible import FlexibleCheck, check_flexible, joint_frequencies
+from space_robot.tuning.flexible import (
+    FlexibleCheck,
+    FlexibleMotions,
+    check_flexible,
+    joint_frequencies,
+)
 from space_robot_control.laws import ControlLaw, find_law
 from space_robot_control.navigation.low_pass import low_pass_weight
 from space_robot_model.robot import Robot
@@ -169,10 +174,23 @@ def held_flight(
     return flight
 
 
+def check_stability(
+    law: ControlLaw,
+    robot: Robot,
+    positions: Array,
+    quaternion: Array,
+    corner_hz: float,
+    controls_base: bool,
+) -> FlexibleCheck:
+    """Check a law on a robot's motions about some positions (K, n)."""
+    motions = FlexibleMotions(robot, positions, quaternion, law.period, controls_base)
+    return check_flexible(law, motions, corner_hz)
+
+
 def checked(flight: Flight, quaternion: Array = UPRIGHT) -> FlexibleCheck:
     corner = flight.controller_settings.acceleration_filter_hz
     positions = np.radians([POSTURE_DEG])
-    return check_flexible(
+    return check_stability(
         flight.law, flight.plant.robot, positions, quaternion, corner, flight.controls_base
     )
 
@@ -274,7 +292,7 @@ def test_on_the_motor_h_bar_may_be_twice_the_rotors_inertia(
     h_bar: float, controls_base: bool
 ) -> None:
     """``B a_k = F_k``, ``F_k = F_k-1 - h_bar a_k-1`` alternates, and grows above h_bar = 2 B."""
-    check = check_flexible(
+    check = check_stability(
         small_law(h_bar), heavy_link(), np.zeros((1, 1)), UPRIGHT, 0.0, controls_base
     )
     assert check.largest_h_bar_scale is not None
@@ -287,7 +305,7 @@ def test_on_the_motor_h_bar_may_be_twice_the_rotors_inertia(
 def test_a_low_pass_of_weight_w_lets_it_be_as_much_larger(corner_hz: float) -> None:
     weight = 1.0 - np.exp(-2.0 * np.pi * corner_hz * PERIOD)
     positions = np.zeros((1, 1))
-    check = check_flexible(small_law(0.5), heavy_link(), positions, UPRIGHT, corner_hz, True)
+    check = check_stability(small_law(0.5), heavy_link(), positions, UPRIGHT, corner_hz, True)
     assert check.largest_h_bar_scale is not None
     assert check.largest_h_bar_scale * 0.5 == pytest.approx(2.0 * B / weight, rel=0.01)
 
@@ -295,7 +313,7 @@ def test_a_low_pass_of_weight_w_lets_it_be_as_much_larger(corner_hz: float) -> N
 @pytest.mark.parametrize("factor", [3.0, 8.0])
 def test_the_largest_bandwidth_is_that_at_which_w_h_bar_is_2_b(factor: float) -> None:
     law, positions = small_law(factor * B), np.zeros((1, 1))
-    check = check_flexible(law, heavy_link(), positions, UPRIGHT, 0.0, True)
+    check = check_stability(law, heavy_link(), positions, UPRIGHT, 0.0, True)
     assert not check.is_stable
     assert check.radius == pytest.approx(factor - 1.0, rel=0.01)
     assert check.largest_corner_hz is not None
@@ -309,7 +327,7 @@ def test_at_its_limits_a_law_turns_from_stable_to_unstable(paper_robot: Robot) -
     law, positions = find_law("tde_smc")(values, PERIOD), np.radians([POSTURE_DEG])
 
     def check(law: ControlLaw, corner_hz: float) -> FlexibleCheck:
-        return check_flexible(law, robot, positions, UPRIGHT, corner_hz, True)
+        return check_stability(law, robot, positions, UPRIGHT, corner_hz, True)
 
     first = check(law, 0.0)
     assert not first.is_stable
@@ -332,7 +350,7 @@ def test_what_no_low_pass_and_no_h_bar_helps_has_limits_of_0(paper_robot: Robot)
     robot = flexible_arm(paper_robot, 1e4, "link")
     values = {"h_bar": np.array(H_BAR), "lambda": np.full(9, 50.0), "g": np.full(9, 0.1)}
     law = find_law("tde_smc")(values, PERIOD)
-    check = check_flexible(law, robot, np.radians([POSTURE_DEG]), UPRIGHT, 0.0, True)
+    check = check_stability(law, robot, np.radians([POSTURE_DEG]), UPRIGHT, 0.0, True)
     assert (check.is_stable, check.largest_corner_hz, check.largest_h_bar_scale) == (
         False,
         0.0,
@@ -347,7 +365,7 @@ def test_a_law_without_an_estimate_has_no_limits(
     """Slow computed torque leaves a damped spring alone."""
     robot = flexible_arm(paper_robot, 2e4, "link", 200.0)
     gains = {"k_p": np.full(9, k_d**2 / 4.0), "k_d": np.full(9, k_d)}
-    check = check_flexible(
+    check = check_stability(
         find_law("ctc")(gains, PERIOD), robot, np.radians([POSTURE_DEG]), UPRIGHT, 0.0, True
     )
     assert check.is_stable is is_stable
@@ -359,7 +377,7 @@ def test_the_worst_configuration_counts(paper_robot: Robot) -> None:
     gains = {"k_p": np.full(9, 400.0), "k_d": np.full(9, 40.0)}
     positions = np.radians([POSTURE_DEG, [30.0, 100.0, 150.0, 90.0, 30.0, -50.0], [0.0] * 6])
     radii = [
-        check_flexible(law(gains, PERIOD), robot, some, UPRIGHT, 0.0, True).radius
+        check_stability(law(gains, PERIOD), robot, some, UPRIGHT, 0.0, True).radius
         for some in (positions[:1], positions[1:2], positions[2:], positions)
     ]
     assert len(set(radii[:3])) == 3
@@ -369,7 +387,7 @@ def test_the_worst_configuration_counts(paper_robot: Robot) -> None:
 def test_both_encoders_let_the_law_see_the_link(paper_robot: Robot) -> None:
     gains = {"k_p": np.full(9, 400.0), "k_d": np.full(9, 40.0)}
     radii = [
-        check_flexible(
+        check_stability(
             find_law("ctc")(gains, PERIOD),
             flexible_arm(paper_robot, 2e4, encoder),
             np.radians([POSTURE_DEG]),
@@ -391,7 +409,7 @@ def test_stiff_passive_joints_are_none(paper_robot: Robot) -> None:
     law, positions = find_law("ctc")(gains, PERIOD), np.full((1, panels.n), 0.3)
 
     def radius(robot: Robot) -> float:
-        return check_flexible(law, robot, positions, UPRIGHT, 0.0, True).radius
+        return check_stability(law, robot, positions, UPRIGHT, 0.0, True).radius
 
     locked = radius(with_gears(panels.nominal, gears[: panels.n]))
     assert locked > 1.0
@@ -416,7 +434,7 @@ def test_checks_change_nothing_and_are_repeated_to_the_bit(seed: int) -> None:
     law, positions = find_law("tde_smc")(values, PERIOD), rng.uniform(-2.0, 2.0, (2, 3))
     before = copy.deepcopy(law.gain_values)
     one, other = (
-        check_flexible(law, replace(robot), positions, UPRIGHT, corner, base)
+        check_stability(law, replace(robot), positions, UPRIGHT, corner, base)
         for corner, base in itertools.repeat((5.0, True), 2)
     )
     assert one == other
