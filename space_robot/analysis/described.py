@@ -320,7 +320,8 @@ def recorded_h_bar(log: FlightLog) -> Array:
     rows: list[Array] = [none]
     for law in laws:
         values = law.gains.get("h_bar", ())
-        rows.append(np.broadcast_to(values, log.axes) if len(values) in (1, log.axes) else none)
+        fits = len(values) in (1, log.axes) and any(values)  # zeros: the nominal inertia
+        rows.append(np.broadcast_to(values, log.axes) if fits else none)
     if len(laws) == 1 and laws[0].tick <= log.first_tick:
         return np.asarray(rows[1])
     ticks = np.arange(log.first_tick, log.first_tick + log.ticks)
@@ -345,8 +346,8 @@ def _described_h_bar(log: FlightLog) -> Array:
         if not log.trusted:
             check_law(str(name))
         h_bar = build_law(str(name), ControllerNodeSettings.resolve(chosen), log.axes).h_bar
-    if not h_bar.size:
-        raise NotDescribedError(f"{name} has no time-delay estimate")
+    if not h_bar.any():
+        raise NotDescribedError(f"{name} has no time-delay estimate with a constant inertia")
     if h_bar.shape not in ((log.axes,), (1,)):
         raise NotDescribedError(f"gains_used of the bag: h_bar: {log.axes} values were expected")
     return np.broadcast_to(h_bar, log.axes)

@@ -32,7 +32,8 @@ from .metrics import AxisMaximum, AxisRms, Table, axis_groups
 
 Array = NDArray[np.float64]
 HBar = Callable[[FlightLog], Array]
-"""h_bar in force in the rows of a log: (m,), or (N, m) with NaN under a law without an estimate."""
+"""h_bar in force in the rows of a log: (m,), or (N, m) with NaN under a law without an estimate, or
+with one of the nominal inertia."""
 
 
 class DelayedEstimate:
@@ -152,7 +153,7 @@ class EstimateError(Metric):
         errors = self._errors.of(log)
         for law in laws_of(log):
             self._laws.add(law.name)
-            self._has_estimate |= "h_bar" in law.gains
+            self._has_estimate |= any(law.gains.get("h_bar", ()))
         self._rms.add(errors)
         self._maximum.add(errors)
 
@@ -160,7 +161,8 @@ class EstimateError(Metric):
         """``rms`` and ``max`` by group."""
         if not self._rms.rows:
             if self._laws and not self._has_estimate:
-                raise InputError(f"{', '.join(sorted(self._laws))} has no time-delay estimate")
+                names = ", ".join(sorted(self._laws))
+                raise InputError(f"{names} has no time-delay estimate with a constant h_bar")
             raise InputError("three measured states in a row are needed")
         each, largest, groups = self._rms.value, self._maximum.value, self._groups
         if not np.isfinite([each[axes].sum() for axes in groups.values()]).all():

@@ -21,6 +21,7 @@ from ..allocation.allocation import Allocation, allocation_code
 from ..allocation.diagnosis import Diagnosis, diagnose
 from ..allocation.settings import AllocationSettings
 from ..laws import ControlLaw, Signals
+from ..laws.base import NOMINAL_INERTIA
 from ..laws.checked import force_of
 from ..navigation.low_pass import low_pass_weight
 from ..navigation.navigation import Navigation
@@ -32,6 +33,7 @@ from .kernels import (
     TOO_LARGE,
     USABLE,
     ControllerMemory,
+    add_nominal_inertia,
     apply_transfer,
     compute_signals,
     engage,
@@ -98,7 +100,8 @@ class Controller(RecordOwner):
         self.block = ControllerMemory.block(robot.n)
         """The controller's `ControllerMemory`, for compiled loops."""
         memory: ControllerMemory = self.block[0]
-        assign(memory, model=robot.nominal.model, last_jacobian_inverse=2.0 * np.eye(3))
+        assign(memory, last_jacobian_inverse=2.0 * np.eye(3))
+        assign(memory.signals, model=robot.nominal.model)
         assign(memory, controls_base=actuators.controls_base)
         assign(memory, transfer_ticks=max(1, round(TRANSFER_S / period)))
         assign(memory.pair, smoothing=low_pass_weight(acceleration_filter_hz, period))
@@ -107,6 +110,7 @@ class Controller(RecordOwner):
         if actuators.names:
             how = allocation or AllocationSettings()
             assign(memory, allocation=Allocation.build(robot.n, actuators, how, period))
+        self._robot = robot.nominal
         self._look_into_blocks()
         self.last_command = Command(-1, np.zeros(len(self.names.commanded)))
         """Command of the last tick, overwritten by the next."""
@@ -121,6 +125,7 @@ class Controller(RecordOwner):
         self._actuators: Array = allocated["command"][0, : len(self.names.actuators)]
         """Command for each actuator."""
         self.signals = Signals.view(self.block["signals"])
+        self.signals.robot = self._robot
         """The signals that the law saw at the last tick."""
 
     def __setstate__(self, state: dict[str, Any]) -> None:
@@ -181,15 +186,20 @@ class Controller(RecordOwner):
             LawError: the code of the law failed.
         """
         law = self._law
+        known = law.h_bar, law.estimate, law.needs_model
         status = compute_signals(
-            self.block, state.tick, state.block, reference, law.h_bar, law.uses_model, self.period
+            self.block, state.tick, state.block, reference, *known, self.period
         )
         if status != USABLE:
             raise unusable(status, state.tick, state.quaternion)
         return self.command_for(state.tick, force_of(law, self.signals, state.tick))
 
     def command_for(self, tick: int, force: Array) -> Command:
-        """Return the command for the force (m,) of a law, N m, after `compute_signals`."""
+        """Return the command for the force (m,) of the law, N m, after `compute_signals`."""
+        law = self._law
+        if law.estimate == NOMINAL_INERTIA and law.h_bar.size:
+            force = force.copy()  # it may be the law's own
+            add_nominal_inertia(self.block, law.memory.u, force)
         apply_transfer(self.block, tick, force, self.last_command.torque)
         return self._allocate(tick)
 

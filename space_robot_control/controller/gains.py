@@ -24,8 +24,10 @@ from .settings import DEFAULT, DEFAULT_SETS, OF_THE_SET, ControllerNodeSettings
 
 Array = NDArray[np.float64]
 
-STRICTLY_POSITIVE = ("h_bar", "delta")
+STRICTLY_POSITIVE = ("h_bar", "inertia", "delta")
 """Gains used as divisors; other gains may be zero."""
+NOMINAL = "nominal"
+"""``h_bar`` for a time-delay estimate with the inertia of the nominal model; as numbers: zeros."""
 PARAMETERS = "controller parameters"
 
 
@@ -116,7 +118,7 @@ def check_gains(content: Tree, law: type[ControlLaw], axes: int, where: str) -> 
         key = f"{where}: {law.name}.{name}"
         if name not in content:
             raise InputError(f"{key}: missing ({description})")
-        values = _numbers(content[name])
+        values = np.zeros(1) if _is_nominal(name, content[name]) else _numbers(content[name])
         if values is None:
             raise InputError(f"{key}: numbers were expected, got {short(content[name])}")
         if values.shape not in ((axes,), (1,)):
@@ -124,6 +126,8 @@ def check_gains(content: Tree, law: type[ControlLaw], axes: int, where: str) -> 
                 f"{key}: {gain_lengths(axes)} were expected, got {short(content[name])}"
             )
         fits = values > 0.0 if name in STRICTLY_POSITIVE else values >= 0.0
+        if name == "h_bar" and not values.any():
+            fits = values == 0.0
         if not np.all(fits & np.isfinite(values)):
             raise InputError(f"{key}: {gain_range(name)} were expected, got {short(content[name])}")
         gains[name] = np.ascontiguousarray(np.broadcast_to(values, axes))
@@ -132,7 +136,12 @@ def check_gains(content: Tree, law: type[ControlLaw], axes: int, where: str) -> 
 
 def gain_range(name: str) -> str:
     """Return the allowed values of a gain, in words."""
-    return f"finite values {'above 0' if name in STRICTLY_POSITIVE else '0 or more'}"
+    text = f"finite values {'above 0' if name in STRICTLY_POSITIVE else '0 or more'}"
+    return f"{text}, or {NOMINAL} (as numbers: all 0)," if name == "h_bar" else text
+
+
+def _is_nominal(name: str, value: Any) -> bool:
+    return name == "h_bar" and (value == NOMINAL if isinstance(value, str) else value == [NOMINAL])
 
 
 def gain_lengths(axes: int) -> str:

@@ -11,14 +11,15 @@ from space_robot_model.hardware.base_actuators import BaseActuatorSettings
 from space_robot_model.robot import Robot
 from space_robot_msgs_py.bag.law_history import LawChange
 from space_robot_msgs_py.config.validation import one_of
-from space_robot_msgs_py.errors import SpaceRobotError
+from space_robot_msgs_py.errors import InputError, SpaceRobotError
 from space_robot_msgs_py.ros.managed_node import ManagedNode
 from space_robot_msgs_py.ros.parameters import overrides
 from space_robot_msgs_py.samples import Reference, RobotState
 
 from ..laws import ControlLaw
+from ..laws.signals import Array
 from .controller import Controller
-from .gains import build_laws, check_gains, gain_lengths, gain_range, split_gains
+from .gains import NOMINAL, build_laws, check_gains, gain_lengths, gain_range, split_gains
 from .law_choice import LawChoice
 from .settings import ControllerNodeSettings
 from .supervisor import Supervisor
@@ -106,9 +107,25 @@ class LawSet:
                     law = self._laws[law_name]
                     changed = {**gains[law_name], gain: list(parameter.value)}
                     gains[law_name] = check_gains(changed, type(law), self._axes, "parameter")
+                    if gain == "h_bar":
+                        _check_kind(law, gains[law_name]["h_bar"])
         except SpaceRobotError as error:
             return SetParametersResult(successful=False, reason=str(error))
         for name, law in self._laws.items():
             law.gain_values = gains[name]
         self.choice.choose(chosen)
         return SetParametersResult(successful=True)
+
+
+def _check_kind(law: ControlLaw, h_bar: Array) -> None:
+    """Check that a new h_bar is constant as the old one, or nominal as the old one.
+
+    Raises:
+        InputError: it is not; compiled code is that of one of the two.
+    """
+    if h_bar.any() != law.h_bar.any():
+        before, after = ("a constant", NOMINAL) if law.h_bar.any() else (NOMINAL, "a constant")
+        raise InputError(
+            f"parameter {law.name}.h_bar cannot be changed from {before} to {after} in flight: "
+            "start with that gain, or swap to another law"
+        )

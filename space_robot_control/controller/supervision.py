@@ -143,7 +143,7 @@ def answer_state(
         The status of the state.
     """
     status = admit_state(
-        block, controller, law.h_bar, law.uses_model, tick, state, reference, period
+        block, controller, law.h_bar, law.estimate, law.uses_model, tick, state, reference, period
     )
     if status == USABLE:
         compute_command(controller, law, allocate, tick, block[0].command, period)
@@ -156,6 +156,7 @@ def admit_state(
     block: Block,
     controller: Block,
     h_bar: Array,
+    estimate: int,
     uses_model: bool,
     tick: int,
     state: Block,
@@ -173,7 +174,9 @@ def admit_state(
     least = NOMINAL_FROM_ETA if block[0].mode == SAFE else SAFE_BELOW_ETA
     if abs(quaternion[0]) < least and is_unit(quaternion):
         return SINGULAR
-    status: int = compute_signals(controller, tick, state, reference, h_bar, uses_model, period)
+    status: int = compute_signals(
+        controller, tick, state, reference, h_bar, estimate, uses_model, period
+    )
     return status
 
 

@@ -129,7 +129,8 @@ class Supervisor:
                 self.block, controller.block, self._code_of(law), controller.allocate, *inputs
             )
         else:
-            status = admit_state(self.block, controller.block, law.h_bar, law.uses_model, *inputs)
+            block, estimate, has_model = controller.block, law.estimate, law.needs_model
+            status = admit_state(self.block, block, law.h_bar, estimate, has_model, *inputs)
             if status == USABLE:
                 force = force_of(law, controller.signals, tick)
                 command.torque[:] = controller.command_for(tick, force).torque

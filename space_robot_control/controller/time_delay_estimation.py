@@ -84,3 +84,15 @@ def time_delay_estimate(pair: TimeDelayPair, h_bar: Array, n_hat: Array) -> None
     """Compute the estimate (36) for a constant diagonal inertia ``h_bar`` (m,)."""
     for i in range(n_hat.size):
         n_hat[i] = pair.applied_force[i] - h_bar[i] * pair.acceleration[i]
+
+
+@kernel
+def nominal_estimate(pair: TimeDelayPair, inertia: Array, n_hat: Array) -> None:
+    """Compute the estimate (36) with the ``inertia`` (m, m) H_S of the nominal model.
+
+    This is incremental nonlinear dynamic inversion (Sieberling, Chu & Mulder 2010).
+    """
+    for i in range(n_hat.size):
+        n_hat[i] = pair.applied_force[i]
+        for j in range(n_hat.size):
+            n_hat[i] -= inertia[i, j] * pair.acceleration[j]

@@ -65,11 +65,29 @@ def tracking_errors(
 
 
 @kernel
-def leave_base_out(signals: Signals, rate: Array, applied_force: Array) -> None:
-    """Zero the base's axes in the signals of `tracking_errors`, ``rate`` and force (m,)."""
+def show_state(state: State, quaternion: Array, reference: Reference, signals: Signals) -> None:
+    """Write attitude, rates, joints and their reference into ``signals``."""
+    signals.quaternion[:] = quaternion
+    signals.omega_base[:] = state.omega_base
+    signals.joint_positions[:] = state.joint_positions
+    signals.joint_velocities[:] = state.joint_velocities
+    signals.rho[:3] = quaternion[1:]
+    signals.rho[3:] = state.joint_positions
+    desired = signals.reference
+    desired.quaternion[:] = reference.quaternion
+    desired.omega_base[:] = reference.omega_base
+    desired.alpha_base[:] = reference.alpha_base
+    desired.joint_positions[:] = reference.joint_positions
+    desired.joint_velocities[:] = reference.joint_velocities
+    desired.joint_accelerations[:] = reference.joint_accelerations
+
+
+@kernel
+def leave_base_out(signals: Signals) -> None:
+    """Zero the base's axes in all signals of m axes."""
     for k in range(3):
         signals.error[k] = signals.error_rate[k] = signals.acceleration_desired[k] = 0.0
-        rate[k] = applied_force[k] = 0.0
+        signals.rho[k] = signals.rho_rate[k] = signals.applied_force[k] = 0.0
 
 
 @kernel

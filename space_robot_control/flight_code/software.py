@@ -116,7 +116,7 @@ class FlightSoftware:
         while ring < memory.navigation.attitude.delay + 2:
             ring *= 2
         return {
-            "MOST_JOINTS": int(memory.model.joint_count),
+            "MOST_JOINTS": int(memory.signals.model.joint_count),
             "MOST_WHEELS": wheels,
             "MOST_PAIRS": wheels * (wheels - 1) // 2,
             "MOST_THRUSTERS": len(names.thrusters),
@@ -240,13 +240,13 @@ def _value(kind: lang.Type) -> lang.Value:
 def _law(law: CompiledLaw) -> lang.Value:
     """Return a law as the argument of a kernel: its function bound, gains and memory passed."""
     own = type(law)
-    has_h_bar = law.uses_time_delay_estimate()
     items = {
         "run": lang.Known(own.kernel),
         "gains": lang.BlockOf(own.gains_type),
         "memory": lang.BlockOf(own.memory_type),
-        "h_bar": lang.FieldOf("gains", "h_bar") if has_h_bar else lang.EMPTY,
-        "uses_model": lang.Known(law.uses_model),
+        "h_bar": lang.FieldOf("gains", "h_bar") if law.h_bar.size else lang.EMPTY,
+        "estimate": lang.Known(law.estimate),
+        "uses_model": lang.Known(law.needs_model),
     }
     return _value(lang.Bundle(law.name, tuple(items.items())))
 

@@ -19,9 +19,10 @@ from space_robot_msgs_py.config.text import one_line_of
 from space_robot_msgs_py.config.validation import one_of, short
 from space_robot_msgs_py.errors import InputError
 
-from .base import ControlLaw, LawGains, LawMemory, Signals, per_axis
+from .base import ControlLaw, LawGains, LawMemory
 from .compiled import CompiledLaw
 from .law_file import ENDING, import_file, importable_name, law_file
+from .signals import Signals, per_axis
 
 __all__ = [
     "CompiledLaw",

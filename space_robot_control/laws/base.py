@@ -8,34 +8,14 @@ from collections.abc import Mapping
 from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
-from space_robot_model.dynamics.rho_space import RhoSpaceModel
-from space_robot_msgs_py.compiled.records import Field, Record, RecordOwner, nested, shaped
+from space_robot_msgs_py.compiled.records import Field, Record, RecordOwner
 from space_robot_msgs_py.samples import LawInForce
 
-Array = NDArray[np.float64]
+from .signals import Array, Signals, per_axis
 
-
-def per_axis(description: str, unit: str = "") -> Any:
-    """Declare a gain, or a field of a law's memory, with one value per axis: (m,)."""
-    return shaped(lambda n: (n + 3,), ", ".join(filter(None, (description, unit))))
-
-
-class Signals(Record):
-    """Inputs of a law at a tick, in the coordinates ``rho = [eps, theta]``, m = n+3 axes."""
-
-    error: Array = per_axis("e = rho_d - rho")
-    error_rate: Array = per_axis("edot")
-    acceleration_desired: Array = per_axis("rhodd_d")
-    n_hat: Array = per_axis("time-delay estimate N_hat of (35), (36)", "N m")
-    """Zero for laws without ``h_bar``."""
-    nominal: RhoSpaceModel = nested(RhoSpaceModel)
-    """``inertia`` (m, m) H_S and ``bias`` (m,) c_S; filled only for laws with ``uses_model``.
-
-    For a base without attitude actuators they are those of
-    `space_robot_model.dynamics.free_floating`, and all other signals are zero on its axes.
-    """
+NO_ESTIMATE, CONSTANT_INERTIA, NOMINAL_INERTIA = range(3)
+"""Inertia of a law's time-delay estimate, see `ControlLaw.estimate`."""
 
 
 class LawGains(Record):
@@ -61,12 +41,18 @@ class ControlLaw(RecordOwner, ABC):
     A new law is a subclass with a ``name``, its gains, and `force` (or, as `CompiledLaw`, a
     kernel). A law with a gain ``h_bar`` receives the time-delay estimate; one with ``uses_model``
     the nominal model (never the payload, friction or disturbance).
+
+    The inertia of the estimate is constant, ``h_bar``, or with the gain ``h_bar: nominal`` the
+    inertia H_S of the nominal model: then ``h_bar`` is zero in the law's equation, and the
+    controller adds ``H_S u`` to the force in place of ``h_bar u``.
     """
 
     name: ClassVar[str]
     gains_type: ClassVar[type[LawGains]]
     memory_type: ClassVar[type[LawMemory]] = LawMemory
     uses_model: ClassVar[bool] = False
+    estimates_with_model: ClassVar[bool] = False
+    """True for a law without ``h_bar`` whose N_hat is always that of the nominal inertia."""
     _views = ("gains", "memory", "h_bar")
 
     def __init__(self, gains: Mapping[str, Array], period: float, axes: int | None = None) -> None:
@@ -91,7 +77,8 @@ class ControlLaw(RecordOwner, ABC):
         self.memory: Any = self.memory_type.view(self.memory_block)
         """s and u of the last tick, and the law's internal states, as attributes."""
         self.h_bar: Array = getattr(self.gains, "h_bar", np.zeros(0))
-        """(m,) h_bar of the time-delay estimate, kg m2; empty if the law has none."""
+        """(m,) h_bar of the time-delay estimate, kg m2; zero for the nominal inertia, empty without
+        an estimate."""
 
     def save(self) -> dict[str, Any]:
         """Copy gains, memory and all other attributes, for `restore`."""
@@ -126,10 +113,20 @@ class ControlLaw(RecordOwner, ABC):
         gains = {name: tuple(values.tolist()) for name, values in self.gain_values.items()}
         return LawInForce(tick, self.name, gains, is_first)
 
-    @classmethod
-    def uses_time_delay_estimate(cls) -> bool:
-        """Return True if the law adds the time-delay estimate N_hat."""
-        return "h_bar" in cls.gains_type.fields()
+    @property
+    def estimate(self) -> int:
+        """Inertia of the time-delay estimate.
+
+        `NO_ESTIMATE`, `CONSTANT_INERTIA` (``h_bar``) or `NOMINAL_INERTIA` (H_S).
+        """
+        if self.h_bar.size:
+            return CONSTANT_INERTIA if self.h_bar.any() else NOMINAL_INERTIA
+        return NOMINAL_INERTIA if self.estimates_with_model else NO_ESTIMATE
+
+    @property
+    def needs_model(self) -> bool:
+        """True if the law, or its time-delay estimate, uses the nominal model."""
+        return self.uses_model or self.estimate == NOMINAL_INERTIA
 
     def reset(self) -> None:
         """Clear the memory (integrals, last errors); called when the law is activated."""

@@ -12,7 +12,8 @@ from space_robot_msgs_py.config.text import one_line_of
 from space_robot_msgs_py.config.validation import short
 from space_robot_msgs_py.errors import SpaceRobotError
 
-from .base import Array, ControlLaw, Signals
+from .base import ControlLaw
+from .signals import Array, Signals
 
 
 class LawError(SpaceRobotError):

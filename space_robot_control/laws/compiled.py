@@ -10,7 +10,8 @@ from typing import Any, NamedTuple
 from space_robot_msgs_py.compiled.kernels import RecordFunction
 from space_robot_msgs_py.compiled.records import Block, Record, prefix
 
-from .base import Array, ControlLaw, LawMemory, Signals, per_axis
+from .base import ControlLaw, LawMemory
+from .signals import Array, Signals, per_axis
 
 
 class SomeGains(Record):
@@ -30,7 +31,10 @@ class LawCode(NamedTuple):
     """A block of `LawMemory`."""
     h_bar: Array
     """(m,) h_bar of the time-delay estimate, kg m2; empty if the law has none."""
+    estimate: int
+    """See `ControlLaw.estimate`."""
     uses_model: bool
+    """See `ControlLaw.needs_model`."""
 
 
 class CompiledLaw(ControlLaw):
@@ -64,7 +68,7 @@ class CompiledLaw(ControlLaw):
         n = len(self.memory.s) - 3
         gains = prefix(self.gains_block, SomeGains.dtype(n))
         memory = prefix(self.memory_block, LawMemory.dtype(n))
-        return LawCode(self.function(), gains, memory, self.h_bar, self.uses_model)
+        return LawCode(self.function(), gains, memory, self.h_bar, self.estimate, self.needs_model)
 
     def force(self, signals: Signals) -> Array:
         """Run the kernel; ``signals`` is a `Signals.view`."""

@@ -5,8 +5,9 @@ from __future__ import annotations
 from space_robot_model.dynamics.rho_space import RhoSpaceModel
 from space_robot_msgs_py.compiled.kernels import kernel
 
-from .base import Array, LawGains, LawMemory, Signals, per_axis
+from .base import LawGains, LawMemory
 from .compiled import CompiledLaw
+from .signals import Array, Signals, per_axis
 
 
 class Gains(LawGains):

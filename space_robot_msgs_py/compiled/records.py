@@ -57,6 +57,8 @@ class Record:
 
     address: int
     """Memory address of a `view`'s block."""
+    view_type: ClassVar[type[RecordView]]
+    """Class of its `view`."""
 
     @classmethod
     def fields(cls) -> dict[str, Field | type[Record]]:
@@ -114,14 +116,18 @@ class Record:
     def view(cls, block: Block) -> Self:
         """Return the arrays of a block as attributes, ten times faster in Python than a record.
 
-        They are written in place (``view.name[:] = ...``); scalar fields are omitted.
+        They are written in place (``view.name[:] = ...``); scalar fields are read as floats.
         """
-        record = RecordView(address=block.ctypes.data)
+        record = cls.view_type(address=block.ctypes.data)
+        scalars = {}
         for name, field in cls.fields().items():
             if not isinstance(field, Field):
                 setattr(record, name, field.view(block[name]))
             elif block[name].ndim > 1:
                 setattr(record, name, block[name][0])
+            else:
+                scalars[name] = block[name]
+        record.scalars = scalars
         return cast(Self, record)
 
 
@@ -130,6 +136,16 @@ class RecordView(SimpleNamespace):
 
     Copy the object that owns the block instead: a `RecordOwner` creates its views again.
     """
+
+    scalars: dict[str, NDArray[np.float64]]
+    """Scalar fields by name, (1,) each."""
+
+    def __getattr__(self, name: str) -> float:
+        """Return the number of a scalar field."""
+        scalars = vars(self).get("scalars", {})
+        if name not in scalars:
+            raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
+        return float(scalars[name][0])
 
     def __reduce__(self) -> Any:
         """Refuse copying and pickling.
@@ -141,6 +157,9 @@ class RecordView(SimpleNamespace):
             "a view of a record cannot be copied or pickled: copy the object that owns its block "
             "(a law, a controller, a plant, a bench), and omit views in its __getstate__"
         )
+
+
+Record.view_type = RecordView
 
 
 class RecordOwner:

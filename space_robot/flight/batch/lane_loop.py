@@ -7,7 +7,13 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from space_robot_control.controller.kernels import USABLE, apply_transfer, compute_signals
+from space_robot_control.controller.kernels import (
+    USABLE,
+    add_nominal_inertia,
+    apply_transfer,
+    compute_signals,
+)
+from space_robot_control.laws.base import NOMINAL_INERTIA
 from space_robot_control.laws.compiled import LawCode
 from space_robot_msgs_py.compiled.kernels import RecordFunction, kernel
 from space_robot_msgs_py.compiled.lane_rows import spread
@@ -128,7 +134,14 @@ def fly_lanes(
             _log_state(log.measured, k, plant.measured)
         _refer(references, k, memory.reference_numbers)
         status = compute_signals(
-            controllers, tick, memory.measured, memory.reference, h_bar, law.uses_model, period
+            controllers,
+            tick,
+            memory.measured,
+            memory.reference,
+            h_bar,
+            law.estimate,
+            law.uses_model,
+            period,
         )
         is_flying = flies[0] == 1.0
         statuses[0] = where(is_flying, status, statuses[0])
@@ -137,6 +150,8 @@ def fly_lanes(
         if not any_lane(is_flying):
             return tick
         law.run(signals, law.gains[0], of_law, period)
+        if law.estimate == NOMINAL_INERTIA and law.h_bar.size > 0:
+            add_nominal_inertia(controllers, of_law.u, of_law.force)
         apply_transfer(controllers, tick, of_law.force, torque)
         if torque.size > of_law.force.size:
             _allocate(allocate, memory, is_flying, torque, of_law.force.size, tick)

@@ -129,7 +129,8 @@ class LawInLanes:
             prefix(gains, SomeGains.dtype(n, WIDTH)),
             prefix(self._memory, LawMemory.dtype(n, WIDTH)),
             np.ascontiguousarray(np.stack([law.h_bar for law in of_lanes], axis=-1)),
-            first.uses_model,
+            first.estimate,
+            first.needs_model,
         )
         """The law for `fly_lanes`."""
 

@@ -49,8 +49,8 @@ def batch_key(flight: Flight) -> Hashable:
         ControllerMemory.uniform_numbers(controller.block),
         flight.controller_settings.telemetry_decimation,
         flight.mission_settings.chunk_ticks,
-        type(controller.law),
-        tuple((tick, type(law)) for tick, law in flight.swaps),
+        (type(controller.law), controller.law.estimate),
+        tuple((tick, type(law), law.estimate) for tick, law in flight.swaps),
     )
 
 

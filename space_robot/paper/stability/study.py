@@ -46,11 +46,11 @@ def check_law(flight: Flight) -> None:
         InputError: the law has no time-delay estimation, or the flight is too short.
     """
     law = flight.controller.law
-    if not law.uses_time_delay_estimate():
-        fitting = [name for name, cls in laws().items() if cls.uses_time_delay_estimate()]
+    if not law.h_bar.any():
+        fitting = [name for name, cls in laws().items() if "h_bar" in cls.gain_descriptions()]
         raise InputError(
-            f"controller {law.name!r} has no gain h_bar: the paper's stability analysis is for "
-            f"time-delay estimation, choose one of {', '.join(sorted(fitting))}"
+            f"controller {law.name!r} has no constant h_bar: the paper's stability analysis is for "
+            f"time-delay estimation with one, choose one of {', '.join(sorted(fitting))}"
         )
     if flight.ticks < SHORTEST:
         raise InputError(

@@ -171,7 +171,7 @@ def test_the_gains_of_the_bag_come_before_those_of_the_name() -> None:
 @pytest.mark.parametrize(
     ("change", "reason"),
     [
-        ({"controller": "ctc"}, "ctc has no time-delay estimate"),
+        ({"controller": "ctc"}, "ctc has no time-delay estimate with a constant h_bar"),
         ({"controller": None}, "does not say which law"),
         ({"swaps": ["0.1:ctc"]}, "swapped in flight"),
         ({"controller": "mine"}, "unknown controller 'mine'"),

@@ -1,0 +1,43 @@
+"""Incremental nonlinear dynamic inversion: time-delay estimation with the nominal inertia.
+
+Sieberling, Chu & Mulder, J. Guidance 33(6), 2010; Smeur, Chu & de Croon, J. Guidance 39(3), 2016.
+The increment of the force is the nominal inertia times the acceleration that is missing,
+``F_S = F_S(t - d) + H_S (u - rhodd(t - d))``, so c_S need not be known.
+"""
+
+from __future__ import annotations
+
+from space_robot_msgs_py.compiled.kernels import kernel
+
+from .base import LawGains, LawMemory
+from .compiled import CompiledLaw
+from .signals import Array, Signals, per_axis
+
+
+class Gains(LawGains):
+    """Gains of (31)."""
+
+    k_p: Array = per_axis("K_P of (31)", "1/s2")
+    k_d: Array = per_axis("K_D of (31)", "1/s")
+
+
+@kernel
+def incremental_inversion(signals: Signals, gains: Gains, memory: LawMemory, period: float) -> None:
+    """Compute one tick: u of (31), force of (37) with H_S in place of h_bar."""
+    e, edot, rhodd_d = signals.error, signals.error_rate, signals.acceleration_desired
+    u, inertia = memory.u, signals.nominal.inertia
+    for i in range(e.size):
+        u[i] = rhodd_d[i] + gains.k_d[i] * edot[i] + gains.k_p[i] * e[i]
+    for i in range(e.size):
+        memory.force[i] = signals.n_hat[i]
+        for j in range(e.size):
+            memory.force[i] += inertia[i, j] * u[j]
+
+
+class IncrementalInversion(CompiledLaw):
+    """``F_S = H_S u_PD + N_hat``, ``N_hat = F_S(t - d) - H_S rhodd(t - d)``, u_PD of (31)."""
+
+    name = "indi"
+    gains_type = Gains
+    estimates_with_model = True
+    kernel = staticmethod(incremental_inversion)

@@ -1,0 +1,68 @@
+"""PD control with the torque on the base that cancels the motion of the joints.
+
+The joints' torques are those of PD control. The nominal model says which accelerations of the
+joints they cause, and which torque on the base lets it follow its reference meanwhile; PD control
+of the attitude is added. For a base at rest this is the compensation of Carignan & Akin, The
+reaction stabilization of on-orbit robots, IEEE Control Systems Magazine 20(6), 2000, in which the
+joints' torques are known, and of Basilisk's ``jointMotionCompensator``.
+"""
+
+from __future__ import annotations
+
+from space_robot_model.elementary.cholesky import cholesky_into, solve_cholesky
+from space_robot_msgs_py.compiled.kernels import kernel
+from space_robot_msgs_py.compiled.records import shaped
+
+from .base import LawGains, LawMemory
+from .compiled import CompiledLaw
+from .signals import Array, Signals, per_axis
+
+
+class Gains(LawGains):
+    """Stiffness and damping of each axis."""
+
+    k_p: Array = per_axis("stiffness K_P", "N m/rad (eps: N m)")
+    k_d: Array = per_axis("damping K_D", "N m s/rad (eps: N m s)")
+
+
+class Memory(LawMemory):
+    """Scratch of the forward dynamics of the joints."""
+
+    factor: Array = shaped(lambda n: (n, n), "Cholesky factor of H_qq")
+
+
+@kernel
+def feedforward(signals: Signals, gains: Gains, memory: Memory, period: float) -> None:
+    """Compute one tick: u, the predicted acceleration, and the force; s is not used.
+
+    With blocks b (base) and q (joints) of H_S and c_S:
+    ``u_b = rhodd_d,b``, ``H_qq u_q = F_q - c_q - H_qb u_b``, ``F_b += H_bb u_b + H_bq u_q + c_b``.
+    """
+    inertia, bias = signals.nominal.inertia, signals.nominal.bias
+    u, force, axes = memory.u, memory.force, signals.error.size
+    for i in range(axes):
+        force[i] = gains.k_p[i] * signals.error[i] + gains.k_d[i] * signals.error_rate[i]
+    for k in range(3):
+        u[k] = signals.acceleration_desired[k]
+    for i in range(3, axes):
+        u[i] = force[i] - bias[i]
+        for k in range(3):
+            u[i] -= inertia[i, k] * u[k]
+    cholesky_into(inertia[3:, 3:], memory.factor)
+    solve_cholesky(memory.factor, u[3:])
+    for k in range(3):
+        force[k] += bias[k]
+        for j in range(axes):
+            force[k] += inertia[k, j] * u[j]
+
+
+class ProportionalDerivativeFeedforward(CompiledLaw):
+    """``F_q = K_P e + K_D edot``; the base has, beside the same, its part of ``H_S u + c_S``.
+
+    u is the acceleration that F_q causes while the base follows its reference.
+    """
+
+    name = "pd_feedforward"
+    gains_type, memory_type = Gains, Memory
+    uses_model = True
+    kernel = staticmethod(feedforward)
