@@ -141,7 +141,9 @@ def gain_range(name: str) -> str:
 
 
 def _is_nominal(name: str, value: Any) -> bool:
-    return name == "h_bar" and (value == NOMINAL if isinstance(value, str) else value == [NOMINAL])
+    if isinstance(value, (list, tuple)) and len(value) == 1:
+        (value,) = value
+    return name == "h_bar" and isinstance(value, str) and value == NOMINAL
 
 
 def gain_lengths(axes: int) -> str:

@@ -71,7 +71,9 @@ def _compile_controllers() -> None:
     controller, row = _block(ControllerMemory), array_of_lanes(1)
     signals: Any = compute_signals
     inputs = _block(State), _block(Reference)
-    signals.compile((controller, types.intp, *inputs, row, types.boolean, types.float64))
+    signals.compile(
+        (controller, types.intp, *inputs, row, types.intp, types.boolean, types.float64)
+    )
     transfer: Any = apply_transfer
     transfer.compile((controller, types.intp, row, row))
 
