@@ -118,7 +118,7 @@ def test_law_and_gains_change_in_flight(start: Start, domain: int) -> None:
         ("plant", {"command_latency_ticks": -1}, "greater than or equal to 0, got -1"),
         ("plant", {"comand_latency_ticks": 1}, "unknown parameter 'comand_latency_ticks'"),
         ("plant", {"case": 9}, "unknown case '9': choose one of 1, 2"),
-        ("plant", {"robot": "xyz"}, "unknown robot 'xyz': choose one of boom, dual_arm"),
+        ("plant", {"robot": "xyz"}, "unknown robot 'xyz': choose one of boom, canadarm"),
         ("controller", {"period": 1}, "period: Input should be less than or equal to 0.1, got 1"),
         ("controller", {"controller": "pid"}, "unknown controller 'pid'"),
         ("controller", {"tde_stc__k_1": "[1.0, 2.0]"}, "9 values (base x, y, z and the joints)"),
