@@ -3,7 +3,7 @@
 `two_link_arm.urdf` is a satellite of 200 kg with a light arm of three joints. Mission and gains
 exist for the shipped robots only, so this program defines them. Computed torque uses the robot's
 model, so it needs only two gains: every axis is critically damped at 10 rad/s.
-``space-robot new two_link_arm.urdf`` creates a mission and gains for all five laws instead.
+``space-robot new two_link_arm.urdf`` creates a mission and gains for all laws instead.
 
     python examples/own_robot.py
 
