@@ -5,7 +5,7 @@ VENV := .venv
 # Versions that are known to work; `make newest` goes without.
 CONSTRAINTS := constraints.txt
 # Extras with versions in it. Not apt, which has ROS's own NumPy, and not bench: Basilisk holds others back.
-CONSTRAINED := campaign dask docs gym mutation notebooks parquet ros test view xacro
+CONSTRAINED := campaign dask docs gym mpc mutation notebooks parquet ros test view xacro
 PACKAGES := space_robot space_robot_control space_robot_model space_robot_msgs_py space_robot_sim
 # A file's tests run in one process; tests/conftest.py has the files in an order that fills both.
 PYTEST := $(VENV)/bin/python -m pytest --numprocesses 2 --dist loadfile --no-loadscope-reorder

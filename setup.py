@@ -74,6 +74,7 @@ setup(
             "ziamath",
         ],
         "gym": ["gymnasium>=1.0"],  # space_robot.api.gymnasium_env
+        "mpc": ["daqp>=0.8"],  # examples/mpc_law.py
         "mutation": ["cosmic-ray"],  # tests/mutation
         "notebooks": ["ipykernel", "pandas>=2.1", "pyarrow>=14"],  # docs/notebooks
         "parquet": ["pyarrow>=14"],  # `analyze --parquet`
@@ -86,6 +87,7 @@ setup(
         "test": [
             "cvxpy",
             "catkin_pkg",  # ROS's generators of interfaces
+            "daqp>=0.8",
             "distributed>=2024.1",
             "gymnasium>=1.0",
             "hypothesis",

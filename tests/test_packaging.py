@@ -207,6 +207,7 @@ def test_types_of_untyped_libraries_are_told_of_libraries_that_are_used() -> Non
     untyped = {PYPI.get(name, name) for name in re.findall(r'"(\w+)\.\*"', listed)}
     messages = {topic.type.split("/")[0] for topic in (*topics.ALL, topics.DIAGNOSTICS)}
     assert untyped - messages <= third_party_imports() | dependencies("exec_depend") | {
+        "daqp",  # of an example
         "mujoco",
         "pin",
     }

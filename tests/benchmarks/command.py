@@ -22,6 +22,7 @@ SECTIONS = (
     "wheels",
     "orbit",
     "laws",
+    "mpc",
     "simulate",
     "reproduce",
     "campaign",
@@ -64,7 +65,8 @@ def bench(
     """Measure how fast it is on this machine, each figure beside its competitor in the same run.
 
     SECTION is one of plant, wheels (beside Basilisk's), orbit (its torques beside Basilisk's),
-    laws, simulate, reproduce, campaign, lanes (eight flights at a time, beside MuJoCo's rollout);
+    laws, mpc (a law that solves a QP), simulate, reproduce, campaign, lanes (eight flights at a
+    time, beside MuJoCo's rollout);
     on the ROS 2 graph: graph, composed, clock, recorder (10 minutes), start-up; compile (a first
     start, and one with a robot of another size); python (a tick stepped from Python); flight-code
     (in C, beside its kernels); beside MuJoCo, Pinocchio and Basilisk: peers (one step of the plant)
