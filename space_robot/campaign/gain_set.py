@@ -20,9 +20,11 @@ from ..scenario.node_settings import FlightSettings
 from ..scenario.robots import Robots
 from ..tuning.demand import demand
 from ..tuning.gain_file import gain_files
-from ..tuning.inertia import inertia_along
-from ..tuning.method import Tuned, TuningOptions, tune
+from ..tuning.inertia import SAMPLING, inertia_along
+from ..tuning.method import Tuned, tune
 from ..tuning.noise import listen
+from ..tuning.postures import postures_along
+from ..tuning.task import TuningOptions
 
 
 def tuned_set(
@@ -61,7 +63,9 @@ def tuned_set(
     if plant.sensors != "ideal" or navigation:
         step("noise of the sensors")
         noise = listen(nominal, plant, navigation, reference, plant.period)
-    return tune(np.concatenate(inertias), asked, wishes, plant.period, noise)
+    postures = postures_along(nominal, reference, SAMPLING)
+    step("gains")
+    return tune(np.concatenate(inertias), postures, asked, wishes, plant.period, noise)
 
 
 def write_set(tuned: Tuned, command: str, folder: Path) -> list[Path]:

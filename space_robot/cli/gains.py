@@ -26,20 +26,29 @@ def gains() -> None:
     show_default=True,
     help="A law's name, or file.py:Class of your own; all: every law that the gain set has.",
 )
+@click.option(
+    "--mass-uncertainty",
+    type=FiniteRange(0.0, 0.9),
+    default=0.2,
+    show_default=True,
+    help="Share by which each mass and inertia may be wrong.",
+)
 @flight_options(
     *("case", "gains", "robot", "plant_robot", "mission", "sensors", "actuators", "orbit"),
     *("navigation", "seed", "set", "json"),
 )
-def check(as_json: bool, **options: Any) -> None:
+def check(as_json: bool, mass_uncertainty: float, **options: Any) -> None:
     """Compute the margin and noise gain of each law of a gain set along a mission.
 
-    For laws with time-delay estimation: the eigenvalues of H_S^-1 h_bar, the radius of
-    E - H_S^-1 h_bar, the share by which the torque reported may exceed the one commanded. For all
-    laws: the torque that noise on the measured rates becomes; with --sensors, the ripple of the
-    torque while the robot is held still for some seconds. With --actuators none the inertia is that
-    of the joints of a robot whose base floats freely. For a robot with gears: frequencies of their
-    springs, and whether small oscillations grow. Exit code 1 if they do, if the radius is 1 or more
-    or the margin below 2 %, for any of the laws.
+    For laws with time-delay estimation: the eigenvalues of H_S^-1 h_bar, also with wrong masses,
+    the radius of E - H_S^-1 h_bar, the share by which the torque reported may exceed the one
+    commanded (for laws with an observer: the same share, by their closed loop). For all laws:
+    whether small motions of the closed loop grow; the torque that noise on the measured rates
+    becomes; with --sensors, the ripple of the torque while the robot is held still for some
+    seconds. With --actuators none the inertia is that of the joints of a robot whose base floats
+    freely. For a robot with gears: frequencies of their springs, and whether small oscillations
+    grow. Exit code 1 if anything grows, if the radius is 1 or more or the margin below 2 %, for any
+    of the laws.
 
     \b
     Examples:
@@ -55,7 +64,7 @@ def check(as_json: bool, **options: Any) -> None:
     from .gains_checked import checked, report_of
     from .gains_display import print_checks
 
-    checks = checked(options)
+    checks = checked(options, mass_uncertainty)
     if as_json:
         echo_json(report_of(checks))
     else:
@@ -103,6 +112,21 @@ def check(as_json: bool, **options: Any) -> None:
     help="Noise allowed on a torque, RMS, as a share of the largest that the mission asks.",
 )
 @click.option(
+    "--h-bar",
+    "h_bar",
+    type=click.Choice(["constant", "nominal", "auto"]),
+    default="constant",
+    show_default=True,
+    help="Inertia of the laws with time-delay estimation: a constant diagonal, H_S of the nominal "
+    "model, or that one only where no diagonal will do.",
+)
+@click.option(
+    "--noise-ripple",
+    type=FiniteRange(0.0, 10.0, min_open=True),
+    metavar="SHARE",
+    help="Give every law this ripple by noise, in place of at most --ripple.",
+)
+@click.option(
     "-o",
     "--output",
     type=click.Path(path_type=Path, file_okay=False),
@@ -112,7 +136,7 @@ def check(as_json: bool, **options: Any) -> None:
 )
 @click.pass_context
 def tune(context: click.Context, /, output: Path, **options: Any) -> None:
-    """Make a gain set for all five laws by a deterministic method.
+    """Make a gain set for all laws by a deterministic method.
 
     h_bar from the inertia along the mission, so that the time-delay estimate contracts with the
     margin asked for, whichever of the masses are wrong; a low-pass for it; poles below its lag;
@@ -128,10 +152,10 @@ def tune(context: click.Context, /, output: Path, **options: Any) -> None:
     """
     from ..campaign.gain_set import tuned_set, write_set
     from ..console.terminal import terminal
-    from ..tuning.method import TuningOptions
+    from ..tuning.task import TuningOptions
     from ..tuning.warning import estimate_remark
 
-    names = ("margin", "mass_uncertainty", "bandwidth", "ripple")
+    names = ("margin", "mass_uncertainty", "bandwidth", "ripple", "h_bar", "noise_ripple")
     wishes, cases = TuningOptions(*(options.pop(name) for name in names)), options.pop("cases")
     with terminal(stderr=True).status("tuning") as status:
         tuned = tuned_set(options, cases, wishes, status.update)

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from space_robot_control.controller.gains import available_laws
 from space_robot_control.laws import ControlLaw
+from space_robot_control.laws.base import NO_ESTIMATE, NOMINAL_INERTIA
 from space_robot_model.dynamics.attitude import SINGULAR_ETA
 from space_robot_msgs_py.config.validation import validate
 from space_robot_msgs_py.errors import FlightError, InputError
@@ -19,8 +20,10 @@ from ..flight.plan import Flight, FlightPlan, resolve
 from ..flight.simulate import simulate
 from ..scenario.node_settings import FlightSettings
 from ..tuning.flexible import FlexibleMotions, check_flexible
-from ..tuning.gain_check import GainCheck, check_gains, pair_corner
-from ..tuning.inertia import inertia_along, sampled_reference
+from ..tuning.gain_check import GainCheck, check_gains, estimated_with, pair_corner
+from ..tuning.inertia import SAMPLING, inertia_along, sampled_reference
+from ..tuning.mass_errors import COARSE, check_masses, drawn_inertias
+from ..tuning.postures import postures_along
 
 Array = NDArray[np.float64]
 
@@ -43,6 +46,11 @@ class Checked:
     frequencies: dict[str, tuple[float, float]]
     """By joint with a gear, Hz: lowest and highest frequency of its spring along the mission."""
 
+    with_pair: frozenset[str]
+    """Laws with a time-delay estimate."""
+    with_model: frozenset[str]
+    """Those of them whose estimate has the nominal inertia."""
+
     @property
     def is_sound(self) -> bool:
         """True if every law passes its check."""
@@ -53,17 +61,27 @@ class Checked:
         """What is wrong with which laws, one clause for each kind of fault."""
         kinds = {
             "h_bar leaves too little margin in torque scale": [
-                check.law for check in self.checks if not check.has_margin
+                check.law for check in self.checks if check.spectrum and not check.has_margin
             ],
+            "the observer leaves too little margin in torque scale": [
+                check.law for check in self.checks if not (check.spectrum or check.has_margin)
+            ],
+            "small motions grow": [check.law for check in self.checks if not check.loop.is_stable],
             "small oscillations of the gears' springs grow": [
-                check.law for check in self.checks if not check.is_stable
+                check.law
+                for check in self.checks
+                if check.flexible and not check.flexible.is_stable
             ],
         }
         return [f"{', '.join(laws)}: {fault}" for fault, laws in kinds.items() if laws]
 
 
-def checked(options: dict[str, Any]) -> Checked:
+def checked(options: dict[str, Any], mass_uncertainty: float = 0.2) -> Checked:
     """Check the laws that the options of a command name.
+
+    Args:
+        options: of a `FlightPlan`.
+        mass_uncertainty: share by which masses and inertias may be wrong.
 
     Raises:
         InputError: a name is unknown, or no law can control the base.
@@ -72,18 +90,15 @@ def checked(options: dict[str, Any]) -> Checked:
     if every:
         plan = plan.model_copy(update={"controller": _first_law(plan)})
     flight = Flight(resolve(plan))
-    laws = flight.laws.values() if every else [flight.law]
+    laws = list(flight.laws.values()) if every else [flight.law]
     quaternion = flight.mission.chunk(0, 1).base[0, :4]
     if flight.controls_base and abs(quaternion[0]) <= SINGULAR_ETA:
         raise InputError("base_quaternion: turned by 180 degrees, where the laws are singular")
-    inertia = inertia_along(
-        flight.plant.robot, flight.mission_settings, controls_base=flight.controls_base
-    )
     corner = pair_corner(flight.controller_settings)
-    checks = [check_gains(law, inertia, quaternion, corner) for law in laws]
+    checks = _on_rigid_robot(flight, laws, corner, mass_uncertainty)
     frequencies: dict[str, tuple[float, float]] = {}
     if any(flight.plant.robot.gears):
-        checks, frequencies = with_gears(flight, checks, list(laws), quaternion, corner)
+        checks, frequencies = with_gears(flight, checks, laws, quaternion, corner)
     ripple: dict[str, Array | None] = {}
     if flight.plant_settings.sensors != "ideal":
         names = flight.laws if every else [plan.controller]
@@ -91,7 +106,35 @@ def checked(options: dict[str, Any]) -> Checked:
             check.law: held_ripple(flight, plan.model_copy(update={"controller": name}))
             for check, name in zip(checks, names, strict=True)
         }
-    return Checked(flight, checks, ripple, frequencies)
+    estimates = {law.name: law.estimate for law in laws}
+    return Checked(
+        flight,
+        checks,
+        ripple,
+        frequencies,
+        frozenset(name for name, kind in estimates.items() if kind != NO_ESTIMATE),
+        frozenset(name for name, kind in estimates.items() if kind == NOMINAL_INERTIA),
+    )
+
+
+def _on_rigid_robot(
+    flight: Flight, laws: Sequence[ControlLaw], corner: float, mass_uncertainty: float
+) -> list[GainCheck]:
+    """Check laws without the gears of the robot."""
+    robot, mission, has_base = flight.plant.robot, flight.mission_settings, flight.controls_base
+    inertia = inertia_along(robot, mission, controls_base=has_base)
+    postures = postures_along(flight.robot, mission, SAMPLING, has_base)
+    coarse = postures_along(flight.robot, mission, COARSE, has_base)
+    drawn = drawn_inertias(robot, mission, mass_uncertainty, COARSE, has_base)
+    checks = []
+    for law in laws:
+        check = check_gains(law, inertia, postures, corner)
+        assumed = estimated_with(law, coarse, drawn.shape[1])
+        if check.spectrum and assumed is not None:
+            masses = check_masses(check.spectrum, assumed, drawn, mass_uncertainty)
+            check = replace(check, masses=masses)
+        checks.append(check)
+    return checks
 
 
 def with_gears(
@@ -182,6 +225,12 @@ def _of_law(check: GainCheck, checks: Checked) -> Iterable[tuple[str, Any]]:
             ("torque_scale_margin", spectrum.margin),
             ("largest_torque_scale", spectrum.largest_scale),
         )
+    elif check.margin is not None:
+        yield "torque_scale_margin", check.margin
+        yield "largest_torque_scale", check.loop.largest_scale
+    if masses := check.masses:
+        yield "wrong_masses", asdict(masses)
+    yield "loop_radius", check.loop.radius
     if flexible := check.flexible:
         yield "flexible", {"is_stable": flexible.is_stable, **asdict(flexible)}
     yield "noise_gain", check.noise_gain.tolist()

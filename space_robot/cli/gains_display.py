@@ -2,13 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from typing import TypeVar
+
 from rich.console import Console
 
 from ..console.tables import Column, JudgedCell, Table
 from ..console.terminal import say
 from ..console.terminal_tables import print_table
+from ..tuning.mass_errors import DRAWS
 from ..tuning.spectrum import LEAST_MARGIN
 from .gains_checked import Checked
+
+T = TypeVar("T")
+
+A_TABLE, LONGEST = 5, 9
+"""Laws in a table, and letters of a name in one line."""
 
 
 def print_checks(checks: Checked, console: Console) -> None:
@@ -21,12 +30,16 @@ def print_checks(checks: Checked, console: Console) -> None:
     )
     if any(check.spectrum for check in checks.checks):
         print_table(_margins(checks), console)
+        print_table(_wrong_masses(checks), console)
+    print_table(_loops(checks), console)
     if checks.frequencies:
         print_table(_frequencies(checks), console)
         print_table(_with_gears(checks), console)
-    print_table(_noise_gains(checks), console)
+    for table in _noise_gains(checks):
+        print_table(table, console)
     if checks.ripple:
-        print_table(_ripple(checks), console)
+        for table in _ripple(checks):
+            print_table(table, console)
 
 
 def _margins(checks: Checked) -> Table:
@@ -55,11 +68,51 @@ def _margins(checks: Checked) -> Table:
             )
     inertia = "H_S" if checks.flight.controls_base else "H_f"
     table = Table.of(f"Eigenvalues of {inertia}^-1 h_bar along the mission", columns, rows)
-    note = (
+    notes = [
         "The margin is the share by which the torque reported may exceed the one commanded "
         "until the time-delay estimate diverges."
-    )
+    ]
+    if nominal := [check.law for check in checks.checks if check.law in checks.with_model]:
+        notes.append(f"h_bar of {', '.join(nominal)} is {inertia} of the nominal model.")
+    return Table(table.title, table.columns, table.groups, notes)
+
+
+def _wrong_masses(checks: Checked) -> Table:
+    columns = [
+        Column("", is_label=True),
+        Column("smallest", spec=".4f"),
+        Column("largest", spec=".4f"),
+        Column("smallest\ndrawn", spec=".4f"),
+        Column("largest\ndrawn", spec=".4f"),
+    ]
+    masses = {check.law: check.masses for check in checks.checks if check.masses}
+    rows = [
+        [law, own.smallest, own.largest, own.smallest_drawn, own.largest_drawn]
+        for law, own in masses.items()
+    ]
+    share = next(iter(masses.values())).share
+    title = f"The same with masses and inertias wrong by {share:.0%}"
+    table = Table.of(title, columns, rows)
+    note = f"Bounds for all such robots, and the extremes of {DRAWS} drawn at random."
     return Table(table.title, table.columns, table.groups, [note])
+
+
+def _loops(checks: Checked) -> Table:
+    columns = [Column("", is_label=True), Column("radius"), Column("margin")]
+    rows = []
+    for check in checks.checks:
+        radius = JudgedCell(f"{check.loop.radius:.6f}", *_holds(check.loop.is_stable))
+        margin: JudgedCell | None = None
+        if (share := check.loop.margin) is not None:
+            word, verdict = ("sound", "good") if check.loop.has_margin else ("small", "bad")
+            word = word if check.loop.is_stable else "none"
+            margin = JudgedCell(f"{share:.2%}", word, verdict)
+        rows.append([check.law, radius, margin])
+    table = Table.of("Stability of the closed loop along the mission", columns, rows)
+    notes = ["A small motion of the rigid robot grows by the radius in a tick if it is above 1."]
+    if any(check.loop.margin is not None for check in checks.checks):
+        notes.append("The margin of observers is that of the loop; 100 % is the largest searched.")
+    return Table(table.title, table.columns, table.groups, notes)
 
 
 def _frequencies(checks: Checked) -> Table:
@@ -84,14 +137,14 @@ def _with_gears(checks: Checked) -> Table:
         if flexible := check.flexible:
             corner = flexible.largest_corner_hz
             text: str | None = "any" if corner is None else f"{corner:.3g} Hz"
-            text = text if check.spectrum else None
+            text = text if check.law in checks.with_pair else None
             stable = JudgedCell(f"{flexible.radius:.6f}", *_holds(flexible.is_stable))
             rows.append([check.law, stable, text, flexible.largest_h_bar_scale])
     table = Table.of("Stability with the springs of the gears along the mission", columns, rows)
     note = (
         "An oscillation grows by the radius in a tick if it is above 1. The bandwidth is the "
-        "largest controller.acceleration_filter_hz, and h_bar the largest factor on all of h_bar, "
-        "with which it does not; switching terms are not counted."
+        "largest controller.acceleration_filter_hz, and h_bar the largest factor on all of h_bar "
+        "(of an observer: on its inertia), with which it does not; switching terms are not counted."
     )
     return Table(table.title, table.columns, table.groups, [note])
 
@@ -100,18 +153,31 @@ def _holds(value: bool) -> tuple[str, str]:
     return ("holds", "good") if value else ("fails", "bad")
 
 
-def _noise_gains(checks: Checked) -> Table:
-    columns = [
-        Column("", is_label=True),
-        *(Column(check.law, spec=".3g") for check in checks.checks),
-    ]
+def _noise_gains(checks: Checked) -> list[Table]:
     names = _axes(checks, "N s/m")
-    rows = [
-        [name, *(float(check.noise_gain[axis]) for check in checks.checks)]
-        for axis, name in enumerate(names)
-    ]
-    title = "Torque that noise on the rate of an axis becomes, N m per rad/s"
-    return Table.of(title, columns, rows)
+    tables = []
+    for some in _groups(checks.checks):
+        columns = [
+            Column("", is_label=True),
+            *(Column(_heading(check.law), spec=".3g") for check in some),
+        ]
+        rows = [
+            [name, *(float(check.noise_gain[axis]) for check in some)]
+            for axis, name in enumerate(names)
+        ]
+        title = "Torque that noise on the rate of an axis becomes, N m per rad/s"
+        tables.append(Table.of(title, columns, rows))
+    return tables
+
+
+def _groups(laws: Sequence[T]) -> list[Sequence[T]]:
+    """Return the laws in groups, each a table that fits a terminal."""
+    return [laws[start : start + A_TABLE] for start in range(0, len(laws), A_TABLE)]
+
+
+def _heading(law: str) -> str:
+    """Return the name of a law in two lines, if it is long."""
+    return law.replace("_", "_\n", 1) if len(law) > LONGEST else law
 
 
 def _axes(checks: Checked, of_prismatic: str) -> list[str]:
@@ -124,14 +190,19 @@ def _axes(checks: Checked, of_prismatic: str) -> list[str]:
     ]
 
 
-def _ripple(checks: Checked) -> Table:
-    columns = [Column("", is_label=True), *(Column(law, spec=".3g") for law in checks.ripple)]
-    rows = [
-        [name, *(None if x is None else float(x[axis]) for x in checks.ripple.values())]
-        for axis, name in enumerate(_axes(checks, "N"))
-    ]
+def _ripple(checks: Checked) -> list[Table]:
     sensors = checks.flight.plant_settings.sensors
-    table = Table.of(f"Torque ripple with sensors {sensors}, held still, N m RMS", columns, rows)
-    diverged = [law for law, ripple in checks.ripple.items() if ripple is None]
-    notes = [f"Held still, {', '.join(diverged)} diverged."] if diverged else []
-    return Table(table.title, table.columns, table.groups, notes)
+    tables = []
+    for some in _groups(list(checks.ripple)):
+        columns = [Column("", is_label=True), *(Column(_heading(law), spec=".3g") for law in some)]
+        ripple = [checks.ripple[law] for law in some]
+        rows = [
+            [name, *(None if x is None else float(x[axis]) for x in ripple)]
+            for axis, name in enumerate(_axes(checks, "N"))
+        ]
+        title = f"Torque ripple with sensors {sensors}, held still, N m RMS"
+        table = Table.of(title, columns, rows)
+        diverged = [law for law in some if checks.ripple[law] is None]
+        notes = [f"Held still, {', '.join(diverged)} diverged."] if diverged else []
+        tables.append(Table(table.title, table.columns, table.groups, notes))
+    return tables

@@ -218,6 +218,7 @@ def remarks_on(flight: Flight) -> list[str]:
         flight.controls_base,
         on_thrusters=bool(names.thrusters and not names.wheels),
         on_thin_margin=tries_margin,
+        nominal=flight.robot,
     )
     on_limits = limit_remarks(flight.plant.robot, flight.mission_settings)
     step = flight.start_step

@@ -1,46 +1,40 @@
-"""Small motions of a robot with gears under the linear part of a law, in discrete time.
+"""Stability of a law on a robot with gears, along a mission.
 
-The laws believe that a joint turns as its motor does. With springs between them the loop is closed
-over the motions of `space_robot_model.robot.gears.FlexibleModel`, of which the momentum of what
-floats freely is eliminated. Between two ticks the torque is held; with r and p the measured rates
-and positions in rho, w the weight of the pair's low-pass and T the period, a law with time-delay
-estimation is
-
-    N_k = (1 - w) N_k-1 + w (F_k-1 - h_bar (r_k - r_k-1) / T)
-    F_k = N_k - h_bar (K_D r_k + K_P p_k)
-
-and one with a model ``F_k = -H_S (K_D r_k + K_P p_k)``. The slope of a sliding surface has the role
-of K_D; switching terms are left out, a boundary layer counts with its slope. An absolute eigenvalue
-above 1 says by how much an oscillation grows in a tick. Modes slower than half of the slowest
-spring are those of the rigid robot, which the switching terms decide; they do not count.
+The laws believe that a joint turns as its motor does. With springs between them the loop of
+`closed_loop` is closed over the motions of `space_robot_model.robot.gears.FlexibleModel`, of which
+the momentum of what floats freely is eliminated. Switching terms are left out, a boundary layer
+counts with its slope. An absolute eigenvalue above 1 says by how much an oscillation grows in a
+tick. Modes slower than half of the slowest spring are those of the rigid robot, which the switching
+terms decide; they do not count.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from space_robot_control.laws import ControlLaw
+from space_robot_control.laws.base import NO_ESTIMATE
 from space_robot_control.navigation.low_pass import low_pass_weight
 from space_robot_model.robot import Robot
 from space_robot_model.robot.gears import FlexibleModel, flexible_model, geared_joints
 
-from .inertia import attitude_jacobian, free_inertia, inertia_in_rho, semi_floating_inertia
+from .closed_loop import SLOWEST_GROWTH, Motion, loop_of
+from .inertia import attitude_jacobian
+from .linear_law import LinearLaw, linear_laws
+from .postures import Posture, postures_at
 
 Array = NDArray[np.float64]
 
-SLOWEST_GROWTH = 1e-6
-"""Growth in a tick up to which a loop counts as stable: that of rounding errors."""
 RIGID = 0.5
 """Share of the slowest spring's rate below which a mode is one of the rigid robot."""
 LOWEST_HZ = 0.01
 """Lowest corner of a low-pass that is tried."""
 SCALES = (1e-3, 1e3)
-"""Factors on h_bar between which its limit is searched."""
+"""Factors on the assumed inertia between which its limit is searched."""
 HALVINGS = 14
 """Of the searched interval's logarithm: the limit is known to a thousandth."""
 
@@ -53,9 +47,10 @@ class FlexibleCheck:
     """Largest absolute eigenvalue of all configurations; 0: there is none that counts."""
     largest_corner_hz: float | None
     """Largest corner of ``acceleration_filter_hz`` with which the law is stable: the bandwidth that
-    its estimate may have. 0: none helps; None: no low-pass is needed."""
+    its estimate may have. 0: none helps; None: none is needed, or the law has no estimate."""
     largest_h_bar_scale: float | None
-    """Largest factor on all of h_bar with which the law is stable; None: no estimate."""
+    """Largest factor on the inertia that the law's estimate or observer assumes, of all axes, with
+    which the law is stable; None: neither."""
 
     @property
     def is_stable(self) -> bool:
@@ -117,14 +112,14 @@ class FlexibleMotions:
         self.frequencies = joint_frequencies(robot, positions)
         """(K, G) Hz, see `joint_frequencies`."""
         self.period = period
-        inertia = semi_floating_inertia(robot.nominal, joint_positions)
-        inertia = inertia_in_rho(quaternion, inertia) if controls_base else free_inertia(inertia)
-        jacobian = np.eye(inertia.shape[-1])
+        self.postures = postures_at(robot, quaternion, joint_positions, controls_base)
+        """Of all configurations, without springs."""
+        jacobian = np.eye(self.postures[0].axes)
         if controls_base:
             jacobian[:3, :3] = attitude_jacobian(quaternion)
         self.configurations = [
-            _motion(robot, row, jacobian, own, period)
-            for row, own in zip(positions, inertia, strict=True)
+            _motion(robot, row, jacobian, posture, period)
+            for row, posture in zip(positions, self.postures, strict=True)
         ]
         """Motions in each configuration."""
 
@@ -138,20 +133,25 @@ def check_flexible(law: ControlLaw, motions: FlexibleMotions, corner_hz: float) 
         corner_hz: of the low-pass of the time-delay pair, Hz (0: none).
     """
     least = RIGID * 2.0 * np.pi * float(motions.frequencies.min())
-    loops = [_Loop(law, motion, least) for motion in motions.configurations]
     period = motions.period
+    laws = linear_laws(law, motions.postures)
 
-    def is_stable(corner: float, scale: float) -> bool:
+    def radii(corner: float, laws: Iterable[LinearLaw]) -> Iterator[float]:
         weight = low_pass_weight(corner, period) or 1.0
-        return all(loop.radius(weight, scale) <= 1.0 + SLOWEST_GROWTH for loop in loops)
+        for motion, linear in zip(motions.configurations, laws, strict=True):
+            yield _fast_growth(loop_of(motion, linear, weight).step, period, least)
 
-    radius = max(loop.radius(low_pass_weight(corner_hz, period) or 1.0) for loop in loops)
-    if not law.h_bar.size:
+    def is_stable(corner: float, laws: Iterable[LinearLaw]) -> bool:
+        return all(radius <= 1.0 + SLOWEST_GROWTH for radius in radii(corner, laws))
+
+    radius = max(radii(corner_hz, laws))
+    if law.uses_model or not (laws[0].uses("n_hat") or laws[0].uses("applied_force")):
         return FlexibleCheck(radius, None, None)
     corner: float | None = None
-    if not is_stable(0.0, 1.0):
-        corner = _largest(LOWEST_HZ, 0.5 / period, lambda value: is_stable(value, 1.0))
-    return FlexibleCheck(radius, corner, _largest(*SCALES, lambda x: is_stable(corner_hz, x)))
+    if law.estimate != NO_ESTIMATE and not is_stable(0.0, laws):
+        corner = _largest(LOWEST_HZ, 0.5 / period, lambda value: is_stable(value, laws))
+    scale = _largest(*SCALES, lambda x: is_stable(corner_hz, linear_laws(law, motions.postures, x)))
+    return FlexibleCheck(radius, corner, scale)
 
 
 def _largest(low: float, high: float, is_stable: Callable[[float], bool]) -> float:
@@ -166,79 +166,31 @@ def _largest(low: float, high: float, is_stable: Callable[[float], bool]) -> flo
     return low
 
 
-class _Motion(NamedTuple):
-    """Motions near a configuration, with states ``[q, qdot]`` and forces in rho."""
-
-    step: Array
-    """(2k, 2k) state a period later, by the state."""
-    by_force: Array
-    """(2k, m) the same by a force that is held."""
-    rate: Array
-    """(m, k) rates in rho that encoders and gyro measure, by qdot."""
-    inertia: Array
-    """(m, m) H_S, or H_f, of the rigid robot that laws with a model know."""
-
-
 def _motion(
-    robot: Robot, positions: Array, jacobian: Array, inertia: Array, period: float
-) -> _Motion:
+    robot: Robot, positions: Array, jacobian: Array, posture: Posture, period: float
+) -> Motion:
     """Return the motions near a configuration.
 
     Args:
         robot: with gears.
         positions: (N,) of all joints, rad or m.
         jacobian: (m, m) rates in rho by those of base and joints.
-        inertia: (m, m), see `_Motion`.
+        posture: of the rigid robot in this configuration.
         period: s.
     """
     model, base = flexible_model(robot, positions), len(jacobian) - robot.n
     rows = np.arange(3 if base else 6, len(model.inertia))
     force, rate = _axes_of(robot, len(model.inertia), base)
     step, by_force = _discrete(_reduced(model, rows), force[rows] @ jacobian.T, period)
-    return _Motion(step, by_force, jacobian @ rate[:, rows], inertia)
+    return Motion(step, by_force, jacobian @ rate[:, rows], posture)
 
 
-class _Loop:
-    """A law on a robot with gears near a configuration."""
-
-    def __init__(self, law: ControlLaw, motion: _Motion, least: float) -> None:
-        """``least``: rate of the slowest mode that counts, rad/s; see `check_flexible`."""
-        self._motion, self._least, self._period = motion, least, law.period
-        axes = len(motion.inertia)
-        self._h_bar = law.h_bar[-axes:]
-        self._damping, self._stiffness = _linear_gains(law, motion.inertia, axes)
-
-    def radius(self, weight: float, scale: float = 1.0) -> float:
-        """Return the largest absolute eigenvalue with h_bar times ``scale``."""
-        step, by_force, rate, _ = self._motion
-        axes, count = rate.shape
-        r = np.hstack([np.zeros((axes, count)), rate])
-        p = np.hstack([rate, np.zeros((axes, count))])
-        pd = self._damping @ r + self._stiffness @ p
-        if not self._h_bar.size:
-            return self._largest(step - by_force @ pd)
-        h_bar = scale * np.diag(self._h_bar)
-        one, none = np.eye(axes), np.zeros((axes, axes))
-        acceleration = weight * h_bar / self._period
-        estimate = np.hstack([-acceleration @ r, (1.0 - weight) * one, weight * one, acceleration])
-        force = estimate.copy()
-        force[:, : 2 * count] -= scale * pd
-        whole = np.vstack(
-            [
-                np.hstack([step, np.zeros((2 * count, 3 * axes))]) + by_force @ force,
-                estimate,
-                force,
-                np.hstack([r, none, none, none]),
-            ]
-        )
-        return self._largest(whole)
-
-    def _largest(self, matrix: Array) -> float:
-        """Return the largest absolute eigenvalue of modes that count."""
-        values = np.linalg.eigvals(matrix)
-        with np.errstate(divide="ignore"):
-            rates = np.abs(np.log(values.astype(complex))) / self._period
-        return float(np.abs(values[rates >= self._least]).max(initial=0.0))
+def _fast_growth(matrix: Array, period: float, least: float) -> float:
+    """Return the largest absolute eigenvalue of modes whose rate is at least ``least``, rad/s."""
+    values = np.linalg.eigvals(matrix)
+    with np.errstate(divide="ignore"):
+        rates = np.abs(np.log(values.astype(complex))) / period
+    return float(np.abs(values[rates >= least]).max(initial=0.0))
 
 
 def _discrete(model: FlexibleModel, force: Array, period: float) -> tuple[Array, Array]:
@@ -279,16 +231,3 @@ def _axes_of(robot: Robot, size: int, base: int) -> tuple[Array, Array]:
         force[motor, base + joint] = 1.0
         rate[base + joint, motor if gear and gear.encoder == "motor" else link] = 1.0
     return force, rate
-
-
-def _linear_gains(law: ControlLaw, inertia: Array, axes: int) -> tuple[Array, Array]:
-    """Return forces (m, m) by rates and by positions, but for the estimate."""
-    gains = {name: values[-axes:] for name, values in law.gain_values.items()}
-    none = np.zeros(axes)
-    damping = gains.get("k_d", gains.get("lambda", none))
-    mass = np.diag(law.h_bar[-axes:]) if law.h_bar.size else inertia
-    by_rate, by_position = mass * damping, mass * gains.get("k_p", none)
-    if {"g", "delta", "lambda"} <= gains.keys():
-        slope = np.diag(gains["g"] / gains["delta"])
-        by_rate, by_position = by_rate + slope, by_position + slope * gains["lambda"]
-    return by_rate, by_position

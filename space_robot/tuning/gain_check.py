@@ -1,13 +1,15 @@
-"""Check of a law's gains along a mission, without flying it: stability margin and noise gain.
+"""Check of a law's gains along a mission, without flying it: stability, margin and noise gain.
 
-Each law gets two results: its **margin** against a wrong torque scale, if it uses time-delay
-estimation (see `spectrum`), and its **noise gain** per axis: torque per unit of white noise of the
-axis' measured rate in the same tick, N m s.
+Each law gets three results:
 
-- Time-delay estimation: the differences of the rate sum up in N_hat to ``w h_bar v / delta`` for
-  the noise v of the last tick; u adds ``h_bar K_D v`` (lambda for K_D with a sliding surface).
-- Computed torque: ``H_S K_D v``, without the noise of the other axes.
-- With a boundary layer: ``(H_S lambda + g / Delta) v``.
+- Its **margin** against a wrong torque scale, if what it commands depends on the applied force. For
+  time-delay estimation it is the smallest eigenvalue of `spectrum`, likewise for a disturbance
+  observer; for any other law with an observer, such as `adrc`, it is the largest excess of the
+  reported torque with which the loop of `closed_loop` is stable.
+- The **radius** of that loop, of small motions of the rigid robot under the linear part of the law.
+- Its **noise gain** per axis: torque per unit of white noise of the axis' measured rate in the same
+  tick, N m s, on all paths of the law's `linear_law`, with N_hat as ``-w H^ v / period`` for the
+  noise v. The noise of the other axes is not in it.
 
 The effect of noise on switching terms depends on its size: ``g sign(s)`` adds up to g, and the
 roots of super-twisting and of the terminal sliding mode add ``h_bar K_1 |s|^1/2``. The torque on
@@ -17,6 +19,7 @@ actuators has no torques, and the joints have the inertia H_f of `inertia`.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -24,13 +27,45 @@ from numpy.typing import NDArray
 
 from space_robot_control.controller.settings import ControllerNodeSettings
 from space_robot_control.laws import ControlLaw
+from space_robot_control.laws.base import CONSTANT_INERTIA, NO_ESTIMATE
 from space_robot_control.navigation.low_pass import low_pass_weight
 
+from .closed_loop import SLOWEST_GROWTH, RigidLoop
 from .flexible import FlexibleCheck
 from .inertia import attitude_jacobian
-from .spectrum import Spectrum, spectrum
+from .linear_law import force_by_rate, linear_laws
+from .mass_errors import MassCheck
+from .postures import Posture
+from .spectrum import LEAST_MARGIN, Spectrum, spectrum
 
 Array = NDArray[np.float64]
+
+LOOPS = 31
+"""Largest number of postures in which the loop is closed."""
+
+
+@dataclass(frozen=True)
+class LoopCheck:
+    """The rigid closed loop of the linear part of a law along a mission."""
+
+    radius: float
+    """Largest growth of a small motion in a tick."""
+    margin: float | None
+    """Share by which the reported torque may exceed the commanded one, at most
+    `closed_loop.MOST_SCALE`, of a law that uses it and has no `Spectrum`; negative: it is unstable
+    without."""
+    largest_scale: float | None
+    """Largest stable ratio of actual to commanded torque, of the same."""
+
+    @property
+    def is_stable(self) -> bool:
+        """True if no small motion grows."""
+        return self.radius <= 1.0 + SLOWEST_GROWTH
+
+    @property
+    def has_margin(self) -> bool:
+        """False if there is a margin below `LEAST_MARGIN`."""
+        return self.margin is None or self.margin >= LEAST_MARGIN
 
 
 @dataclass(frozen=True)
@@ -40,25 +75,33 @@ class GainCheck:
     law: str
     spectrum: Spectrum | None
     """Eigenvalues and margin; None for a law without time-delay estimation."""
+    loop: LoopCheck
     noise_gain: Array
     """(m,) torque per unit of noise on the rate of the same axis, N m s."""
     flexible: FlexibleCheck | None = None
     """Stability on a robot with gears; None for one without."""
+    masses: MassCheck | None = None
+    """Eigenvalues with wrong masses; None for a law without time-delay estimation."""
 
     @property
     def is_sound(self) -> bool:
-        """False if time-delay estimation has too little margin, or a gear's spring oscillates."""
+        """False if the margin is too small, or small motions of robot or springs grow."""
         return self.has_margin and self.is_stable
 
     @property
+    def margin(self) -> float | None:
+        """The margin in torque scale; None for a law that does not use the applied force."""
+        return self.spectrum.margin if self.spectrum else self.loop.margin
+
+    @property
     def has_margin(self) -> bool:
-        """False if the law uses time-delay estimation with too little margin."""
-        return self.spectrum is None or self.spectrum.is_sound
+        """False if the law has a margin in torque scale that is too small."""
+        return self.spectrum.is_sound if self.spectrum else self.loop.has_margin
 
     @property
     def is_stable(self) -> bool:
-        """False if small oscillations of a gear's spring grow."""
-        return self.flexible is None or self.flexible.is_stable
+        """False if small motions of the rigid robot, or of a gear's spring, grow."""
+        return self.loop.is_stable and (self.flexible is None or self.flexible.is_stable)
 
 
 def pair_corner(settings: ControllerNodeSettings) -> float:
@@ -75,45 +118,116 @@ def pair_corner(settings: ControllerNodeSettings) -> float:
 
 
 def check_gains(
-    law: ControlLaw, inertia: Array, quaternion: Array, acceleration_filter_hz: float = 0.0
+    law: ControlLaw,
+    inertia: Array,
+    postures: Sequence[Posture],
+    acceleration_filter_hz: float = 0.0,
 ) -> GainCheck:
-    """Compute margin and noise gain of a law.
+    """Compute margin, loop and noise gain of a law.
 
     Args:
         law: with its gains and period.
-        inertia: (K, m, m) H_S in all configurations; (K, n, n) H_f of the joints for a base
-            without attitude actuators.
-        quaternion: (4,) attitude of the base in all configurations.
+        inertia: (L, m, m) H_S of the robot in all configurations; (L, n, n) H_f of the joints for a
+            base without attitude actuators.
+        postures: (K,) of the nominal robot; L is a multiple of K.
         acceleration_filter_hz: see `pair_corner`.
+
+    Raises:
+        LawError: the law's code failed.
     """
     weight = low_pass_weight(acceleration_filter_hz, law.period) or 1.0
-    h_bar = law.h_bar[-inertia.shape[-1] :]
-    eigen = spectrum(inertia, h_bar, weight) if h_bar.size else None
-    return GainCheck(law.name, eigen, noise_gain(law, inertia, quaternion, weight))
+    eigen = estimate_spectrum(law, inertia, postures, weight)
+    loop = check_loop(law, inertia, postures, weight, has_margin=eigen is None)
+    return GainCheck(law.name, eigen, loop, noise_gain(law, postures, weight))
 
 
-def noise_gain(law: ControlLaw, inertia: Array, quaternion: Array, weight: float = 1.0) -> Array:
+def estimate_spectrum(
+    law: ControlLaw, inertia: Array, postures: Sequence[Posture], weight: float = 1.0
+) -> Spectrum | None:
+    """Return the `Spectrum` of a law's estimate; None: it has none that is known by its algebra.
+
+    Args: see `check_gains`; ``weight`` is that of the pair's low-pass.
+    """
+    assumed = estimated_with(law, postures, len(inertia))
+    if assumed is None:
+        return None
+    if law.estimate == NO_ESTIMATE:
+        per_tick = law.gain_values["bandwidth"][-inertia.shape[-1] :] * law.period
+        return spectrum(inertia, assumed, per_tick / (1.0 + per_tick))
+    return spectrum(inertia, assumed, weight)
+
+
+def estimated_with(law: ControlLaw, postures: Sequence[Posture], count: int) -> Array | None:
+    """Return the inertia of a law's estimate: (m,) diagonal, or (``count``, m, m) in all postures.
+
+    That of a disturbance observer is its gain ``inertia``; it has a gain ``bandwidth``, too.
+    """
+    axes, gains = postures[0].axes, law.gain_values
+    if law.estimate == CONSTANT_INERTIA:
+        return gains["h_bar"][-axes:]
+    if law.estimate != NO_ESTIMATE:
+        nominal = np.array([posture.inertia for posture in postures])
+        return np.tile(nominal, (count // len(nominal), 1, 1))
+    return gains["inertia"][-axes:] if {"inertia", "bandwidth"} <= gains.keys() else None
+
+
+def check_loop(
+    law: ControlLaw,
+    inertia: Array,
+    postures: Sequence[Posture],
+    weight: float = 1.0,
+    has_margin: bool = True,
+) -> LoopCheck:
+    """Check the rigid closed loop in some of the postures.
+
+    Args: see `check_gains`; ``weight`` is that of the pair's low-pass.
+        has_margin: whether the margin in torque scale is wanted.
+
+    Raises:
+        LawError: the law's code failed.
+    """
+    every = _every(postures)
+    some = postures[::every]
+    linear = linear_laws(law, some)
+    sets = inertia.reshape(-1, len(postures), *inertia.shape[1:])[:, ::every]
+    rigid = RigidLoop(
+        sets.reshape(-1, *inertia.shape[1:]), [*some] * len(sets), linear * len(sets), weight
+    )
+    radius = rigid.radius()
+    if not (has_margin and (linear[0].uses("applied_force") or linear[0].uses("n_hat"))):
+        return LoopCheck(radius, None, None)
+    return LoopCheck(radius, rigid.margin(), rigid.largest_scale())
+
+
+def noise_gain(law: ControlLaw, postures: Sequence[Posture], weight: float = 1.0) -> Array:
     """Return the torque (m,) per unit of white noise on each axis' rate, N m s.
 
     Args:
         law: with its gains and period.
-        inertia: (K, m, m) H_S, or (K, n, n) H_f, see `check_gains`.
-        quaternion: (4,) attitude of the base.
+        postures: of the nominal robot.
         weight: of the low-pass of the time-delay pair; 1: none.
+
+    Raises:
+        LawError: the law's code failed.
     """
-    axes = inertia.shape[-1]
-    gains = {name: values[-axes:] for name, values in law.gain_values.items()}
-    # the slope of a sliding surface has the role of K_D
-    damping = gains.get("k_d", gains.get("lambda", np.zeros(axes)))
-    if law.h_bar.size:
-        per_rate = law.h_bar[-axes:] * (weight / law.period + damping)
-    else:
-        per_rate = np.diagonal(inertia, axis1=1, axis2=2).max(axis=0) * damping
-        if {"g", "delta"} <= gains.keys():
-            per_rate = per_rate + gains["g"] / gains["delta"]
-    if axes < len(law.memory.s):  # no torque on the base
+    some = _extreme(postures) if law.needs_model else postures[:1]
+    gains = [np.abs(np.diag(force_by_rate(law, posture, weight))) for posture in some]
+    per_rate = np.max(gains, axis=0)
+    if len(per_rate) < len(law.memory.s):  # no torque on the base
         return np.concatenate([np.zeros(3), per_rate])
     gain: Array = per_rate.copy()
-    jacobian = attitude_jacobian(quaternion)
+    jacobian = attitude_jacobian(postures[0].quaternion)
     gain[:3] = np.diag(jacobian.T @ np.diag(per_rate[:3]) @ jacobian)
     return gain
+
+
+def _every(postures: Sequence[Posture]) -> int:
+    """Return the step that leaves at most `LOOPS` postures."""
+    return -(-len(postures) // LOOPS)
+
+
+def _extreme(postures: Sequence[Posture]) -> list[Posture]:
+    """Return some postures, and those in which an axis has its largest inertia."""
+    own = np.array([np.diag(posture.inertia) for posture in postures])
+    chosen = {*range(0, len(postures), _every(postures)), *np.argmax(own, axis=0).tolist()}
+    return [postures[index] for index in sorted(chosen)]

@@ -7,9 +7,11 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from space_robot_control.controller.gains import NOMINAL as IN_FILES
 from space_robot_control.controller.settings import OF_THE_SET
 
 from .method import Tuned
+from .task import NOMINAL
 
 Array = NDArray[np.float64]
 
@@ -19,6 +21,12 @@ NOTES = {
     "tde_smc": "lambda = W; g = h_bar eps, the least that holds the surface.",
     "tde_tsmc": "K_P = W^2, K_D = 2 W; K_1 = (W eps)^1/2.",
     "tde_stc": "lambda = W; K_2 = 1.1 W eps, K_1 = 2.2 (W eps)^1/2.",
+    "pd": "K_D = 2 W d, K_P = W^2 d, d the inertia of an axis with the others free.",
+    "pd_feedforward": "K_D = 2 W d, K_P = W^2 d, d the inertia of an axis with the others free.",
+    "slotine_li": "lambda = W, K_D = W d; gamma: adapts in 10 s at the mission's largest force.",
+    "indi": "K_P = W^2, K_D = 2 W; estimate with the nominal inertia and the low-pass of the set.",
+    "dob": "J = h_bar; bandwidth: weight of the estimate's low-pass; K_P = W^2, K_D = 2 W.",
+    "adrc": "J = h_bar, less if it is not stable; omega_o: lag or noise; omega_c = W.",
 }
 """Tuning rule of each law, see `method`."""
 
@@ -32,7 +40,7 @@ def gain_files(tuned: Tuned, command: str) -> Mapping[str, str]:
     """
     head = [f"Made by `{command}`."]
     files = {
-        f"{law}.yaml": _file([*head, NOTES[law], *_numbers(tuned, "h_bar" in gains)], law, gains)
+        f"{law}.yaml": _file([*head, NOTES[law], *_numbers(tuned, law)], law, gains)
         for law, gains in tuned.gains.items()
     }
     files[OF_THE_SET] = "\n".join(
@@ -47,22 +55,29 @@ def gain_files(tuned: Tuned, command: str) -> Mapping[str, str]:
     return files
 
 
-def _numbers(tuned: Tuned, has_estimate: bool) -> Sequence[str]:
-    wishes = tuned.wishes
-    bandwidth = tuned.bandwidth if has_estimate else tuned.model_bandwidth
-    lines = [f"W = {bandwidth:.3g} rad/s; masses wrong by {wishes.mass_uncertainty:.0%}."]
-    if has_estimate:
+def _numbers(tuned: Tuned, law: str) -> Sequence[str]:
+    wishes, gains = tuned.wishes, tuned.gains[law]
+    lines = [
+        f"W = {tuned.bandwidths[law]:.3g} rad/s; masses wrong by {wishes.mass_uncertainty:.0%}."
+    ]
+    if "h_bar" in gains:
+        margin = wishes.margin
+        if tuned.h_bar == NOMINAL:
+            margin = tuned.smallest / (1.0 + wishes.mass_uncertainty)
         lines += [
             f"Eigenvalues of H_S^-1 h_bar {tuned.smallest:.3g} to {tuned.largest:.3g}: "
-            f"margin {wishes.margin:.1%}.",
+            f"margin {margin:.1%}.",
             f"The estimate lags by {tuned.delay * 1e3:.3g} ms; eps = {_list(tuned.error, 2)}.",
         ]
-    return lines
+    return [*lines, *tuned.remarks[law]]
 
 
 def _file(comments: Sequence[str], law: str, gains: Mapping[str, Array]) -> str:
     lines = [*_comments(comments), "controller_node:", "  ros__parameters:", f"    {law}:"]
     for name, values in gains.items():
+        if name == "h_bar" and not values.any():
+            lines.append(f"      h_bar: {IN_FILES}")
+            continue
         same = bool(np.all(values == values[0]))
         lines.append(f"      {name}: {_list(values[:1] if same else values, 12)}")
     return "\n".join([*lines, ""])

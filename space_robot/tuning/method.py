@@ -1,4 +1,4 @@
-"""Tuning of a gain set for all five laws, in six steps.
+"""Tuning of a gain set for all laws, in seven steps.
 
 1. **Shape of h_bar.** ``d_i``, the smallest inertia of axis i when all others are free,
    ``1 / (H_S^-1)_ii``, along the mission and with every payload. The ratio of the extreme
@@ -29,49 +29,77 @@
    the nominal model does not contain; the boundary layer is that of Slotine and Li (1991, 7.2):
    inside it s decays with rate W, and not faster in any direction, ``Delta = g / (W d')`` with
    ``d'`` proportional to the shape of h_bar and ``H_S^-1 d' <= E``.
+7. **Laws without h_bar.** W is that of the laws with a model, or of those with an estimate:
+
+   - PD, with and without feedforward: ``K_D = 2 W d``, ``K_P = W^2 d``, the noise is multiplied by
+     d in place of H_S.
+   - Slotine and Li (1987): ``lambda = W``, ``K_D = W d``; gamma adapts in ten seconds at the
+     largest force of the mission (`laws_with_model`); spread is mu.
+   - Disturbance observer: J is h_bar, g has the weight of the pair's low-pass, so that it equals
+     the time-delay estimate (`spectrum`).
+   - Active disturbance rejection: J is h_bar, but with ``max(lambda) / (1 - mu) <= 5``; omega_o has
+     the lag of the pair's low-pass, ``3 / omega_o``, or less noise; ``omega_c = W``, at most
+     ``omega_o / 4``, and slower where the loop is not stable (`laws_with_observer`).
+   - INDI: the estimate with the nominal inertia and the low-pass of the set; its W by step 4 with
+     ``min(lambda) / (1 + mu)`` in place of the margin, at most that of the laws with a model.
+
+**Nominal inertia.** With H_S of the nominal model in place of h_bar, steps 1 and 2 have nothing to
+choose: lambda is near 1. The low-pass (3) has ``w max(lambda) / (1 - mu) <= 1`` and noise of
+``H_S rhodd`` within the ripple, all axes together. This pair takes rates and torques as measured,
+so its delay is ``delta / w``; W is as that of INDI. The errors (5) are accelerations by
+``|H_S^-1| h_bar eps`` in the worst posture. It is used on request, or (``auto``) where the laws
+with a constant h_bar would have less than a tenth of the bandwidth of the laws with a model.
 """
 
 from __future__ import annotations
 
-import math
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
-from space_robot_msgs_py.errors import InputError
+from space_robot_control.laws import laws
 
 from .demand import ForceDemand
+from .equal_ripple import bandwidth_at_ripple, estimate_at_ripple
+from .estimate_design import (
+    EstimateDesign,
+    check_estimate,
+    constant_estimate,
+    is_weak,
+    model_bandwidth,
+    nominal_estimate,
+)
+from .laws_with_estimate import tune_dob, tune_indi, tune_tde_smc, tune_tde_stc, tune_tde_tsmc
+from .laws_with_model import tune_ctc, tune_ctc_smc, tune_pd, tune_slotine_li
+from .laws_with_observer import tune_adrc
 from .noise import Noise
-from .spectrum import eigenvalues
+from .noise_limits import low_pass_corner
+from .postures import Posture
+from .task import AUTO, CONSTANT, NOMINAL, TunedLaw, TuningOptions, TuningTask, axis_inertia
 
 Array = NDArray[np.float64]
 
-SEPARATION = 4.0
-"""Ratio of the estimate's pole to the poles of the loop; see step 4."""
-MOST_PER_TICK = 0.05
-"""Largest bandwidth times period, rad: K_D then removes a tenth of a rate error per tick."""
-LEAST_WEIGHT = 1e-4
-"""Smallest weight of a low-pass: a corner of 0.03 Hz at 2 kHz."""
-BISECTIONS = 12
-"""Bisections: the weight is then more precise than the written digits."""
 DIGITS = 3
 """Significant digits of a gain: few enough to be equal on all machines."""
-
-
-@dataclass(frozen=True)
-class TuningOptions:
-    """Requirements on a gain set."""
-
-    margin: float
-    """Share by which the reported torque may exceed the commanded one."""
-    mass_uncertainty: float
-    """Share by which every mass and inertia may be wrong."""
-    bandwidth: float | None = None
-    """Bandwidth of all laws, rad/s; None: the largest that lag and ripple allow each law."""
-    ripple: float = 0.1
-    """Allowed RMS force by noise, as a share of the largest force of an axis."""
+WITH_ESTIMATE: Mapping[str, Callable[[TuningTask, EstimateDesign], TunedLaw]] = {
+    "tde_smc": tune_tde_smc,
+    "tde_tsmc": tune_tde_tsmc,
+    "tde_stc": tune_tde_stc,
+}
+"""Laws with the estimate of the set."""
+WITHOUT_ESTIMATE: Mapping[str, Callable[[TuningTask, float], TunedLaw]] = {
+    "ctc": tune_ctc,
+    "ctc_smc": tune_ctc_smc,
+    "slotine_li": tune_slotine_li,
+    "pd": tune_pd,
+    "pd_feedforward": tune_pd,
+}
+"""Laws with W alone."""
+WITHOUT_MODEL = ("pd", "pd_feedforward")
+"""Those whose K_P and K_D have the inertia d in place of the model's."""
 
 
 @dataclass(frozen=True)
@@ -88,17 +116,26 @@ class Tuned:
     model_bandwidth: float
     """W of the laws with a model, rad/s."""
     smallest: float
-    """Smallest eigenvalue of ``H_S^-1 h_bar`` with nominal masses and every payload."""
+    """Smallest eigenvalue of ``H_S^-1 H^`` with nominal masses and every payload."""
     largest: float
     """Largest eigenvalue of the same."""
     error: Array
     """(m,) eps of step 5, rad/s2 (eps: 1/s2)."""
     gains: Mapping[str, Mapping[str, Array]]
     """Gains by law and name, (m,) each."""
+    h_bar: str = CONSTANT
+    """Inertia of the laws with time-delay estimation, `CONSTANT` or `NOMINAL`."""
+    constant: EstimateDesign | None = None
+    """The estimate with a constant h_bar, whether it is used or not."""
+    bandwidths: Mapping[str, float] = field(default_factory=dict)
+    """W by law, rad/s."""
+    remarks: Mapping[str, Sequence[str]] = field(default_factory=dict)
+    """On the gains of some laws, for their files."""
 
 
 def tune(
     inertia: Array,
+    postures: Sequence[Posture],
     asked: ForceDemand,
     wishes: TuningOptions,
     period: float,
@@ -107,7 +144,8 @@ def tune(
     """Compute a gain set.
 
     Args:
-        inertia: (K, m, m) H_S in all configurations, with all payloads.
+        inertia: (L, m, m) H_S in all configurations, with all payloads.
+        postures: (K,) of the nominal robot in the same configurations; L is a multiple of K.
         asked: forces of the mission.
         wishes: the user's tuning options.
         period: delta, s.
@@ -116,105 +154,57 @@ def tune(
     Raises:
         InputError: the tuning options cannot be met together.
     """
-    margin, share = wishes.margin, wishes.mass_uncertainty
-    shape = axis_inertia(inertia)
-    asked = asked.on_all_axes(shape)
-    eigen = eigenvalues(inertia, shape)
-    low, high = float(eigen.min()), float(eigen.max())
-    size = margin * (1.0 + share) / low
-    weight = min(1.0, (1.0 - share) / (size * high))
-    h_bar, allowed = size * shape, wishes.ripple * asked.peak
-    if noise:
-        weight = _quiet_weight(weight, noise, allowed / h_bar)
-    delay = period / weight + (noise.lag if noise else 0.0)
-    fastest = margin / delay / SEPARATION
-    bandwidth = wishes.bandwidth or fastest
-    quiet = _quiet_bandwidth(inertia, noise, allowed)
-    of_model = wishes.bandwidth or min(quiet, MOST_PER_TICK / period)
-    if noise and noise.lag and not wishes.bandwidth:
-        of_model = min(of_model, 1.0 / SEPARATION / noise.lag)
-    if bandwidth > 2.0 * fastest:
-        raise InputError(
-            f"bandwidth must be at most {2.0 * fastest:.3g} rad/s, half of the pole of an estimate "
-            f"with this margin and lag, got {bandwidth:g}"
+    on_all_axes = asked.on_all_axes(axis_inertia(inertia))
+    task = TuningTask(inertia, postures, on_all_axes, wishes, period, noise)
+    has_ripple = bool(wishes.noise_ripple and noise and noise.rates.any())
+    constant = constant_estimate(task)
+    observer = estimate_at_ripple(task, constant, True) if has_ripple else constant
+    if has_ripple:
+        constant = estimate_at_ripple(task, constant)
+    design, is_auto = constant, wishes.h_bar == AUTO
+    if wishes.h_bar == NOMINAL or (is_auto and is_weak(constant, task)):
+        design = nominal_estimate(task)
+        design = estimate_at_ripple(task, design) if has_ripple else design
+    check_estimate(task, design)
+    tuned = {name: own(task, design) for name, own in WITH_ESTIMATE.items()}
+    for name, tune_law in WITHOUT_ESTIMATE.items():
+        if name in laws():
+            most = model_bandwidth(task, task.shape if name in WITHOUT_MODEL else None)
+            if has_ripple:
+                most = bandwidth_at_ripple(task, name, partial(tune_law, task), most)
+            tuned[name] = tune_law(task, most)
+    of_model = tuned["ctc"].bandwidth
+    incremental = nominal_estimate(task, design.weight)
+    tuned["indi"] = tune_indi(task, incremental)
+    if has_ripple and design.kind == CONSTANT:
+        most = bandwidth_at_ripple(
+            task,
+            "indi",
+            lambda bandwidth: tune_indi(task, incremental, bandwidth),
+            incremental.bandwidth,
+            design.weight,
         )
-    gap = delay * asked.slope + 0.5 * margin * asked.peak
-    error = gap / h_bar
-    layer = shape * (1.0 - share) / high
-    unknown = asked.unknown + share * asked.nominal
-    ones = np.ones_like(shape)
-    rough = bandwidth * error
-    slope, poles = bandwidth * ones, _critical(bandwidth * ones)
-    gains = {
-        "ctc": _critical(of_model * ones),
-        "ctc_smc": {"lambda": of_model * ones, "g": unknown, "delta": unknown / (of_model * layer)},
-        "tde_smc": {"h_bar": h_bar, "lambda": slope, "g": gap},
-        "tde_tsmc": {"h_bar": h_bar, **poles, "k_1": np.sqrt(rough)},
-        "tde_stc": {
-            "h_bar": h_bar,
-            "lambda": slope,
-            "k_1": 2.2 * np.sqrt(rough),
-            "k_2": 1.1 * rough,
-        },
-    }
-    rounded = {
-        law: {name: significant(values) for name, values in own.items()}
-        for law, own in gains.items()
-    }
-    corner = float(significant(low_pass_corner(weight, period)))
+        tuned["indi"] = tune_indi(task, incremental, most)
+    tuned["dob"] = tune_dob(task, observer)
+    tuned["adrc"] = tune_adrc(task, replace(constant, weight=constant_estimate(task).weight))
     return Tuned(
-        wishes, corner, delay, bandwidth, of_model, size * low, size * high, error, rounded
+        wishes,
+        float(significant(low_pass_corner(design.weight, period))),
+        design.delay,
+        design.bandwidth,
+        of_model,
+        design.smallest,
+        design.largest,
+        design.error,
+        {
+            law: {name: significant(values) for name, values in own.gains.items()}
+            for law, own in tuned.items()
+        },
+        design.kind,
+        constant,
+        {law: own.bandwidth for law, own in tuned.items()},
+        {law: own.remarks for law, own in tuned.items()},
     )
-
-
-def _critical(bandwidth: Array) -> dict[str, Array]:
-    """Return K_P and K_D with both poles at ``bandwidth`` (m,), rad/s."""
-    return {"k_p": bandwidth**2, "k_d": 2.0 * bandwidth}
-
-
-def axis_inertia(inertia: Array) -> Array:
-    """Return d_i (m,) of step 1 for ``inertia`` (K, m, m), kg m2."""
-    free = 1.0 / np.diagonal(np.linalg.inv(inertia), axis1=1, axis2=2)
-    smallest: Array = free.min(axis=0)
-    return smallest
-
-
-def _quiet_weight(largest: float, noise: Noise, allowed: Array) -> float:
-    """Return the largest weight, at most ``largest``, with noise up to ``allowed`` (m,), rad/s2.
-
-    Raises:
-        InputError: there is no such weight.
-    """
-    if np.all(noise.acceleration(largest) <= allowed):
-        return largest
-    low, high = math.log(LEAST_WEIGHT), math.log(largest)
-    if np.any(noise.acceleration(LEAST_WEIGHT) > allowed):
-        raise InputError("no low-pass reduces the noise of these sensors enough: allow more ripple")
-    for _ in range(BISECTIONS):
-        middle = 0.5 * (low + high)
-        is_quiet = np.all(noise.acceleration(math.exp(middle)) <= allowed)
-        low, high = (middle, high) if is_quiet else (low, middle)
-    return math.exp(low)
-
-
-def _quiet_bandwidth(inertia: Array, noise: Noise | None, allowed: Array) -> float:
-    """Return the largest W of computed torque, rad/s, with noise up to ``allowed`` (m,), N m.
-
-    ``H^2 (4 W^2 sigma_rate^2 + W^4 sigma_e^2) = allowed^2`` on the limiting axis.
-    """
-    if noise is None or not noise.rates.any():
-        return math.inf
-    own = np.diagonal(inertia, axis1=1, axis2=2).max(axis=0)
-    rate, angle = 2.0 * own * noise.rates.std(axis=0), own * noise.errors.std(axis=0)
-    root = np.sqrt(rate**4 + 4.0 * (angle * allowed) ** 2)
-    with np.errstate(divide="ignore"):
-        squares = 2.0 * allowed**2 / (rate**2 + root)
-    return float(np.sqrt(squares.min()))
-
-
-def low_pass_corner(weight: float, period: float) -> float:
-    """Return the corner, Hz, of a low-pass with a ``weight``; 0 (no low-pass) for 1."""
-    return 0.0 if weight >= 1.0 else -math.log(1.0 - weight) / (2.0 * math.pi * period)
 
 
 def significant(values: Array | float) -> Array:

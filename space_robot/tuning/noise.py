@@ -39,6 +39,9 @@ class Noise:
     """(K, m) rhodot at every tick."""
     errors: Array
     """(K, m) e at every tick."""
+    measured_rates: Array
+    """(K, m) rhodot without the navigation's low-pass, as a time-delay estimate with the nominal
+    inertia takes it."""
     lag: float
     """Largest delay of the reported torque over all axes, s."""
     period: float
@@ -52,12 +55,32 @@ class Noise:
         Args:
             weight: of the pair's low-pass.
         """
-        from scipy.signal import lfilter  # slow to import
-
-        differences = np.diff(self.rates, axis=0) / self.period
-        smooth = lfilter([weight], [1.0, weight - 1.0], differences, axis=0)
-        deviation: Array = smooth[len(smooth) // 10 :].std(axis=0)
+        deviation: Array = _acceleration(self.rates, weight, self.period).std(axis=0)
         return deviation
+
+    def nominal_force(self, weight: float, inertia: Array) -> Array:
+        """Return the standard deviation (m,) of ``H rhodd``, N m, the largest of all inertias.
+
+        rhodd is that of the pair of a time-delay estimate with the nominal inertia.
+
+        Args:
+            weight: of the pair's low-pass.
+            inertia: (K, m, m) H.
+        """
+        acceleration = _acceleration(self.measured_rates, weight, self.period)
+        covariance = np.atleast_2d(np.cov(acceleration.T))
+        variances = np.einsum("kij,jl,kil->ki", inertia, covariance, inertia)
+        deviation: Array = np.sqrt(variances.max(axis=0))
+        return deviation
+
+
+def _acceleration(rates: Array, weight: float, period: float) -> Array:
+    """Return the pair's acceleration (L, m) once its low-pass has settled."""
+    from scipy.signal import lfilter  # slow to import
+
+    differences = np.diff(rates, axis=0) / period
+    smooth: Array = lfilter([weight], [1.0, weight - 1.0], differences, axis=0)
+    return smooth[len(smooth) // 10 :]
 
 
 def listen(
@@ -78,21 +101,24 @@ def listen(
     """
     quiet = settings.model_copy(update={"disturbance": DisturbanceSettings()})
     plant, command = Plant(robot, quiet, period), Command(0, np.zeros(robot.n + 3))
-    kind = find_law("tde_stc")  # any law: its command is not used
-    law = kind({name: np.ones(robot.n + 3) for name in kind.gain_descriptions()}, period)
+    kind = find_law("tde_stc")  # any law with an estimate: its command is not used
+    gains = {name: np.ones(robot.n + 3) for name in kind.gain_descriptions()}
+    law = kind({**gains, "h_bar": np.zeros(robot.n + 3)}, period)  # of the nominal inertia
     controller = Controller(robot, law, period, navigation=navigation)
     memory, held = controller.block[0], Mission(robot, mission, period).chunk(0, 1).references()
     first, last = round(SETTLING / period), round((SETTLING + LISTENING) / period)
-    rates, errors = np.empty((2, last - first, robot.n + 3))
+    rates, errors, measured = np.empty((3, last - first, robot.n + 3))
     for tick in range(last):
         plant.state.applied_torque[:] = RAMP * period * tick
         controller.update(plant.state, held)
         if tick >= first:
-            rates[tick - first], errors[tick - first] = memory.rate, controller.signals.error
+            rates[tick - first] = controller.signals.rho_rate
+            errors[tick - first] = controller.signals.error
+            measured[tick - first] = memory.pair.rate
         command.tick = tick
         plant.step(command)
     lag = 0.0
     if navigation:
         late = memory.navigation.estimate.applied_torque
         lag = max(0.0, float(np.max((last - 1) * period - late / RAMP)))
-    return Noise(rates, errors, lag, period)
+    return Noise(rates, errors, measured, lag, period)

@@ -1,7 +1,10 @@
-"""The eigenvalues of ``H_S^-1 h_bar`` along a mission, and the margin against wrong torques.
+"""The eigenvalues of ``H_S^-1 H^`` along a mission, and the margin against wrong torques.
+
+H^ is the inertia of a law's time-delay estimate: the constant diagonal ``h_bar``, or the nominal
+model's H_S, which differs from the robot's by the errors of the masses and the payload.
 
 Over a tick the robot obeys ``H_S a_k + c = G_k``: G is the actual force, a the mean acceleration.
-A law with time-delay estimation commands ``C_k = h_bar u_k + N_hat_k``. Let a drive produce
+A law with time-delay estimation commands ``C_k = H^ u_k + N_hat_k``. Let a drive produce
 ``G = a_g C`` and report ``R = b C`` (the applied force of the controller's `TimeDelayPair`). With
 the weight w of the pair's low-pass (1: none), (36) is
 
@@ -14,11 +17,11 @@ and positive, an error of the estimate is multiplied in each tick by
     1 + w (b - 1 - a_g lambda).                                                             (*)
 
 - Correct torques, w = 1: ``1 - lambda``, Lemma 1's W (69); its magnitude is below 1 for lambda < 2.
-- Reported torque too large, ``b = 1 + g``: the matrix is ``(1 + g) E - H_S^-1 h_bar``, which
+- Reported torque too large, ``b = 1 + g``: the matrix is ``(1 + g) E - H_S^-1 H^``, which
   diverges for ``g >= min lambda``. The estimate interprets the excess as a force that did not
   accelerate the robot, commands it, and receives it with a further excess.
 - Reported torque too small: the estimate decays instead of diverging, and leaves an acceleration
-  error of ``h_bar^-1 (1 - b) C``.
+  error of ``H^^-1 (1 - b) C``.
 - Actual torque wrong, command reported (``b = 1``): lambda becomes ``a_g lambda``. It converges for
   ``a_g < 2 / (w max lambda)``.
 - Ideal torque sensor, actual torque too large (``a_g = b``): ``b (1 - lambda)`` for w = 1, so the
@@ -27,7 +30,16 @@ and positive, an error of the estimate is multiplied in each tick by
 Hence the margin in torque scale is the smallest eigenvalue. If all masses and inertias have
 relative errors of at most mu, then ``(1 - mu) H_S <= H_S' <= (1 + mu) H_S``, because the kinetic
 energy is linear in them and a free base minimises it: every eigenvalue stays between
-``lambda / (1 + mu)`` and ``lambda / (1 - mu)``.
+``lambda / (1 + mu)`` and ``lambda / (1 - mu)``. With the nominal inertia and no payload these are
+``1 / (1 + mu)`` and ``1 / (1 - mu)``: a margin near 1, whatever the robot.
+
+A disturbance observer of inertia J and bandwidth g, `dob`, is the estimate with ``H^ = J`` and
+``w = g period / (1 + g period)``. With a weight for each axis, W in place of w, the factors are the
+eigenvalues of ``E + W ((b - 1) E - J H_S^-1)``. They are real, and the first one reaches 1 where
+``b - 1`` is the smallest lambda (Sylvester), so the margin is the same.
+
+The terms of u depend on the estimate as well, through the motion of the robot. They move the limit
+by a share of the order of the law's bandwidth times ``period / w``; `closed_loop` has them all.
 """
 
 from __future__ import annotations
@@ -45,19 +57,26 @@ LEAST_MARGIN = 0.02
 
 @dataclass(frozen=True)
 class Spectrum:
-    """Extreme eigenvalues of ``H_S^-1 h_bar`` over all configurations."""
+    """Extreme eigenvalues of ``H_S^-1 H^`` over all configurations."""
 
     smallest: float
     largest: float
     norm: float
-    """Largest spectral norm of ``E - H_S^-1 h_bar``, below 1 by Lemma 1."""
+    """Largest spectral norm of ``E - H_S^-1 H^``, below 1 by Lemma 1."""
     weight: float = 1.0
-    """Weight w of the low-pass of the time-delay pair, see `low_pass_weight`; 1: none."""
+    """Weight w of the low-pass of the estimate, see `low_pass_weight`; 1: none. Of an observer with
+    different weights: the largest."""
+    least_weight: float | None = None
+    """The smallest of these; None: the same."""
 
     @property
     def radius(self) -> float:
-        """Largest factor (*) of an error per tick; the estimate converges if it is below 1."""
-        return max(abs(1.0 - self.weight * x) for x in (self.smallest, self.largest))
+        """Largest factor (*) of an error per tick, or its bound if axes have different weights.
+
+        The estimate converges if it is below 1.
+        """
+        least = self.weight if self.least_weight is None else self.least_weight
+        return max(abs(1.0 - least * self.smallest), abs(1.0 - self.weight * self.largest))
 
     @property
     def margin(self) -> float:
@@ -80,23 +99,38 @@ class Spectrum:
         return self.contracts and self.margin >= LEAST_MARGIN
 
 
-def spectrum(inertia: Array, h_bar: Array, weight: float = 1.0) -> Spectrum:
-    """Return the `Spectrum` of the diagonal ``h_bar`` (m,) over ``inertia`` (K, m, m), H_S."""
-    eigen = eigenvalues(inertia, h_bar)
-    norm = np.linalg.norm(contraction_matrix(inertia, h_bar), 2, axis=(-2, -1))
-    return Spectrum(float(eigen.min()), float(eigen.max()), float(norm.max()), weight)
+def spectrum(inertia: Array, assumed: Array, weight: float | Array = 1.0) -> Spectrum:
+    """Return the `Spectrum` over ``inertia`` (K, m, m), H_S.
 
-
-def eigenvalues(inertia: Array, h_bar: Array) -> Array:
-    """Return the ascending eigenvalues (..., m) of ``H_S^-1 h_bar`` for H_S (..., m, m).
-
-    They are those of the symmetric ``h_bar^1/2 H_S^-1 h_bar^1/2``.
+    Args:
+        inertia: of the robot.
+        assumed: H^ of the estimate: (m,) diagonal, or (K, m, m).
+        weight: w of its low-pass, or (m,) for a diagonal H^.
     """
-    root = np.sqrt(h_bar)
-    similar = root[:, np.newaxis] * np.linalg.inv(inertia) * root
+    eigen = eigenvalues(inertia, assumed)
+    norm = np.linalg.norm(contraction_matrix(inertia, assumed), 2, axis=(-2, -1))
+    extremes = float(eigen.min()), float(eigen.max()), float(norm.max())
+    weights = np.atleast_1d(np.asarray(weight, dtype=np.float64))
+    if np.all(weights == weights[0]):
+        return Spectrum(*extremes, float(weights[0]))
+    return Spectrum(*extremes, float(weights.max()), float(weights.min()))
+
+
+def eigenvalues(inertia: Array, assumed: Array) -> Array:
+    """Return the ascending eigenvalues (..., m) of ``H_S^-1 H^`` for H_S (..., m, m).
+
+    They are those of the symmetric ``L^T H_S^-1 L`` with ``H^ = L L^T``.
+
+    Args:
+        inertia: H_S.
+        assumed: H^, (m,) diagonal or (..., m, m).
+    """
+    root = np.diag(np.sqrt(assumed)) if assumed.ndim == 1 else np.linalg.cholesky(assumed)
+    similar = root.swapaxes(-1, -2) @ np.linalg.inv(inertia) @ root
     return np.linalg.eigvalsh(0.5 * (similar + similar.swapaxes(-1, -2)))
 
 
-def contraction_matrix(inertia: Array, h_bar: Array) -> Array:
-    """Return ``W = E - H_S^-1 h_bar`` (69) of H_S (..., m, m) and the diagonal ``h_bar`` (m,)."""
-    return np.eye(len(h_bar)) - np.linalg.solve(inertia, np.diag(h_bar))
+def contraction_matrix(inertia: Array, assumed: Array) -> Array:
+    """Return ``W = E - H_S^-1 H^`` (69) of H_S (..., m, m) and H^, (m,) diagonal or (..., m, m)."""
+    whole = np.diag(assumed) if assumed.ndim == 1 else assumed
+    return np.eye(inertia.shape[-1]) - np.linalg.solve(inertia, whole)

@@ -2,25 +2,35 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from space_robot_control.guidance.limits import too_fast, too_strong
 from space_robot_control.guidance.mission import Mission, MissionSettings
-from space_robot_control.laws import ControlLaw
+from space_robot_control.laws import CompiledLaw, ControlLaw
+from space_robot_control.laws.base import CONSTANT_INERTIA, NO_ESTIMATE
 from space_robot_control.navigation.low_pass import low_pass_weight
 from space_robot_model.robot import Robot
 from space_robot_msgs_py.errors import InputError
 
+from .closed_loop import RigidLoop
+from .estimate_design import MUCH_SLOWER
+from .gain_check import estimate_spectrum
 from .inertia import inertia_along, sampled_reference, semi_floating_inertia
+from .linear_law import linear_law
 from .method import Tuned
-from .spectrum import LEAST_MARGIN, spectrum
+from .postures import Posture, postures_along
+from .spectrum import LEAST_MARGIN
+from .task import AUTO, NOMINAL
 
+Array = NDArray[np.float64]
+
+FEW = 8
+"""Configurations in which the loop of an observer is closed."""
 A_LEG = 10
 """Minimum number of configurations per leg."""
-MUCH_SLOWER = 0.1
-"""A law is weak below this share of the bandwidth of the laws with a model."""
 COARSE = 0.5
 """Largest time between two configurations, s; coarse, to save time."""
 
@@ -33,11 +43,13 @@ def margin_remarks(
     controls_base: bool = True,
     on_thrusters: bool = False,
     on_thin_margin: bool = True,
+    nominal: Robot | None = None,
 ) -> list[str]:
-    """Return a warning for each law with an h_bar that is unstable or nearly so.
+    """Return a warning for each law with an estimate or observer that is unstable or nearly so.
 
     Args:
-        flown: the laws of the flight, in order of use.
+        flown: the laws of the flight, in order of use; those in Python without an h_bar are not
+            tried.
         robot: of the plant, with its payload.
         mission: settings of the reference.
         acceleration_filter_hz: corner of the low-pass of the time-delay pair (0: none).
@@ -45,48 +57,88 @@ def margin_remarks(
         on_thrusters: whether these are only thrusters: the estimate feeds their pulses back into
             the demand, except the share ``H^-1 h_bar``.
         on_thin_margin: whether to warn of stable laws with little margin, too.
+        nominal: the robot as the controller knows it; None: ``robot``.
     """
-    laws = {law.name: law for law in flown if law.h_bar.size}
+    laws = {
+        law.name: law
+        for law in flown
+        if law.estimate != NO_ESTIMATE or (isinstance(law, CompiledLaw) and not law.uses_model)
+    }
     if not laws:
         return []
     try:
         inertia = inertia_along(robot, mission, COARSE, controls_base)
+        postures = postures_along(nominal or robot, mission, COARSE, controls_base)
     except InputError:  # the flight itself reports it
         return []
     remarks = []
     for name, law in laws.items():
         weight = low_pass_weight(acceleration_filter_hz, law.period) or 1.0
-        eigen = spectrum(inertia, law.h_bar[-inertia.shape[-1] :], weight)
-        if not eigen.contracts:
-            why = f"h_bar is too large for the robot (radius {eigen.radius:.3g}): it will diverge"
-        elif not eigen.is_sound and on_thin_margin:
-            why = (
-                f"h_bar leaves {eigen.margin:.2%} of margin in torque scale, "
-                f"at least {LEAST_MARGIN:.0%} is recommended"
-            )
-            if on_thrusters:
+        if why := _why_it_is_unsound(law, inertia, postures, weight, on_thin_margin):
+            if on_thrusters and law.estimate != NO_ESTIMATE and "diverge" not in why:
                 why += ", and thrusters' pulses come back into the demand (--gains robust)"
-        else:
-            continue
-        remarks.append(f"warning: {name}: {why}; see space-robot gains check")
+            remarks.append(f"warning: {name}: {why}; see space-robot gains check")
     return remarks
 
 
-def estimate_remark(tuned: Tuned) -> str:
-    """Return a remark if a set's laws with time-delay estimation are weak; else empty.
+def _why_it_is_unsound(
+    law: ControlLaw,
+    inertia: Array,
+    postures: Sequence[Posture],
+    weight: float,
+    on_thin_margin: bool,
+) -> str:
+    """Return what is wrong with a law's estimate or observer; empty if nothing is."""
+    name = {NO_ESTIMATE: "observer", CONSTANT_INERTIA: "h_bar"}.get(law.estimate, "nominal inertia")
+    if eigen := estimate_spectrum(law, inertia, postures, weight):
+        contracts, margin = eigen.contracts, f"{eigen.margin:.2%}"
+        growth, is_sound = f"radius {eigen.radius:.3g}", eigen.is_sound
+    else:
+        linear = linear_law(law, postures[0])
+        if not linear.uses("applied_force"):
+            return ""
+        every = -(-len(inertia) // FEW)
+        some = [postures[index % len(postures)] for index in range(0, len(inertia), every)]
+        loop = RigidLoop(inertia[::every], some, [linear] * len(some), weight)
+        contracts, is_sound = loop.is_stable(), loop.is_stable(1.0 + LEAST_MARGIN)
+        margin, growth = f"less than {LEAST_MARGIN:.0%}", f"growth {loop.radius():.6f} a tick"
+    if not contracts:
+        if law.estimate == CONSTANT_INERTIA:
+            return f"h_bar is too large for the robot ({growth}): it will diverge"
+        return f"its {name} does not suit the robot ({growth}): it will diverge"
+    if is_sound or not on_thin_margin:
+        return ""
+    return (
+        f"{name} leaves {margin} of margin in torque scale, "
+        f"at least {LEAST_MARGIN:.0%} is recommended"
+    )
 
-    They are weak below a tenth of the bandwidth of the laws with a model.
+
+def estimate_remark(tuned: Tuned) -> str:
+    """Return a remark if a constant h_bar does not suit a set's robot; else empty.
+
+    Its laws with time-delay estimation are then weak, with less than a tenth of the bandwidth of
+    those with a model, or they have the nominal inertia.
     """
+    if tuned.h_bar == NOMINAL:
+        if tuned.wishes.h_bar != AUTO or tuned.constant is None:
+            return ""
+        return (
+            "The laws with time-delay estimation use the inertia of the nominal model (h_bar: "
+            "nominal), because no diagonal h_bar suits light and heavy directions of this robot at "
+            f"once: eigenvalues of H_S^-1 h_bar would be {tuned.constant.smallest:.2g} to "
+            f"{tuned.constant.largest:.3g}, with {tuned.constant.bandwidth:.2g} rad/s."
+        )
     if tuned.bandwidth >= MUCH_SLOWER * tuned.model_bandwidth:
         return ""
     return (
         f"The laws with time-delay estimation are weak: {tuned.bandwidth:.2g} rad/s, those with a "
         f"model {tuned.model_bandwidth:.2g}. Eigenvalues of H_S^-1 h_bar are {tuned.smallest:.2g} "
         f"to {tuned.largest:.3g} (no diagonal h_bar suits light and heavy directions at once), so "
-        f"the estimate needs a low-pass and lags by {tuned.delay * 1e3:.3g} ms. What helps: fly "
-        "ctc or ctc_smc; panels on hinges without motors as passive joints; a smaller margin or "
-        "mass uncertainty (gains tune --margin, --mass-uncertainty), where drives and masses are "
-        "known that well; a shorter period."
+        f"the estimate needs a low-pass and lags by {tuned.delay * 1e3:.3g} ms. What helps: the "
+        "inertia of the nominal model (gains tune --h-bar nominal); ctc or ctc_smc; panels on "
+        "hinges without motors as passive joints; a smaller margin or mass uncertainty (--margin, "
+        "--mass-uncertainty), where drives and masses are known that well; a shorter period."
     )
 
 

@@ -26,15 +26,15 @@ from ...flight.plan import Flight, FlightPlan, resolve
 from ...flight.simulate import fly_blocks
 from ...processes.pool import cores, run_all
 from ...tuning.demand import demand
-from ...tuning.method import TuningOptions
+from ...tuning.task import AUTO, TuningOptions
 from ...tuning.warning import estimate_remark
 from ..gain_set import tuned_set, write_set
 from .folder import whole_folder
 
 SET, CASE = "tuned", "1"
 """Name of the tuned gain set, and the environment of tuning and flights."""
-WISHES = TuningOptions(margin=0.05, mass_uncertainty=0.2)
-"""Defaults of ``gains tune``."""
+WISHES = TuningOptions(margin=0.05, mass_uncertainty=0.2, h_bar=AUTO)
+"""Defaults of ``gains tune``, but that the estimate has the nominal inertia where it must."""
 
 
 Array = NDArray[np.float64]

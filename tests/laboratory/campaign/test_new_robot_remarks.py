@@ -14,7 +14,8 @@ from hypothesis import strategies as st
 
 from space_robot.analysis.metrics import axis_groups
 from space_robot.campaign.new_robot.make import DAMPING_RATIO, FREQUENCY_HZ, hinge_remark
-from space_robot.tuning.method import Tuned, TuningOptions
+from space_robot.tuning.method import Tuned
+from space_robot.tuning.task import TuningOptions
 from space_robot.tuning.warning import estimate_remark
 from space_robot_model.robot import Robot
 from space_robot_model.robot.find import find_robot, robot_names

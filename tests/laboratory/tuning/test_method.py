@@ -11,10 +11,12 @@ from hypothesis import strategies as st
 
 from space_robot.flight.plan import Flight, FlightPlan, resolve
 from space_robot.tuning.demand import ForceDemand, demand
-from space_robot.tuning.inertia import inertia_along
-from space_robot.tuning.method import Tuned, TuningOptions, axis_inertia, tune
+from space_robot.tuning.inertia import SAMPLING, inertia_along
+from space_robot.tuning.method import Tuned, tune
 from space_robot.tuning.noise import Noise
+from space_robot.tuning.postures import Posture, postures_along
 from space_robot.tuning.spectrum import eigenvalues
+from space_robot.tuning.task import TuningOptions, axis_inertia
 from space_robot_control.laws import laws
 from space_robot_msgs_py.errors import InputError
 
@@ -23,25 +25,26 @@ PERIOD = 5e-4
 
 
 @functools.cache
-def scene(robot: str = "paper") -> tuple[Array, ForceDemand]:
-    """H_S along the mission with the least and the largest payload, and what is asked for."""
+def scene(robot: str = "paper") -> tuple[Array, list[Posture], ForceDemand]:
+    """H_S with the least and the largest payload, nominal postures, and what is asked for."""
     flights = [Flight(resolve(FlightPlan(robot=robot, case=case))) for case in ("1", "4-2")]
     first = flights[0]
     inertias = [inertia_along(x.plant.robot, first.mission_settings) for x in flights]
     cases = [x.plant_settings for x in flights]
-    return np.concatenate(inertias), demand(first.robot, first.mission_settings, cases)
+    postures = postures_along(first.robot, first.mission_settings, SAMPLING)
+    return np.concatenate(inertias), postures, demand(first.robot, first.mission_settings, cases)
 
 
 def tuned(wishes: TuningOptions, robot: str = "paper", lag: float = 0.0) -> Tuned:
     still = np.zeros((100, scene(robot)[0].shape[-1]))
-    return tune(*scene(robot), wishes, PERIOD, Noise(still, still, lag, PERIOD))
+    return tune(*scene(robot), wishes, PERIOD, Noise(still, still, still, lag, PERIOD))
 
 
 @pytest.mark.parametrize("robot", ["paper", "seven_joint"])
 @pytest.mark.parametrize("margin", [0.01, 0.05])
 @pytest.mark.parametrize("share", [0.0, 0.2])
 def test_the_margin_is_left_with_the_worst_masses(robot: str, margin: float, share: float) -> None:
-    found, (inertia, _) = tuned(TuningOptions(margin, share), robot), scene(robot)
+    found, (inertia, *_) = tuned(TuningOptions(margin, share), robot), scene(robot)
     h_bar = np.asarray(found.gains["tde_stc"]["h_bar"])
     heavy, light = (eigenvalues(factor * inertia, h_bar) for factor in (1.0 + share, 1.0 - share))
     assert heavy.min() == pytest.approx(margin, rel=0.01)  # gains are rounded
@@ -122,7 +125,7 @@ def test_demand_is_what_a_flight_commands() -> None:
 
     log = simulate(Flight(resolve(FlightPlan(controller="ctc"))))
     assert log.commanded_torque is not None
-    asked = scene()[1]
+    asked = scene()[2]
     flight = Flight(resolve(FlightPlan(controller="ctc")))
     case_1 = demand(flight.robot, flight.mission_settings, [flight.plant_settings])
     peak = np.abs(log.commanded_torque).max(axis=0)
@@ -134,13 +137,16 @@ def test_demand_is_what_a_flight_commands() -> None:
 def white(rate: float, angle: float = 0.0) -> Noise:
     """White noise of rates, rad/s (eps: 1/s), and of angles, rad, alike on all axes."""
     rng, shape = np.random.default_rng(1), (8000, 9)
-    return Noise(rate * rng.normal(size=shape), angle * rng.normal(size=shape), 0.0, PERIOD)
+    rates = rate * rng.normal(size=shape)
+    return Noise(rates, angle * rng.normal(size=shape), rates, 0.0, PERIOD)
 
 
 def test_noise_is_kept_within_the_ripple_allowed() -> None:
-    inertia, asked = scene()
+    inertia, postures, asked = scene()
     wishes = TuningOptions(0.05, 0.2, ripple=0.1)
-    quiet, loud = (tune(inertia, asked, wishes, PERIOD, noise=white(x)) for x in (1e-9, 1e-5))
+    quiet, loud = (
+        tune(inertia, postures, asked, wishes, PERIOD, noise=white(x)) for x in (1e-9, 1e-5)
+    )
     assert quiet.corner_hz == tuned(wishes).corner_hz
     weight = 1.0 - np.exp(-2.0 * np.pi * loud.corner_hz * PERIOD)
     share = loud.gains["tde_stc"]["h_bar"] * weight / PERIOD * 1e-5 / asked.peak
@@ -149,9 +155,9 @@ def test_noise_is_kept_within_the_ripple_allowed() -> None:
 
 
 def test_bandwidth_is_also_what_computed_torque_allows() -> None:
-    inertia, asked = scene()
+    inertia, postures, asked = scene()
     noise = white(1e-9, angle=1e-3)
-    found = tune(inertia, asked, TuningOptions(0.05, 0.2), PERIOD, noise)
+    found = tune(inertia, postures, asked, TuningOptions(0.05, 0.2), PERIOD, noise)
     own = np.diagonal(inertia, axis1=1, axis2=2).max(axis=0)
     gains = found.gains["ctc"]
     command = gains["k_d"] * noise.rates + gains["k_p"] * noise.errors
@@ -165,14 +171,14 @@ def test_noise_beyond_any_low_pass_is_refused() -> None:
 
 def test_axes_that_nothing_is_asked_of_have_gains_as_well() -> None:
     """A motion in a plane asks the base for nothing about two of its axes, but for rounding."""
-    inertia, asked = scene()
+    inertia, postures, asked = scene()
     idle = [0, 2]
     factor = np.ones(len(asked.peak))
     factor[idle] = 0.0, 1e-17
     planar = ForceDemand(
         asked.peak * factor, asked.slope * factor, asked.unknown * factor, asked.nominal * factor
     )
-    found = tune(inertia, planar, TuningOptions(0.05, 0.2), PERIOD)
+    found = tune(inertia, postures, planar, TuningOptions(0.05, 0.2), PERIOD)
     usual = tuned(TuningOptions(0.05, 0.2))
     for law, gains in found.gains.items():
         for name, values in gains.items():

@@ -1,0 +1,199 @@
+"""Small motions of a robot under the linear part of a law, in discrete time.
+
+Between two ticks the torque is held. With r and p the measured rates and positions in rho, w the
+weight of the low-pass of the time-delay pair, H^ the inertia of the law's estimate, and b F the
+force that is reported for a commanded force F, the inputs of the law (`linear_law`) are
+
+    e = -p,  edot = -r,  rho = p,  rhodot = r,  F_applied = b F_k-1,
+    N_hat_k = (1 - w) N_hat_k-1 + w (b F_k-1 - H^ (r_k - r_k-1) / period).
+
+These motions have the states ``[x, law's states, F_k-1, N_hat_k-1, r_k-1]``, x those of the robot;
+those that a law does not use are left out. Noise of the measured e and r, and of the r that the
+pair takes, is an input.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .linear_law import LinearLaw
+from .postures import Posture
+
+Array = NDArray[np.float64]
+
+SLOWEST_GROWTH = 1e-6
+"""Growth in a tick up to which a loop counts as stable: that of rounding errors."""
+MOST_SCALE = 1.0
+"""Largest margin in torque scale that is searched: a torque reported twice as large."""
+MOST_ACTUAL = 100.0
+"""Largest ratio of actual to commanded torque that is searched."""
+HALVINGS = 14
+"""Of a searched interval, see `largest_stable`."""
+
+
+class Motion(NamedTuple):
+    """Motions near a posture, with states ``[q, qdot]`` and forces in rho."""
+
+    step: Array
+    """(2k, 2k) state a period later, by the state."""
+    by_force: Array
+    """(2k, m) the same by a force that is held."""
+    rate: Array
+    """(m, k) rates in rho that encoders and gyro measure, by qdot."""
+    posture: Posture
+    """As a law with a model knows it."""
+
+
+def rigid_motion(inertia: Array, posture: Posture, period: float) -> Motion:
+    """Return the motions ``H rhodd = F`` of a rigid robot, ``inertia`` H (m, m)."""
+    axes = len(inertia)
+    one, none, compliance = np.eye(axes), np.zeros((axes, axes)), np.linalg.inv(inertia)
+    step = np.block([[one, period * one], [none, one]])
+    by_force = np.vstack([0.5 * period**2 * compliance, period * compliance])
+    return Motion(step, by_force, one, posture)
+
+
+class Loop(NamedTuple):
+    """Small motions of robot and law, with Z states and 3 m inputs: noise of e, r, and pair's r."""
+
+    step: Array
+    """(Z, Z) state a tick later, by the state."""
+    by_noise: Array
+    """(Z, 3 m) the same by noise."""
+    force: Array
+    """(m, Z) force of a tick, by the state."""
+    force_by_noise: Array
+    """(m, 3 m) the same by noise."""
+
+
+def loop_of(
+    motion: Motion, law: LinearLaw, weight: float, reported: float = 1.0, actual: float = 1.0
+) -> Loop:
+    """Return the closed loop of a law.
+
+    Args:
+        motion: of the robot.
+        law: in the same posture.
+        weight: w of the low-pass of the time-delay pair; 1: none.
+        reported: b, ratio of reported to commanded torque.
+        actual: ratio of actual to commanded torque.
+    """
+    rate = motion.rate
+    axes, count = rate.shape
+    has_estimate = law.estimate is not None and law.uses("n_hat")
+    parts = _parts(
+        {
+            "robot": 2 * count,
+            "law": len(law.step),
+            "force": axes if has_estimate or law.uses("applied_force") else 0,
+            "n_hat": axes if has_estimate else 0,
+            "last_rate": axes if has_estimate else 0,
+            "error_noise": axes,
+            "rate_noise": axes,
+            "pair_noise": axes,
+        }
+    )
+    none = np.zeros((axes, count))
+    e = parts["error_noise"] - np.hstack([rate, none]) @ parts["robot"]
+    r = np.hstack([none, rate]) @ parts["robot"]
+    noisy, of_pair = r + parts["rate_noise"], r + parts["pair_noise"]
+    signals = {"error": e, "error_rate": -noisy, "rho": -e, "rho_rate": noisy}
+    if len(parts["force"]):
+        signals["applied_force"] = reported * parts["force"]
+    if has_estimate:
+        assert law.estimate is not None
+        acceleration = (of_pair - parts["last_rate"]) / law.period
+        pair = reported * parts["force"] - law.estimate @ acceleration
+        signals["n_hat"] = parts["n_hat"] + weight * (pair - parts["n_hat"])
+    states, force = law.step @ parts["law"], law.force_by_state @ parts["law"]
+    for name, value in signals.items():
+        states = states + law.state_by[name] @ value
+        force = force + law.force_by[name] @ value
+    rows = [motion.step @ parts["robot"] + actual * motion.by_force @ force, states]
+    if len(parts["force"]):
+        rows.append(force)
+    if has_estimate:
+        rows += [signals["n_hat"], of_pair]
+    whole, size = np.vstack(rows), force.shape[1] - 3 * axes
+    return Loop(whole[:, :size], whole[:, size:], force[:, :size], force[:, size:])
+
+
+def growth(matrix: Array) -> float:
+    """Return the largest absolute eigenvalue of a matrix."""
+    return float(np.abs(np.linalg.eigvals(matrix)).max())
+
+
+class RigidLoop:
+    """A law on a rigid robot in some postures."""
+
+    def __init__(
+        self, inertia: Array, postures: Sequence[Posture], laws: Sequence[LinearLaw], weight: float
+    ) -> None:
+        """Close the loop.
+
+        Args:
+            inertia: (K, m, m) of the actual robot.
+            postures: (K,) of the nominal robot.
+            laws: (K,) in these postures.
+            weight: of the low-pass of the time-delay pair; 1: none.
+        """
+        period = laws[0].period
+        motions = [rigid_motion(*pair, period) for pair in zip(inertia, postures, strict=True)]
+        self._parts = list(zip(motions, laws, strict=True))
+        self._weight = weight
+
+    def radius(self, reported: float = 1.0, actual: float = 1.0) -> float:
+        """Return the largest growth in a tick, with torque scales as in `loop_of`."""
+        return max(
+            growth(loop_of(*part, self._weight, reported, actual).step) for part in self._parts
+        )
+
+    def is_stable(self, reported: float = 1.0, actual: float = 1.0) -> bool:
+        """Return True if no small motion grows."""
+        return all(self._is_stable(index, reported, actual) for index in range(len(self._parts)))
+
+    def margin(self) -> float:
+        """Return the share by which the reported torque may exceed the commanded one.
+
+        At most `MOST_SCALE`; negative: ``1 - radius`` of a loop that is not stable.
+        """
+        return self._least(MOST_SCALE, lambda index, x: self._is_stable(index, 1.0 + x, 1.0))
+
+    def largest_scale(self) -> float:
+        """Return the largest stable ratio of actual to commanded torque, at most `MOST_ACTUAL`."""
+        if not self.is_stable():
+            return 0.0
+        more = self._least(MOST_ACTUAL - 1.0, lambda index, x: self._is_stable(index, 1.0, 1.0 + x))
+        return 1.0 + more
+
+    def _least(self, most: float, is_stable: Callable[[int, float], bool]) -> float:
+        """Return the smallest limit of all postures, at most ``most``."""
+        limit = most
+        for index in range(len(self._parts)):
+            if is_stable(index, limit):
+                continue
+            if not is_stable(index, 0.0):
+                return 1.0 - self.radius()
+            low, high = 0.0, limit
+            for _ in range(HALVINGS):
+                middle = 0.5 * (low + high)
+                low, high = (middle, high) if is_stable(index, middle) else (low, middle)
+            limit = low
+        return limit
+
+    def _is_stable(self, index: int, reported: float, actual: float) -> bool:
+        loop = loop_of(*self._parts[index], self._weight, reported, actual)
+        return growth(loop.step) <= 1.0 + SLOWEST_GROWTH
+
+
+def _parts(sizes: dict[str, int]) -> dict[str, Array]:
+    """Return for each part of a state the matrix (size, Z) that selects it."""
+    whole, start, parts = np.eye(sum(sizes.values())), 0, {}
+    for name, size in sizes.items():
+        parts[name] = whole[start : start + size]
+        start += size
+    return parts

@@ -1,0 +1,165 @@
+"""Inertia, low-pass, and errors of a time-delay estimate: steps 1 to 5 of `method`."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from space_robot_msgs_py.errors import InputError
+
+from .noise_limits import quiet_bandwidth, quiet_weight
+from .spectrum import eigenvalues
+from .task import CONSTANT, MOST_PER_TICK, NOMINAL, SEPARATION, TuningTask
+
+Array = NDArray[np.float64]
+
+MUCH_SLOWER = 0.1
+"""A law is weak below this share of the bandwidth of the laws with a model."""
+
+
+@dataclass(frozen=True)
+class EstimateDesign:
+    """A time-delay estimate, and what laws may ask of it."""
+
+    kind: str
+    """`CONSTANT` or `NOMINAL`."""
+    h_bar: Array
+    """(m,) kg m2; zero for the nominal inertia."""
+    weight: float
+    """w of the pair's low-pass; 1: none."""
+    delay: float
+    """T of step 4, s."""
+    bandwidth: float
+    """W of its laws, rad/s."""
+    fastest: float
+    """The largest one, a quarter of the estimate's pole, rad/s."""
+    smallest: float
+    """Smallest eigenvalue of ``H_S^-1 H^`` with nominal masses and every payload."""
+    largest: float
+    """Largest eigenvalue of the same."""
+    gap: Array
+    """(m,) error of the estimate in a tick, N m."""
+    error: Array
+    """(m,) eps, the acceleration by it, rad/s2 (eps: 1/s2)."""
+
+
+def constant_estimate(task: TuningTask) -> EstimateDesign:
+    """Return the estimate with a constant diagonal inertia.
+
+    Raises:
+        InputError: the sensors are too noisy.
+    """
+    wishes, eigen = task.wishes, eigenvalues(task.inertia, task.shape)
+    low, high = float(eigen.min()), float(eigen.max())
+    size = wishes.margin * (1.0 + wishes.mass_uncertainty) / low
+    weight = min(1.0, (1.0 - wishes.mass_uncertainty) / (size * high))
+    h_bar = size * task.shape
+    if task.noise and not wishes.noise_ripple:
+        weight = quiet_weight(weight, task.noise.acceleration, task.allowed / h_bar)
+    first = EstimateDesign(
+        CONSTANT, h_bar, weight, 0.0, 0.0, 0.0, size * low, size * high, h_bar, h_bar
+    )
+    return with_weight(task, first, weight)
+
+
+def nominal_estimate(task: TuningTask, weight: float | None = None) -> EstimateDesign:
+    """Return the estimate with the inertia of the nominal model.
+
+    Args:
+        task: requirements.
+        weight: of the low-pass; None: the largest one that the masses and the noise allow.
+
+    Raises:
+        InputError: the sensors are too noisy.
+    """
+    eigen = eigenvalues(task.inertia, task.nominal)
+    low, high = float(eigen.min()), float(eigen.max())
+    if weight is None:
+        weight = min(1.0, (1.0 - task.wishes.mass_uncertainty) / high)
+        if (noise := task.noise) and not task.wishes.noise_ripple:
+            weight = quiet_weight(
+                weight, lambda w: noise.nominal_force(w, task.nominal), task.allowed
+            )
+    none = np.zeros_like(task.shape)
+    first = EstimateDesign(NOMINAL, none, weight, 0.0, 0.0, 0.0, low, high, none, none)
+    return with_weight(task, first, weight)
+
+
+def check_estimate(task: TuningTask, design: EstimateDesign) -> None:
+    """Check margin and bandwidth that a user asks for.
+
+    Raises:
+        InputError: the margin is beyond what the nominal inertia leaves, or the bandwidth beyond
+            half of the estimate's pole.
+    """
+    wishes, smallest = task.wishes, design.smallest / (1.0 + task.wishes.mass_uncertainty)
+    if design.kind == NOMINAL and smallest < wishes.margin:
+        raise InputError(
+            f"margin must be at most {smallest:.3g} with the nominal inertia, this mass "
+            f"uncertainty and these payloads, got {wishes.margin:g}"
+        )
+    if design.bandwidth > 2.0 * design.fastest:
+        raise InputError(
+            f"bandwidth must be at most {2.0 * design.fastest:.3g} rad/s, half of the pole of an "
+            f"estimate with this margin and lag, got {design.bandwidth:g}"
+        )
+
+
+def with_weight(task: TuningTask, design: EstimateDesign, weight: float) -> EstimateDesign:
+    """Return the estimate with another low-pass: steps 4 and 5.
+
+    The pair of the nominal inertia has no lag but its own, see `method`.
+    """
+    wishes, asked, is_constant = task.wishes, task.asked, design.kind == CONSTANT
+    delay = task.period / weight + (task.lag if is_constant else 0.0)
+    slowest = wishes.margin
+    if not is_constant:
+        slowest = design.smallest / (1.0 + wishes.mass_uncertainty)
+    fastest = slowest / delay / SEPARATION
+    bandwidth = wishes.bandwidth or fastest
+    if not is_constant and not wishes.bandwidth:
+        bandwidth = min(fastest, model_bandwidth(task))
+    gap = delay * asked.slope + 0.5 * wishes.margin * asked.peak
+    error = gap / design.h_bar if is_constant else _largest_acceleration(task.inertia, gap)
+    return replace(
+        design,
+        weight=weight,
+        delay=delay,
+        bandwidth=bandwidth,
+        fastest=fastest,
+        gap=gap,
+        error=error,
+    )
+
+
+def is_weak(design: EstimateDesign, task: TuningTask) -> bool:
+    """Return True if the laws of an estimate are much slower than those with a model."""
+    return (
+        design.bandwidth < MUCH_SLOWER * model_bandwidth(task)
+        or design.bandwidth > 2.0 * design.fastest
+    )
+
+
+def model_bandwidth(task: TuningTask, own: Array | None = None) -> float:
+    """Return W of a law without estimate, rad/s: what lag, period and noise allow.
+
+    Args:
+        task: with its lag and noise.
+        own: (m,) inertia by which the law multiplies K_P and K_D; None: that of the model.
+    """
+    if task.wishes.bandwidth:
+        return task.wishes.bandwidth
+    if own is None:
+        own = np.diagonal(task.inertia, axis1=1, axis2=2).max(axis=0)
+    bandwidth = MOST_PER_TICK / task.period
+    if not task.wishes.noise_ripple:
+        bandwidth = min(quiet_bandwidth(own, task.noise, task.allowed), bandwidth)
+    return min(bandwidth, 1.0 / SEPARATION / task.lag) if task.lag else bandwidth
+
+
+def _largest_acceleration(inertia: Array, force: Array) -> Array:
+    """Return the largest ``|H_S^-1| |F|`` (m,) of all configurations."""
+    largest: Array = (np.abs(np.linalg.inv(inertia)) @ force).max(axis=0)
+    return largest
