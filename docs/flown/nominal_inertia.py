@@ -15,7 +15,7 @@ NOMINAL: dict[str, Any] = {"controller": "tde_stc", "gains": {"h_bar": "nominal"
 PRINTED: dict[str, Any] = {"controller": "tde_stc", "gains": "printed"}
 SCALES = (0.8, 0.95, 1.005, 1.01, 1.05, 1.2)
 GRADES = ("fine", "tactical", "coarse")
-CORNERS = (5.0, 20.0, 40.0)
+CORNERS = (20.0, 40.0)
 
 
 def largest_rms(flown: FlownFlight) -> float | None:
@@ -46,7 +46,7 @@ def _of_scale(factor: float) -> list[str | Number]:
 
 def _of_grade(grade: str) -> list[str | Number]:
     shared: Options = {"case": "3", "sensors": grade, "navigation": "filtered", "duration": 20.0}
-    slow = {"h_bar": "nominal", "lambda": [3.0], "k_1": [0.02], "k_2": [1e-4]}
+    strong = {"h_bar": "nominal", "lambda": [20.0], "k_1": [0.1], "k_2": [2e-3]}
     flights: list[Options] = [
         {**shared, "controller": law, "gains": "robust"} for law in ("ctc", "tde_stc")
     ]
@@ -54,7 +54,7 @@ def _of_grade(grade: str) -> list[str | Number]:
         {
             **shared,
             "controller": "tde_stc",
-            "gains": slow,
+            "gains": strong,
             "parameters": {"controller": {"acceleration_filter_hz": corner}},
         }
         for corner in CORNERS
