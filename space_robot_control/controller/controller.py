@@ -102,6 +102,7 @@ class Controller(RecordOwner):
         memory: ControllerMemory = self.block[0]
         assign(memory, last_jacobian_inverse=2.0 * np.eye(3))
         assign(memory.signals, model=robot.nominal.model)
+        assign(memory.signals, base_is_free=not actuators.controls_base)
         assign(memory, controls_base=actuators.controls_base)
         assign(memory, transfer_ticks=max(1, round(TRANSFER_S / period)))
         assign(memory.pair, smoothing=low_pass_weight(acceleration_filter_hz, period))

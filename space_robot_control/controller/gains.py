@@ -26,6 +26,8 @@ Array = NDArray[np.float64]
 
 STRICTLY_POSITIVE = ("h_bar", "inertia", "delta")
 """Gains used as divisors; other gains may be zero."""
+FRACTIONS = ("spread",)
+"""Gains that must be below 1."""
 NOMINAL = "nominal"
 """``h_bar`` for a time-delay estimate with the inertia of the nominal model; as numbers: zeros."""
 PARAMETERS = "controller parameters"
@@ -126,6 +128,8 @@ def check_gains(content: Tree, law: type[ControlLaw], axes: int, where: str) -> 
                 f"{key}: {gain_lengths(axes)} were expected, got {short(content[name])}"
             )
         fits = values > 0.0 if name in STRICTLY_POSITIVE else values >= 0.0
+        if name in FRACTIONS:
+            fits &= values < 1.0
         if name == "h_bar" and not values.any():
             fits = values == 0.0
         if not np.all(fits & np.isfinite(values)):
@@ -137,6 +141,8 @@ def check_gains(content: Tree, law: type[ControlLaw], axes: int, where: str) -> 
 def gain_range(name: str) -> str:
     """Return the allowed values of a gain, in words."""
     text = f"finite values {'above 0' if name in STRICTLY_POSITIVE else '0 or more'}"
+    if name in FRACTIONS:
+        return f"{text} and below 1"
     return f"{text}, or {NOMINAL} (as numbers: all 0)," if name == "h_bar" else text
 
 

@@ -60,6 +60,7 @@ class Signals(Record):
     applied_force: Array = per_axis("F_S applied over the last interval", "N m")
     paired_force: Array = per_axis("the same through the low-pass of the time-delay pair", "N m")
     paired_acceleration: Array = per_axis("mean rhodd of that interval, through the same low-pass")
+    base_is_free: float = shaped(lambda n: (), "1 if nothing turns the base, else 0", uniform=True)
     reference: Reference = nested(Reference)
     """Desired motion of base and joints."""
     nominal: RhoSpaceModel = nested(RhoSpaceModel)

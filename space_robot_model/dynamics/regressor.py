@@ -1,0 +1,250 @@
+"""The nominal model as a linear function of the second moments of mass (`.second_moments`).
+
+The robot moves with ``qdot = [w0, thetadot]``, w0 in inertial axes. With ``J_k`` the Jacobian of
+the vector ``u_k``, so that its rate is ``J_k qdot``, and D the second moments, the inertia matrix
+and bias force of the robot whose base floats are (`.rho_space`)
+
+    H_r = sum_kl D_kl J_k^T J_l,   C_r = sum_kl D_kl J_k^T Jdot_l,   c_r = C_r qdot
+
+``Hdot_r - 2 C_r`` is skew-symmetric, since D is symmetric. For any velocities v and s,
+
+    s^T (H_r vdot + C_r v) = sum_kl D_kl (J_k s) . (J_l vdot + Jdot_l v)
+
+so no matrix of the regressor is needed: the force is that of forces ``f_k = sum_l D_kl
+(J_l vdot + Jdot_l v)`` on the vectors, and the gradient by D is the product of the two factors.
+In ``rho = [eps, theta]`` the same holds with ``w0 = J0^-1 epsdot`` (`take_rho`, `force_in_rho`).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from space_robot_msgs_py.compiled.kernels import kernel, subroutine
+from space_robot_msgs_py.compiled.lanes import uniform, whole
+from space_robot_msgs_py.compiled.records import Record, shaped
+
+from ..elementary.sine import sin_cos
+from .algebra import (
+    Matrix,
+    Vector,
+    add,
+    cross,
+    dot,
+    scale,
+    store,
+    subtract,
+    transform,
+    transform_transposed,
+    vector,
+)
+from .attitude import attitude_jacobian_inverse, rotation_matrix
+from .model import Model
+
+Array = NDArray[np.float64]
+
+
+class Regressor(Record):
+    """Vectors and their motion for n joints, in inertial axes.
+
+    The vectors of the base are the columns 0 to 2, those of joint j the columns ``3 + 2 j`` and
+    ``4 + 2 j``; the second of a prismatic joint is zero.
+    """
+
+    velocity: Array = shaped(lambda n: (n + 3,))
+    """qdot, rad/s and m/s."""
+    s: Array = shaped(lambda n: (n + 3,))
+    """Any other velocity."""
+    v: Array = shaped(lambda n: (n + 3,))
+    """And one more."""
+    v_rate: Array = shaped(lambda n: (n + 3,))
+    """vdot, rad/s2 and m/s2."""
+    axes: Array = shaped(lambda n: (n + 1, 9))
+    """Axes x, y and z of each body."""
+    motion: Array = shaped(lambda n: (n + 1, 12))
+    """Angular velocity of each body with qdot, s and v, and the rate of the last."""
+    torque: Array = shaped(lambda n: (n + 1, 3))
+    """Torque on each body and all bodies that it carries, N m."""
+    jacobian_inverse: Array = shaped(lambda n: (3, 3))
+    """``J0^-1`` in the base frame; in inertial axes it is the transpose."""
+    rotation: Array = shaped(lambda n: (3, 3))
+    """Rotation from the base frame to the inertial frame."""
+    vectors: Array = shaped(lambda n: (3, 2 * n + 3))
+    """``u_k``."""
+    sliding: Array = shaped(lambda n: (3, 2 * n + 3))
+    """``J_k s``."""
+    acceleration: Array = shaped(lambda n: (3, 2 * n + 3))
+    """``J_k vdot + Jdot_k v``."""
+
+
+@kernel
+def vectors_into(model: Model, quaternion: Array, joint_positions: Array, out: Regressor) -> None:
+    """Write ``out.axes`` and ``out.vectors`` of a robot without passive joints.
+
+    Args:
+        model: the robot.
+        quaternion: (4,) base attitude, unit.
+        joint_positions: (n,) rad, or m for prismatic joints.
+        out: ``rotation`` is written, too.
+    """
+    rotation_matrix(quaternion, out.rotation)
+    for k in range(3):
+        for c in range(3):
+            out.axes[0, 3 * k + c] = out.vectors[c, k] = out.rotation[c, k]
+    for j in range(whole(model.joint_count)):
+        parent, e = out.axes[whole(model.parent[j])], model.rotation[j]
+        x, y, z = vector(parent, 0), vector(parent, 3), vector(parent, 6)
+        x, y, z = (
+            add(add(scale(x, e[0]), scale(y, e[3])), scale(z, e[6])),
+            add(add(scale(x, e[1]), scale(y, e[4])), scale(z, e[7])),
+            add(add(scale(x, e[2]), scale(y, e[5])), scale(z, e[8])),
+        )
+        if uniform(model.is_prismatic[j]) == 0.0:
+            st, ct = sin_cos(joint_positions[j])
+            x, y = add(scale(x, ct), scale(y, st)), subtract(scale(y, ct), scale(x, st))
+            store_column(x, out.vectors, 3 + 2 * j)
+            store_column(y, out.vectors, 4 + 2 * j)
+        else:
+            store_column(scale(z, joint_positions[j]), out.vectors, 3 + 2 * j)
+            store_column((0.0, 0.0, 0.0), out.vectors, 4 + 2 * j)
+        store(x, out.axes[j + 1], 0)
+        store(y, out.axes[j + 1], 3)
+        store(z, out.axes[j + 1], 6)
+
+
+@kernel
+def take_rho(
+    quaternion: Array, rate: Array, s: Array, v: Array, v_rate: Array, out: Regressor
+) -> None:
+    """Write ``out.velocity``, ``s``, ``v`` and ``v_rate`` from those in ``rho = [eps, theta]``.
+
+    Args:
+        quaternion: (4,) base attitude, unit; singular at eta = 0.
+        rate: (m,) rhodot.
+        s: (m,) velocity in rho.
+        v: (m,) velocity in rho.
+        v_rate: (m,) its rate.
+        out: ``jacobian_inverse`` is written, too.
+    """
+    attitude_jacobian_inverse(quaternion, out.jacobian_inverse)
+    inverse = _nine(out.jacobian_inverse)
+    epsilon_rate = vector(rate, 0)
+    w = transform_transposed(inverse, epsilon_rate)
+    wv = transform_transposed(inverse, vector(v, 0))
+    eta_rate = -0.5 * dot(vector(quaternion, 1), w)
+    # J0dot = (etadot E - skew(epsdot)) / 2 in inertial axes
+    convective = scale(subtract(scale(wv, eta_rate), cross(epsilon_rate, wv)), 0.5)
+    store(w, out.velocity, 0)
+    store(transform_transposed(inverse, vector(s, 0)), out.s, 0)
+    store(wv, out.v, 0)
+    store(transform_transposed(inverse, subtract(vector(v_rate, 0), convective)), out.v_rate, 0)
+    for i in range(3, rate.size):
+        out.velocity[i], out.s[i], out.v[i], out.v_rate[i] = rate[i], s[i], v[i], v_rate[i]
+
+
+@kernel
+def motions_into(model: Model, out: Regressor) -> None:
+    """Write ``out.sliding`` and ``out.acceleration`` from vectors and velocities."""
+    w, ws, wv = vector(out.velocity, 0), vector(out.s, 0), vector(out.v, 0)
+    a = vector(out.v_rate, 0)
+    _keep(w, ws, wv, a, out.motion[0])
+    for k in range(3):
+        _move(w, ws, wv, a, k, out)
+    for j in range(whole(model.joint_count)):
+        row, first, z = out.motion[whole(model.parent[j])], 3 + 2 * j, vector(out.axes[j + 1], 6)
+        rate, s, v = out.velocity[3 + j], out.s[3 + j], out.v[3 + j]
+        w, ws, wv, a = vector(row, 0), vector(row, 3), vector(row, 6), vector(row, 9)
+        along = add(scale(z, out.v_rate[3 + j]), scale(cross(w, z), v))
+        if uniform(model.is_prismatic[j]) == 0.0:
+            w, a = add(w, scale(z, rate)), add(a, along)
+            ws, wv = add(ws, scale(z, s)), add(wv, scale(z, v))
+            _move(w, ws, wv, a, first, out)
+            _move(w, ws, wv, a, first + 1, out)
+        else:
+            _move(w, ws, wv, a, first, out)
+            sliding = column(out.sliding, first)
+            acceleration = column(out.acceleration, first)
+            along = add(along, cross(wv, scale(z, rate)))
+            store_column(add(sliding, scale(z, s)), out.sliding, first)
+            store_column(add(acceleration, along), out.acceleration, first)
+            store_column((0.0, 0.0, 0.0), out.sliding, first + 1)
+            store_column((0.0, 0.0, 0.0), out.acceleration, first + 1)
+        _keep(w, ws, wv, a, out.motion[j + 1])
+
+
+@kernel
+def force_on_vectors_into(model: Model, forces: Array, out: Regressor, total: Array) -> None:
+    """Write ``sum_k J_k^T f_k``, after `vectors_into`.
+
+    Args:
+        model: the robot.
+        forces: (3, 2n+3) f_k, inertial axes.
+        out: with the vectors; ``torque`` is written.
+        total: (m,) torque on the base in inertial axes and those of the joints, N m.
+    """
+    n = whole(model.joint_count)
+    for i in range(n + 1):
+        store((0.0, 0.0, 0.0), out.torque[i], 0)
+    for j in range(n - 1, -1, -1):
+        first, z, parent = 3 + 2 * j, vector(out.axes[j + 1], 6), out.torque[whole(model.parent[j])]
+        own = _moment(first, forces, out)
+        torque = add(vector(out.torque[j + 1], 0), own)
+        torque = add(torque, _moment(first + 1, forces, out))
+        if uniform(model.is_prismatic[j]) == 0.0:
+            total[3 + j] = dot(z, torque)
+        else:
+            force = column(forces, first)
+            total[3 + j] = dot(z, force)
+        store(add(vector(parent, 0), torque), parent, 0)
+    torque = vector(out.torque[0], 0)
+    for k in range(3):
+        torque = add(torque, _moment(k, forces, out))
+    store(torque, total, 0)
+
+
+@kernel
+def force_in_rho(out: Regressor, force: Array) -> None:
+    """Convert a force (m,) to the generalised force F_S, after `take_rho`."""
+    inverse = _nine(out.jacobian_inverse)
+    store(transform(inverse, vector(force, 0)), force, 0)
+
+
+@subroutine
+def column(vectors: Array, k: int) -> Vector:
+    """Return column k of ``vectors`` (3, N)."""
+    return vectors[0, k], vectors[1, k], vectors[2, k]
+
+
+@subroutine
+def store_column(a: Vector, vectors: Array, k: int) -> None:
+    """Write ``a`` into column k of ``vectors`` (3, N)."""
+    vectors[0, k], vectors[1, k], vectors[2, k] = a
+
+
+@subroutine
+def _moment(k: int, forces: Array, out: Regressor) -> Vector:
+    """Return ``u_k x f_k``."""
+    u = column(out.vectors, k)
+    force = column(forces, k)
+    return cross(u, force)
+
+
+@subroutine
+def _move(w: Vector, ws: Vector, wv: Vector, a: Vector, k: int, out: Regressor) -> None:
+    """Write the motion of a vector that is fixed in a body, see `Regressor.motion`."""
+    u = column(out.vectors, k)
+    store_column(cross(ws, u), out.sliding, k)
+    store_column(add(cross(a, u), cross(wv, cross(w, u))), out.acceleration, k)
+
+
+@subroutine
+def _keep(w: Vector, ws: Vector, wv: Vector, a: Vector, row: Array) -> None:
+    store(w, row, 0)
+    store(ws, row, 3)
+    store(wv, row, 6)
+    store(a, row, 9)
+
+
+@subroutine
+def _nine(m: Array) -> Matrix:
+    return m[0, 0], m[0, 1], m[0, 2], m[1, 0], m[1, 1], m[1, 2], m[2, 0], m[2, 1], m[2, 2]

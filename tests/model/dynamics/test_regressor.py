@@ -1,0 +1,201 @@
+"""The model as a linear function of second moments of mass, and these moments."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+from oracles import attitude_jacobian_base
+from paths import ROOT
+from random_robots import Case, branched_cases, cases, random_state
+from second_moment_model import frames, jacobians, missing, second_moments, vectors
+
+from space_robot_model.dynamics.regressor import (
+    Regressor,
+    force_in_rho,
+    force_on_vectors_into,
+    motions_into,
+    take_rho,
+    vectors_into,
+)
+from space_robot_model.dynamics.rho_space import RhoSpaceModel, rho_space_into
+from space_robot_model.robot import Robot
+
+Array = NDArray[np.float64]
+
+ROBOTS = sorted(path.stem for path in (ROOT / "config/robots").glob("*.yaml"))
+FEW = settings(max_examples=25, deadline=None)
+SMALLEST_ETA = 0.1
+
+
+def near_zero(case: Case, least: float = SMALLEST_ETA) -> Array:
+    """The attitude of a case, nearer to zero than half a turn: there J0^-1 would be large."""
+    quaternion = case.state.quaternion.copy()
+    quaternion[0] = abs(quaternion[0]) + least
+    return quaternion / np.linalg.norm(quaternion)
+
+
+def model_of(robot: Robot, quaternion: Array, theta: Array, rate: Array) -> tuple[Array, Array]:
+    """H_S and c_S of the project for ``rho = [eps, theta]`` with ``rhodot = rate``."""
+    out = RhoSpaceModel.allocate(robot.n)
+    omega_base = np.asarray(
+        np.linalg.solve(attitude_jacobian_base(quaternion), rate[:3]), np.float64
+    )
+    rho_space_into(robot.model, quaternion, theta, omega_base, rate[3:].copy(), out)
+    return out.inertia.copy(), out.bias.copy()
+
+
+def relative(actual: Array, expected: Array) -> float:
+    """Largest difference, relative to the largest number."""
+    return float(np.abs(actual - expected).max() / np.abs(expected).max())
+
+
+def by_sweep(case: Case, moments: Array, quaternion: Array, motion: Array) -> tuple[Array, Array]:
+    """``Y pi`` and ``(J s)^T (J vdot + Jdot v)`` by the kernels, for rate, s, v and vdot."""
+    robot, work = case.robot, Regressor.allocate(case.robot.n)
+    force = np.zeros(robot.n + 3)
+    vectors_into(robot.model, quaternion, case.state.theta, work)
+    rate, s, v, v_rate = motion
+    take_rho(quaternion, rate, s, v, v_rate, work)
+    motions_into(robot.model, work)
+    force_on_vectors_into(robot.model, np.array(work.acceleration) @ moments, work, force)
+    force_in_rho(work, force)
+    product = np.array(work.sliding).T @ np.array(work.acceleration)
+    return force, 0.5 * (product + product.T)
+
+
+@pytest.mark.parametrize("name", ROBOTS)
+def test_nominal_moments_give_the_model_of_every_robot(name: str) -> None:
+    robot, rng = (
+        Robot.from_yaml(ROOT / f"config/robots/{name}.yaml").nominal,
+        np.random.default_rng(1),
+    )
+    moments = second_moments(robot)
+    for _ in range(10):
+        case = Case(robot, random_state(rng, robot.n), rng)
+        quaternion, (rate, acceleration) = near_zero(case), rng.normal(size=(2, robot.n + 3))
+        inertia, bias = model_of(robot, quaternion, case.state.theta, rate)
+        expected = inertia @ acceleration + bias
+        motion = np.array([rate, rate, rate, acceleration])
+        force, _ = by_sweep(case, moments, quaternion, motion)
+        assert relative(force, expected) < 1e-12
+        dense = jacobians(robot, quaternion, case.state.theta, rate)
+        assert relative(dense.inertia(moments), inertia) < 1e-12
+        assert relative(dense.force(moments, rate, acceleration), expected) < 1e-12
+
+
+@FEW
+@given(cases() | branched_cases())
+def test_force_and_gradient_are_those_of_dense_jacobians(case: Case) -> None:
+    """Also for velocities v and s that the robot does not have, and for any D."""
+    quaternion, size = near_zero(case), 2 * case.robot.n + 3
+    motion = case.rng.normal(size=(4, case.robot.n + 3))
+    rate, s, v, v_rate = motion
+    root = case.rng.normal(size=(size, size))
+    force, gradient = by_sweep(case, root @ root.T, quaternion, motion)
+    dense = jacobians(case.robot, quaternion, case.state.theta, rate)
+    assert relative(force, dense.force(root @ root.T, v, v_rate)) < 1e-11
+    assert relative(gradient, dense.gradient(s, v, v_rate)) < 1e-11
+    change = case.rng.normal(size=(size, size))
+    change += change.T
+    by_difference = s @ (dense.force(root @ root.T + change, v, v_rate) - force)
+    assert np.sum(gradient * change) == pytest.approx(by_difference, rel=1e-7, abs=1e-9)
+
+
+@FEW
+@given(cases([1, 3, 6]) | branched_cases([1, 3, 6]))
+def test_rate_of_inertia_less_twice_coriolis_is_skew_symmetric(case: Case) -> None:
+    """Hdot by central differences of the project's H_S along the motion."""
+    robot, state, h = case.robot, case.state, 1e-4
+    quaternion, moments = near_zero(case, 1.0), second_moments(case.robot)
+    rate = case.rng.normal(size=robot.n + 3)
+    inertias = []
+    for t in (-2 * h, -h, h, 2 * h):
+        # epsilon moves evenly, so its rate is constant along the way
+        epsilon = quaternion[1:] + t * rate[:3]
+        at = np.concatenate([[np.sqrt(1.0 - epsilon @ epsilon)], epsilon])
+        inertias.append(model_of(robot, at, state.theta + t * rate[3:], rate)[0])
+    inertia_rate = (inertias[0] - 8 * inertias[1] + 8 * inertias[2] - inertias[3]) / (12 * h)
+    coriolis = jacobians(robot, quaternion, state.theta, rate).coriolis(moments)
+    skew = inertia_rate - 2.0 * coriolis
+    assert np.abs(skew + skew.T).max() < 1e-8 * max(
+        np.abs(inertia_rate).max(), np.abs(inertias).max()
+    )
+
+
+def points_of(robot: Robot) -> list[tuple[float, int, Array]]:
+    """Mass points (mass, body, position in its frame) with the moments of every body."""
+    points = []
+    for i in range(robot.n + 1):
+        tensor, mass = robot.inertia[i], robot.mass[i]
+        second, axes = np.linalg.eigh(0.5 * np.trace(tensor) * np.eye(3) - tensor)
+        com = np.zeros(3) if i == 0 else robot.com[i]
+        for moment, axis in zip(second, axes.T, strict=True):
+            for side in (-1.0, 1.0):
+                points.append((mass / 6, i, com + side * np.sqrt(3 * moment / mass) * axis))
+    return points
+
+
+@FEW
+@given(cases([1, 3]) | branched_cases([3, 6]))
+def test_moments_are_those_of_mass_points(case: Case) -> None:
+    """The constants of every point follow from where it is in many postures."""
+    robot, rng, points = case.robot, case.rng, points_of(case.robot)
+    masses = np.array([mass for mass, _, _ in points])
+    rows, places = [], []
+    for _ in range(2 * robot.n + 6):
+        state = random_state(rng, robot.n)
+        at = frames(robot, state.quaternion, state.theta)
+        positions = np.array([at.origins[i] + at.axes[i] @ p for _, i, p in points])
+        places.append((positions - masses @ positions / masses.sum()).T)
+        rows.append(vectors(robot, state.quaternion, state.theta))
+    constants, *_ = np.linalg.lstsq(np.vstack(rows), np.vstack(places), rcond=1e-12)
+    expected = (constants * masses) @ constants.T
+    for k in missing(robot):
+        expected[k, k] = 1.0
+    assert relative(second_moments(robot), expected) < 1e-9
+
+
+def pseudo_inertia(robot: Robot, i: int) -> Array:
+    """(4, 4) integral of ``[x, 1] [x, 1]^T dm`` of a body in its frame."""
+    com = np.zeros(3) if i == 0 else robot.com[i]
+    second = 0.5 * np.trace(robot.inertia[i]) * np.eye(3) - robot.inertia[i]
+    moment = robot.mass[i] * com
+    second = second + np.outer(moment, com)
+    return np.block([[second, moment[:, None]], [moment[None], np.array([[robot.mass[i]]])]])
+
+
+def deviated(robot: Robot, spread: Array, rng: np.random.Generator) -> Robot:
+    """Every link's pseudo-inertia off by up to its ``spread`` in any direction; the base scaled."""
+    masses, inertias, coms = robot.mass.copy(), robot.inertia.copy(), robot.com.copy()
+    scale = 1.0 + spread[0] * rng.uniform(-1, 1)
+    masses[0], inertias[0] = scale * masses[0], scale * inertias[0]
+    for i in range(1, robot.n + 1):
+        axes, _ = np.linalg.qr(rng.normal(size=(4, 4)))
+        root = np.linalg.cholesky(pseudo_inertia(robot, i))
+        factor = axes @ np.diag(1.0 + spread[i] * rng.uniform(-1, 1, 4)) @ axes.T
+        p = root @ factor @ root.T
+        masses[i], coms[i] = p[3, 3], p[:3, 3] / p[3, 3]
+        second = p[:3, :3] - masses[i] * np.outer(coms[i], coms[i])
+        inertias[i] = np.trace(second) * np.eye(3) - second
+    return replace(robot, mass=masses, inertia=inertias, com=coms)
+
+
+@FEW
+@given(cases() | branched_cases(), st.floats(0.01, 0.95))
+def test_moments_lie_between_those_of_the_lightest_and_heaviest_robot(
+    case: Case, most: float
+) -> None:
+    spread = most * case.rng.uniform(0.1, 1.0, case.robot.n + 1)
+    moments = second_moments(deviated(case.robot, spread, case.rng))
+    lower, upper = (second_moments(case.robot, 1.0 + side * spread) for side in (-1.0, 1.0))
+    for k in missing(case.robot):
+        moments[k, k] = 1.0
+    for difference in (moments - lower, upper - moments, lower):
+        size = np.sqrt(np.diag(upper))
+        assert np.linalg.eigvalsh(difference / np.outer(size, size))[0] > -1e-12
+    assert np.linalg.eigvalsh(lower)[0] > 0.0
