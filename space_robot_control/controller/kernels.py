@@ -62,7 +62,7 @@ class ControllerMemory(Record):
     """J0^-1 of the last tick."""
     desired_jacobian: Array = shaped(lambda n: (3, 3))
     """Scratch."""
-    pair_is_as_measured: float = shaped(lambda n: ())
+    pair_is_as_measured: float = shaped(lambda n: (), uniform=True)
     """1 if the time-delay pair has rates as they were measured, 0 if as navigation has them."""
     rate_as_measured: Array = shaped(lambda n: (n + 3,))
     """Scratch: rhodot without the navigation's low-pass."""
