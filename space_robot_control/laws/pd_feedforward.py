@@ -48,7 +48,7 @@ def feedforward(signals: Signals, gains: Gains, memory: Memory, period: float) -
         u[i] = force[i] - bias[i]
         for k in range(3):
             u[i] -= inertia[i, k] * u[k]
-    cholesky_into(inertia[3:, 3:], memory.factor)
+    cholesky_into(inertia, 3, memory.factor)
     solve_cholesky(memory.factor, u[3:])
     for k in range(3):
         force[k] += bias[k]

@@ -189,7 +189,7 @@ def bound_estimate(model: Model, gains: Gains, memory: Memory) -> None:
         gamma = of_body(gains.gamma, i)
         factor[i] = np.sqrt(where(gamma > SLOWEST_ADAPTATION, gamma, SLOWEST_ADAPTATION))
     second_moments_into(model, coordinates, factor, memory.metric)
-    cholesky_into(memory.metric, memory.root)
+    cholesky_into(memory.metric, 0, memory.root)
     for k in range(size):
         for c in range(size):
             memory.work[k, c] = memory.upper[k, c] - memory.lower[k, c]

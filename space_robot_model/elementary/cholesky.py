@@ -11,14 +11,17 @@ Array = NDArray[np.float64]
 
 
 @kernel
-def cholesky_into(matrix: Array, factor: Array) -> None:
-    """Write the lower triangle L of ``matrix = L L^T`` into ``factor``; both (n, n).
+def cholesky_into(matrix: Array, first: int, factor: Array) -> None:
+    """Write the lower triangle L of a block ``L L^T`` of ``matrix`` into ``factor``.
 
-    Only the lower triangle of ``matrix`` is read, and only that of ``factor`` is written.
+    Args:
+        matrix: (first + n, first + n) or larger; only the lower triangle of the block is read.
+        first: row and column where the block begins.
+        factor: (n, n); only its lower triangle is written.
     """
     for j in range(len(factor)):
         for i in range(j, len(factor)):
-            total = matrix[i, j]
+            total = matrix[first + i, first + j]
             for k in range(j):
                 total -= factor[i, k] * factor[j, k]
             factor[i, j] = np.sqrt(total) if i == j else total / factor[j, j]
@@ -32,7 +35,7 @@ def solve_cholesky(factor: Array, right: Array) -> None:
             right[i] -= factor[i, k] * right[k]
         right[i] /= factor[i, i]
     for step in range(len(factor)):
-        i = len(factor) - 1 - step
-        for k in range(i + 1, len(factor)):
-            right[i] -= factor[k, i] * right[k]
-        right[i] /= factor[i, i]
+        row = len(factor) - 1 - step
+        for k in range(row + 1, len(factor)):
+            right[row] -= factor[k, row] * right[k]
+        right[row] /= factor[row, row]

@@ -116,10 +116,11 @@ class Record:
     def view(cls, block: Block) -> Self:
         """Return the arrays of a block as attributes, ten times faster in Python than a record.
 
-        They are written in place (``view.name[:] = ...``); scalar fields are read as floats.
+        They are written in place (``view.name[:] = ...``); scalar fields are floats, which are
+        written by assignment.
         """
         record = cls.view_type(address=block.ctypes.data)
-        scalars = {}
+        scalars: dict[str, NDArray[np.float64]] = {}
         for name, field in cls.fields().items():
             if not isinstance(field, Field):
                 setattr(record, name, field.view(block[name]))
@@ -146,6 +147,14 @@ class RecordView(SimpleNamespace):
         if name not in scalars:
             raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
         return float(scalars[name][0])
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        """Write the number of a scalar field, or set an attribute that is no field."""
+        scalars = vars(self).get("scalars", {})
+        if name in scalars:
+            scalars[name][0] = value
+        else:
+            super().__setattr__(name, value)
 
     def __reduce__(self) -> Any:
         """Refuse copying and pickling.

@@ -193,7 +193,7 @@ def test_on_a_turning_base_torque_becomes_force_with_the_attitude_it_began_at(
         controller.update(state, reference)
         # either quaternion of an attitude will do, but the same one throughout
         j0 = attitude_jacobian_base(sign * began_at)
-        force = controller.block[0].applied_force
+        force = controller.signals.applied_force
         np.testing.assert_allclose(j0.T @ force[:3], torque[:3], rtol=1e-9, atol=1e-9)
         np.testing.assert_array_equal(force[3:], torque[3:])
         np.testing.assert_array_equal(controller.block[0].pair.applied_force, force)

@@ -21,6 +21,8 @@ TAKEOVER, STOP = 10_000, 12_000
 """Ticks: at 5 s the arm is in full motion; flown until 6 s."""
 NEXT_10_MS = 20
 LAWS = sorted(laws())
+ACCURATE = [name for name in LAWS if name.startswith(("ctc", "tde", "indi"))]
+"""Laws that know or estimate every force, and so have small errors in full motion."""
 ROUNDING = 1e-9
 """N m; the base turns a little from tick to tick, and J0 with it."""
 
@@ -72,23 +74,29 @@ class CommonBeginning:
         return self.log
 
 
-def assert_smooth(log: FlightLog) -> None:
+def assert_smooth(log: FlightLog, *in_force: str) -> None:
     """The torque steps no more than in the 10 ms after, on any axis, and the base stays."""
     steps = np.abs(np.diff(log.commanded_torque, axis=0))
     own = steps[TAKEOVER : TAKEOVER + NEXT_10_MS].max(axis=0)
     assert (steps[TAKEOVER - 1] <= own).all()
-    error = np.abs(tracking_error(log)[TAKEOVER:STOP])
-    assert error[:, :3].max() < 1e-5
-    assert error[:, 3:].max() < 1e-4
+    assert_accurate(log, *in_force)
+
+
+def assert_accurate(log: FlightLog, *in_force: str) -> None:
+    """The errors stay small, if they are under the laws in force."""
+    if set(in_force) <= set(ACCURATE):
+        error = np.abs(tracking_error(log)[TAKEOVER:STOP])
+        assert error[:, :3].max() < 1e-5
+        assert error[:, 3:].max() < 1e-4
 
 
 @pytest.mark.parametrize("first", LAWS)
 def test_every_law_takes_over_smoothly_from_every_other(first: str) -> None:
-    """Twenty swaps in full motion."""
+    """In full motion."""
     beginning = CommonBeginning(first)
     for law in LAWS:
         if law != first:
-            assert_smooth(beginning.swapped_to(law))
+            assert_smooth(beginning.swapped_to(law), first, law)
 
 
 @pytest.mark.parametrize("first", LAWS)
@@ -96,7 +104,7 @@ def test_a_new_controller_takes_over_smoothly_in_flight(first: str) -> None:
     """As after a restart, under the same law or another."""
     beginning = CommonBeginning(first)
     for law in LAWS:
-        assert_smooth(beginning.taken_over_by(law))
+        assert_smooth(beginning.taken_over_by(law), first, law)
 
 
 @pytest.mark.parametrize("latency", [1, 2, 4])
@@ -109,9 +117,7 @@ def test_with_late_commands_a_law_takes_over_from_what_is_applied_now(latency: i
             torque = log.commanded_torque
             applied = torque[TAKEOVER - 1 - latency]
             np.testing.assert_allclose(torque[TAKEOVER], applied, atol=ROUNDING)
-            error = np.abs(tracking_error(log)[TAKEOVER:STOP])
-            assert error[:, :3].max() < 1e-5
-            assert error[:, 3:].max() < 1e-4
+            assert_accurate(log, law)
 
 
 @pytest.mark.parametrize("law", LAWS)
@@ -135,4 +141,5 @@ def test_a_law_takes_over_smoothly_with_a_base_that_nothing_turns(first: str) ->
             own = steps[TAKEOVER : TAKEOVER + NEXT_10_MS].max(axis=0)
             assert (steps[TAKEOVER - 1] <= own).all()
             assert (torque[TAKEOVER:STOP, :3] == 0.0).all()
-            assert np.abs(tracking_error(log)[TAKEOVER:STOP, 3:]).max() < 1e-4
+            if {first, law} <= set(ACCURATE):
+                assert np.abs(tracking_error(log)[TAKEOVER:STOP, 3:]).max() < 1e-4

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +10,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from law_equations import EQUATIONS, PERIOD, History, forces, random_gains
 from numpy.typing import NDArray
 from paths import ROOT
 
@@ -26,103 +26,14 @@ from space_robot_control.laws import (
     laws,
     per_axis,
 )
+from space_robot_control.laws.base import CONSTANT_INERTIA, NO_ESTIMATE, NOMINAL_INERTIA
 from space_robot_control.laws.ctc_smc import saturation
 from space_robot_msgs_py.errors import InputError
 
 Array = NDArray[np.float64]
-Gains = dict[str, Array]
-
-PERIOD = 5e-4
-TICKS = 12
 
 
-class History:
-    """Random signals of ``TICKS`` ticks, (TICKS, m) each."""
-
-    def __init__(self, axes: int, seed: int) -> None:
-        rng = np.random.default_rng(seed)
-        self.e, self.edot, self.rhodd_d, self.n_hat, self.bias = rng.normal(size=(5, TICKS, axes))
-        # errors of all sizes, some of them zero: sign, root and boundary layer matter there
-        self.e *= 10.0 ** rng.uniform(-6.0, 0.0, self.e.shape)
-        self.edot *= 10.0 ** rng.uniform(-6.0, 0.0, self.edot.shape)
-        nothing = rng.random(self.e.shape) < 0.1
-        self.e[nothing] = self.edot[nothing] = 0.0
-        root = rng.normal(size=(TICKS, axes, axes))
-        self.inertia = root @ root.transpose(0, 2, 1)
-
-    def at(self, k: int) -> Signals:
-        signals = Signals.view(Signals.block(self.e.shape[1] - 3))
-        signals.error[:], signals.error_rate[:] = self.e[k], self.edot[k]
-        signals.acceleration_desired[:], signals.n_hat[:] = self.rhodd_d[k], self.n_hat[k]
-        signals.nominal.inertia[:], signals.nominal.bias[:] = self.inertia[k], self.bias[k]
-        return signals
-
-    def through_model(self, u: Array) -> Array:
-        """H_S u + c_S at every tick."""
-        return np.einsum("kij,kj->ki", self.inertia, u) + self.bias
-
-
-def sign_root(s: Array) -> Array:
-    """|s|^1/2 sign(s)."""
-    return np.sign(s) * np.abs(s) ** 0.5
-
-
-def ctc(h: History, g: Gains) -> Array:
-    """(30), (31)."""
-    return h.through_model(h.rhodd_d + g["k_d"] * h.edot + g["k_p"] * h.e)
-
-
-def ctc_smc(h: History, g: Gains) -> Array:
-    """(57), (58)."""
-    s = h.edot + g["lambda"] * h.e
-    sat = np.where(np.abs(s) > g["delta"], np.sign(s), s / g["delta"])
-    return h.through_model(h.rhodd_d + g["lambda"] * h.edot) + g["g"] * sat
-
-
-def tde_smc(h: History, g: Gains) -> Array:
-    """(59)."""
-    s = h.edot + g["lambda"] * h.e
-    return g["h_bar"] * (h.rhodd_d + g["lambda"] * h.edot) + h.n_hat + g["g"] * np.sign(s)
-
-
-def tde_tsmc(h: History, g: Gains) -> Array:
-    """(60); the integral of edd is edot - edot(0), the rest summed from the second tick on."""
-    u_pd = h.rhodd_d + g["k_d"] * h.edot + g["k_p"] * h.e
-    summed = np.cumsum((g["k_d"] * h.edot + g["k_p"] * h.e)[1:], axis=0) * PERIOD
-    s = h.edot - h.edot[0] + np.vstack([np.zeros_like(h.e[:1]), summed])
-    return g["h_bar"] * (u_pd + g["k_1"] * sign_root(s)) + h.n_hat
-
-
-def tde_stc(h: History, g: Gains) -> Array:
-    """(41), (42)."""
-    s = h.edot + g["lambda"] * h.e
-    integral = np.cumsum(g["k_2"] * np.sign(s), axis=0) * PERIOD
-    u = h.rhodd_d + g["lambda"] * h.edot + g["k_1"] * sign_root(s) + integral
-    return g["h_bar"] * u + h.n_hat
-
-
-EQUATIONS: dict[str, Callable[[History, Gains], Array]] = {
-    "ctc": ctc,
-    "ctc_smc": ctc_smc,
-    "tde_smc": tde_smc,
-    "tde_tsmc": tde_tsmc,
-    "tde_stc": tde_stc,
-}
-
-
-def random_gains(law: type[ControlLaw], axes: int, seed: int) -> Gains:
-    rng = np.random.default_rng(seed)
-    gains = {name: rng.uniform(0.1, 5.0, axes) for name in law.gain_descriptions()}
-    if "delta" in gains:
-        gains["delta"] *= 1e-2
-    return gains
-
-
-def forces(law: ControlLaw, history: History) -> Array:
-    return np.array([law.force(history.at(k)).copy() for k in range(TICKS)])
-
-
-def test_the_five_laws_are_found_by_name() -> None:
+def test_all_laws_are_found_by_name() -> None:
     assert set(laws()) == set(EQUATIONS)
     for name in EQUATIONS:
         assert find_law(name).name == name
@@ -183,8 +94,8 @@ def test_reset_empties_the_memory(name: str) -> None:
     remembered = forces(law, history)
     law.reset()
     np.testing.assert_array_equal(forces(law, history), first)
-    if name in ("tde_tsmc", "tde_stc"):
-        assert np.any(remembered != first), "these two have a memory that must show"
+    has_memory = name in ("tde_tsmc", "tde_stc", "dob", "adrc")
+    assert np.any(remembered != first) == has_memory, "a memory must show"
 
 
 @pytest.mark.parametrize("name", EQUATIONS)
@@ -213,15 +124,10 @@ def test_laws_of_one_class_share_nothing(name: str) -> None:
 
 @pytest.mark.parametrize("name", EQUATIONS)
 def test_force_leaves_the_signals_alone(name: str) -> None:
-    law, history = find_law(name), History(9, 5)
-    signals = history.at(0)
-    law(random_gains(law, 9, seed=4), PERIOD).force(signals)
-    before = history.at(0)
-    for name in Signals.fields().keys() - {"nominal"}:
-        np.testing.assert_array_equal(getattr(signals, name), getattr(before, name))
-    for name in ("inertia", "bias"):
-        now, then = getattr(signals.nominal, name), getattr(before.nominal, name)
-        np.testing.assert_array_equal(now, then)
+    law, block = find_law(name), History(9, 5).block(0)
+    before = block.tobytes()
+    law(random_gains(law, 9, seed=4), PERIOD).force(Signals.view(block))
+    assert block.tobytes() == before
 
 
 def test_terminal_surface_starts_at_zero_whatever_the_error() -> None:
@@ -238,15 +144,41 @@ def test_terminal_surface_starts_at_zero_whatever_the_error() -> None:
 
 
 def test_model_and_time_delay_estimate_go_to_the_laws_that_say_so() -> None:
-    given = {n: (law.uses_model, law.uses_time_delay_estimate()) for n, law in laws().items()}
-    model, estimate = (True, False), (False, True)
-    assert given == {
+    """By the inertia of the estimate, and whether the law itself reads the model."""
+    uses = {}
+    for name, law in laws().items():
+        built = law(random_gains(law, 9, seed=1), PERIOD)
+        uses[name] = built.estimate, law.uses_model, built.needs_model
+    none, model = (NO_ESTIMATE, False, False), (NO_ESTIMATE, True, True)
+    constant, nominal = (CONSTANT_INERTIA, False, False), (NOMINAL_INERTIA, False, True)
+    assert uses == {
         "ctc": model,
         "ctc_smc": model,
-        "tde_smc": estimate,
-        "tde_tsmc": estimate,
-        "tde_stc": estimate,
+        "tde_smc": constant,
+        "tde_tsmc": constant,
+        "tde_stc": constant,
+        "pd": none,
+        "pd_feedforward": model,
+        "indi": nominal,
+        "dob": none,
+        "adrc": none,
     }
+
+
+@pytest.mark.parametrize("name", [name for name in EQUATIONS if name.startswith("tde")])
+def test_with_h_bar_zero_the_estimate_has_the_nominal_inertia(name: str) -> None:
+    """The law is told so by its gain, also when it is changed; its own force has no h_bar u."""
+    law, history = find_law(name), History(9, 2)
+    gains = random_gains(law, 9, seed=1)
+    built = law(gains, PERIOD)
+    built.gain_values = {**gains, "h_bar": np.zeros(9)}
+    assert (built.estimate, built.needs_model, built.uses_model) == (NOMINAL_INERTIA, True, False)
+    switching = (
+        gains["g"] * np.sign(history.edot + gains["lambda"] * history.e) if "g" in gains else 0
+    )
+    np.testing.assert_allclose(forces(built, history), history.n_hat + switching, rtol=1e-14)
+    built.gain_values = gains
+    assert (built.estimate, built.needs_model) == (CONSTANT_INERTIA, False)
 
 
 @given(st.floats(-1e3, 1e3), st.floats(1e-6, 10.0))
@@ -273,7 +205,7 @@ class LeadGains(LawGains):
 
 
 class LeadLaw(ControlLaw):
-    """A sixth law, as a user would write it: PD on the time-delay estimate."""
+    """A further law, as a user would write it: PD on the time-delay estimate."""
 
     name = "lead"
     gains_type = LeadGains
@@ -286,9 +218,10 @@ class LeadLaw(ControlLaw):
 def test_a_law_of_ones_own_is_found_by_module_and_class() -> None:
     law = find_law(f"{__name__}:LeadLaw")
     assert law.name == "lead"
-    assert law.uses_time_delay_estimate()
     history = History(4, 7)
-    force = law({"h_bar": np.full(4, 2.0), "k": np.full(4, 3.0)}, PERIOD).force(history.at(2))
+    built = law({"h_bar": np.full(4, 2.0), "k": np.full(4, 3.0)}, PERIOD)
+    assert built.estimate == CONSTANT_INERTIA
+    force = built.force(history.at(2))
     np.testing.assert_allclose(force, 6.0 * history.edot[2] + history.n_hat[2])
     assert "lead" not in laws(), "only a file in the laws' folder gets a name of its own"
 

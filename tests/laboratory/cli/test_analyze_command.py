@@ -141,7 +141,8 @@ def test_the_page_stands_by_itself(analyze: Run, bags: tuple[Path, Path], tmp_pa
     links = re.findall(r'(?:src|href)="([^"]*)"', text)
     assert links
     assert all(link.startswith(("data:image/svg+xml;base64,", "#")) for link in links)
-    for words in ("tde_stc", "ctc has no time-delay estimate with a constant h_bar", "whole", "&#34;controller&#34;"):
+    why = "ctc has no time-delay estimate with a constant h_bar"
+    for words in ("tde_stc", why, "whole", "&#34;controller&#34;"):
         assert words in text
     assert [path.name for path in tmp_path.iterdir()] == ["page.html"]
 

@@ -12,8 +12,9 @@ import pytest
 from command import Run
 
 from space_robot.export.verify import CROSS, EMULATORS
+from space_robot_control.laws import laws
 
-LAWS = ("ctc", "ctc_smc", "tde_smc", "tde_stc", "tde_tsmc")
+LAWS = sorted(laws())
 ALLOWED = {"sqrt", "floor", "fmod", "fabs", "copysign", "memset", "memcpy", "__stack_chk_fail"}
 """Functions of the C library that flight software may call; compilers make copies by memcpy."""
 SCENARIOS = {
@@ -149,8 +150,8 @@ def test_parameters_have_source_and_unit(folders: dict[str, Path], space_robot: 
     text = (exported("wheels", folders, space_robot) / "parameters.h").read_text("utf-8")
     assert "tde_stc_gains.h_bar: constant inertia h_bar of (33), kg m2." in text
     assert "Source: gain set 'default', law tde_stc." in text
-    assert "controller.model.mass: Body masses, kg, base first." in text
-    assert "static const double SR_CONTROLLER_MODEL_MASS[7] = {\n    750.0, 20.0," in text
+    assert "controller.signals.model.mass: Body masses, kg, base first." in text
+    assert "static const double SR_CONTROLLER_SIGNALS_MODEL_MASS[7] = {\n    750.0, 20.0," in text
 
 
 def test_a_folder_is_not_overwritten_unasked(tmp_path: Path, space_robot: Run) -> None:

@@ -23,6 +23,7 @@ from space_robot_control.flight_code.compiler import write_sources
 from space_robot_control.flight_code.library import FlightLibrary
 from space_robot_control.flight_code.remote import BEGIN, FlightComputer
 from space_robot_control.flight_code.supervisors import ShadowError, bits
+from space_robot_control.laws import laws
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.errors import FlightError, InputError
 
@@ -55,6 +56,36 @@ def test_a_flight_under_c_has_the_same_bits(actuators: str) -> None:
     python = flown(actuators=actuators)
     assert_same(flown(actuators=actuators, controller_code="c"), python)
     assert_same(flown(actuators=actuators, shadow="c"), python)
+
+
+LAWS = sorted(laws())
+ONE_AFTER_ANOTHER = [f"{0.01 * (k + 1):g}:{name}" for k, name in enumerate(LAWS * 2)]
+"""Swaps every 20 ticks, each law twice: it takes over with a memory that it has used."""
+NOMINAL = {
+    name: {"h_bar": "nominal"} for name in LAWS if "h_bar" in laws()[name].gain_descriptions()
+}
+
+
+@needs_compiler
+@pytest.mark.parametrize(
+    ("gains", "navigation", "actuators"),
+    [({}, "filtered", "wheels"), (NOMINAL, "filtered", "wheels"), (NOMINAL, "direct", "none")],
+    ids=["constant", "nominal", "nominal_free"],
+)
+def test_every_law_under_c_has_the_same_bits(
+    gains: dict[str, Any], navigation: str, actuators: str
+) -> None:
+    """One after the other, with states that are lost, and with constant and nominal inertia."""
+    options: dict[str, Any] = {
+        "gains": gains,
+        "navigation": navigation,
+        "actuators": actuators,
+        "swaps": ONE_AFTER_ANOTHER,
+        "duration": 0.01 * (len(ONE_AFTER_ANOTHER) + 1),
+    }
+    python = flown(**options)
+    assert {law.name for law in python.laws} == set(LAWS)
+    assert_same(flown(**options, controller_code="c"), python)
 
 
 @needs_compiler

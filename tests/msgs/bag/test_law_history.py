@@ -134,5 +134,6 @@ def test_the_estimates_error_is_taken_with_the_h_bar_in_force(
 
 def test_where_no_law_has_an_estimate_there_is_no_error_of_it(swapped: FlightLog) -> None:
     report = analyze(excerpt(swapped, 0.1, 0.2))
-    assert report["unavailable"]["estimate_error"] == "ctc has no time-delay estimate with a constant h_bar"
+    why = "ctc has no time-delay estimate with a constant h_bar"
+    assert report["unavailable"]["estimate_error"] == why
     assert analyze(swapped)["estimate_error"]["rms"]["base"] > 0.0

@@ -21,7 +21,7 @@ EXACT = {
     *("np.int64", "np.uint64", "math.inf", "math.nan", "math.pi"),
 }
 """What kernels use of `math` and NumPy: each gives the same bits on every processor."""
-SAME_IN_FLIGHT = {"transfer_left", "tick", "seen", "is_active"}
+SAME_IN_FLIGHT = {"transfer_left", "tick", "seen", "is_active", "pair_is_as_measured"}
 """Fields that change in flight, in all lanes alike."""
 
 

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import copy
+import pickle
+from typing import Any
+
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
 from space_robot_msgs_py.compiled.kernels import RecordFunction, kernel
-from space_robot_msgs_py.compiled.records import Record, assign, nested, prefix, shaped
+from space_robot_msgs_py.compiled.records import Record, RecordView, assign, nested, prefix, shaped
 from space_robot_msgs_py.errors import InputError
 
 Array = NDArray[np.float64]
@@ -87,7 +91,56 @@ def test_a_view_is_the_same_memory() -> None:
     assert block[0].more.tolist() == [1.5] * 3
     assert block[0].inner.matrix[2, 0] == 6.0
     assert view.address == block.ctypes.data
-    assert not hasattr(view, "scalar"), "a copy of it would not be the same memory"
+
+
+def test_scalar_fields_of_a_view_are_floats_of_now() -> None:
+    """Also where the view writes them: there is no number but that in the block."""
+    block = Longer.block(3)
+    view = Longer.view(block)
+    assert view.scalar == 0.0
+    block[0].scalar = 2.5
+    assert view.scalar == 2.5
+    assert type(view.scalar) is float
+    view.scalar += 1.0
+    assert block[0].scalar == view.scalar == 3.5
+    block[:] = np.zeros_like(block)
+    assert view.scalar == 0.0
+    with pytest.raises(AttributeError, match="no attribute 'vectors'"):
+        view.vectors  # type: ignore[attr-defined]  # noqa: B018
+
+
+class OuterView(RecordView):
+    owner: str
+
+    def twice(self) -> float:
+        outer: Any = self
+        return 2.0 * float(outer.scalar)
+
+
+class Viewed(Outer):
+    view_type = OuterView
+
+
+def test_a_view_has_the_class_that_its_record_names() -> None:
+    """With methods, and with attributes that are no fields; inner records have their own."""
+    block = Viewed.block(3)
+    block[0].scalar = 4.0
+    view: Any = Viewed.view(block)
+    assert isinstance(view, OuterView)
+    assert type(view.inner) is RecordView
+    plain: Any = Outer.view(Outer.block(2))
+    assert type(plain) is RecordView
+    assert view.twice() == 8.0
+    assert not hasattr(view, "owner")
+    view.owner = "me"
+    assert view.owner == "me"
+    assert "view_type" not in Viewed.fields()
+
+
+@pytest.mark.parametrize("copying", [copy.copy, copy.deepcopy, pickle.dumps])
+def test_a_view_with_scalars_is_not_copied(copying: Any) -> None:
+    with pytest.raises(TypeError, match="a view of a record cannot be copied or pickled"):
+        copying(Viewed.view(Viewed.block(3)))
 
 
 @kernel

@@ -15,6 +15,7 @@ from space_robot.flight.batch.batch import FlightBatch
 from space_robot.flight.batch.sharing import batch_key, batches, reason_to_fly_alone
 from space_robot.flight.plan import Flight
 from space_robot.flight.simulate import simulate
+from space_robot_control.laws import laws
 from space_robot_msgs_py.bag.flight_log import MEASURED_COLUMNS, FlightLog
 from space_robot_msgs_py.compiled.lanes import WIDTH
 from space_robot_msgs_py.errors import FlightError
@@ -83,6 +84,19 @@ FAULTS = (
 )
 
 
+OWN_GAINS: dict[str, dict[str, Any]] = {
+    "pd": {"k_p": 50.0, "k_d": 20.0},
+    "pd_feedforward": {"k_p": 50.0, "k_d": 20.0},
+    "indi": {"k_p": 25.0, "k_d": 10.0},
+    "dob": {"inertia": 0.5, "bandwidth": 50.0, "k_p": 25.0, "k_d": 10.0},
+    "adrc": {"inertia": 0.5, "omega_c": 5.0, "omega_o": 50.0},
+    "tde_smc": {"h_bar": "nominal", "lambda": 5.0, "g": 0.01},
+    "tde_tsmc": {"h_bar": "nominal", "k_p": 25.0, "k_d": 10.0, "k_1": 0.1},
+    "tde_stc": {"h_bar": "nominal", "lambda": 5.0, "k_1": 0.1, "k_2": 0.01},
+}
+"""Gains for robots of any number of axes; those of the time-delay laws are not the default."""
+
+
 @st.composite
 def scenarios(draw: st.DrawFn) -> list[dict[str, Any]]:
     """Options of flights, most of which can share a batch."""
@@ -92,7 +106,7 @@ def scenarios(draw: st.DrawFn) -> list[dict[str, Any]]:
         hardware += ["wheels", "thrusters", "wheels_and_thrusters"]
     common = {
         "robot": robot,
-        "controller": draw(st.sampled_from(["ctc", "ctc_smc", "tde_smc", "tde_tsmc", "tde_stc"])),
+        "controller": draw(st.sampled_from(sorted(laws()))),
         "case": draw(st.sampled_from(["1", "2", "3"])),
         "sensors": draw(st.sampled_from(["ideal", "fine", "coarse", "tactical"])),
         "navigation": draw(st.sampled_from(["direct", "filtered"])),
@@ -104,6 +118,9 @@ def scenarios(draw: st.DrawFn) -> list[dict[str, Any]]:
     }
     if robot != "paper" and common["actuators"] == "none":
         common["actuators"] = "ideal"
+    law = common["controller"]
+    if law in OWN_GAINS and (not law.startswith("tde") or draw(st.booleans())):
+        common["gains"] = {law: OWN_GAINS[law]}
     flights = []
     for seed in range(draw(st.integers(2, WIDTH + 2))):
         own: dict[str, Any] = {"seed": seed}
@@ -126,6 +143,44 @@ def test_each_flight_of_any_batch_has_its_own_bits(
     order.shuffle(options)
     first = [Scenario(**option).check() for option in options]
     assert_same(first, [Scenario(**option).check() for option in options])
+
+
+@pytest.mark.parametrize("law", OWN_GAINS)
+def test_every_law_has_the_bits_of_a_flight_alone(law: str) -> None:
+    """Eight flights with gains, cases and faults of their own; all change to another law and
+    back."""
+    options: list[dict[str, Any]] = [
+        {
+            "controller": law,
+            "gains": {law: {name: scaled(gain, lane) for name, gain in OWN_GAINS[law].items()}},
+            "sensors": "fine",
+            "navigation": "filtered",
+            "case": "3" if lane % 2 else "1",
+            "seed": lane,
+            "faults": [f"torque_scale@0.01:all={1.0 + 0.001 * lane}", *FAULTS[1:2]],
+            "swaps": ["0.02:ctc", f"0.04:{law}"],
+            "duration": 0.06,
+        }
+        for lane in range(WIDTH)
+    ]
+    flights = [Scenario(**option).check() for option in options]
+    assert [len(group) for group in batches(enumerate(flights))] == [WIDTH]
+    assert_same(flights, [Scenario(**option).check() for option in options])
+
+
+def scaled(gain: Any, lane: int) -> Any:
+    """A gain that differs from lane to lane."""
+    return gain if isinstance(gain, str) else gain * (1.0 + 0.01 * lane)
+
+
+def test_constant_and_nominal_inertia_fly_apart() -> None:
+    """Their code is not the same."""
+    nominal = {"gains": {"tde_stc": {"h_bar": "nominal"}}}
+    flights = [*some(2), *some(2, **nominal), *some(2, controller="indi")]
+    assert len({batch_key(flight) for flight in flights}) == 3
+    swapped = [*some(2, controller="ctc", swaps=["0.02:tde_stc"])]
+    swapped += some(2, controller="ctc", swaps=["0.02:tde_stc"], **nominal)
+    assert len({batch_key(flight) for flight in swapped}) == 2
 
 
 def some(count: int, **options: Any) -> list[Flight]:

@@ -1,0 +1,273 @@
+"""N_hat of (35), (36) with the inertia of the nominal model in place of a constant one."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import yaml
+from closed_loop import PERIOD
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+from law_equations import random_gains
+from numpy.typing import NDArray
+from oracles import (
+    attitude_jacobian_inertial,
+    pinocchio_forward_dynamics,
+    rho_space_inertia,
+    rotation_of,
+    skew,
+)
+from random_robots import Case, cases
+
+from space_robot import Scenario
+from space_robot_control.controller.controller import Controller
+from space_robot_control.controller.gains import NOMINAL, check_gains, read_gains
+from space_robot_control.controller.law_set import LawSet
+from space_robot_control.controller.settings import ControllerNodeSettings
+from space_robot_control.controller.time_delay_estimation import (
+    TimeDelayPair,
+    nominal_estimate,
+    time_delay_estimate,
+)
+from space_robot_control.laws import ControlLaw, find_law, laws
+from space_robot_model.hardware.base_actuators import BaseActuatorSettings
+from space_robot_msgs_py.compiled.records import assign
+from space_robot_msgs_py.errors import InputError
+from space_robot_msgs_py.samples import Reference, RobotState
+
+Array = NDArray[np.float64]
+
+WITH_H_BAR = sorted(name for name, law in laws().items() if "h_bar" in law.gain_descriptions())
+ESTIMATING = [*WITH_H_BAR, "indi"]
+FREE = BaseActuatorSettings(base_actuation="none")
+
+
+def nominal_law(name: str, axes: int, **changes: Array) -> ControlLaw:
+    """A law whose estimate has the nominal inertia, with random gains."""
+    law = find_law(name)
+    gains = random_gains(law, axes, seed=1)
+    if "h_bar" in gains:
+        gains["h_bar"] = np.zeros(axes)
+    return law({**gains, **changes}, PERIOD)
+
+
+def measured(case: Case, tick: int, rate: tuple[Any, Any], torque: Array) -> RobotState:
+    """A state of the case's attitude and posture with another velocity."""
+    state = RobotState.allocate(case.robot.n)
+    state.tick, state.quaternion[:] = tick, case.state.quaternion
+    state.omega_base[:] = rotation_of(case.state.quaternion).inv().apply(rate[0])
+    state.joint_positions[:], state.joint_velocities[:] = case.state.theta, rate[1]
+    state.applied_torque[:] = torque
+    return state
+
+
+def flown_into(case: Case, law: ControlLaw, controls_base: bool) -> tuple[Controller, Array, Array]:
+    """A controller that has seen an interval with the acceleration that Pinocchio gives for a
+    torque on the nominal robot; the force F_S, and rhodd."""
+    robot, s, rng = case
+    torque = 10.0 * rng.normal(size=robot.n + 3)
+    if not controls_base:
+        torque[:3] = 0.0
+    rotation = rotation_of(s.quaternion)
+    force = np.concatenate([np.zeros(3), rotation.apply(torque[:3]), torque[3:]])
+    acceleration = pinocchio_forward_dynamics(robot, s, force)[3:]
+    j0 = attitude_jacobian_inertial(s.quaternion)
+    epsilon_rate, eta_rate = j0 @ s.w0, -0.5 * s.quaternion[1:] @ s.w0
+    rhodd = acceleration.copy()
+    rhodd[:3] = j0 @ acceleration[:3]
+    rhodd[:3] += 0.5 * (eta_rate * np.eye(3) - skew(epsilon_rate)) @ s.w0
+    # one posture at both ticks, so that the difference of rhodot is rhodd and nothing else
+    before = np.linalg.solve(j0, epsilon_rate - PERIOD * rhodd[:3]), s.rate - PERIOD * rhodd[3:]
+    actuators = None if controls_base else FREE
+    controller = Controller(robot, law, PERIOD, actuators=actuators)
+    reference = Reference.at_rest(robot.n)
+    controller.update(measured(case, 7, before, torque), reference)
+    controller.update(measured(case, 8, (s.w0, s.rate), torque), reference)
+    applied = torque.copy()
+    applied[:3] = np.linalg.solve(j0.T, rotation.apply(torque[:3]))
+    return controller, applied, rhodd
+
+
+@pytest.mark.parametrize("name", ESTIMATING)
+@settings(max_examples=15)
+@given(case=cases(joints=[1, 6]))
+def test_it_is_the_force_that_the_nominal_inertia_does_not_explain(name: str, case: Case) -> None:
+    """``F_S(t - d) - H_S rhodd(t - d)``, H_S by Pinocchio; and with a perfect model it is c_S."""
+    assume(abs(case.state.quaternion[0]) > 0.1)
+    controller, force, rhodd = flown_into(case, nominal_law(name, case.robot.n + 3), True)
+    signals = controller.signals
+    inertia = rho_space_inertia(case.robot, case.state.quaternion, case.state.theta)
+    size = np.abs(inertia).max() * (1.0 + np.abs(rhodd).max()) + np.abs(force).max()
+    np.testing.assert_allclose(signals.n_hat, force - inertia @ rhodd, rtol=0.0, atol=1e-11 * size)
+    np.testing.assert_allclose(signals.n_hat, signals.nominal.bias, rtol=0.0, atol=1e-11 * size)
+
+
+@settings(max_examples=15)
+@given(case=cases(joints=[6]))
+def test_with_a_free_base_it_is_that_of_the_joints_alone(case: Case) -> None:
+    """Pinocchio's accelerations of the joints while nothing turns the base."""
+    controller, force, rhodd = flown_into(case, nominal_law("indi", 9), False)
+    signals = controller.signals
+    size = np.abs(signals.nominal.inertia).max() * (1.0 + np.abs(rhodd).max())
+    np.testing.assert_allclose(signals.n_hat, signals.nominal.bias, rtol=0.0, atol=1e-11 * size)
+    assert (signals.n_hat[:3] == 0.0).all()
+    assert (signals.paired_force[3:] == force[3:]).all()
+
+
+@given(st.integers(0, 2**32 - 1), st.sampled_from([4, 9, 10]))
+def test_for_a_diagonal_inertia_it_is_the_constant_estimate(seed: int, axes: int) -> None:
+    """To the last bit."""
+    rng = np.random.default_rng(seed)
+    pair = TimeDelayPair.allocate(axes - 3)
+    assign(pair, applied_force=rng.normal(size=axes), acceleration=rng.normal(size=axes))
+    h_bar = rng.uniform(0.1, 100.0, axes)
+    constant, nominal = np.full(axes, np.nan), np.full(axes, np.nan)
+    time_delay_estimate(pair, h_bar, constant)
+    nominal_estimate(pair, np.diag(h_bar), nominal)
+    np.testing.assert_array_equal(nominal, constant)
+
+
+@pytest.mark.parametrize("name", WITH_H_BAR)
+@settings(max_examples=10)
+@given(case=cases(joints=[6]))
+def test_the_controller_adds_the_inertia_times_u(name: str, case: Case) -> None:
+    """``F_S = H_S u + ...`` where a constant one has ``h_bar u``; u itself is the same. The force
+    is not added to that of the last tick."""
+    assume(abs(case.state.quaternion[0]) > 0.1)
+    law = nominal_law(name, case.robot.n + 3)
+    controller = flown_into(case, law, True)[0]
+    memory, signals = controller.block[0], controller.signals
+    inertia = rho_space_inertia(case.robot, case.state.quaternion, case.state.theta)
+    s, u = law.memory.s, law.memory.u
+    switching = law.gains.g * np.sign(s) if name == "tde_smc" else np.zeros(9)
+    own = memory.force - memory.transfer * (memory.transfer_left + 1.0) / memory.transfer_ticks
+    size = np.abs(inertia).max() * (1.0 + np.abs(u).max()) + np.abs(memory.transfer).max()
+    wanted = inertia @ u + signals.n_hat + switching
+    np.testing.assert_allclose(own, wanted, rtol=0.0, atol=1e-10 * size)
+
+
+def test_super_twisting_without_switching_is_incremental_inversion() -> None:
+    """``lambda`` alone is PD: ``tde_stc`` with the nominal inertia and ``K_1 = K_2 = 0`` flies as
+    ``indi`` with ``K_D = lambda``, ``K_P = 0``."""
+    length, zero = 4.0, [0.0]
+    stc = Scenario(
+        controller="tde_stc",
+        gains={"h_bar": NOMINAL, "lambda": length, "k_1": zero, "k_2": zero},
+        duration=0.3,
+    ).fly()
+    indi = Scenario(controller="indi", gains={"k_p": 0.0, "k_d": length}, duration=0.3).fly()
+    torque, other = (flight.log.commanded_torque for flight in (stc, indi))
+    assert torque is not None
+    assert other is not None
+    np.testing.assert_allclose(torque, other, rtol=0.0, atol=1e-9 * np.abs(other).max())
+
+
+# Gains
+
+
+def test_a_gains_file_says_nominal(tmp_path: Path) -> None:
+    """As a word, or in a list; recorded and told as zeros, which are the same."""
+    for h_bar in (NOMINAL, [NOMINAL], [0.0], [0.0] * 9):
+        path = tmp_path / "tde_smc.yaml"
+        content = {"h_bar": h_bar, "lambda": [1.0], "g": [0.1]}
+        path.write_text(
+            yaml.safe_dump({"controller_node": {"ros__parameters": {"tde_smc": content}}})
+        )
+        gains = read_gains(path, find_law("tde_smc"), 9)
+        np.testing.assert_array_equal(gains["h_bar"], np.zeros(9))
+        law = find_law("tde_smc")(gains, PERIOD)
+        assert law.needs_model
+        assert law.in_force(3).gains["h_bar"] == (0.0,) * 9
+
+
+@pytest.mark.parametrize(
+    ("h_bar", "said"),
+    [
+        ([0.0] * 8 + [1.0], "finite values above 0, or nominal (as numbers: all 0), were expected"),
+        ([1.0] * 8 + [0.0], "finite values above 0, or nominal (as numbers: all 0), were expected"),
+        (
+            [-1.0],
+            "finite values above 0, or nominal (as numbers: all 0), were expected, got [-1.0]",
+        ),
+        ([0.0] * 8, "9 values (base x, y, z and the joints) or 1 were expected"),
+        ([0.0] * 8 + [float("nan")], "finite values above 0, or nominal"),
+        ([NOMINAL] * 9, "numbers were expected, got"),
+        ([NOMINAL, 1.0], "numbers were expected, got"),
+        ("Nominal", "numbers were expected, got 'Nominal'"),
+        (0.0, "numbers were expected, got 0.0"),
+    ],
+)
+def test_anything_between_the_two_is_refused(h_bar: Any, said: str) -> None:
+    content = {"h_bar": h_bar, "lambda": [1.0], "g": [0.1]}
+    with pytest.raises(InputError) as caught:
+        check_gains(content, find_law("tde_smc"), 9, "mine.yaml")
+    assert str(caught.value).startswith("mine.yaml: tde_smc.h_bar: ")
+    assert said in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_no_other_gain_is_nominal() -> None:
+    content = {"h_bar": NOMINAL, "lambda": NOMINAL, "g": [0.1]}
+    with pytest.raises(InputError, match=r"tde_smc\.lambda: numbers were expected, got 'nominal'"):
+        check_gains(content, find_law("tde_smc"), 9, "mine.yaml")
+    for name, gain in (("dob", "inertia"), ("adrc", "inertia")):
+        gains = {**random_gains(find_law(name), 9, 1), gain: [0.0]}
+        with pytest.raises(
+            InputError, match=rf"{name}\.{gain}: finite values above 0 were expected"
+        ):
+            check_gains(gains, find_law(name), 9, "mine.yaml")
+
+
+class ParameterNode:
+    """What `LawSet` asks of its node."""
+
+    def __init__(self, **given_values: Any) -> None:
+        from rclpy.parameter import Parameter
+
+        make: Any = Parameter
+        parameters = [make(k.replace("__", "."), value=v) for k, v in given_values.items()]
+        self._parameter_overrides = {p.name: p for p in parameters}
+        self.on_set: Any = None
+
+    def add_on_set_parameters_callback(self, callback: Any) -> None:
+        self.on_set = callback
+
+    def __getattr__(self, name: str) -> Any:
+        """Anything else is done without effect."""
+        from rcl_interfaces.msg import ParameterDescriptor
+
+        return lambda *_, **__: ParameterDescriptor()
+
+    def set(self, **values: Any) -> str:
+        """Set parameters; why not, if they are refused."""
+        from rclpy.parameter import Parameter
+
+        make: Any = Parameter
+        result = self.on_set([make(k.replace("__", "."), value=v) for k, v in values.items()])
+        assert result.successful == (not result.reason)
+        return str(result.reason)
+
+
+def test_a_parameter_does_not_change_the_kind_of_estimate() -> None:
+    """The compiled code is that of one of the two; a value of the same kind is taken."""
+    pytest.importorskip("rclpy")
+    settings_of = ControllerNodeSettings.resolve({"controller": "tde_stc"})
+    node = ParameterNode(tde_smc__h_bar=[0.0])
+    law_set = LawSet(node, settings_of, 9)  # type: ignore[arg-type]
+    by_name = {law.name: law for law in law_set.laws}
+    assert (by_name["tde_stc"].needs_model, by_name["tde_smc"].needs_model) == (False, True)
+    assert node.set(tde_stc__h_bar=[2.0]) == node.set(tde_smc__h_bar=[0.0] * 9) == ""
+    np.testing.assert_array_equal(by_name["tde_stc"].h_bar, np.full(9, 2.0))
+    for values, said in (
+        ({"tde_stc__h_bar": [0.0]}, "tde_stc.h_bar cannot be changed from a constant to nominal"),
+        ({"tde_smc__h_bar": [1.0]}, "tde_smc.h_bar cannot be changed from nominal to a constant"),
+        ({"tde_smc__h_bar": [0.0] * 8 + [1.0]}, "tde_smc.h_bar: finite values above 0, or nominal"),
+    ):
+        reason = node.set(**values)
+        assert said in reason
+        assert "\n" not in reason
+    np.testing.assert_array_equal(by_name["tde_stc"].h_bar, np.full(9, 2.0))
+    np.testing.assert_array_equal(by_name["tde_smc"].h_bar, np.zeros(9))

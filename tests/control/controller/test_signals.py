@@ -1,0 +1,384 @@
+"""What laws see at a tick: every signal beside its definition, measured and estimated, with and
+without a base to control."""
+
+from __future__ import annotations
+
+import copy
+import pickle
+from typing import Any
+
+import numpy as np
+import pytest
+from closed_loop import NAVIGATION, PERIOD
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from law_equations import random_gains
+from numpy.typing import NDArray
+from oracles import attitude_jacobian_base, quaternion_of, rotation_of
+from random_robots import random_quaternion, random_robot
+from scipy.spatial.transform import Rotation
+
+from space_robot import Scenario
+from space_robot_control.controller.controller import Controller
+from space_robot_control.controller.time_delay_estimation import LONGEST_GAP
+from space_robot_control.laws import ControlLaw, LawGains, Signals, find_law, laws, per_axis
+from space_robot_control.laws.base import CONSTANT_INERTIA, NO_ESTIMATE, NOMINAL_INERTIA
+from space_robot_control.navigation.low_pass import low_pass_weight
+from space_robot_control.navigation.navigation import Navigation, navigate
+from space_robot_model.hardware.base_actuators import BaseActuatorSettings
+from space_robot_model.robot import Robot
+from space_robot_model.robot.kinematics import tool_state
+from space_robot_msgs_py.errors import InputError
+from space_robot_msgs_py.samples import ReferenceChunk, RobotState
+
+Array = NDArray[np.float64]
+
+FREE = BaseActuatorSettings(base_actuation="none")
+TICKS = 6
+M_AXES = (
+    *("error", "error_rate", "acceleration_desired", "n_hat", "rho", "rho_rate"),
+    *("applied_force", "paired_force", "paired_acceleration"),
+)
+"""Signals with a value per axis."""
+LAWS = sorted(laws())
+
+
+def law_with(name: str, n: int) -> ControlLaw:
+    """A law with random gains; ``tde_stc nominal`` has ``h_bar: nominal``."""
+    law = find_law(name.split()[0])
+    gains = random_gains(law, n + 3, seed=n)
+    if name.endswith("nominal"):
+        gains["h_bar"] = np.zeros(n + 3)
+    return law(gains, PERIOD)
+
+
+class Motion:
+    """A robot that turns and moves somehow, and a reference near it, tick by tick."""
+
+    def __init__(self, rng: np.random.Generator, n: int) -> None:
+        self._rng, self._n = rng, n
+        attitude = random_quaternion(rng)
+        attitude[0] += 2.0  # away from half a turn
+        self._attitude = rotation_of(attitude / np.linalg.norm(attitude))
+        self._omega, self._theta, self._rate = (rng.normal(size=k) for k in (3, n, n))
+        self.tick = int(rng.integers(0, 10**6))
+
+    def step(self, ticks: int) -> tuple[RobotState, Any]:
+        """State and reference ``ticks`` later; the sensor's quaternion has any sign."""
+        rng, duration = self._rng, ticks * PERIOD
+        self._attitude *= Rotation.from_rotvec(self._omega * duration)
+        self._theta = self._theta + duration * self._rate
+        self._omega = self._omega + 0.01 * rng.normal(size=3)
+        self._rate = self._rate + 0.01 * rng.normal(size=self._n)
+        self.tick += ticks
+        state = RobotState.allocate(self._n)
+        state.tick = self.tick
+        state.quaternion[:] = quaternion_of(self._attitude) * rng.choice([-1.0, 1.0])
+        state.omega_base[:], state.joint_positions[:] = self._omega, self._theta
+        state.joint_velocities[:] = self._rate
+        state.applied_torque[:] = rng.normal(size=self._n + 3)
+        base = np.concatenate([random_quaternion(rng), rng.normal(size=6)])
+        joints = rng.normal(size=(3, self._n))
+        return state, ReferenceChunk(self.tick, joints[None], base[None]).references()
+
+
+class Expected:
+    """The signals by their definitions, from one state and reference after another."""
+
+    def __init__(self, controls_base: bool, corner_hz: float = 0.0) -> None:
+        self._controls_base = controls_base
+        self._weight = low_pass_weight(corner_hz, PERIOD) or 1.0
+        self._quaternion: Array | None = None
+        self._tick = -1000
+        self._j0_before: Array = np.eye(3)
+        self._of_last: tuple[Array, Array] = np.zeros(0), np.zeros(0)
+        self._pair: tuple[Array, Array] = np.zeros(0), np.zeros(0)
+
+    def after(
+        self, state: RobotState, reference: Any, pair_of: tuple[Array, Array, Array] | None = None
+    ) -> dict[str, Array]:
+        """The signals of a tick.
+
+        ``pair_of`` are base rate, joint rates and torque for the time-delay pair, if they are not
+        those of the state.
+        """
+        quaternion = state.quaternion.copy()
+        before = quaternion if self._quaternion is None else self._quaternion
+        if quaternion @ before < 0.0:
+            quaternion *= -1.0
+        j0 = attitude_jacobian_base(quaternion)
+        began = self._j0_before if self._follows(state.tick) else j0
+        desired, r = self._desired(reference, quaternion), reference[0]
+        signals = {
+            "quaternion": quaternion,
+            "omega_base": state.omega_base.copy(),
+            "joint_positions": state.joint_positions.copy(),
+            "joint_velocities": state.joint_velocities.copy(),
+            "rho": np.concatenate([quaternion[1:], state.joint_positions]),
+            "rho_rate": np.concatenate([j0 @ state.omega_base, state.joint_velocities]),
+            "applied_force": force_of(began, state.applied_torque),
+        }
+        signals["error"] = np.concatenate([desired[0], r.joint_positions]) - signals["rho"]
+        signals["error_rate"] = np.concatenate([desired[1], r.joint_velocities])
+        signals["error_rate"] -= signals["rho_rate"]
+        signals["acceleration_desired"] = np.concatenate([desired[2], r.joint_accelerations])
+        rate, force = signals["rho_rate"], signals["applied_force"]
+        if pair_of is not None:
+            rate = np.concatenate([j0 @ pair_of[0], pair_of[1]])
+            force = force_of(began, pair_of[2])
+        if not self._controls_base:
+            rate, force = rate.copy(), force.copy()
+            for column in (*(signals[n] for n in M_AXES if n in signals), rate, force):
+                column[:3] = 0.0
+        self._observe(state.tick, force, rate, signals["acceleration_desired"])
+        signals["paired_force"], signals["paired_acceleration"] = self._pair
+        self._quaternion, self._tick, self._j0_before = quaternion, state.tick, j0
+        return signals
+
+    def _follows(self, tick: int) -> bool:
+        return 1 <= tick - self._tick <= LONGEST_GAP
+
+    @staticmethod
+    def _desired(reference: Any, quaternion: Array) -> tuple[Array, Array, Array]:
+        """eps_d and its derivatives, of the desired quaternion on the side of the measured one.
+
+        ``epsdd = J0 alpha + J0dot omega``, with ``J0dot omega = -|omega|^2 eps / 4``.
+        """
+        r = reference[0]
+        desired = r.quaternion if r.quaternion @ quaternion >= 0.0 else -r.quaternion
+        j0, omega = attitude_jacobian_base(desired), r.omega_base
+        acceleration = j0 @ r.alpha_base - 0.25 * (omega @ omega) * desired[1:]
+        return desired[1:], j0 @ omega, acceleration
+
+    def _observe(self, tick: int, force: Array, rate: Array, desired: Array) -> None:
+        """The low-pass of both; at the first tick of a pair, the force and the desired motion."""
+        new = force.copy(), desired.copy()
+        if self._follows(tick):
+            acceleration = (rate - self._of_last[1]) / ((tick - self._tick) * PERIOD)
+            old, w = self._pair, self._weight
+            new = old[0] + w * (force - old[0]), old[1] + w * (acceleration - old[1])
+        self._pair, self._of_last = new, (force.copy(), rate.copy())
+
+
+def force_of(j0: Array, torque: Array) -> Array:
+    """``F_S = J^-T tau``."""
+    return np.concatenate([np.linalg.solve(j0.T, torque[:3]), torque[3:]])
+
+
+def check(controller: Controller, state: RobotState, reference: Any, wanted: Any) -> None:
+    """Compare all signals but those of the model."""
+    signals: Any = controller.signals
+    assert signals.tick == state.tick
+    assert signals.time == pytest.approx(state.tick * PERIOD, rel=1e-15)
+    for name, column in wanted.items():
+        size = 1.0 + np.abs(column).max()
+        np.testing.assert_allclose(
+            getattr(signals, name), column, rtol=0.0, atol=1e-10 * size, err_msg=name
+        )
+    assert reference.dtype.names
+    for name in reference.dtype.names:
+        np.testing.assert_array_equal(getattr(signals.reference, name), reference[name][0])
+
+
+steps = st.lists(
+    st.sampled_from([1, 1, 1, 3, LONGEST_GAP, LONGEST_GAP + 1]), min_size=1, max_size=8
+)
+
+
+@settings(max_examples=40)
+@given(
+    seed=st.integers(0, 2**32 - 1),
+    n=st.sampled_from([1, 6, 7]),
+    name=st.sampled_from([*LAWS, "tde_stc nominal"]),
+    controls_base=st.booleans(),
+    corner_hz=st.sampled_from([0.0, 20.0]),
+    gaps=steps,
+)
+def test_measured_signals_are_what_they_are_defined_to_be(
+    seed: int, n: int, name: str, controls_base: bool, corner_hz: float, gaps: list[int]
+) -> None:
+    """Over short and long gaps, whatever the sign of the measured quaternion."""
+    rng = np.random.default_rng(seed)
+    robot = random_robot(rng, n)
+    law = law_with(name, n)
+    actuators = None if controls_base else FREE
+    controller = Controller(robot, law, PERIOD, corner_hz, actuators=actuators)
+    motion, expected = Motion(rng, n), Expected(controls_base, corner_hz)
+    for gap in gaps:
+        state, reference = motion.step(gap)
+        controller.update(state, reference)
+        wanted = expected.after(state, reference)
+        signals: Any = controller.signals
+        check(controller, state, reference, wanted)
+        force, acceleration = wanted["paired_force"], wanted["paired_acceleration"]
+        inertia = signals.nominal.inertia
+        explained = {
+            NO_ESTIMATE: force,
+            CONSTANT_INERTIA: law.h_bar * acceleration if law.h_bar.size else force,
+            NOMINAL_INERTIA: inertia @ acceleration,
+        }[law.estimate]
+        size = 1.0 + np.abs(force).max() + np.abs(explained).max()
+        np.testing.assert_allclose(signals.n_hat, force - explained, rtol=0.0, atol=1e-9 * size)
+        assert inertia.any() == law.needs_model
+        if not controls_base:
+            for axis_signal in M_AXES:
+                assert (getattr(signals, axis_signal)[:3] == 0.0).all()
+
+
+@settings(max_examples=20)
+@given(
+    seed=st.integers(0, 2**32 - 1),
+    name=st.sampled_from(["pd", "tde_stc", "tde_stc nominal", "indi"]),
+    controls_base=st.booleans(),
+    corner_hz=st.sampled_from([0.0, 20.0]),
+)
+def test_behind_navigation_the_signals_are_its_estimates(
+    seed: int, name: str, controls_base: bool, corner_hz: float
+) -> None:
+    """But the pair of the nominal inertia has the rates and the torque as they are measured, less
+    the gyro's bias, so that all axes' are of the same time."""
+    rng = np.random.default_rng(seed)
+    actuators = None if controls_base else FREE
+    law = law_with(name, 6)
+    controller = Controller(
+        random_robot(rng, 6), law, PERIOD, corner_hz, navigation=NAVIGATION, actuators=actuators
+    )
+    alone = Navigation.build(6, NAVIGATION, PERIOD)
+    alone.attitude.bias[:] = controller.block[0].navigation.attitude.bias[:] = [0.1, -0.2, 0.3]
+    motion, expected = Motion(rng, 6), Expected(controls_base, corner_hz)
+    for _ in range(TICKS):
+        state, reference = motion.step(1)
+        controller.update(state, reference)
+        navigate(alone, state.tick, state.block[0], PERIOD)
+        estimate = state.copy()
+        for part in ("quaternion", "omega_base", "joint_positions", "joint_velocities"):
+            getattr(estimate, part)[:] = getattr(alone.estimate, part)
+        estimate.applied_torque[:] = alone.estimate.applied_torque
+        measured = state.omega_base - alone.attitude.bias, state.joint_velocities
+        pair_of = (*measured, state.applied_torque) if law.needs_model else None
+        check(controller, state, reference, expected.after(estimate, reference, pair_of))
+
+
+def test_after_a_swap_the_pair_begins_anew_where_its_rates_are_others(paper_robot: Robot) -> None:
+    """Behind navigation alone: a difference of a measured rate and an estimated one is no
+    acceleration."""
+    for navigation in (None, NAVIGATION):
+        rng = np.random.default_rng(3)
+        controller = Controller(paper_robot, law_with("tde_stc", 6), PERIOD, navigation=navigation)
+        motion = Motion(rng, 6)
+        for name in ("tde_stc", "indi", "tde_stc nominal", "ctc"):
+            controller.law = law_with(name, 6)
+            anew = []
+            for _ in range(3):
+                controller.update(*motion.step(1))
+                signals = controller.signals
+                anew.append(
+                    bool((signals.paired_acceleration == signals.acceleration_desired).all())
+                )
+            is_other = navigation is not None and name in ("indi", "ctc")
+            assert anew[0] == (is_other or (name == "tde_stc")), name
+            assert anew[1:] == [False, False], name
+
+
+# The tool
+
+
+@pytest.mark.parametrize("name", ["paper", "dual_arm", "flexible_panels", "boom", "ets_vii"])
+def test_the_tool_is_that_of_the_nominal_robot(name: str) -> None:
+    """Passive joints are locked; every tool has its name."""
+    flight = Scenario(robot=name, controller="pd", gains=pd_gains(name), duration=0.05).check()
+    robot, controller = flight.controller.signals.robot, flight.controller
+    rng, n = np.random.default_rng(1), robot.n
+    attitude, theta = random_quaternion(rng), rng.normal(size=n)
+    state = RobotState.allocate(n)
+    state.quaternion[:], state.joint_positions[:] = attitude, theta
+    controller.update(state, ReferenceChunk(0, np.zeros((1, 3, n)), NO_TURN).references())
+    for tool in (None, *(tool.name for tool in robot.tools)):
+        actual = controller.signals.tool_state(tool)
+        wanted = tool_state(robot, attitude, theta, tool)
+        for one, other in zip(actual, wanted, strict=True):
+            np.testing.assert_array_equal(one, other)
+        if tool is None:  # and by the robot's own Jacobian
+            jacobian = robot.tool_jacobian(theta, attitude, "free")
+            np.testing.assert_allclose(actual.free, jacobian, atol=1e-12)
+    with pytest.raises(InputError, match="nonesuch"):
+        controller.signals.tool_state("nonesuch")
+
+
+NO_TURN = np.array([[1.0, 0.0, 0.0, 0.0, *[0.0] * 6]])
+
+
+def pd_gains(robot: str) -> Any:
+    """Gains for any robot."""
+    return {"k_p": 1.0, "k_d": 1.0}
+
+
+# Laws in Python
+
+
+class ToolGains(LawGains):
+    """Gains of the law below."""
+
+    k: Array = per_axis("stiffness", "N m/rad")
+
+
+class ToolHolding(ControlLaw):
+    """A user's law: PD control, and from half a second on a virtual spring that holds the tool
+    where it is."""
+
+    name = "tool_holding"
+    gains_type = ToolGains
+
+    def reset(self) -> None:
+        """Forget the place."""
+        super().reset()
+        self.place: Array | None = None
+
+    def force(self, signals: Signals) -> Array:
+        """A virtual spring by the transposed Jacobian, and damping against the reference."""
+        force: Array = self.memory.force
+        tool = signals.tool_state()
+        force[:] = self.gains.k * (signals.error + signals.error_rate)
+        if signals.time >= 0.5:
+            if self.place is None:
+                self.place = tool.position
+            self.memory.s[:3] = self.place - tool.position
+            force[3:] = tool.joints[:3].T @ (300.0 * self.memory.s[:3])
+            force[3:] += 5.0 * (signals.reference.joint_velocities - signals.joint_velocities)
+        return force
+
+
+def test_a_law_of_twenty_lines_uses_time_reference_and_tool(paper_robot: Robot) -> None:
+    """It flies in the whole loop; where its tool was is what the recorded states say."""
+    law = ToolHolding({"k": np.array([500.0] * 3 + [50.0] * 3 + [5.0] * 3)}, PERIOD)
+    log = Scenario(controller=law, friction=False, duration=1.0).fly().log
+    assert log is not None
+    assert log.telemetry is not None
+    states = zip(log.quaternion, log.joint_positions, strict=True)
+    places = np.array([tool_state(paper_robot, *state).position for state in states])
+    held = np.flatnonzero(log.time >= 0.5)[0]
+    away = places[held] - places
+    np.testing.assert_allclose(log.telemetry[held:, 0, :3], away[held:], atol=1e-14)
+    assert (log.telemetry[:held, 0] == 0.0).all()
+    assert 0.0 < np.abs(away[held:]).max() < 0.1
+
+
+def test_a_view_of_signals_cannot_be_copied_but_a_controller_can(paper_robot: Robot) -> None:
+    """The copy has signals of its own, with the robot, and answers the same."""
+    rng = np.random.default_rng(5)
+    controller = Controller(paper_robot, law_with("adrc", 6), PERIOD)
+    motion = Motion(rng, 6)
+    controller.update(*motion.step(1))
+    for copying in (copy.copy, copy.deepcopy, pickle.dumps):
+        with pytest.raises(TypeError, match="a view of a record cannot be copied or pickled"):
+            copying(controller.signals)
+    copies = [copy.deepcopy(controller), pickle.loads(pickle.dumps(controller))]
+    state, reference = motion.step(1)
+    torque = controller.update(state, reference).torque.copy()
+    for other in copies:
+        np.testing.assert_array_equal(other.update(state, reference).torque, torque)
+        assert other.signals.time == controller.signals.time
+        position = other.signals.tool_state().position
+        np.testing.assert_array_equal(position, controller.signals.tool_state().position)
+        other.signals.error[:] = np.nan
+        assert np.isfinite(controller.signals.error).all()
