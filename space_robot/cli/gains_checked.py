@@ -59,12 +59,16 @@ class Checked:
     @property
     def faults(self) -> list[str]:
         """What is wrong with which laws, one clause for each kind of fault."""
+        small = [check.law for check in self.checks if not check.has_margin]
         kinds = {
             "h_bar leaves too little margin in torque scale": [
-                check.law for check in self.checks if check.spectrum and not check.has_margin
+                law for law in small if law in self.with_pair - self.with_model
+            ],
+            "the nominal inertia leaves too little margin in torque scale": [
+                law for law in small if law in self.with_model
             ],
             "the observer leaves too little margin in torque scale": [
-                check.law for check in self.checks if not (check.spectrum or check.has_margin)
+                law for law in small if law not in self.with_pair
             ],
             "small motions grow": [check.law for check in self.checks if not check.loop.is_stable],
             "small oscillations of the gears' springs grow": [

@@ -55,7 +55,8 @@ class LawTrial:
             elif name in OF_INERTIA:
                 values *= inertia_scale
         self._block = self._at_rest(1.0 if law.uses_model else inertia_scale)
-        self._rest_block = self._block.copy()
+        self._bytes = self._block.view(np.uint8)
+        self._rest_bytes = self._bytes.copy()
         self._signals = Signals.view(self._block)
         self._signals.robot = posture.robot
         self._inputs = {name: getattr(self._signals, name)[-posture.axes :] for name in INPUTS}
@@ -88,7 +89,7 @@ class LawTrial:
         ticks = []
         for step in (STEP, 2.0 * STEP):
             self._restore()
-            self._block[:] = self._rest_block
+            self._bytes[:] = self._rest_bytes
             for name, values in moved.items():
                 self._inputs[name][:] = step * values
             if "rho" in moved or "rho_rate" in moved:
@@ -107,7 +108,7 @@ class LawTrial:
         """
         size = len(self._numbers)
         columns = np.zeros((self._posture.axes + size, size))
-        self._block[:] = self._rest_block
+        self._bytes[:] = self._rest_bytes
         for index in np.flatnonzero(self._may_matter()):
             ticks = []
             for step in (STEP, 2.0 * STEP):
@@ -125,7 +126,7 @@ class LawTrial:
         axes, types = self._posture.axes, self._law.memory_block.dtype
         assert types.names
         assert types.fields
-        self._block[:] = self._rest_block
+        self._bytes[:] = self._rest_bytes
         size, changes = types.itemsize // 8, {}
         ranges = {
             name: slice(types.fields[name][1] // 8, types.fields[name][1] // 8 + own.itemsize // 8)

@@ -1,10 +1,11 @@
 """The linear part of a control law near rest, from the law's own code.
 
-Without its switching terms (`law_trial.SWITCHING`) a law is linear in its signals and its memory, inside a
-boundary layer as well. It is differentiated by running it: one tick at rest, so that observers have
-begun, then two ticks for each signal and each number of its memory, moved by `law_trial.STEP` and by
-twice as much, of which the difference counts: a jump at rest, as of a sign function, is not in it. With
-inputs y, x the part of the memory that has influence, and F_S the force,
+Without its switching terms (`law_trial.SWITCHING`) a law is linear in its signals and its memory,
+inside a boundary layer as well. It is differentiated by running it: one tick at rest, so that
+observers have begun, then two ticks for each signal and each number of its memory, moved by
+`law_trial.STEP` and by twice as much, of which the difference counts: a jump at rest, as of a sign
+function, is not in it. With inputs y, x the part of the memory that has influence, and F_S the
+force,
 
     x_k+1 = A x_k + B y_k,    F_k = C x_k + D y_k,    y = [e, edot, rho, rhodot, F_applied, N_hat].
 
@@ -122,9 +123,9 @@ def linear_laws(
 
 def _influential(step: Array, by_input: Array, force_by_state: Array) -> Sequence[int]:
     """Return the states that an input reaches and the force depends on, at once or later."""
-    return np.flatnonzero(
-        _spread(by_input.any(axis=1), step) & _spread(force_by_state.T.any(axis=1), step.T)
-    ).tolist()
+    by_inputs: NDArray[np.bool_] = by_input.any(axis=1)
+    to_force: NDArray[np.bool_] = force_by_state.any(axis=0)
+    return np.flatnonzero(_spread(by_inputs, step) & _spread(to_force, step.T)).tolist()
 
 
 def _spread(reached: NDArray[np.bool_], step: Array) -> NDArray[np.bool_]:

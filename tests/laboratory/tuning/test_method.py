@@ -11,12 +11,13 @@ from hypothesis import strategies as st
 
 from space_robot.flight.plan import Flight, FlightPlan, resolve
 from space_robot.tuning.demand import ForceDemand, demand
+from space_robot.tuning.held_ripple import law_ripple
 from space_robot.tuning.inertia import SAMPLING, inertia_along
 from space_robot.tuning.method import Tuned, tune
 from space_robot.tuning.noise import Noise
 from space_robot.tuning.postures import Posture, postures_along
 from space_robot.tuning.spectrum import eigenvalues
-from space_robot.tuning.task import TuningOptions, axis_inertia
+from space_robot.tuning.task import TuningOptions, TuningTask, axis_inertia
 from space_robot_control.laws import laws
 from space_robot_msgs_py.errors import InputError
 
@@ -101,6 +102,116 @@ def test_all_laws_of_the_house_get_all_their_gains() -> None:
         assert found.gains[name].keys() == law.gain_descriptions().keys()
 
 
+def test_laws_without_h_bar_have_poles_and_inertia_of_the_method() -> None:
+    found, inertia = tuned(TuningOptions(0.05, 0.2)), scene()[0]
+    free = 1.0 / np.diagonal(np.linalg.inv(inertia), axis1=1, axis2=2)
+    d = free.min(axis=0)
+    for law in ("pd", "pd_feedforward"):
+        gains = found.gains[law]
+        np.testing.assert_allclose(gains["k_d"], 2.0 * 100.0 * d, rtol=0.01)
+        np.testing.assert_allclose(gains["k_p"], 100.0**2 * d, rtol=0.01)
+    dob, h_bar = found.gains["dob"], np.asarray(found.gains["tde_stc"]["h_bar"])
+    weight = 1.0 - np.exp(-2.0 * np.pi * found.corner_hz * PERIOD)
+    np.testing.assert_array_equal(dob["inertia"], h_bar)
+    per_tick = dob["bandwidth"] * PERIOD
+    np.testing.assert_allclose(per_tick / (1.0 + per_tick), weight, rtol=0.01)
+    np.testing.assert_allclose(dob["k_p"], found.bandwidth**2, rtol=0.01)
+    adrc = found.gains["adrc"]
+    np.testing.assert_array_equal(adrc["inertia"], h_bar)
+    np.testing.assert_allclose(3.0 / adrc["omega_o"], PERIOD / weight, rtol=0.01)  # the same lag
+    assert np.all(adrc["omega_c"] <= adrc["omega_o"] / 4.0)
+    np.testing.assert_allclose(adrc["omega_c"], found.bandwidth, rtol=0.01)
+
+
+def test_adrc_has_less_inertia_where_its_three_poles_would_be_unstable() -> None:
+    """``(s + omega_o)^3 = (1 - lambda) omega_o^3`` has no growing root for lambda below 9."""
+    found = tuned(TuningOptions(0.05, 0.2), "seven_joint")
+    inertia, h_bar = found.gains["adrc"]["inertia"], found.gains["tde_stc"]["h_bar"]
+    assert np.all(np.asarray(inertia) < h_bar)
+    largest = eigenvalues(0.8 * scene("seven_joint")[0], np.asarray(inertia)).max()
+    assert largest == pytest.approx(5.0, rel=0.01)
+    for value, is_stable in ((largest, True), (8.9, True), (9.1, False)):
+        roots = np.roots([1.0, 3.0, 3.0, value])
+        assert bool(roots.real.max() < 0.0) is is_stable
+
+
+def test_indi_waits_for_its_estimate_alone() -> None:
+    """Its pole is at the smallest eigenvalue of ``H_S'^-1 H_S``, over the lag of the low-pass."""
+    found, (inertia, postures, _) = tuned(TuningOptions(0.05, 0.2)), scene()
+    nominal = np.tile([posture.inertia for posture in postures], (2, 1, 1))
+    small = np.linalg.eigvals(np.linalg.solve(1.2 * inertia, nominal)).real.min()
+    weight = 1.0 - np.exp(-2.0 * np.pi * found.corner_hz * PERIOD)
+    bandwidth = small * weight / PERIOD / 4.0
+    assert bandwidth < 100.0
+    np.testing.assert_allclose(found.gains["indi"]["k_d"], 2.0 * bandwidth, rtol=0.01)
+
+
+def test_a_nominal_set_has_no_h_bar_and_is_fast_as_computed_torque() -> None:
+    found = tuned(TuningOptions(0.05, 0.2, h_bar="nominal"))
+    constant = tuned(TuningOptions(0.05, 0.2))
+    for law in ("tde_smc", "tde_tsmc", "tde_stc"):
+        assert not found.gains[law]["h_bar"].any()
+    assert found.h_bar == "nominal"
+    assert found.bandwidth > 5.0 * constant.bandwidth
+    assert found.bandwidth <= found.model_bandwidth
+    assert found.corner_hz > constant.corner_hz
+    for law in ("ctc", "ctc_smc", "pd", "dob", "adrc"):  # they have no part in it
+        for name, values in found.gains[law].items():
+            np.testing.assert_array_equal(values, constant.gains[law][name])
+    # eps: the force that the estimate misses, as acceleration in the worst posture
+    inertia, _, asked = scene()
+    gap = found.delay * asked.slope + 0.025 * asked.peak
+    accelerations = np.array([np.abs(np.linalg.inv(own)) @ gap for own in inertia])
+    np.testing.assert_allclose(found.error, accelerations.max(axis=0), rtol=1e-6)
+    np.testing.assert_allclose(found.gains["tde_smc"]["g"], gap, rtol=0.01)
+
+
+def test_auto_takes_the_nominal_inertia_where_no_diagonal_will_do() -> None:
+    """Where a constant one has less than a tenth of the bandwidth of computed torque, or asked."""
+    for bandwidth, kind in ((None, "nominal"), (3.0, "constant"), (20.0, "nominal")):
+        found = tuned(TuningOptions(0.05, 0.2, bandwidth=bandwidth, h_bar="auto"))
+        assert found.constant is not None
+        assert found.h_bar == kind
+        own = found.constant.bandwidth
+        assert (own < 0.1 * found.model_bandwidth) is (bandwidth is None)
+
+
+def test_more_margin_than_the_payload_leaves_is_refused() -> None:
+    with pytest.raises(InputError, match=r"margin must be at most 0\.312 .* got 0\.4"):
+        tuned(TuningOptions(0.4, 0.2, h_bar="nominal"))
+
+
+def test_noise_of_the_nominal_estimate_is_that_of_all_axes_together() -> None:
+    inertia, postures, asked = scene()
+    wishes = TuningOptions(0.05, 0.2, h_bar="nominal")
+    noise = white(1e-6)
+    found = tune(inertia, postures, asked, wishes, PERIOD, noise)
+    weight = 1.0 - np.exp(-2.0 * np.pi * found.corner_hz * PERIOD)
+    # white noise through the low-pass of a difference, see test_noise
+    one = np.sqrt(2.0 / (2.0 - weight)) * weight / PERIOD * 1e-6
+    nominal = np.array([posture.inertia for posture in postures])
+    force = one * np.sqrt((nominal**2).sum(axis=2)).max(axis=0)
+    assert (force / asked.peak).max() == pytest.approx(0.1, rel=0.05)
+
+
+def test_every_law_has_the_same_ripple_on_request() -> None:
+    """Of the linear parts, on the limiting axis; and the same W where that is asked for."""
+    inertia, postures, asked = scene()
+    noise = white(3e-6, 3e-6, 1500)
+    wishes = TuningOptions(0.05, 0.2, noise_ripple=0.05)
+    found = tune(inertia, postures, asked, wishes, PERIOD, noise)
+    task = TuningTask(inertia, postures, asked, wishes, PERIOD, noise)
+    weight = 1.0 - np.exp(-2.0 * np.pi * found.corner_hz * PERIOD)
+    for law in ("ctc", "ctc_smc", "tde_tsmc", "dob", "pd", "pd_feedforward"):
+        share = law_ripple(task, law, found.gains[law], weight) / asked.peak
+        is_at_limit = found.bandwidths[law] > 99.0
+        assert share.max() == pytest.approx(0.05, rel=0.05) or (is_at_limit and share.max() < 0.05)
+    same = tune(inertia, postures, asked, TuningOptions(0.05, 0.2, bandwidth=2.0), PERIOD)
+    for law in ("ctc", "indi", "dob", "tde_tsmc"):
+        np.testing.assert_array_equal(same.gains[law]["k_p"], np.full(9, 4.0))
+    np.testing.assert_array_equal(same.gains["adrc"]["omega_c"], np.full(9, 2.0))
+
+
 @given(st.integers(0, 2**32 - 1), st.integers(2, 9))
 @settings(max_examples=30, deadline=None)
 def test_the_shape_is_near_the_best_diagonal(seed: int, m: int) -> None:
@@ -134,9 +245,9 @@ def test_demand_is_what_a_flight_commands() -> None:
     assert np.all(asked.peak >= case_1.peak)
 
 
-def white(rate: float, angle: float = 0.0) -> Noise:
+def white(rate: float, angle: float = 0.0, ticks: int = 8000) -> Noise:
     """White noise of rates, rad/s (eps: 1/s), and of angles, rad, alike on all axes."""
-    rng, shape = np.random.default_rng(1), (8000, 9)
+    rng, shape = np.random.default_rng(1), (ticks, 9)
     rates = rate * rng.normal(size=shape)
     return Noise(rates, angle * rng.normal(size=shape), rates, 0.0, PERIOD)
 

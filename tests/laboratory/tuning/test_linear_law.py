@@ -1,0 +1,240 @@
+"""Linear parts of laws against their equations, written out, and against the laws themselves."""
+
+from __future__ import annotations
+
+import copy
+import functools
+
+import numpy as np
+import pytest
+from closed_loop import H_BAR
+from numpy.typing import NDArray
+
+from space_robot.flight.plan import Flight, FlightPlan, resolve
+from space_robot.tuning.gain_check import noise_gain
+from space_robot.tuning.linear_law import LinearLaw, force_by_rate, linear_law
+from space_robot.tuning.postures import Posture, postures_at
+from space_robot_control.laws import ControlLaw, LawGains, Signals, find_law, per_axis
+from space_robot_control.laws.checked import LawError
+
+Array = NDArray[np.float64]
+
+PERIOD = 5e-4
+JOINTS = np.radians([0.0, 120.0, 220.0, 0.0, -10.0, 0.0])
+TURNED = np.array([0.6, 0.48, -0.4, 0.4964])
+ONES = np.ones(9)
+DIAGONAL = np.array(H_BAR)
+
+
+@functools.cache
+def posture(controls_base: bool = True) -> Posture:
+    robot = Flight(resolve(FlightPlan())).robot
+    (only,) = postures_at(robot, TURNED / np.linalg.norm(TURNED), [JOINTS], controls_base)
+    return only
+
+
+def law(name: str, **gains: Array | float) -> ControlLaw:
+    return find_law(name)({k.rstrip("_"): v * ONES for k, v in gains.items()}, PERIOD)
+
+
+LAWS = {
+    "ctc": law("ctc", k_p=300.0, k_d=30.0),
+    "ctc_smc": law("ctc_smc", lambda_=7.0, g=2.0, delta=1e-4),
+    "tde_smc": law("tde_smc", h_bar=DIAGONAL, lambda_=7.0, g=2.0),
+    "tde_tsmc": law("tde_tsmc", h_bar=DIAGONAL, k_p=300.0, k_d=30.0, k_1=2.0),
+    "tde_stc": law("tde_stc", h_bar=DIAGONAL, lambda_=7.0, k_1=0.3, k_2=0.1),
+    "nominal": law("tde_tsmc", h_bar=0.0, k_p=300.0, k_d=30.0, k_1=2.0),
+    "indi": law("indi", k_p=300.0, k_d=30.0),
+    "dob": law("dob", inertia=DIAGONAL, bandwidth=80.0, k_p=300.0, k_d=30.0),
+    "adrc": law("adrc", inertia=DIAGONAL, omega_c=9.0, omega_o=70.0),
+    "pd": law("pd", k_p=300.0 * DIAGONAL, k_d=30.0 * DIAGONAL),
+    "pd_feedforward": law("pd_feedforward", k_p=300.0 * DIAGONAL, k_d=30.0 * DIAGONAL),
+}
+INERTIA_OF = {"ctc": True, "nominal": True, "indi": True, "tde_tsmc": False}
+
+
+@pytest.mark.parametrize("controls_base", [True, False])
+@pytest.mark.parametrize("name", INERTIA_OF)
+def test_poles_of_laws_are_their_gains_times_their_inertia(name: str, controls_base: bool) -> None:
+    own = posture(controls_base)
+    linear = linear_law(LAWS[name], own)
+    inertia = own.inertia if INERTIA_OF[name] else np.diag(DIAGONAL[-own.axes :])
+    np.testing.assert_allclose(linear.force_by["error"], 300.0 * inertia, rtol=1e-12)
+    np.testing.assert_allclose(linear.force_by["error_rate"], 30.0 * inertia, rtol=1e-12)
+    np.testing.assert_array_equal(linear.force_by["n_hat"], (name != "ctc") * np.eye(own.axes))
+    assert linear.step.size == 0
+    if name == "ctc":
+        assert linear.estimate is None
+    else:
+        assert linear.estimate is not None
+        np.testing.assert_array_equal(linear.estimate, inertia)
+
+
+def test_a_boundary_layer_counts_with_its_slope_and_switching_does_not() -> None:
+    layer, inertia = linear_law(LAWS["ctc_smc"], posture()), posture().inertia
+    slope = 2.0 / 1e-4 * np.eye(9)
+    np.testing.assert_allclose(layer.force_by["error_rate"], 7.0 * inertia + slope, rtol=1e-9)
+    np.testing.assert_allclose(layer.force_by["error"], 7.0 * slope, rtol=1e-9)
+    for name in ("tde_smc", "tde_stc"):
+        linear = linear_law(LAWS[name], posture())
+        np.testing.assert_allclose(linear.force_by["error_rate"], np.diag(7.0 * DIAGONAL))
+        assert not linear.force_by["error"].any()
+
+
+def test_the_observer_of_adrc_has_its_three_poles() -> None:
+    """At ``1 / (1 + omega_o period)`` on each axis; a triple one is known to the cube root."""
+    linear = linear_law(LAWS["adrc"], posture())
+    assert linear.step.shape == (27, 27)
+    beta = 1.0 / (1.0 + 70.0 * PERIOD)
+    np.testing.assert_allclose(np.linalg.eigvals(linear.step), beta, atol=1e-4)
+    polynomial = np.poly(linear.step[np.ix_([0, 9, 18], [0, 9, 18])])
+    np.testing.assert_allclose(polynomial, np.poly([beta] * 3), atol=1e-9)
+
+
+def test_the_observer_of_dob_has_its_pole_and_reaches_the_force() -> None:
+    """``d_hat`` follows a constant force completely, with the pole ``1 / (1 + g period)``."""
+    linear = linear_law(LAWS["dob"], posture())
+    poles = np.linalg.eigvals(linear.step)
+    pole = 1.0 / (1.0 + 80.0 * PERIOD)
+    np.testing.assert_allclose(np.sort(np.abs(poles)), [0.0] * 9 + [pole] * 9, atol=1e-12)
+    at_rest = np.linalg.solve(np.eye(18) - linear.step, linear.state_by["applied_force"])
+    reached = linear.force_by["applied_force"] + linear.force_by_state @ at_rest
+    np.testing.assert_allclose(reached, np.eye(9), atol=1e-9)
+
+
+def test_feedforward_moves_the_base_as_the_joints_need() -> None:
+    """``F_b = PD + H_bq H_qq^-1 F_q``, so that only PD turns the base."""
+    linear, inertia = linear_law(LAWS["pd_feedforward"], posture()), posture().inertia
+    pd = np.diag(300.0 * DIAGONAL)
+    share = inertia[:3, 3:] @ np.linalg.inv(inertia[3:, 3:])
+    expected = pd.copy()
+    expected[:3] += share @ pd[3:]
+    np.testing.assert_allclose(linear.force_by["error"], expected, rtol=1e-9, atol=1e-9)
+    moved = np.linalg.solve(inertia, expected)
+    np.testing.assert_allclose(moved[:3, 3:], 0.0, atol=1e-9 * np.abs(moved).max())
+
+
+@pytest.mark.parametrize("name", LAWS)
+def test_it_is_what_the_law_does_near_rest(name: str) -> None:
+    """Of twenty ticks with random signals, for the laws without their switching terms."""
+    own = copy.deepcopy(LAWS[name])
+    for gain, values in own.gain_values.items():
+        if gain in ("k_1", "k_2") or (gain == "g" and "delta" not in own.gain_values):
+            values[:] = 0.0
+    linear, rng = linear_law(own, posture()), np.random.default_rng(3)
+    block = Signals.block(6)
+    signals = Signals.view(block)
+    block[0]["nominal"]["inertia"][:] = posture().inertia
+    signals.quaternion[:], signals.joint_positions[:] = posture().quaternion, JOINTS
+    own.reset()
+    own.force(signals)
+    state = np.zeros(len(linear.step))
+    for _ in range(20):
+        inputs = {key: 1e-7 * rng.normal(size=9) for key in linear.force_by}
+        for key, values in inputs.items():
+            getattr(signals, key)[:] = values
+        force = own.force(signals).copy()
+        if name == "nominal":
+            force += posture().inertia @ own.memory.u
+        expected = linear.force_by_state @ state
+        expected += sum(linear.force_by[key] @ values for key, values in inputs.items())
+        scale = np.abs(expected).max()
+        np.testing.assert_allclose(force, expected, atol=1e-7 * scale)
+        state = linear.step @ state
+        state += sum(linear.state_by[key] @ values for key, values in inputs.items())
+
+
+def by_gains(own: ControlLaw, weight: float) -> Array:
+    """Torque by noise of a rate, by the names of the gains, in the coordinates of `posture`."""
+    gains = own.gain_values
+    damping = gains.get("k_d", gains.get("lambda"))
+    assert damping is not None
+    if "h_bar" in gains and gains["h_bar"].any():
+        return gains["h_bar"] * (weight / PERIOD + damping)
+    per_rate = np.diag(posture().inertia) * damping
+    if "h_bar" in gains or own.name == "indi":
+        per_rate = per_rate + np.diag(posture().inertia) * weight / PERIOD
+    return per_rate + (gains["g"] / gains["delta"] if "delta" in gains else 0.0)
+
+
+@pytest.mark.parametrize("weight", [1.0, 0.05])
+@pytest.mark.parametrize("name", [name for name in LAWS if name not in ("adrc", "dob")])
+def test_noise_gain_is_that_of_the_gains(name: str, weight: float) -> None:
+    own = LAWS[name]
+    w, x, y, z = posture().quaternion
+    jacobian = 0.5 * np.array([[w, -z, y], [z, w, -x], [-y, x, w]])
+    if name.startswith("pd"):
+        per_rate = own.gain_values["k_d"]
+    else:
+        per_rate = by_gains(own, weight)
+    expected = per_rate.copy()
+    expected[:3] = np.diag(jacobian.T @ np.diag(per_rate[:3]) @ jacobian)
+    np.testing.assert_allclose(noise_gain(own, [posture()], weight), expected, rtol=1e-9)
+
+
+def test_noise_gain_of_observers_is_that_of_their_own_filters() -> None:
+    """`dob`: ``J (w / period + K_D)`` with its own weight; `adrc` sees positions alone."""
+    weight = 80.0 * PERIOD / (1.0 + 80.0 * PERIOD)
+    expected = DIAGONAL * (weight / PERIOD + 30.0)
+    by_rate = force_by_rate(LAWS["dob"], posture())
+    np.testing.assert_allclose(np.diag(by_rate), -expected, rtol=1e-9)
+    assert not force_by_rate(LAWS["adrc"], posture()).any()
+
+
+class Gains(LawGains):
+    k: Array = per_axis("K")
+
+
+class Steps(ControlLaw):
+    """A law with a jump at rest under a name that nobody knows, and a state that is no number."""
+
+    name = "steps"
+    gains_type = Gains
+
+    def force(self, signals: Signals) -> Array:
+        self.memory.u[:] = np.sign(signals.error_rate)
+        rate = 2.0 * signals.omega_base[0] + signals.joint_velocities[0]
+        force: Array = self.gains.k * signals.error + 5.0 * self.memory.u + rate
+        return force
+
+
+def test_a_jump_at_rest_is_not_in_it_and_rates_move_with_rhodot() -> None:
+    linear: LinearLaw = linear_law(Steps({"k": 3.0 * ONES}, PERIOD), posture())
+    np.testing.assert_allclose(linear.force_by["error"], 3.0 * np.eye(9), rtol=1e-5)
+    assert np.abs(linear.force_by["error_rate"]).max() < 1e-3
+    w, x, y, z = posture().quaternion
+    jacobian = 0.5 * np.array([[w, -z, y], [z, w, -x], [-y, x, w]])
+    row = np.concatenate([2.0 * np.linalg.inv(jacobian)[0], [1.0], np.zeros(5)])
+    np.testing.assert_allclose(linear.force_by["rho_rate"], np.tile(row, (9, 1)), rtol=1e-4)
+
+
+class Failing(Steps):
+    """A law whose code fails."""
+
+    name = "failing"
+
+    def force(self, signals: Signals) -> Array:
+        raise ValueError("no")
+
+
+def test_a_law_that_fails_is_named() -> None:
+    with pytest.raises(LawError, match="controller failing failed"):
+        linear_law(Failing({"k": ONES}, PERIOD), posture())
+
+
+def test_the_law_is_not_changed() -> None:
+    own = LAWS["adrc"]
+    before = own.gains_block.tobytes(), own.memory_block.tobytes()
+    linear_law(own, posture(), 2.0)
+    assert (own.gains_block.tobytes(), own.memory_block.tobytes()) == before
+
+
+@pytest.mark.parametrize("name", ["tde_tsmc", "nominal", "indi", "dob", "adrc"])
+def test_the_assumed_inertia_is_scaled_as_a_whole(name: str) -> None:
+    once, twice = (linear_law(LAWS[name], posture(), scale) for scale in (1.0, 2.0))
+    for key in ("error", "error_rate", "rho_rate"):
+        expected = 2.0 * once.force_by[key]
+        np.testing.assert_allclose(twice.force_by[key], expected, rtol=1e-9, atol=1e-9)
+    if once.estimate is not None:
+        assert twice.estimate is not None
+        np.testing.assert_array_equal(twice.estimate, 2.0 * once.estimate)
