@@ -63,7 +63,7 @@ from numpy.typing import NDArray
 from space_robot_control.laws import laws
 
 from .demand import ForceDemand
-from .equal_ripple import bandwidth_at_ripple, estimate_at_ripple
+from .equal_ripple import bandwidth_at_ripple, estimate_at_ripple, with_quiet_switching
 from .estimate_design import (
     EstimateDesign,
     check_estimate,
@@ -166,7 +166,10 @@ def tune(
         design = nominal_estimate(task)
         design = estimate_at_ripple(task, design) if has_ripple else design
     check_estimate(task, design)
-    tuned = {name: own(task, design) for name, own in WITH_ESTIMATE.items()}
+    tuned = {
+        name: with_quiet_switching(task, name, own, design) if has_ripple else own(task, design)
+        for name, own in WITH_ESTIMATE.items()
+    }
     for name, tune_law in WITHOUT_ESTIMATE.items():
         if name in laws():
             most = model_bandwidth(task, task.shape if name in WITHOUT_MODEL else None)
