@@ -35,7 +35,7 @@ HALVINGS = 14
 """Of a searched interval, see `largest_stable`."""
 
 
-class Motion(NamedTuple):
+class SmallMotion(NamedTuple):
     """Motions near a posture, with states ``[q, qdot]`` and forces in rho."""
 
     step: Array
@@ -48,16 +48,16 @@ class Motion(NamedTuple):
     """As a law with a model knows it."""
 
 
-def rigid_motion(inertia: Array, posture: Posture, period: float) -> Motion:
+def rigid_motion(inertia: Array, posture: Posture, period: float) -> SmallMotion:
     """Return the motions ``H rhodd = F`` of a rigid robot, ``inertia`` H (m, m)."""
     axes = len(inertia)
     one, none, compliance = np.eye(axes), np.zeros((axes, axes)), np.linalg.inv(inertia)
     step = np.block([[one, period * one], [none, one]])
     by_force = np.vstack([0.5 * period**2 * compliance, period * compliance])
-    return Motion(step, by_force, one, posture)
+    return SmallMotion(step, by_force, one, posture)
 
 
-class Loop(NamedTuple):
+class LinearLoop(NamedTuple):
     """Small motions of robot and law, with Z states and 3 m inputs: noise of e, r, and pair's r."""
 
     step: Array
@@ -71,8 +71,8 @@ class Loop(NamedTuple):
 
 
 def loop_of(
-    motion: Motion, law: LinearLaw, weight: float, reported: float = 1.0, actual: float = 1.0
-) -> Loop:
+    motion: SmallMotion, law: LinearLaw, weight: float, reported: float = 1.0, actual: float = 1.0
+) -> LinearLoop:
     """Return the closed loop of a law.
 
     Args:
@@ -119,7 +119,7 @@ def loop_of(
     if has_estimate:
         rows += [signals["n_hat"], of_pair]
     whole, size = np.vstack(rows), force.shape[1] - 3 * axes
-    return Loop(whole[:, :size], whole[:, size:], force[:, :size], force[:, size:])
+    return LinearLoop(whole[:, :size], whole[:, size:], force[:, :size], force[:, size:])
 
 
 def growth(matrix: Array) -> float:

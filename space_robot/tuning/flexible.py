@@ -22,7 +22,7 @@ from space_robot_control.navigation.low_pass import low_pass_weight
 from space_robot_model.robot import Robot
 from space_robot_model.robot.gears import FlexibleModel, flexible_model, geared_joints
 
-from .closed_loop import SLOWEST_GROWTH, Motion, loop_of
+from .closed_loop import SLOWEST_GROWTH, SmallMotion, loop_of
 from .inertia import attitude_jacobian
 from .linear_law import LinearLaw, linear_laws
 from .postures import Posture, postures_at
@@ -168,7 +168,7 @@ def _largest(low: float, high: float, is_stable: Callable[[float], bool]) -> flo
 
 def _motion(
     robot: Robot, positions: Array, jacobian: Array, posture: Posture, period: float
-) -> Motion:
+) -> SmallMotion:
     """Return the motions near a configuration.
 
     Args:
@@ -182,7 +182,7 @@ def _motion(
     rows = np.arange(3 if base else 6, len(model.inertia))
     force, rate = _axes_of(robot, len(model.inertia), base)
     step, by_force = _discrete(_reduced(model, rows), force[rows] @ jacobian.T, period)
-    return Motion(step, by_force, jacobian @ rate[:, rows], posture)
+    return SmallMotion(step, by_force, jacobian @ rate[:, rows], posture)
 
 
 def _fast_growth(matrix: Array, period: float, least: float) -> float:

@@ -33,7 +33,7 @@ from space_robot_control.navigation.low_pass import low_pass_weight
 from .closed_loop import SLOWEST_GROWTH, RigidLoop
 from .flexible import FlexibleCheck
 from .inertia import attitude_jacobian
-from .linear_law import force_by_rate, linear_laws
+from .linear_law import depends_on_posture, force_by_rate, linear_laws
 from .mass_errors import MassCheck
 from .postures import Posture
 from .spectrum import LEAST_MARGIN, Spectrum, spectrum
@@ -210,7 +210,7 @@ def noise_gain(law: ControlLaw, postures: Sequence[Posture], weight: float = 1.0
     Raises:
         LawError: the law's code failed.
     """
-    some = _extreme(postures) if law.needs_model else postures[:1]
+    some = _extreme(postures) if depends_on_posture(law, postures) else postures[:1]
     gains = [np.abs(np.diag(force_by_rate(law, posture, weight))) for posture in some]
     per_rate = np.max(gains, axis=0)
     if len(per_rate) < len(law.memory.s):  # no torque on the base

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from space_robot_control.laws import find_law
 from space_robot_control.laws.base import NOMINAL_INERTIA
 
-from .closed_loop import Loop, loop_of, rigid_motion
+from .closed_loop import LinearLoop, loop_of, rigid_motion
 from .linear_law import linear_law
 from .noise import Noise
 from .task import TuningTask
@@ -43,7 +43,7 @@ def law_ripple(
     return force_ripple(loop, task.noise, law.estimate == NOMINAL_INERTIA)
 
 
-def force_ripple(loop: Loop, noise: Noise, uses_measured_rates: bool) -> Array:
+def force_ripple(loop: LinearLoop, noise: Noise, uses_measured_rates: bool) -> Array:
     """Return the standard deviation (m,) of the force, N m.
 
     Args:

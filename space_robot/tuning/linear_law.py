@@ -115,23 +115,33 @@ def assumed_inertia(law: ControlLaw, posture: Posture, scale: float = 1.0) -> Ar
 def linear_laws(
     law: ControlLaw, postures: Sequence[Posture], inertia_scale: float = 1.0
 ) -> list[LinearLaw]:
-    """Return the `linear_law` in each posture; one that needs no model is the same in all."""
-    if law.needs_model:
+    """Return the `linear_law` in each posture."""
+    if depends_on_posture(law, postures):
         return [linear_law(law, posture, inertia_scale) for posture in postures]
     return [linear_law(law, postures[0], inertia_scale)] * len(postures)
 
 
+def depends_on_posture(law: ControlLaw, postures: Sequence[Posture]) -> bool:
+    """Return True if a law may be another one in each posture.
+
+    One that needs no nominal inertia is, if it differs in the first and the last posture.
+    """
+    if law.needs_model:
+        return True
+    first, last = (linear_law(law, postures[index]).force_by for index in (0, -1))
+    return not all(np.allclose(first[name], last[name], rtol=1e-5) for name in INPUTS)
+
+
 def _influential(step: Array, by_input: Array, force_by_state: Array) -> Sequence[int]:
     """Return the states that an input reaches and the force depends on, at once or later."""
-    by_inputs: NDArray[np.bool_] = by_input.any(axis=1)
-    to_force: NDArray[np.bool_] = force_by_state.any(axis=0)
+    by_inputs, to_force = (by_input != 0.0).any(axis=1), (force_by_state != 0.0).any(axis=0)
     return np.flatnonzero(_spread(by_inputs, step) & _spread(to_force, step.T)).tolist()
 
 
 def _spread(reached: NDArray[np.bool_], step: Array) -> NDArray[np.bool_]:
     """Return the states that are reached, from those that are, through any number of ticks."""
     while True:
-        more = reached | step[:, reached].any(axis=1)
+        more: NDArray[np.bool_] = np.logical_or(reached, (step[:, reached] != 0.0).any(axis=1))
         if np.array_equal(more, reached):
             return more
         reached = more

@@ -163,10 +163,7 @@ def test_noise_gain_is_that_of_the_gains(name: str, weight: float) -> None:
     own = LAWS[name]
     w, x, y, z = posture().quaternion
     jacobian = 0.5 * np.array([[w, -z, y], [z, w, -x], [-y, x, w]])
-    if name.startswith("pd"):
-        per_rate = own.gain_values["k_d"]
-    else:
-        per_rate = by_gains(own, weight)
+    per_rate = own.gain_values["k_d"] if name.startswith("pd") else by_gains(own, weight)
     expected = per_rate.copy()
     expected[:3] = np.diag(jacobian.T @ np.diag(per_rate[:3]) @ jacobian)
     np.testing.assert_allclose(noise_gain(own, [posture()], weight), expected, rtol=1e-9)

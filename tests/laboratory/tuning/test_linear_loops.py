@@ -139,7 +139,7 @@ def test_observers_fly_up_to_their_margin_and_no_further(law: str) -> None:
 def test_with_the_nominal_inertia_a_fifth_too_much_is_flown(
     law: str, largest: float, echo_scale: float
 ) -> None:
-    """TDE-SMC, whose g is for half of the margin asked for, 2.5 %, leaves its surface, but flies."""
+    """TDE-SMC leaves its surface, for its g is for an excess of 2.5 %, but it flies."""
     assert fly(law, "nominal", echo_scale=echo_scale) < largest
 
 
