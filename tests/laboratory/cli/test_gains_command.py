@@ -207,3 +207,38 @@ def test_a_law_that_diverges_held_still_has_no_ripple() -> None:
     options = ("--controller", "ctc", "--gains", "printed", "--sensors", "white_l1")
     assert report(*options)["laws"]["ctc"]["held_ripple"] is None
     assert "ctc diverged" in run("check", *options).stdout
+
+
+def test_a_nominal_set_is_written_read_and_flown(tmp_path: Path) -> None:
+    result = tune(tmp_path, "--h-bar", "nominal")
+    assert result.exit_code == 0, result.exception
+    for law in ("tde_smc", "tde_tsmc", "tde_stc"):
+        assert "      h_bar: nominal\n" in (tmp_path / f"{law}.yaml").read_text()
+    found = report("--gains", str(tmp_path), "--case", "4-2")["laws"]
+    assert found["tde_stc"]["torque_scale_margin"] == pytest.approx(0.375, abs=5e-4)
+    masses = report("--gains", str(tmp_path), "--mass-uncertainty", "0.1")["laws"]["indi"]
+    assert masses["wrong_masses"]["smallest"] == pytest.approx(1.0 / 1.1)
+    assert masses["wrong_masses"]["largest"] == pytest.approx(1.0 / 0.9)
+    text = run("check", "--gains", str(tmp_path)).stdout
+    assert "h_bar of indi, tde_smc, tde_stc, tde_tsmc is H_S of the nominal model" in text
+    simulate(Flight(resolve(FlightPlan(gains=str(tmp_path), duration=0.1))))
+
+
+def test_auto_says_why_it_takes_the_nominal_inertia(tmp_path: Path) -> None:
+    result = tune(tmp_path, "--h-bar", "auto")
+    assert result.exit_code == 0, result.exception
+    assert "use the inertia of the nominal model (h_bar: nominal)" in result.stderr
+    assert "eigenvalues of H_S^-1 h_bar would be 0.06 to 2.24" in result.stderr
+    assert "h_bar: nominal" in (tmp_path / "tde_stc.yaml").read_text()
+
+
+def test_laws_at_equal_ripple_have_it_in_flight(tmp_path: Path) -> None:
+    """On the limiting axis, as it was asked for: 5 % of the largest force of the mission."""
+    noise = ("--sensors", "white_l1")
+    result = tune(tmp_path, *noise, "--noise-ripple", "0.05", "--h-bar", "nominal")
+    assert result.exit_code == 0, result.exception
+    asked = np.array([1.27, 2.39, 0.832, 0.669, 1.39, 2.85, 0.117, 0.144, 0.034])  # case 1
+    for law in ("ctc", "indi", "dob", "pd"):
+        options = ("--controller", law, "--gains", str(tmp_path), *noise)
+        held = np.array(report(*options)["laws"][law]["held_ripple"])
+        assert (held / asked).max() == pytest.approx(0.05, rel=0.15), law

@@ -17,7 +17,12 @@ def remarks(plan: FlightPlan, corner: float = 0.0) -> list[str]:
     flight = Flight(resolve(plan))
     laws = [flight.law, *(law for _, law in flight.swaps)]
     return margin_remarks(
-        laws, flight.plant.robot, flight.mission_settings, corner, flight.controls_base
+        laws,
+        flight.plant.robot,
+        flight.mission_settings,
+        corner,
+        flight.controls_base,
+        nominal=flight.robot,
     )
 
 
@@ -104,3 +109,26 @@ def test_nobody_waits_for_it(robot: str) -> None:
 def test_what_filters_the_pair_counts(own: str, given: dict[str, float], corner: float) -> None:
     settings = ControllerNodeSettings.resolve({"navigation": own, **given})
     assert pair_corner(settings) == corner
+
+
+@pytest.mark.parametrize(
+    ("inertia", "word"), [(2.0, "it will diverge"), (100.0, "margin in torque scale"), (400.0, "")]
+)
+def test_an_observer_of_too_little_inertia_is_remarked_upon(inertia: float, word: str) -> None:
+    """Of ADRC by its loop: its observer's pole is at ``min(lambda) omega_o / 3``."""
+    shape = [5.3, 2.8, 2.2, 0.067, 0.23, 0.19, 0.0053, 0.0056, 0.0012]
+    own = {"inertia": [inertia * value for value in shape], "omega_c": [0.2], "omega_o": [400.0]}
+    plan = FlightPlan(
+        controller="adrc", parameters={"controller": {f"adrc.{k}": v for k, v in own.items()}}
+    )
+    found = remarks(plan)
+    assert len(found) == bool(word)
+    assert all(word in line and line.startswith("warning: adrc: ") for line in found)
+
+
+def test_the_nominal_inertia_is_remarked_upon_where_a_payload_outweighs_it() -> None:
+    flights = (("paper", "4-2", 0), ("seven_joint", "1", 0), ("seven_joint", "4-2", 1))
+    for robot, case, count in flights:
+        found = remarks(FlightPlan(controller="indi", robot=robot, case=case))
+        assert len(found) == count
+        assert all("nominal inertia leaves 1.87% of margin" in line for line in found)
