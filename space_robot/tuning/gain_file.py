@@ -23,7 +23,7 @@ NOTES = {
     "tde_stc": "lambda = W; K_2 = 1.1 W eps, K_1 = 2.2 (W eps)^1/2.",
     "pd": "K_D = 2 W d, K_P = W^2 d, d the inertia of an axis with the others free.",
     "pd_feedforward": "K_D = 2 W d, K_P = W^2 d, d the inertia of an axis with the others free.",
-    "slotine_li": "lambda = W, K_D = W d; gamma: adapts in 10 s at the mission's largest force.",
+    "slotine_li": "lambda = W, K_D = W d; gamma: adapts with W / 6 at the mission's largest force.",
     "indi": "K_P = W^2, K_D = 2 W; estimate with the nominal inertia and the low-pass of the set.",
     "dob": "J = h_bar; bandwidth: weight of the estimate's low-pass; K_P = W^2, K_D = 2 W.",
     "adrc": "J = h_bar, less if it is not stable; omega_o: lag or noise; omega_c = W.",

@@ -7,8 +7,8 @@ import numpy as np
 from .spectrum import eigenvalues
 from .task import TunedLaw, TuningTask, critical
 
-ADAPTATION_S = 10.0
-"""Time in which an error of the masses is adapted at the largest force of the mission, s."""
+ADAPTATION = 1.0 / 6.0
+"""Bandwidth of the adaptation of masses, as a share of that of the surface."""
 MOST_SPREAD = 0.9
 """Largest deviation of a body's mass that an adaptive law counts with."""
 
@@ -41,18 +41,20 @@ def tune_pd(task: TuningTask, bandwidth: float) -> TunedLaw:
 
 
 def tune_slotine_li(task: TuningTask, bandwidth: float) -> TunedLaw:
-    """Return ``lambda = W``, ``K_D = W d``, and an adaptation by the force of the mission.
+    """Return ``lambda = W``, ``K_D = W d``, and an adaptation that is slower than the surface.
 
-    A force F that is missing leaves ``s = F / K_D``, which does the work ``F^2 / K_D`` a second on
-    the estimate: gamma adapts all of it in `ADAPTATION_S` at the largest force of all axes.
+    Near a constant acceleration a the estimate acts as an integral of s with a bandwidth of
+    ``(gamma a^T H_S a)^1/2``: it is at most `ADAPTATION` W at the largest force F of the mission on
+    all axes at once, ``a = H_S^-1 F``. A faster one adapts to friction, which the masses cannot
+    explain.
     """
-    k_d, asked = bandwidth * task.shape, task.asked
-    rate = 1.0 / (ADAPTATION_S * float(np.sum(asked.peak**2 / k_d)))
-    spread = min(task.wishes.mass_uncertainty, MOST_SPREAD)
+    force = task.asked.nominal
+    largest = float(np.max(np.linalg.solve(task.inertia, force) @ force))
+    k_d, spread = bandwidth * task.shape, min(task.wishes.mass_uncertainty, MOST_SPREAD)
     gains = {
         "lambda": np.full_like(k_d, bandwidth),
         "k_d": k_d,
-        "gamma": np.full_like(k_d, rate),
+        "gamma": np.full_like(k_d, (ADAPTATION * bandwidth) ** 2 / largest),
         "spread": np.full_like(k_d, spread),
     }
     return TunedLaw(gains, bandwidth)

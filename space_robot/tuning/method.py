@@ -33,8 +33,8 @@
 
    - PD, with and without feedforward: ``K_D = 2 W d``, ``K_P = W^2 d``, the noise is multiplied by
      d in place of H_S.
-   - Slotine and Li (1987): ``lambda = W``, ``K_D = W d``; gamma adapts in ten seconds at the
-     largest force of the mission (`laws_with_model`); spread is mu.
+   - Slotine and Li (1987): ``lambda = W``, ``K_D = W d``; gamma adapts with a bandwidth of W / 6
+     at the largest force of the mission (`laws_with_model`); spread is mu.
    - Disturbance observer: J is h_bar, g has the weight of the pair's low-pass, so that it equals
      the time-delay estimate (`spectrum`).
    - Active disturbance rejection: J is h_bar, but with ``max(lambda) / (1 - mu) <= 5``; omega_o has
