@@ -127,8 +127,8 @@ def estimate_remark(tuned: Tuned) -> str:
             "The laws with time-delay estimation use the inertia of the nominal model (h_bar: "
             "nominal), because no diagonal h_bar suits light and heavy directions of this robot at "
             f"once: eigenvalues of H_S^-1 h_bar would be {tuned.constant.smallest:.2g} to "
-            f"{tuned.constant.largest:.3g}, with {tuned.constant.bandwidth:.2g} rad/s. dob and adrc, "
-            "whose inertia is a diagonal, too, are weak: "
+            f"{tuned.constant.largest:.3g}, with {tuned.constant.bandwidth:.2g} rad/s. dob and "
+            "adrc, whose inertia is a diagonal, too, are weak: "
             f"{tuned.bandwidths['dob']:.2g} and {tuned.bandwidths['adrc']:.2g} rad/s."
         )
     if tuned.bandwidth >= MUCH_SLOWER * tuned.model_bandwidth:
