@@ -8,9 +8,9 @@ force, by bisection of the `held_ripple` of its linear part:
   that of TDE-TSMC; W follows from it by step 4 of `method`;
 - the weight of `dob`, W likewise, and omega_o of `adrc`, omega_c likewise.
 
-The laws with time-delay estimation have half of the variance by their linear part. The other half is
-left to their switching terms: K_1, K_2 and g are those of an error ``c eps``, c <= 1, with which the
-law itself, run on the held robot, has the ripple (`switching_ripple`).
+The laws with time-delay estimation have half of the variance by their linear part. The other half
+is left to their switching terms: K_1, K_2 and g are those of an error ``c eps``, c <= 1, with which
+the law itself, run on the held robot, has the ripple (`switching_ripple`).
 
 A law remains below the share where lag or period end its range. `indi` in a set with a constant
 h_bar exceeds it where its estimate does so behind the low-pass of the set, whatever W; it then has

@@ -78,6 +78,7 @@ class LawTrial:
         assign(signals, model=posture.robot.model, **place)
         assign(signals.reference, **place)
         assign(signals.nominal, inertia=inertia)
+        assign(signals, base_is_free=posture.axes == posture.robot.n)
         return block
 
     def run(self, moved: Mapping[str, Array]) -> Array:
