@@ -90,6 +90,7 @@ OWN_GAINS: dict[str, dict[str, Any]] = {
     "indi": {"k_p": 25.0, "k_d": 10.0},
     "dob": {"inertia": 0.5, "bandwidth": 50.0, "k_p": 25.0, "k_d": 10.0},
     "adrc": {"inertia": 0.5, "omega_c": 5.0, "omega_o": 50.0},
+    "slotine_li": {"lambda": 5.0, "k_d": 5.0, "gamma": 1.0, "spread": 0.3},
     "tde_smc": {"h_bar": "nominal", "lambda": 5.0, "g": 0.01},
     "tde_tsmc": {"h_bar": "nominal", "k_p": 25.0, "k_d": 10.0, "k_1": 0.1},
     "tde_stc": {"h_bar": "nominal", "lambda": 5.0, "k_1": 0.1, "k_2": 0.01},
