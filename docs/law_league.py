@@ -1,15 +1,20 @@
-"""Put tables and figures of the flown campaigns into law_league.md: `python docs/law_league.py`.
+"""Put tables and figures of the flown campaigns into law_league.md and rivals.md.
 
-The page names the folders: what stands between ``<!-- begin DIR -->`` and ``<!-- end -->`` is what
-`space-robot campaign report DIR --markdown` writes of that folder, without what was flown. The
-figure goes beside the page, named like the folder. ``<!-- begin DIR medians -->`` has one table, a
-metric a row. Folders that are not there are left out.
+`python docs/law_league.py` does so; with ``--geared DIR`` it makes the robot with gears of
+rivals.md. The pages name the folders: what stands between ``<!-- begin DIR -->`` and
+``<!-- end -->`` is what `space-robot campaign report DIR --markdown` writes of that folder, without
+what was flown. The figure goes beside the page, named like the folder. ``<!-- begin DIR medians
+-->`` has one table, a metric a row. Folders that are not there are left out.
 """
 
 from __future__ import annotations
 
 import re
+import shutil
+import sys
 from pathlib import Path
+
+import yaml
 
 from space_robot.analysis.figures.style import save_figure
 from space_robot.campaign.flown import FlownCampaign
@@ -20,7 +25,8 @@ from space_robot.campaign.report.league_tables import choice_tables
 from space_robot.campaign.report.subject import subject_of
 from space_robot.console.tables import Column, Group, Table, as_markdown
 
-PAGE = Path(__file__).with_name("law_league.md")
+HERE = Path(__file__).parent
+PAGES = [HERE / "law_league.md", HERE / "rivals.md"]
 BLOCK = re.compile(r"(<!-- begin (\S+)( medians)? -->\n).*?(<!-- end -->)", re.DOTALL)
 OF_WHAT_WAS_FLOWN = 1
 """Tables before those of the laws."""
@@ -31,8 +37,8 @@ def block(findings: Findings) -> str:
     text = as_markdown("", [*tables(findings)][OF_WHAT_WAS_FLOWN:]).removeprefix("# \n\n")
     name = f"law_{findings.subject.folder.name}"
     if figure := summary_figure(findings):
-        save_figure(figure, PAGE.with_name(name))
-        PAGE.with_name(f"{name}.svg").unlink()
+        save_figure(figure, HERE.joinpath(name))
+        HERE.joinpath(f"{name}.svg").unlink()
         text = f"![{name}]({name}.png)\n\n{text}"
     return re.sub(r"^## ", "### ", text, flags=re.MULTILINE)
 
@@ -55,5 +61,21 @@ def renewed(found: re.Match[str]) -> str:
     return f"{found[1]}{runs}{medians(findings) if found[3] else block(findings)}{found[4]}"
 
 
+def geared(folder: Path) -> None:
+    """Make a folder for the paper's robot with gears of 1e5 N m/rad, encoders on the motors."""
+    sys.path.append(str(HERE / "flown"))
+    from flexible_joints import geared as geared_robot
+
+    config = HERE.parent / "config"
+    shutil.copytree(config / "gains" / "paper", folder / "gains")
+    shutil.copy(config / "missions" / "paper.yaml", folder / "mission.yaml")
+    text = yaml.safe_dump(geared_robot(1e5, "motor"))
+    (folder / "robot.yaml").write_text(text, "utf-8")
+
+
 if __name__ == "__main__":
-    PAGE.write_text(BLOCK.sub(renewed, PAGE.read_text("utf-8")), "utf-8")
+    if sys.argv[1:2] == ["--geared"]:
+        geared(Path(sys.argv[2]))
+    else:
+        for page in PAGES:
+            page.write_text(BLOCK.sub(renewed, page.read_text("utf-8")), "utf-8")
