@@ -261,8 +261,9 @@ def observe_pair(
     else:
         force, rate = signals.applied_force, signals.rho_rate
         observe(pair, tick, force, rate, signals.acceleration_desired, period)
-    signals.paired_force[:] = pair.applied_force
-    signals.paired_acceleration[:] = pair.acceleration
+    for i in range(pair.applied_force.size):
+        signals.paired_force[i] = pair.applied_force[i]
+        signals.paired_acceleration[i] = pair.acceleration[i]
 
 
 @kernel

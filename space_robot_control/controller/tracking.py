@@ -67,19 +67,22 @@ def tracking_errors(
 @kernel
 def show_state(state: State, quaternion: Array, reference: Reference, signals: Signals) -> None:
     """Write attitude, rates, joints and their reference into ``signals``."""
-    signals.quaternion[:] = quaternion
-    signals.omega_base[:] = state.omega_base
-    signals.joint_positions[:] = state.joint_positions
-    signals.joint_velocities[:] = state.joint_velocities
-    signals.rho[:3] = quaternion[1:]
-    signals.rho[3:] = state.joint_positions
     desired = signals.reference
-    desired.quaternion[:] = reference.quaternion
-    desired.omega_base[:] = reference.omega_base
-    desired.alpha_base[:] = reference.alpha_base
-    desired.joint_positions[:] = reference.joint_positions
-    desired.joint_velocities[:] = reference.joint_velocities
-    desired.joint_accelerations[:] = reference.joint_accelerations
+    for k in range(4):
+        signals.quaternion[k] = quaternion[k]
+        desired.quaternion[k] = reference.quaternion[k]
+    for k in range(3):
+        signals.omega_base[k] = state.omega_base[k]
+        desired.omega_base[k] = reference.omega_base[k]
+        desired.alpha_base[k] = reference.alpha_base[k]
+        signals.rho[k] = quaternion[1 + k]
+    for i in range(state.joint_positions.size):
+        signals.joint_positions[i] = state.joint_positions[i]
+        signals.joint_velocities[i] = state.joint_velocities[i]
+        signals.rho[3 + i] = state.joint_positions[i]
+        desired.joint_positions[i] = reference.joint_positions[i]
+        desired.joint_velocities[i] = reference.joint_velocities[i]
+        desired.joint_accelerations[i] = reference.joint_accelerations[i]
 
 
 @kernel
