@@ -27,7 +27,9 @@ from space_robot.console.tables import Column, Group, Table, as_markdown
 
 HERE = Path(__file__).parent
 PAGES = [HERE / "law_league.md", HERE / "rivals.md"]
-BLOCK = re.compile(r"(<!-- begin (\S+)( medians)? -->\n).*?(<!-- end -->)", re.DOTALL)
+BLOCK = re.compile(
+    r"(<!-- begin (\S+)( medians)?( with figure)? -->\n).*?(<!-- end -->)", re.DOTALL
+)
 OF_WHAT_WAS_FLOWN = 1
 """Tables before those of the laws."""
 
@@ -35,12 +37,18 @@ OF_WHAT_WAS_FLOWN = 1
 def block(findings: Findings) -> str:
     """Return the tables of a campaign, and draw its figure."""
     text = as_markdown("", [*tables(findings)][OF_WHAT_WAS_FLOWN:]).removeprefix("# \n\n")
+    return figure(findings) + re.sub(r"^## ", "### ", text, flags=re.MULTILINE)
+
+
+def figure(findings: Findings) -> str:
+    """Draw the figure of a campaign, and return the line that shows it; empty if it has none."""
+    drawn = summary_figure(findings)
+    if drawn is None:
+        return ""
     name = f"law_{findings.subject.folder.name}"
-    if figure := summary_figure(findings):
-        save_figure(figure, HERE.joinpath(name))
-        HERE.joinpath(f"{name}.svg").unlink()
-        text = f"![{name}]({name}.png)\n\n{text}"
-    return re.sub(r"^## ", "### ", text, flags=re.MULTILINE)
+    save_figure(drawn, HERE / name)
+    HERE.joinpath(f"{name}.svg").unlink()
+    return f"![{name}]({name}.png)\n\n"
 
 
 def medians(findings: Findings) -> str:
@@ -58,7 +66,9 @@ def renewed(found: re.Match[str]) -> str:
     findings = Findings(subject_of(FlownCampaign.open(found[2])))
     subject = findings.subject
     runs = f"{subject.table['run'].nunique()} runs, seed {subject.seed}.\n\n"
-    return f"{found[1]}{runs}{medians(findings) if found[3] else block(findings)}{found[4]}"
+    picture = figure(findings) if found[4] else ""
+    text = medians(findings) if found[3] else block(findings)
+    return f"{found[1]}{runs}{picture}{text}{found[5]}"
 
 
 def geared(folder: Path) -> None:
