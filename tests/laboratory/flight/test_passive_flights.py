@@ -50,7 +50,7 @@ def test_every_law_holds_attitude_and_moves_the_joints_with_motors(law: str) -> 
     """The springs are felt, not commanded; the model that the law has knows them locked."""
     flight = Flight(resolve(plan_of(law)))
     flown = simulate(flight)
-    assert flight.controller.block[0].model.joint_count == 6
+    assert flight.controller.block[0].signals.model.joint_count == 6
     assert flight.plant.memory.model.joint_count == 9
     report = analyze(flown)
     found = report["maxima"]
