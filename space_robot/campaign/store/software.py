@@ -48,8 +48,14 @@ def file_digests(values: Any) -> dict[str, str]:
 
 
 def flight_digest(flight: Flight) -> str:
-    """Return a digest of a flight's resolved scenario: of every number, and of no file's name."""
-    content = json.dumps(flight.scenario.tree, sort_keys=True, default=str)
+    """Return a digest of a flight's resolved scenario: of every number, and of no file's name.
+
+    Gains of laws that it does not fly do not count.
+    """
+    flown = {flight.law.name, *(law.name for _, law in flight.swaps)}
+    tree = dict(flight.scenario.tree)
+    tree["gains"] = {name: gains for name, gains in tree["gains"].items() if name in flown}
+    content = json.dumps(tree, sort_keys=True, default=str)
     return digest(content.encode())
 
 
