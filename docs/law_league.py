@@ -28,7 +28,7 @@ from space_robot.console.tables import Column, Group, Table, as_markdown
 HERE = Path(__file__).parent
 PAGES = [HERE / "law_league.md", HERE / "rivals.md"]
 BLOCK = re.compile(
-    r"(<!-- begin (\S+)( medians)?( with figure)? -->\n).*?(<!-- end -->)", re.DOTALL
+    r"(<!-- begin (\S+)( medians| by law)?( with figure)? -->\n).*?(<!-- end -->)", re.DOTALL
 )
 OF_WHAT_WAS_FLOWN = 1
 """Tables before those of the laws."""
@@ -59,6 +59,23 @@ def medians(findings: Findings) -> str:
     return as_markdown("", [Table("", columns, [Group(rows)])]).lstrip("# \n")
 
 
+def by_law(findings: Findings) -> str:
+    """Return the medians with a law a row, named without the gain sets that they share."""
+    found = choice_tables(findings)
+    names = [re.sub(r"=equal_[a-z]+", "", column.name) for column in found[0].columns]
+    names = [name.replace("_nominal", ", nominal inertia") for name in names]
+    cells = [
+        [re.sub(r"failed \(1e\+02\)", "diverge", str(cell)) for cell in table.groups[0].rows[0]]
+        for table in found
+    ]
+    rows = [[name, *own] for name, own in zip(names, zip(*cells, strict=True), strict=True)]
+    rows[-1] = [
+        re.sub(r"=equal_[a-z]+", "", str(c)).replace("_nominal", " nominal") for c in rows[-1]
+    ]
+    columns = [Column("median", is_label=True), *(Column(table.title) for table in found)]
+    return as_markdown("", [Table("", columns, [Group(rows)])]).lstrip("# \n")
+
+
 def renewed(found: re.Match[str]) -> str:
     """Return a block of the page with the tables of its folder; as it is if that is not there."""
     if not Path(found[2]).is_dir():
@@ -67,7 +84,8 @@ def renewed(found: re.Match[str]) -> str:
     subject = findings.subject
     runs = f"{subject.table['run'].nunique()} runs, seed {subject.seed}.\n\n"
     picture = figure(findings) if found[4] else ""
-    text = medians(findings) if found[3] else block(findings)
+    of_kind = {" medians": medians, " by law": by_law}.get(found[3], block)
+    text = of_kind(findings)
     return f"{found[1]}{runs}{picture}{text}{found[5]}"
 
 

@@ -347,7 +347,7 @@ def _described_h_bar(log: FlightLog) -> Array:
             check_law(str(name))
         h_bar = build_law(str(name), ControllerNodeSettings.resolve(chosen), log.axes).h_bar
     if not h_bar.any():
-        raise NotDescribedError(f"{name} has no time-delay estimate with a constant inertia")
+        raise NotDescribedError(f"{name} has no time-delay estimate with a constant h_bar")
     if h_bar.shape not in ((log.axes,), (1,)):
         raise NotDescribedError(f"gains_used of the bag: h_bar: {log.axes} values were expected")
     return np.broadcast_to(h_bar, log.axes)

@@ -13,6 +13,7 @@ from click.testing import CliRunner, Result
 from space_robot.cli.main import cli
 from space_robot.flight.plan import Flight, FlightPlan, resolve
 from space_robot.flight.simulate import simulate
+from space_robot.tuning.equal_ripple import LINEAR_SHARE
 from space_robot_control.controller.settings import ControllerNodeSettings
 from space_robot_control.laws import laws
 from space_robot_msgs_py.errors import InputError, SpaceRobotError
@@ -233,7 +234,10 @@ def test_auto_says_why_it_takes_the_nominal_inertia(tmp_path: Path) -> None:
 
 
 def test_laws_at_equal_ripple_have_it_in_flight(tmp_path: Path) -> None:
-    """On the limiting axis, as it was asked for: 5 % of the largest force of the mission."""
+    """On the limiting axis, as it was asked for: 5 % of the largest force of the mission.
+
+    INDI has the low-pass of the laws with switching terms, to which half of the variance is left.
+    """
     noise = ("--sensors", "white_l1")
     result = tune(tmp_path, *noise, "--noise-ripple", "0.05", "--h-bar", "nominal")
     assert result.exit_code == 0, result.exception
@@ -241,4 +245,5 @@ def test_laws_at_equal_ripple_have_it_in_flight(tmp_path: Path) -> None:
     for law in ("ctc", "indi", "dob", "pd"):
         options = ("--controller", law, "--gains", str(tmp_path), *noise)
         held = np.array(report(*options)["laws"][law]["held_ripple"])
-        assert (held / asked).max() == pytest.approx(0.05, rel=0.15), law
+        share = 0.05 * (LINEAR_SHARE**0.5 if law == "indi" else 1.0)
+        assert (held / asked).max() == pytest.approx(share, rel=0.15), law

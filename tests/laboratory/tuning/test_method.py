@@ -11,12 +11,14 @@ from hypothesis import strategies as st
 
 from space_robot.flight.plan import Flight, FlightPlan, resolve
 from space_robot.tuning.demand import ForceDemand, demand
+from space_robot.tuning.equal_ripple import LINEAR_SHARE
 from space_robot.tuning.held_ripple import law_ripple
 from space_robot.tuning.inertia import SAMPLING, inertia_along
 from space_robot.tuning.method import Tuned, tune
 from space_robot.tuning.noise import Noise
 from space_robot.tuning.postures import Posture, postures_along
 from space_robot.tuning.spectrum import eigenvalues
+from space_robot.tuning.switching_ripple import switching_ripple
 from space_robot.tuning.task import TuningOptions, TuningTask, axis_inertia
 from space_robot_control.laws import laws
 from space_robot_msgs_py.errors import InputError
@@ -195,14 +197,19 @@ def test_noise_of_the_nominal_estimate_is_that_of_all_axes_together() -> None:
 
 
 def test_every_law_has_the_same_ripple_on_request() -> None:
-    """Of the linear parts, on the limiting axis; and the same W where that is asked for."""
+    """On the limiting axis, with switching terms; and the same W where that is asked for."""
     inertia, postures, asked = scene()
     noise = white(3e-6, 3e-6, 1500)
     wishes = TuningOptions(0.05, 0.2, noise_ripple=0.05)
     found = tune(inertia, postures, asked, wishes, PERIOD, noise)
     task = TuningTask(inertia, postures, asked, wishes, PERIOD, noise)
     weight = 1.0 - np.exp(-2.0 * np.pi * found.corner_hz * PERIOD)
-    for law in ("ctc", "ctc_smc", "tde_tsmc", "dob", "pd", "pd_feedforward"):
+    linear = law_ripple(task, "tde_tsmc", found.gains["tde_tsmc"], weight) / asked.peak
+    assert linear.max() == pytest.approx(0.05 * LINEAR_SHARE**0.5, rel=0.05)
+    for law in ("tde_smc", "tde_tsmc", "tde_stc"):
+        share = switching_ripple(task, law, found.gains[law], weight) / asked.peak
+        assert share.max() == pytest.approx(0.05, rel=0.05)
+    for law in ("ctc", "ctc_smc", "dob", "pd", "pd_feedforward"):
         share = law_ripple(task, law, found.gains[law], weight) / asked.peak
         is_at_limit = found.bandwidths[law] > 99.0
         assert share.max() == pytest.approx(0.05, rel=0.05) or (is_at_limit and share.max() < 0.05)
@@ -294,5 +301,7 @@ def test_axes_that_nothing_is_asked_of_have_gains_as_well() -> None:
     for law, gains in found.gains.items():
         for name, values in gains.items():
             assert np.all(values > 0.0), (law, name)
+            if name == "gamma":  # of the forces of all axes together
+                continue
             busy = np.delete(np.arange(len(values)), idle)
             np.testing.assert_array_equal(values[busy], usual.gains[law][name][busy])
