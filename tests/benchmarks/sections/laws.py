@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+import time
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from space_robot.flight.batch.batch import FlightBatch
 from space_robot.flight.plan import Flight, FlightPlan, resolve
 from space_robot.flight.simulate import simulate
 from space_robot_control.controller.controller import Controller
 from space_robot_control.laws import CompiledLaw, Signals
 from space_robot_control.laws import laws as all_laws
 from space_robot_control.laws.compiled import LawCode
+from space_robot_msgs_py.compiled.lanes import WIDTH
 from space_robot_msgs_py.compiled.records import Block
 
 from ..kernels import controller_ticks, law_ticks
@@ -101,4 +104,31 @@ def laws(options: Options) -> list[Result]:
             beside = (f"{REFERENCE}, {what}", seconds[REFERENCE]) if name != REFERENCE else None
             target = TICK_US.get(name) if what == "tick" else None
             results.append(Result.timed(f"{name}, {what}", unit, seconds[name], beside, target))
-    return results
+    return results + _flights(options, names)
+
+
+def _flights(options: Options, names: list[str]) -> list[Result]:
+    """Whole flights behind sensors and navigation, a tick of each, alone and eight in lanes."""
+    flight = {"sensors": "fine", "navigation": "filtered", "gains": "robust"}
+    duration = 0.05 if options.short else 0.5
+
+    def some(name: str, count: int) -> list[Flight]:
+        plan = FlightPlan.model_validate({"controller": name, "duration": duration, **flight})
+        return [Flight(resolve(plan)) for _ in range(count)]
+
+    alone: dict[str, list[float]] = {name: [] for name in names}
+    in_lanes: dict[str, list[float]] = {name: [] for name in names}
+    options.progress("whole flights under each law")
+    for _ in range(options.batches(usual=5)):
+        for name in names:
+            (one,), eight = some(name, 1), FlightBatch(some(name, WIDTH))
+            began = time.process_time()
+            simulate(one)
+            alone[name].append((time.process_time() - began) / one.ticks)
+            began = time.process_time()
+            list(eight.fly())
+            in_lanes[name].append((time.process_time() - began) / (WIDTH * one.ticks))
+    return [
+        Result.timed(f"{name}, flight in lanes", "us", in_lanes[name], ("alone", alone[name]))
+        for name in names
+    ]
