@@ -48,11 +48,14 @@ def roughness(torque: Array) -> float:
 @pytest.mark.parametrize("law", laws())
 def test_every_law_flies_with_fine_sensors(law: str) -> None:
     """The true errors stay below those of the star tracker itself, 4e-5 rad about its boresight."""
-    _, errors, torque = flown(controller=law, sensors="fine", navigation="filtered", duration=3.0)
-    if not law.startswith(("ctc", "tde")):  # PD without friction's share, or by a slow observer
-        assert np.abs(errors[5:]).max() < 0.05
-        assert np.abs(torque[2000:]).max() < 100.0
+    plan = {"controller": law, "sensors": "fine", "navigation": "filtered", "duration": 3.0}
+    if not law.startswith(("ctc", "tde")):  # gains for these sensors; friction costs them joints
+        _, errors, torque = flown(gains="robust", **plan)
+        assert np.abs(errors[5:, :3]).max() < 2e-4
+        assert np.abs(errors[5:, 3:]).max() < 2e-3
+        assert np.abs(torque[2000:]).max() < 15.0
         return
+    _, errors, torque = flown(**plan)
     assert np.abs(errors[5:, :3]).max() < 4e-5
     assert np.abs(errors[5:, 3:]).max() < 5e-5
     # CTC, with 100 rad/s the loudest: 14 to 21 N m with seeds 0 to 5
