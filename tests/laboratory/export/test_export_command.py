@@ -15,8 +15,9 @@ from space_robot.export.verify import CROSS, EMULATORS
 from space_robot_control.laws import laws
 
 LAWS = sorted(laws())
-ALLOWED = {"sqrt", "floor", "fmod", "fabs", "copysign", "memset", "memcpy", "__stack_chk_fail"}
-"""Functions of the C library that flight software may call; compilers make copies by memcpy."""
+COPIES = {"memset", "memcpy", "memmove"}
+ALLOWED = {"sqrt", "floor", "fmod", "fabs", "copysign", "__stack_chk_fail", *COPIES}
+"""Functions of the C library that flight software may call; compilers make copies by `COPIES`."""
 SCENARIOS = {
     "wheels": (
         "--case 3 --sensors fine --navigation filtered --actuators wheels "
