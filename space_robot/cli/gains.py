@@ -13,6 +13,14 @@ from click.core import ParameterSource
 from .numbers import FiniteRange
 from .options import flight_options
 
+MASS_UNCERTAINTY = click.option(
+    "--mass-uncertainty",
+    type=FiniteRange(0.0, 0.9),
+    default=0.2,
+    show_default=True,
+    help="Share by which each mass and inertia may be wrong.",
+)
+
 
 @click.group()
 def gains() -> None:
@@ -26,13 +34,7 @@ def gains() -> None:
     show_default=True,
     help="A law's name, or file.py:Class of your own; all: every law that the gain set has.",
 )
-@click.option(
-    "--mass-uncertainty",
-    type=FiniteRange(0.0, 0.9),
-    default=0.2,
-    show_default=True,
-    help="Share by which each mass and inertia may be wrong.",
-)
+@MASS_UNCERTAINTY
 @flight_options(
     *("case", "gains", "robot", "plant_robot", "mission", "sensors", "actuators", "orbit"),
     *("navigation", "seed", "set", "json"),
@@ -91,13 +93,7 @@ def check(as_json: bool, mass_uncertainty: float, **options: Any) -> None:
     show_default=True,
     help="Share by which the torque reported may exceed the one commanded.",
 )
-@click.option(
-    "--mass-uncertainty",
-    type=FiniteRange(0.0, 0.9),
-    default=0.2,
-    show_default=True,
-    help="Share by which each mass and inertia may be wrong.",
-)
+@MASS_UNCERTAINTY
 @click.option(
     "--bandwidth",
     type=FiniteRange(0.0, 1e4, min_open=True),
