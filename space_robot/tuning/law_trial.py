@@ -13,7 +13,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from space_robot_control.laws import CompiledLaw, ControlLaw, Signals
-from space_robot_control.laws.base import NOMINAL_INERTIA
 from space_robot_control.laws.checked import LawError, force_of
 from space_robot_msgs_py.compiled.records import Block, assign
 from space_robot_msgs_py.config.text import one_line_of
@@ -157,11 +156,8 @@ class LawTrial:
         return np.concatenate([self._tick(), self._numbers])
 
     def _tick(self) -> Array:
-        law, axes = self._law, self._posture.axes
-        force = force_of(law, self._signals, 0)
-        if law.estimate == NOMINAL_INERTIA and law.h_bar.size:
-            force = force + self._signals.nominal.inertia @ law.memory.u
-        last: Array = force[-axes:].copy()
+        force = force_of(self._law, self._signals, 0)
+        last: Array = force[-self._posture.axes :].copy()
         return last
 
     def _move_state(self) -> None:

@@ -38,11 +38,12 @@ def switching_ripple(
     assert task.noise
     law, posture, noise = find_law(name)(gains, task.period), task.postures[0], task.noise
     axes, motion = posture.axes, rigid_motion(task.inertia[0], posture, task.period)
-    is_nominal, estimate = law.estimate == NOMINAL_INERTIA, assumed_inertia(law, posture)
+    estimate = assumed_inertia(law, posture)
     assert estimate is not None
     signals = Signals.view(Signals.block(posture.robot.n))
     signals.nominal.inertia[-axes:, -axes:] = posture.inertia
-    rates_of_pair = noise.measured_rates if is_nominal else noise.rates
+    is_as_measured = law.estimate == NOMINAL_INERTIA
+    rates_of_pair = noise.measured_rates if is_as_measured else noise.rates
     state, force, smooth_force, smooth, last = np.zeros(2 * axes), *np.zeros((4, axes))
     forces = np.empty((len(noise.rates), axes))
     for k in range(len(forces)):
@@ -55,8 +56,6 @@ def switching_ripple(
         signals.error_rate[-axes:] = -noise.rates[k, -axes:] - state[axes:]
         signals.n_hat[-axes:] = smooth_force - estimate @ smooth
         force = force_of(law, signals, k)[-axes:].copy()
-        if is_nominal:
-            force += posture.inertia @ law.memory.u[-axes:]
         forces[k] = force
         state = motion.step @ state + motion.by_force @ force
     deviation: Array = forces[len(forces) // SETTLING :].std(axis=0)

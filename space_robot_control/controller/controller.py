@@ -21,23 +21,13 @@ from ..allocation.allocation import Allocation, allocation_code
 from ..allocation.diagnosis import Diagnosis, diagnose
 from ..allocation.settings import AllocationSettings
 from ..laws import ControlLaw, Signals
-from ..laws.base import NOMINAL_INERTIA
 from ..laws.checked import force_of
 from ..navigation.low_pass import low_pass_weight
 from ..navigation.navigation import Navigation
 from ..navigation.settings import NavigationFilterSettings
-from .kernels import (
-    LARGEST,
-    NOT_UNIT,
-    SINGULAR,
-    TOO_LARGE,
-    USABLE,
-    ControllerMemory,
-    add_nominal_inertia,
-    apply_transfer,
-    compute_signals,
-    engage,
-)
+from .kernels import apply_transfer, engage
+from .memory import ControllerMemory
+from .signal_kernels import LARGEST, NOT_UNIT, SINGULAR, TOO_LARGE, USABLE, compute_signals
 
 Array = NDArray[np.float64]
 
@@ -197,10 +187,6 @@ class Controller(RecordOwner):
 
     def command_for(self, tick: int, force: Array) -> Command:
         """Return the command for the force (m,) of the law, N m, after `compute_signals`."""
-        law = self._law
-        if law.estimate == NOMINAL_INERTIA and law.h_bar.size:
-            force = force.copy()  # it may be the law's own
-            add_nominal_inertia(self.block, law.memory.u, force)
         apply_transfer(self.block, tick, force, self.last_command.torque)
         return self._allocate(tick)
 

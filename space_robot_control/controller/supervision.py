@@ -17,7 +17,8 @@ from space_robot_msgs_py.samples import MOST_THRUSTERS, MOST_TORQUERS, MOST_WHEE
 from space_robot_msgs_py.wire.stamp_guard import accept
 
 from ..laws.compiled import LawCode
-from .kernels import NORM_TOLERANCE, SINGULAR, USABLE, compute_command, compute_signals
+from .kernels import compute_command
+from .signal_kernels import NORM_TOLERANCE, SINGULAR, USABLE, compute_signals
 from .time_delay_estimation import LONGEST_GAP
 
 Array = NDArray[np.float64]

@@ -24,7 +24,7 @@ from ..laws import ControlLaw
 from ..laws.checked import force_of
 from ..laws.compiled import CompiledLaw, LawCode
 from .controller import Controller, unusable
-from .kernels import USABLE
+from .signal_kernels import USABLE
 from .supervision import (
     STATUSES,
     Supervision,

@@ -18,7 +18,8 @@ from space_robot_msgs_py.samples import Reference, State
 from ..allocation.allocation import allocate, leave_alone
 from ..allocation.wheel_set import WheelSet, tabulate
 from ..controller.controller import Controller
-from ..controller.kernels import ControllerMemory, engage
+from ..controller.kernels import engage
+from ..controller.memory import ControllerMemory
 from ..controller.supervision import Supervision, answer_state, judge, swaps_due, takes_over
 from ..controller.supervisor import Supervisor
 from ..laws import CompiledLaw, ControlLaw
@@ -30,6 +31,7 @@ ROOMS = {
     "space_robot_control.controller.supervision": "supervision",
     "space_robot_msgs_py.wire.stamp_guard": "supervision",
     "space_robot_control.controller.kernels": "controller",
+    "space_robot_control.controller.signal_kernels": "controller",
     "space_robot_control.controller.time_delay_estimation": "estimate",
     "space_robot_control.controller.tracking": "tracking",
     "space_robot_control.navigation": "navigation",
@@ -247,6 +249,7 @@ def _law(law: CompiledLaw) -> lang.Value:
         "h_bar": lang.FieldOf("gains", "h_bar") if law.h_bar.size else lang.EMPTY,
         "estimate": lang.Known(law.estimate),
         "uses_model": lang.Known(law.needs_model),
+        "adds_inertia": lang.Known(law.adds_inertia),
     }
     return _value(lang.Bundle(law.name, tuple(items.items())))
 

@@ -128,6 +128,11 @@ class ControlLaw(RecordOwner, ABC):
         """True if the law, or its time-delay estimate, uses the nominal model."""
         return self.uses_model or self.estimate == NOMINAL_INERTIA
 
+    @property
+    def adds_inertia(self) -> bool:
+        """True if ``H_S u`` is added to the law's force, see `checked.force_of`."""
+        return self.estimate == NOMINAL_INERTIA and self.h_bar.size > 0
+
     def reset(self) -> None:
         """Clear the memory (integrals, last errors); called when the law is activated."""
         self.memory_block[:] = np.zeros_like(self.memory_block)

@@ -21,7 +21,7 @@ class LawError(SpaceRobotError):
 
 
 def force_of(law: ControlLaw, signals: Signals, tick: int) -> Array:
-    """Return the generalised force F_S (m,) of a law.
+    """Return the generalised force F_S (m,) of a law, with H_S u if ``h_bar`` is nominal.
 
     Args:
         law: the active law.
@@ -51,6 +51,9 @@ def force_of(law: ControlLaw, signals: Signals, tick: int) -> Array:
             f"controller {law.name} failed at tick {tick}: force() must return {wanted.size} "
             f"numbers, an array of {wanted.dtype}, got {got}"
         )
+    if law.adds_inertia:
+        for column, u in zip(signals.nominal.inertia.T, law.memory.u, strict=True):
+            force = force + column * u  # in the order of the compiled loop, so the bits are its
     return force
 
 

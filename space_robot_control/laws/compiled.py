@@ -35,6 +35,8 @@ class LawCode(NamedTuple):
     """See `ControlLaw.estimate`."""
     uses_model: bool
     """See `ControlLaw.needs_model`."""
+    adds_inertia: bool
+    """See `ControlLaw.adds_inertia`."""
 
 
 class CompiledLaw(ControlLaw):
@@ -68,7 +70,8 @@ class CompiledLaw(ControlLaw):
         n = len(self.memory.s) - 3
         gains = prefix(self.gains_block, SomeGains.dtype(n))
         memory = prefix(self.memory_block, LawMemory.dtype(n))
-        return LawCode(self.function(), gains, memory, self.h_bar, self.estimate, self.needs_model)
+        needs = self.h_bar, self.estimate, self.needs_model, self.adds_inertia
+        return LawCode(self.function(), gains, memory, *needs)
 
     def force(self, signals: Signals) -> Array:
         """Run the kernel; ``signals`` is a `Signals.view`."""

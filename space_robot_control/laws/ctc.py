@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from space_robot_model.dynamics.rho_space import RhoSpaceModel
+from space_robot_model.dynamics.rho_space import RhoSpaceModel, add_inertial_force
 from space_robot_msgs_py.compiled.kernels import kernel
 
 from .base import LawGains, LawMemory
@@ -29,10 +29,8 @@ def computed_torque(signals: Signals, gains: Gains, memory: LawMemory, period: f
 @kernel
 def inverse_dynamics(nominal: RhoSpaceModel, u: Array, force: Array) -> None:
     """``force = H_S u + c_S``."""
-    for i in range(u.size):
-        force[i] = nominal.bias[i]
-        for j in range(u.size):
-            force[i] += nominal.inertia[i, j] * u[j]
+    force[:] = nominal.bias
+    add_inertial_force(nominal, u, force)
 
 
 class ComputedTorque(CompiledLaw):

@@ -7,6 +7,7 @@ The increment of the force is the nominal inertia times the acceleration that is
 
 from __future__ import annotations
 
+from space_robot_model.dynamics.rho_space import add_inertial_force
 from space_robot_msgs_py.compiled.kernels import kernel
 
 from .base import LawGains, LawMemory
@@ -25,13 +26,10 @@ class Gains(LawGains):
 def incremental_inversion(signals: Signals, gains: Gains, memory: LawMemory, period: float) -> None:
     """Compute one tick: u of (31), force of (37) with H_S in place of h_bar."""
     e, edot, rhodd_d = signals.error, signals.error_rate, signals.acceleration_desired
-    u, inertia = memory.u, signals.nominal.inertia
     for i in range(e.size):
-        u[i] = rhodd_d[i] + gains.k_d[i] * edot[i] + gains.k_p[i] * e[i]
-    for i in range(e.size):
-        memory.force[i] = signals.n_hat[i]
-        for j in range(e.size):
-            memory.force[i] += inertia[i, j] * u[j]
+        memory.u[i] = rhodd_d[i] + gains.k_d[i] * edot[i] + gains.k_p[i] * e[i]
+    memory.force[:] = signals.n_hat
+    add_inertial_force(signals.nominal, memory.u, memory.force)
 
 
 class IncrementalInversion(CompiledLaw):

@@ -67,6 +67,14 @@ def rho_space_into(
 
 
 @kernel
+def add_inertial_force(model: RhoSpaceModel, acceleration: Array, force: Array) -> None:
+    """Add ``H_S acceleration`` to the ``force``, (m,) each."""
+    for i in range(force.size):
+        for j in range(force.size):
+            force[i] += model.inertia[i, j] * acceleration[j]
+
+
+@kernel
 def to_rho_space(quaternion: Array, out: RhoSpaceModel) -> None:
     """Convert H_r and c_r of `semi_floating_into` to H_S and c_S."""
     inertia, bias = out.inertia, out.bias

@@ -17,9 +17,9 @@ from typing import Any, NoReturn
 import numpy as np
 from numpy.typing import NDArray
 
-from space_robot_control.controller.kernels import USABLE
 from space_robot_control.controller.loop import ControllerLoop
 from space_robot_control.controller.settings import ControllerNodeSettings
+from space_robot_control.controller.signal_kernels import USABLE
 from space_robot_control.controller.supervision import conclude
 from space_robot_control.controller.supervisor import Supervisor
 from space_robot_msgs_py.compiled.records import Block

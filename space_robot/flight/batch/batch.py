@@ -7,8 +7,8 @@ from collections.abc import Callable, Generator, Sequence
 from typing import NamedTuple
 
 from space_robot_control.controller.controller import unusable
-from space_robot_control.controller.kernels import USABLE
 from space_robot_control.controller.law_changes import LawChanges
+from space_robot_control.controller.signal_kernels import USABLE
 from space_robot_msgs_py.bag.blocks import block_bounds
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.compiled.records import assign

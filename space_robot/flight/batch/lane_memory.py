@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from space_robot_control.controller.controller import Controller
-from space_robot_control.controller.kernels import ControllerMemory
+from space_robot_control.controller.memory import ControllerMemory
 from space_robot_control.laws import ControlLaw
 from space_robot_control.laws.base import LawMemory
 from space_robot_control.laws.compiled import CompiledLaw, LawCode, SomeGains
@@ -131,6 +131,7 @@ class LawInLanes:
             np.ascontiguousarray(np.stack([law.h_bar for law in of_lanes], axis=-1)),
             first.estimate,
             first.needs_model,
+            first.adds_inertia,
         )
         """The law for `fly_lanes`."""
 

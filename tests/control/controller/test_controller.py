@@ -11,7 +11,7 @@ from oracles import attitude_jacobian_base, attitude_jacobian_inertial, rotation
 from random_robots import Case, cases, random_quaternion
 
 from space_robot_control.controller.controller import TRANSFER_S, Controller
-from space_robot_control.controller.kernels import LARGEST
+from space_robot_control.controller.signal_kernels import LARGEST
 from space_robot_control.controller.time_delay_estimation import LONGEST_GAP
 from space_robot_control.laws import find_law
 from space_robot_model.robot import Robot

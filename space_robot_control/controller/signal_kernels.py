@@ -1,0 +1,174 @@
+"""Compiled kernels of a tick's signals: navigation, errors, nominal model and estimate."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from space_robot_model.dynamics.attitude import SINGULAR_ETA, attitude_jacobian_inverse, rotate
+from space_robot_model.dynamics.free_floating import eliminate_rotation
+from space_robot_model.dynamics.rho_space import semi_floating_into, to_rho_space
+from space_robot_msgs_py.compiled.kernels import kernel
+from space_robot_msgs_py.compiled.lanes import all_lanes, uniform, where
+from space_robot_msgs_py.compiled.records import Block
+from space_robot_msgs_py.samples import MOST_WHEELS, State
+
+from ..laws.base import CONSTANT_INERTIA, NOMINAL_INERTIA
+from ..navigation.navigation import navigate
+from .memory import ControllerMemory
+from .time_delay_estimation import follows, nominal_estimate, observe, time_delay_estimate
+from .tracking import force_from_torque, leave_base_out, measured_rate, show_state, tracking_errors
+
+Array = NDArray[np.float64]
+
+NORM_TOLERANCE = 1e-3
+"""Tolerance of the squared norm of a quaternion."""
+LARGEST = 1e30
+"""No number of a state or reference is larger: far beyond any flight, yet no law's products of
+such numbers overflow."""
+
+USABLE, NOT_FINITE, TOO_LARGE, NOT_UNIT, SINGULAR = range(5)
+"""The status of a state."""
+
+
+@kernel
+def compute_signals(
+    block: Block,
+    tick: int,
+    state: Block,
+    reference: Block,
+    h_bar: Array,
+    estimate: int,
+    uses_model: bool,
+    period: float,
+) -> int:
+    """Compute the signals from a measured or estimated state and its reference.
+
+    Without a base to control all of them are zero on its axes, and none asks for J0^-1.
+
+    Args: see `controller_tick` and `LawCode`.
+
+    Returns:
+        `USABLE`, or why the state is not: then nothing was done, but that navigation may have taken
+        a measured state that was usable.
+    """
+    memory, measured = block[0], state[0]
+    signals, controls_base = memory.signals, uniform(memory.controls_base) == 1.0
+    rate, is_filtered = signals.rho_rate, uniform(memory.navigation.is_filtered) == 1.0
+    status: int = status_of(measured, controls_base)
+    if all_lanes(status != USABLE):
+        return status
+    memory.allocation.reported_speeds[:] = measured.wheel_velocities
+    memory.allocation.reported_torques[:] = measured.wheel_torques
+    memory.allocation.torquers.magnetic_field[:] = measured.magnetic_field
+    if is_filtered:
+        navigate(memory.navigation, tick, measured, period)
+        measured = memory.navigation.estimate
+        status = where(status == USABLE, status_of(measured, controls_base), status)
+        if all_lanes(status != USABLE):
+            return status
+    near, dot = memory.quaternion, 0.0
+    for k in range(4):
+        dot += measured.quaternion[k] * near[k]
+    side = where(dot < 0.0, -1.0, 1.0)
+    for k in range(4):
+        near[k] = side * measured.quaternion[k]
+    measured_rate(measured, near, memory.jacobian, rate)
+    if controls_base:
+        if not follows(memory.pair, tick):  # whatever J0 was, this one's is nearer
+            attitude_jacobian_inverse(near, memory.last_jacobian_inverse)
+        # the applied torque acted from the last tick on, so that tick's J0 turns it into F_S
+        force_from_torque(
+            memory.last_jacobian_inverse, measured.applied_torque, signals.applied_force
+        )
+    else:
+        signals.applied_force[:] = measured.applied_torque
+    signals.tick = tick
+    signals.time = tick * period
+    show_state(measured, near, reference[0], signals)
+    tracking_errors(measured, near, rate, reference[0], memory.desired_jacobian, signals)
+    if not controls_base:
+        leave_base_out(signals)
+    observe_pair(memory, tick, state[0], estimate, period)
+    if controls_base:
+        attitude_jacobian_inverse(near, memory.last_jacobian_inverse)
+    if uses_model:
+        semi_floating_into(
+            signals.model,
+            near,
+            measured.joint_positions,
+            measured.omega_base,
+            measured.joint_velocities,
+            signals.nominal,
+        )
+        if controls_base:
+            to_rho_space(near, signals.nominal)
+        else:
+            eliminate_rotation(signals.nominal)
+    if estimate == CONSTANT_INERTIA:
+        time_delay_estimate(memory.pair, h_bar, signals.n_hat)
+    elif estimate == NOMINAL_INERTIA:
+        nominal_estimate(memory.pair, signals.nominal.inertia, signals.n_hat)
+    return status
+
+
+@kernel
+def observe_pair(
+    memory: ControllerMemory, tick: int, measured: State, estimate: int, period: float
+) -> None:
+    """Observe force and acceleration of the interval that ended at ``tick``, after the signals.
+
+    With the nominal inertia every axis' acceleration meets the forces of all axes, so all must be
+    of the same time. Navigation smooths the rates of base and joints differently; the pair then
+    takes them as measured, less the gyro's bias, and has no other low-pass than its own.
+    """
+    signals, pair = memory.signals, memory.pair
+    is_filtered = uniform(memory.navigation.is_filtered) == 1.0
+    if is_filtered:
+        is_as_measured = 1.0 if estimate == NOMINAL_INERTIA else 0.0
+        if uniform(memory.pair_is_as_measured) != is_as_measured:  # rates of the two differ
+            pair.seen = 0.0
+        memory.pair_is_as_measured = is_as_measured
+    if is_filtered and estimate == NOMINAL_INERTIA:
+        rate, force, omega = memory.rate_as_measured, memory.force_as_measured, memory.omega
+        for k in range(3):
+            omega[k] = measured.omega_base[k] - memory.navigation.attitude.bias[k]
+        rotate(memory.jacobian, omega, rate[:3])
+        rate[3:] = measured.joint_velocities
+        force_from_torque(memory.last_jacobian_inverse, measured.applied_torque, force)
+        if uniform(memory.controls_base) == 0.0:
+            for k in range(3):
+                rate[k] = force[k] = 0.0
+        observe(pair, tick, force, rate, signals.acceleration_desired, period)
+    else:
+        force, rate = signals.applied_force, signals.rho_rate
+        observe(pair, tick, force, rate, signals.acceleration_desired, period)
+    for i in range(pair.applied_force.size):
+        signals.paired_force[i] = pair.applied_force[i]
+        signals.paired_acceleration[i] = pair.acceleration[i]
+
+
+@kernel
+def status_of(state: State, controls_base: bool) -> int:
+    """Return `USABLE`, or the reason why a state is not usable."""
+    quaternion, total = state.quaternion, 0.0
+    for k in range(4):
+        total += quaternion[k] * quaternion[k]
+    square = total
+    for k in range(3):
+        total += abs(state.omega_base[k])
+    for i in range(state.joint_positions.size):
+        total += abs(state.joint_positions[i]) + abs(state.joint_velocities[i])
+    for i in range(state.applied_torque.size):
+        total += abs(state.applied_torque[i])
+    for k in range(MOST_WHEELS):
+        total += abs(state.wheel_velocities[k]) + abs(state.wheel_torques[k])
+    for k in range(3):
+        total += abs(state.magnetic_field[k])
+    status = USABLE
+    if controls_base:
+        status = where(abs(quaternion[0]) <= SINGULAR_ETA, SINGULAR, USABLE)
+    status = where(abs(square - 1.0) > NORM_TOLERANCE, NOT_UNIT, status)
+    status = where(total > LARGEST, TOO_LARGE, status)
+    # any number that is not finite makes the sum so
+    return where(np.isfinite(total), status, NOT_FINITE)
