@@ -77,6 +77,7 @@ NOT_RUN = {
     r"for robot in": "18 exports of 30 s: tests/laboratory/export has each kind, shorter",
     r"for gains in": "3,000 flights",
     r"python docs/random_arms.py": "70 flights and 50 gain sets",
+    r"python docs/flown": "its tables: tests/test_flown_pages.py",
     r"make\b|BAG_FUZZ_EXAMPLES": "runs these tests, or for long",
     r"nft\b": "the machine's firewall",
     r"dask\b|.*--scheduler": "a cluster: tests/laboratory/processes/pool/test_cluster.py has one",
@@ -131,6 +132,10 @@ def _urdf_with_a_defect(folder: Path) -> None:
     (folder / "my_laws.py").write_text(files(DOCS / "manual/control_laws.md")["my_laws.py"])
 
 
+def _docs(folder: Path) -> None:
+    (folder / "docs").symlink_to(DOCS)
+
+
 def _slow_gains(folder: Path) -> None:
     (folder / "slow").mkdir()
     gains = {"ctc": {"k_p": [9.0], "k_d": [6.0]}}
@@ -143,6 +148,7 @@ GIVEN: dict[str, Callable[[Path], None]] = {
     "docs/manual/analysis.md": _bag_of_others,
     "docs/manual/namespaces.md": _bag_of_two,
     "docs/manual/urdf.md": _urdf,
+    "docs/rivals.md": _docs,
     "docs/measurements/reality.md": _slow_gains,
     "docs/your_robot.md": _urdf_with_a_defect,
 }
@@ -157,6 +163,7 @@ ask() {
     cat "$PIPES/printed"
 }
 space-robot() { ask space-robot "$@"; }
+python() { "$PYTHON" "$@"; }
 """
 """`space-robot` asks the test's process, which has imported all of it already."""
 
@@ -196,7 +203,7 @@ class PageShell:
             stdin=subprocess.DEVNULL,
             stdout=subprocess.DEVNULL,
             stderr=subprocess.PIPE,
-            env={**os.environ, "PIPES": str(pipes)},
+            env={**os.environ, "PIPES": str(pipes), "PYTHON": sys.executable},
         )
         failures: list[str] = []
         names: dict[str, Any] = {}

@@ -55,4 +55,4 @@ def test_each_example_stands_in_the_table() -> None:
     for program in PROGRAMS:
         assert f"[{program.stem}]({program.name}) |" in table
         assert 25 <= len(program.read_text("utf-8").splitlines()) <= 100
-    assert len(PROGRAMS) == 16
+    assert len(PROGRAMS) == 17

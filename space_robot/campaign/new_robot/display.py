@@ -10,12 +10,9 @@ from .make import NewRobot
 def rms_table(made: NewRobot) -> Table:
     """Return the RMS of errors and torques under every law, mean over the axes."""
     flights = made.flights
-    keys = dict.fromkeys(key for flown in flights.values() for key in flown.rms)
-    columns = [Column(is_label=True), *(Column(law, spec=".3g") for law in flights)]
-    rows = [
-        [f"{key}, {unit_of(key)}", *(flown.rms.get(key, "ended") for flown in flights.values())]
-        for key in keys
-    ]
+    keys = list(dict.fromkeys(key for flown in flights.values() for key in flown.rms))
+    columns = [Column("law", is_label=True), *(Column(k, unit_of(k), ".3g") for k in keys)]
+    rows = [[law, *(flown.rms.get(k, "ended") for k in keys)] for law, flown in flights.items()]
     seconds = made.mission.waypoint_times[-1]
     title = f"{made.robot.name}, {made.robot.n} joints, {seconds:g} s: RMS, mean of axes"
     table = Table.of(title, columns, rows)

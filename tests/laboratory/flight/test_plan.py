@@ -23,7 +23,7 @@ from space_robot.flight.simulate import empty_log, simulate
 from space_robot.scenario.node_settings import NODES, NOT_TO_BE_SET, SCHEMAS
 from space_robot_control.allocation.assumed_actuators import assumed_actuators
 from space_robot_control.controller.controller import Controller
-from space_robot_control.controller.gains import build_laws, split_gains
+from space_robot_control.controller.gains import build_laws, gain_files, split_gains
 from space_robot_control.controller.settings import ControllerNodeSettings
 from space_robot_control.guidance.mission import Mission
 from space_robot_control.guidance.settings import MissionNodeSettings
@@ -300,8 +300,11 @@ def _values(name: str, field: Any) -> st.SearchStrategy[Any]:
 
 
 def _any_parameters() -> st.SearchStrategy[Parameters]:
+    in_every_set = gain_files("paper", "printed")
     gains = {
-        f"{name}.{gain}": _AXES for name, law in laws().items() for gain in law.gain_descriptions()
+        f"{name}.{gain}": _AXES
+        for name in in_every_set
+        for gain in laws()[name].gain_descriptions()
     }
     nodes = {}
     for schema in SCHEMAS:

@@ -11,6 +11,7 @@ from paths import CONFIG
 from space_robot.flight.plan import Flight, FlightPlan, resolve
 from space_robot_control.controller.gains import gain_files
 from space_robot_control.controller.settings import ControllerNodeSettings, set_file
+from space_robot_control.laws import laws
 from space_robot_model.robot.find import (
     find_robot,
     mission_file,
@@ -102,11 +103,5 @@ def test_gains_need_no_sets(folder: Path) -> None:
     shutil.copytree(folder / "gains/robust", folder / "flat")
     shutil.rmtree(folder / "gains")
     (folder / "flat").rename(folder / "gains")
-    assert set(gain_files(f"{folder}/", "default")) == {
-        "ctc",
-        "ctc_smc",
-        "tde_smc",
-        "tde_tsmc",
-        "tde_stc",
-    }
+    assert set(gain_files(f"{folder}/", "default")) == set(laws())
     assert set_file(f"{folder}/", "default") == [folder / "gains/controller.yaml"]

@@ -103,7 +103,7 @@ def test_diverging_flight_says_so(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("options", "said"),
     [
-        (["fly", "--controller", "pid"], "unknown controller 'pid': choose one of ctc"),
+        (["fly", "--controller", "pid"], "unknown controller 'pid': choose one of adrc, ctc"),
         (["fly", "--case", "5"], "unknown case '5': choose one of 1, 2, 3, 4-1, 4-2"),
         (["fly", "--gains", "best"], "unknown gain set 'best' of robot 'paper'"),
         (["fly", "--command-latency-ticks", "-1"], "command_latency_ticks: Input should be"),
