@@ -143,7 +143,7 @@ def gain_range(name: str) -> str:
     text = f"finite values {'above 0' if name in STRICTLY_POSITIVE else '0 or more'}"
     if name in FRACTIONS:
         return f"{text} and below 1"
-    return f"{text}, or {NOMINAL} (as numbers: all 0)," if name == "h_bar" else text
+    return f"{text} (or {NOMINAL}: as numbers all 0)" if name == "h_bar" else text
 
 
 def _is_nominal(name: str, value: Any) -> bool:

@@ -186,14 +186,11 @@ def test_a_gains_file_says_nominal(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("h_bar", "said"),
     [
-        ([0.0] * 8 + [1.0], "finite values above 0, or nominal (as numbers: all 0), were expected"),
-        ([1.0] * 8 + [0.0], "finite values above 0, or nominal (as numbers: all 0), were expected"),
-        (
-            [-1.0],
-            "finite values above 0, or nominal (as numbers: all 0), were expected, got [-1.0]",
-        ),
+        ([0.0] * 8 + [1.0], "finite values above 0 (or nominal: as numbers all 0) were expected"),
+        ([1.0] * 8 + [0.0], "finite values above 0 (or nominal: as numbers all 0) were expected"),
+        ([-1.0], "finite values above 0 (or nominal: as numbers all 0) were expected, got [-1.0]"),
         ([0.0] * 8, "9 values (base x, y, z and the joints) or 1 were expected"),
-        ([0.0] * 8 + [float("nan")], "finite values above 0, or nominal"),
+        ([0.0] * 8 + [float("nan")], "finite values above 0 (or nominal"),
         ([NOMINAL] * 9, "numbers were expected, got"),
         ([NOMINAL, 1.0], "numbers were expected, got"),
         ("Nominal", "numbers were expected, got 'Nominal'"),
@@ -264,7 +261,7 @@ def test_a_parameter_does_not_change_the_kind_of_estimate() -> None:
     for values, said in (
         ({"tde_stc__h_bar": [0.0]}, "tde_stc.h_bar cannot be changed from a constant to nominal"),
         ({"tde_smc__h_bar": [1.0]}, "tde_smc.h_bar cannot be changed from nominal to a constant"),
-        ({"tde_smc__h_bar": [0.0] * 8 + [1.0]}, "tde_smc.h_bar: finite values above 0, or nominal"),
+        ({"tde_smc__h_bar": [0.0] * 8 + [1.0]}, "tde_smc.h_bar: finite values above 0 (or nominal"),
     ):
         reason = node.set(**values)
         assert said in reason

@@ -196,7 +196,7 @@ def _tuned() -> str:
     return str(config_directory() / "gains" / "paper" / "tuned")
 
 
-_LAWS = st.sampled_from(sorted(laws()))
+_LAWS = st.sampled_from(sorted(gain_files("paper", "printed")))  # those with all sets
 _AXES = st.lists(st.floats(1e-3, 1e3) | st.integers(1, 100), min_size=9, max_size=9)
 _QUATERNION = st.lists(st.integers(1, 3) | st.floats(0.1, 1.0), min_size=4, max_size=4)
 _AXIS = st.lists(st.integers(1, 3) | st.floats(0.1, 1.0), min_size=3, max_size=3)
@@ -300,10 +300,9 @@ def _values(name: str, field: Any) -> st.SearchStrategy[Any]:
 
 
 def _any_parameters() -> st.SearchStrategy[Parameters]:
-    in_every_set = gain_files("paper", "printed")
     gains = {
         f"{name}.{gain}": _AXES
-        for name in in_every_set
+        for name in gain_files("paper", "printed")
         for gain in laws()[name].gain_descriptions()
     }
     nodes = {}

@@ -130,7 +130,7 @@ def test_every_law_has_tuned_and_default_gains(robot: str, axes: int) -> None:
     [
         ({"h_bar": [1.0]}, "tde_stc.lambda: missing (slope of the sliding surface"),
         ({"h_bar": [1.0, 2.0]}, "9 values (base x, y, z and the joints) or 1 were expected"),
-        ({"h_bar": [-1.0]}, "finite values above 0, or nominal (as numbers: all 0), were expected"),
+        ({"h_bar": [-1.0]}, "finite values above 0 (or nominal: as numbers all 0) were expected"),
         ({"h_bar": ["x"]}, "numbers were expected, got ['x']"),
         ({"k_9": [1.0]}, "unknown gain of tde_stc 'k_9'"),
     ],

@@ -91,8 +91,8 @@ def test_law_and_gains_change_in_flight(start: Start, domain: int) -> None:
         assert [d.additional_constraints for d in asked.result().descriptors] == [
             "one of tde_stc, adrc, ctc, ctc_smc, dob, indi, pd, pd_feedforward, slotine_li, "
             "tde_smc, tde_tsmc",
-            "9 values (base x, y, z and the joints) or 1; finite values above 0, or nominal "
-            "(as numbers: all 0)",
+            "9 values (base x, y, z and the joints) or 1; finite values above 0 (or nominal: as "
+            "numbers all 0)",
             "9 values (base x, y, z and the joints) or 1; finite values 0 or more",
         ]
         assert change("controller", "tde_tsmc") == (True, "")
