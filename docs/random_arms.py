@@ -185,7 +185,7 @@ def draw(arms: list[Arm]) -> None:
 def main() -> None:
     """Run the command."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--arms", type=int, default=24, metavar="N", help="number of arms")
+    parser.add_argument("--arms", type=int, default=100, metavar="N", help="number of arms")
     arms = list(flown(parser.parse_args().arms))
     draw(arms)
     text = table(arms)

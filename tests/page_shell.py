@@ -76,7 +76,7 @@ NOT_RUN = {
     r"(git|mkdir -p ws|cp TraceableRobotModels|pip|python3 -m venv|sudo apt)\b": "from elsewhere",
     r"for robot in": "18 exports of 30 s: tests/laboratory/export has each kind, shorter",
     r"for gains in": "3,000 flights",
-    r"python docs/random_arms.py": "70 flights and 50 gain sets",
+    r"python docs/random_arms.py": "300 flights and 200 gain sets",
     r"python docs/flown": "its tables: tests/test_flown_pages.py",
     r"make\b|BAG_FUZZ_EXAMPLES": "runs these tests, or for long",
     r"nft\b": "the machine's firewall",
