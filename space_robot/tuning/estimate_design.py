@@ -15,6 +15,8 @@ from .task import CONSTANT, MOST_PER_TICK, NOMINAL, SEPARATION, TuningTask
 
 Array = NDArray[np.float64]
 
+K_1_FACTOR = 2.2
+"""K_1 of the super-twisting term by the square root of W eps, see step 6 of `method`."""
 MUCH_SLOWER = 0.1
 """A law is weak below this share of the bandwidth of the laws with a model."""
 
@@ -43,6 +45,8 @@ class EstimateDesign:
     """(m,) error of the estimate in a tick, N m."""
     error: Array
     """(m,) eps, the acceleration by it, rad/s2 (eps: 1/s2)."""
+    switching: float = 1.0
+    """Share of the acceleration by the gap that ``error`` counts, see `_switching_share`."""
 
 
 def constant_estimate(task: TuningTask) -> EstimateDesign:
@@ -122,7 +126,10 @@ def with_weight(task: TuningTask, design: EstimateDesign, weight: float) -> Esti
     if not is_constant and not wishes.bandwidth:
         bandwidth = min(fastest, model_bandwidth(task))
     gap = delay * asked.slope + 0.5 * wishes.margin * asked.peak
-    error = gap / design.h_bar if is_constant else _largest_acceleration(task.inertia, gap)
+    error, switching = gap / design.h_bar if is_constant else gap, 1.0
+    if not is_constant:
+        error = _largest_acceleration(task.inertia, gap)
+        switching = _switching_share(task, bandwidth * error)
     return replace(
         design,
         weight=weight,
@@ -130,7 +137,8 @@ def with_weight(task: TuningTask, design: EstimateDesign, weight: float) -> Esti
         bandwidth=bandwidth,
         fastest=fastest,
         gap=gap,
-        error=error,
+        error=switching * error,
+        switching=switching,
     )
 
 
@@ -157,6 +165,17 @@ def model_bandwidth(task: TuningTask, own: Array | None = None) -> float:
     if not task.wishes.noise_ripple:
         bandwidth = min(quiet_bandwidth(own, task.noise, task.allowed), bandwidth)
     return min(bandwidth, 1.0 / SEPARATION / task.lag) if task.lag else bandwidth
+
+
+def _switching_share(task: TuningTask, rough: Array) -> float:
+    """Return the share of ``W eps`` (m,) at which switching keeps to the allowed ripple, at most 1.
+
+    In discrete time the super-twisting term of an axis switches by about ``K_1^2 delta / 2``. With
+    the nominal inertia the force of each axis is H_S times that of all axes.
+    """
+    step = 0.5 * K_1_FACTOR**2 * task.period * rough
+    ripple = (np.abs(task.nominal) @ step).max(axis=0)
+    return float(np.min(task.allowed / ripple, initial=1.0))
 
 
 def _largest_acceleration(inertia: Array, force: Array) -> Array:

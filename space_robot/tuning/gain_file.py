@@ -69,6 +69,11 @@ def _numbers(tuned: Tuned, law: str) -> Sequence[str]:
             f"margin {margin:.1%}.",
             f"The estimate lags by {tuned.delay * 1e3:.3g} ms; eps = {_list(tuned.error, 2)}.",
         ]
+        if tuned.switching < 1.0:
+            lines.append(
+                f"eps is {tuned.switching:.2g} times the bound of the estimate's error: "
+                f"K_1 for the whole would switch the force by more than {wishes.ripple:.0%}."
+            )
     return [*lines, *tuned.remarks[law]]
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from .estimate_design import EstimateDesign
+from .estimate_design import K_1_FACTOR, EstimateDesign
 from .spectrum import eigenvalues
 from .task import TunedLaw, TuningTask, critical
 
@@ -31,7 +31,7 @@ def tune_tde_stc(task: TuningTask, design: EstimateDesign) -> TunedLaw:
     gains = {
         "h_bar": design.h_bar,
         "lambda": np.full_like(rough, design.bandwidth),
-        "k_1": 2.2 * np.sqrt(rough),
+        "k_1": K_1_FACTOR * np.sqrt(rough),
         "k_2": 1.1 * rough,
     }
     return TunedLaw(gains, design.bandwidth)

@@ -47,8 +47,11 @@
 choose: lambda is near 1. The low-pass (3) has ``w max(lambda) / (1 - mu) <= 1`` and noise of
 ``H_S rhodd`` within the ripple, all axes together. This pair takes rates and torques as measured,
 so its delay is ``delta / w``; W is as that of INDI. The errors (5) are accelerations by
-``|H_S^-1| h_bar eps`` in the worst posture. It is used on request, or (``auto``) where the laws
-with a constant h_bar would have less than a tenth of the bandwidth of the laws with a model.
+``|H_S^-1| h_bar eps`` in the worst posture, times the largest share at which ``K_1^2 delta / 2``,
+by which the super-twisting term switches in discrete time, remains within the allowed ripple of
+the force, ``|H_S| K_1^2 delta / 2``: K_1 of one axis moves all axes here. It is used on
+request, or (``auto``) where the laws with a constant h_bar would have less than a tenth of the
+bandwidth of the laws with a model.
 """
 
 from __future__ import annotations
@@ -125,6 +128,8 @@ class Tuned:
     """Gains by law and name, (m,) each."""
     h_bar: str = CONSTANT
     """Inertia of the laws with time-delay estimation, `CONSTANT` or `NOMINAL`."""
+    switching: float = 1.0
+    """Share of the estimate's error that eps is, so that switching keeps to the ripple."""
     constant: EstimateDesign | None = None
     """The estimate with a constant h_bar, whether it is used or not."""
     bandwidths: Mapping[str, float] = field(default_factory=dict)
@@ -204,6 +209,7 @@ def tune(
             for law, own in tuned.items()
         },
         design.kind,
+        design.switching,
         constant,
         {law: own.bandwidth for law, own in tuned.items()},
         {law: own.remarks for law, own in tuned.items()},

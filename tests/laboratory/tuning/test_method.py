@@ -161,11 +161,17 @@ def test_a_nominal_set_has_no_h_bar_and_is_fast_as_computed_torque() -> None:
         for name, values in found.gains[law].items():
             np.testing.assert_array_equal(values, constant.gains[law][name])
     # eps: the force that the estimate misses, as acceleration in the worst posture
-    inertia, _, asked = scene()
+    inertia, postures, asked = scene()
     gap = found.delay * asked.slope + 0.025 * asked.peak
     accelerations = np.array([np.abs(np.linalg.inv(own)) @ gap for own in inertia])
-    np.testing.assert_allclose(found.error, accelerations.max(axis=0), rtol=1e-6)
+    share = found.switching
+    np.testing.assert_allclose(found.error, share * accelerations.max(axis=0), rtol=1e-6)
     np.testing.assert_allclose(found.gains["tde_smc"]["g"], gap, rtol=0.01)
+    # what K_1 switches by in a tick, through H_S, is a tenth of the largest force on one axis
+    step = 0.5 * PERIOD * found.gains["tde_stc"]["k_1"] ** 2
+    ripple = np.max([np.abs(own.inertia) @ step for own in postures], axis=0)
+    assert 0.0 < share < 1.0
+    np.testing.assert_allclose((ripple / asked.peak).max(), 0.1, rtol=0.02)
 
 
 def test_auto_takes_the_nominal_inertia_where_no_diagonal_will_do() -> None:
