@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from space_robot_model.dynamics.rho_space import add_inertial_force
+from space_robot_model.dynamics.rho_space import force_for
 from space_robot_msgs_py.compiled.kernels import RecordFunction, kernel
 from space_robot_msgs_py.compiled.lanes import uniform
 from space_robot_msgs_py.compiled.records import Block
@@ -57,11 +57,12 @@ def compute_command(
     block: Block, law: LawCode, allocate: RecordFunction, tick: int, torque: Array, period: float
 ) -> None:
     """Compute the command of a tick from its signals, see `controller_tick`."""
-    law.run(block[0].signals, law.gains[0], law.memory[0], period)
+    signals, memory = block[0].signals, law.memory[0]
+    law.run(signals, law.gains[0], memory, period)
     if law.adds_inertia:
-        add_inertial_force(block[0].signals.nominal, law.memory[0].u, law.memory[0].force)
-    apply_transfer(block, tick, law.memory[0].force, torque)
-    allocation, axes = block[0].allocation, law.memory[0].force.size
+        force_for(signals.nominal, memory.u, memory.force, memory.force)
+    apply_transfer(block, tick, memory.force, torque)
+    allocation, axes = block[0].allocation, memory.force.size
     allocate(allocation, float(tick))
     for k in range(axes, torque.size):
         torque[k] = allocation.command[k - axes]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from space_robot_model.dynamics.rho_space import RhoSpaceModel, add_inertial_force
+from space_robot_model.dynamics.rho_space import force_for
 from space_robot_msgs_py.compiled.kernels import kernel
 
 from .base import LawGains, LawMemory
@@ -23,14 +23,7 @@ def computed_torque(signals: Signals, gains: Gains, memory: LawMemory, period: f
     e, edot, rhodd_d = signals.error, signals.error_rate, signals.acceleration_desired
     for i in range(e.size):
         memory.u[i] = rhodd_d[i] + gains.k_d[i] * edot[i] + gains.k_p[i] * e[i]
-    inverse_dynamics(signals.nominal, memory.u, memory.force)
-
-
-@kernel
-def inverse_dynamics(nominal: RhoSpaceModel, u: Array, force: Array) -> None:
-    """``force = H_S u + c_S``."""
-    force[:] = nominal.bias
-    add_inertial_force(nominal, u, force)
+    force_for(signals.nominal, memory.u, signals.nominal.bias, memory.force)
 
 
 class ComputedTorque(CompiledLaw):

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
+from space_robot_model.dynamics.rho_space import force_for
 from space_robot_msgs_py.compiled.kernels import kernel
 from space_robot_msgs_py.compiled.lanes import where
 
 from .base import LawGains, LawMemory
 from .compiled import CompiledLaw
-from .ctc import inverse_dynamics
 from .signals import Array, Signals, per_axis
 
 
@@ -31,7 +31,7 @@ def computed_torque_sliding_mode(
     for i in range(e.size):
         s[i] = edot[i] + lam[i] * e[i]
         u[i] = rhodd_d[i] + lam[i] * edot[i]
-    inverse_dynamics(signals.nominal, u, force)
+    force_for(signals.nominal, u, signals.nominal.bias, force)
     for i in range(e.size):
         force[i] += gains.g[i] * saturation(s[i], gains.delta[i])
 

@@ -7,7 +7,7 @@ The increment of the force is the nominal inertia times the acceleration that is
 
 from __future__ import annotations
 
-from space_robot_model.dynamics.rho_space import add_inertial_force
+from space_robot_model.dynamics.rho_space import force_for
 from space_robot_msgs_py.compiled.kernels import kernel
 
 from .base import LawGains, LawMemory
@@ -28,8 +28,7 @@ def incremental_inversion(signals: Signals, gains: Gains, memory: LawMemory, per
     e, edot, rhodd_d = signals.error, signals.error_rate, signals.acceleration_desired
     for i in range(e.size):
         memory.u[i] = rhodd_d[i] + gains.k_d[i] * edot[i] + gains.k_p[i] * e[i]
-    memory.force[:] = signals.n_hat
-    add_inertial_force(signals.nominal, memory.u, memory.force)
+    force_for(signals.nominal, memory.u, signals.n_hat, memory.force)
 
 
 class IncrementalInversion(CompiledLaw):

@@ -67,9 +67,10 @@ def rho_space_into(
 
 
 @kernel
-def add_inertial_force(model: RhoSpaceModel, acceleration: Array, force: Array) -> None:
-    """Add ``H_S acceleration`` to the ``force``, (m,) each."""
+def force_for(model: RhoSpaceModel, acceleration: Array, rest: Array, force: Array) -> None:
+    """Write ``H_S acceleration + rest`` into ``force``, (m,) each; ``rest`` may be ``force``."""
     for i in range(force.size):
+        force[i] = rest[i]
         for j in range(force.size):
             force[i] += model.inertia[i, j] * acceleration[j]
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from space_robot_control.controller.kernels import apply_transfer
 from space_robot_control.controller.signal_kernels import USABLE, compute_signals
 from space_robot_control.laws.compiled import LawCode
-from space_robot_model.dynamics.rho_space import add_inertial_force
+from space_robot_model.dynamics.rho_space import force_for
 from space_robot_msgs_py.compiled.kernels import RecordFunction, kernel
 from space_robot_msgs_py.compiled.lane_rows import spread
 from space_robot_msgs_py.compiled.lane_words import as_lanes
@@ -147,7 +147,7 @@ def fly_lanes(
             return tick
         law.run(signals, law.gains[0], of_law, period)
         if law.adds_inertia:
-            add_inertial_force(signals.nominal, of_law.u, of_law.force)
+            force_for(signals.nominal, of_law.u, of_law.force, of_law.force)
         apply_transfer(controllers, tick, of_law.force, torque)
         if torque.size > of_law.force.size:
             _allocate(allocate, memory, is_flying, torque, of_law.force.size, tick)
