@@ -78,9 +78,8 @@ def estimate_at_ripple(
         as_observer: for `dob` in place of the laws with time-delay estimation.
     """
     if not as_observer:
-        ripple_of_all = task.wishes.noise_ripple or task.wishes.ripple
-        linear = replace(task.wishes, noise_ripple=ripple_of_all * LINEAR_SHARE**0.5)
-        task = replace(task, wishes=linear)
+        of_linear_part = task.wishes.allowed_ripple * LINEAR_SHARE**0.5
+        task = replace(task, wishes=replace(task.wishes, noise_ripple=of_linear_part))
 
     def ripple(weight: float) -> Array:
         own = with_weight(task, design, weight)

@@ -126,8 +126,9 @@ def with_weight(task: TuningTask, design: EstimateDesign, weight: float) -> Esti
     if not is_constant and not wishes.bandwidth:
         bandwidth = min(fastest, model_bandwidth(task))
     gap = delay * asked.slope + 0.5 * wishes.margin * asked.peak
-    error, switching = gap / design.h_bar if is_constant else gap, 1.0
-    if not is_constant:
+    if is_constant:
+        error, switching = gap / design.h_bar, 1.0
+    else:
         error = _largest_acceleration(task.inertia, gap)
         switching = _switching_share(task, bandwidth * error)
     return replace(

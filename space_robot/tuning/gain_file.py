@@ -71,8 +71,8 @@ def _numbers(tuned: Tuned, law: str) -> Sequence[str]:
         ]
         if tuned.switching < 1.0:
             lines.append(
-                f"eps is {tuned.switching:.2g} times the bound of the estimate's error: "
-                f"K_1 for the whole would switch the force by more than {wishes.ripple:.0%}."
+                f"eps is {tuned.switching:.2g} times the bound of the estimate's error: K_1 for "
+                f"the whole would switch the force by more than {wishes.allowed_ripple:.0%}."
             )
     return [*lines, *tuned.remarks[law]]
 

@@ -41,6 +41,11 @@ class TuningOptions:
     noise_ripple: float | None = None
     """If set, every law has this ripple in place of at most ``ripple``, see `equal_ripple`."""
 
+    @property
+    def allowed_ripple(self) -> float:
+        """``noise_ripple``, else ``ripple``."""
+        return self.noise_ripple or self.ripple
+
 
 @dataclass(frozen=True)
 class TuningTask:
@@ -72,8 +77,7 @@ class TuningTask:
     @property
     def allowed(self) -> Array:
         """(m,) RMS force that noise may cause, N m."""
-        share = self.wishes.noise_ripple or self.wishes.ripple
-        return share * self.asked.peak
+        return self.wishes.allowed_ripple * self.asked.peak
 
     @property
     def lag(self) -> float:
