@@ -62,18 +62,20 @@ def medians(findings: Findings) -> str:
 def by_law(findings: Findings) -> str:
     """Return the medians with a law a row, named without the gain sets that they share."""
     found = choice_tables(findings)
-    names = [re.sub(r"=equal_[a-z]+", "", column.name) for column in found[0].columns]
-    names = [name.replace("_nominal", ", nominal inertia") for name in names]
+    names = [own_name(column.name, ", nominal inertia") for column in found[0].columns]
     cells = [
         [re.sub(r"failed \(1e\+02\)", "diverge", str(cell)) for cell in table.groups[0].rows[0]]
         for table in found
     ]
     rows = [[name, *own] for name, own in zip(names, zip(*cells, strict=True), strict=True)]
-    rows[-1] = [
-        re.sub(r"=equal_[a-z]+", "", str(c)).replace("_nominal", " nominal") for c in rows[-1]
-    ]
+    rows[-1] = [own_name(str(cell), " nominal") for cell in rows[-1]]
     columns = [Column("median", is_label=True), *(Column(table.title) for table in found)]
     return as_markdown("", [Table("", columns, [Group(rows)])]).lstrip("# \n")
+
+
+def own_name(text: str, nominal: str) -> str:
+    """Return names of competitors without the gain sets that they share."""
+    return re.sub(r"=equal_[a-z]+", "", text).replace("_nominal", nominal)
 
 
 def renewed(found: re.Match[str]) -> str:
@@ -84,9 +86,8 @@ def renewed(found: re.Match[str]) -> str:
     subject = findings.subject
     runs = f"{subject.table['run'].nunique()} runs, seed {subject.seed}.\n\n"
     picture = figure(findings) if found[4] else ""
-    of_kind = {" medians": medians, " by law": by_law}.get(found[3], block)
-    text = of_kind(findings)
-    return f"{found[1]}{runs}{picture}{text}{found[5]}"
+    text_of = {" medians": medians, " by law": by_law}.get(found[3], block)
+    return f"{found[1]}{runs}{picture}{text_of(findings)}{found[5]}"
 
 
 def geared(folder: Path) -> None:
