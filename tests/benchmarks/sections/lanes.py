@@ -107,13 +107,24 @@ def _ticks(options: Options) -> list[Result]:
     duration = 0.1 if options.short else 2.0
     seconds: dict[str, list[float]] = {"alone": [], "lanes": []}
     for _ in range(options.batches(usual=7)):
-        (one,), eight = _flights(duration, 1), FlightBatch(_flights(duration, WIDTH))
-        seconds["alone"].append(_timed(lambda flight=one: simulate(flight)) / one.ticks)
-        took = _timed(lambda batch=eight: list(batch.fly()))
-        seconds["lanes"].append(took / (WIDTH * one.ticks))
+        for name, took in time_ticks(lambda count: _flights(duration, count)).items():
+            seconds[name].append(took)
     beside, asked = ("alone", seconds["alone"]), options.asked(Target(5.0, of="ratio"))
     name = "tick a flight, tde_stc, fine sensors, filtered"
     return [Result.timed(name, "us", seconds["lanes"], beside, asked)]
+
+
+def time_ticks(flights_of: Callable[[int], list[Flight]]) -> dict[str, float]:
+    """Return the seconds of a tick of a whole flight: one ``alone``, and eight in ``lanes``.
+
+    Args:
+        flights_of: returns so many new flights.
+    """
+    (one,), eight = flights_of(1), FlightBatch(flights_of(WIDTH))
+    return {
+        "alone": _timed(lambda: simulate(one)) / one.ticks,
+        "lanes": _timed(lambda: list(eight.fly())) / (WIDTH * one.ticks),
+    }
 
 
 def _timed(function: Callable[[], object]) -> float:

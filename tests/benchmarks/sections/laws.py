@@ -2,25 +2,24 @@
 
 from __future__ import annotations
 
-import time
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
-from space_robot.flight.batch.batch import FlightBatch
 from space_robot.flight.plan import Flight, FlightPlan, resolve
 from space_robot.flight.simulate import simulate
 from space_robot_control.controller.controller import Controller
 from space_robot_control.laws import CompiledLaw, Signals
 from space_robot_control.laws import laws as all_laws
 from space_robot_control.laws.compiled import LawCode
-from space_robot_msgs_py.compiled.lanes import WIDTH
 from space_robot_msgs_py.compiled.records import Block
 
 from ..kernels import controller_ticks, law_ticks
 from ..measure import Competitor, Options, interleave
 from ..result import Result, Target
+from .lanes import time_ticks
 from .plant import CASE
 
 Array = NDArray[np.float64]
@@ -121,13 +120,9 @@ def _flights(options: Options, names: list[str]) -> list[Result]:
     options.progress("whole flights under each law")
     for _ in range(options.batches(usual=5)):
         for name in names:
-            (one,), eight = some(name, 1), FlightBatch(some(name, WIDTH))
-            began = time.process_time()
-            simulate(one)
-            alone[name].append((time.process_time() - began) / one.ticks)
-            began = time.process_time()
-            list(eight.fly())
-            in_lanes[name].append((time.process_time() - began) / (WIDTH * one.ticks))
+            seconds = time_ticks(partial(some, name))
+            alone[name].append(seconds["alone"])
+            in_lanes[name].append(seconds["lanes"])
     return [
         Result.timed(f"{name}, flight in lanes", "us", in_lanes[name], ("alone", alone[name]))
         for name in names
