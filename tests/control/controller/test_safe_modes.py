@@ -52,7 +52,7 @@ def deaths(tmp_path_factory: pytest.TempPathFactory) -> Story:
     return Story(
         tmp_path_factory.mktemp("deaths") / "bag",
         "--duration",
-        "10",
+        "11",
         "--restart-controller",
         "--set",
         "plant.silence_timeout=0.2",
@@ -61,9 +61,9 @@ def deaths(tmp_path_factory: pytest.TempPathFactory) -> Story:
         "--fault",
         "kill_controller@0.3",
         "--fault",
-        "kill_mission@8",
+        "kill_mission@9",
         "--fault",
-        "kill_recorder@9.5",
+        "kill_recorder@10.5",
     )
 
 
@@ -98,8 +98,8 @@ def test_restarted_controller_takes_over_without_a_jolt(deaths: Story) -> None:
 
 def test_restarted_controller_flies_the_mission_on(deaths: Story) -> None:
     back = deaths.time_of("plant", "nominal", after=0.3)
-    assert back < 5.5, "a start takes a few seconds"
-    assert deaths.error(7.9) < 0.5 * max(deaths.error(back), 1e-3)
+    assert back < 5.5
+    assert deaths.error(back + 3.4) < 0.5 * max(deaths.error(back), 1e-3)
 
 
 def test_the_restart_is_recorded_and_replayed(deaths: Story, domain: int) -> None:
@@ -117,7 +117,7 @@ def test_the_restart_is_recorded_and_replayed(deaths: Story, domain: int) -> Non
 
 
 def test_without_mission_the_last_point_is_held(deaths: Story) -> None:
-    deaths.time_of("controller", "holding the reference: the mission is silent", after=8.0)
+    deaths.time_of("controller", "holding the reference: the mission is silent", after=9.0)
     assert int(deaths.report["graph"]["nodes"]["controller_node"]["references_held"]) > 100
 
 
@@ -125,7 +125,7 @@ def test_without_recorder_the_flight_goes_on_and_the_exit_code_tells(deaths: Sto
     assert deaths.result.returncode == 1
     assert "recorder ended by signal 9" in deaths.result.stderr
     assert deaths.report["unfinished"]
-    assert int(deaths.report["graph"]["nodes"]["plant_node"]["tick"]) == 20_000
+    assert int(deaths.report["graph"]["nodes"]["plant_node"]["tick"]) == 22_000
 
 
 @pytest.fixture(scope="module")

@@ -23,7 +23,7 @@ from space_robot.flight.simulate import empty_log, simulate
 from space_robot.scenario.node_settings import NODES, NOT_TO_BE_SET, SCHEMAS
 from space_robot_control.allocation.assumed_actuators import assumed_actuators
 from space_robot_control.controller.controller import Controller
-from space_robot_control.controller.gains import build_laws, gain_files, split_gains
+from space_robot_control.controller.gains import FRACTIONS, build_laws, gain_files, split_gains
 from space_robot_control.controller.settings import ControllerNodeSettings
 from space_robot_control.guidance.mission import Mission
 from space_robot_control.guidance.settings import MissionNodeSettings
@@ -196,14 +196,11 @@ def _tuned() -> str:
     return str(config_directory() / "gains" / "paper" / "tuned")
 
 
-_LAWS = st.sampled_from(sorted(gain_files("paper", "printed")))  # those with all sets
 _AXES = st.lists(st.floats(1e-3, 1e3) | st.integers(1, 100), min_size=9, max_size=9)
+_FRACTIONS = st.lists(st.floats(1e-3, 0.9), min_size=9, max_size=9)
 _QUATERNION = st.lists(st.integers(1, 3) | st.floats(0.1, 1.0), min_size=4, max_size=4)
 _AXIS = st.lists(st.integers(1, 3) | st.floats(0.1, 1.0), min_size=3, max_size=3)
 _SPECIAL: dict[str, st.SearchStrategy[Any]] = {
-    "controller": _LAWS,
-    "gains": st.sampled_from(["default", "tuned", "printed"]),
-    "swaps": st.lists(st.builds("0.0{}:{}".format, st.integers(1, 9), _LAWS), max_size=1),
     "robot": st.just("paper"),
     "mission": st.sampled_from(["", "paper"]),
     "case": st.sampled_from(["1", 2, "4-1"]),
@@ -300,11 +297,26 @@ def _values(name: str, field: Any) -> st.SearchStrategy[Any]:
 
 
 def _any_parameters() -> st.SearchStrategy[Parameters]:
-    gains = {
-        f"{name}.{gain}": _AXES
-        for name in gain_files("paper", "printed")
-        for gain in laws()[name].gain_descriptions()
+    """Of all laws, or of those that the printed set has."""
+    of_paper = sorted(gain_files("paper", "printed"))
+    return _parameters(sorted(laws()), ["default", "tuned"]) | _parameters(of_paper, ["printed"])
+
+
+def _of_laws(names: list[str], sets: list[str]) -> dict[str, st.SearchStrategy[Any]]:
+    law = st.sampled_from(names)
+    return {
+        "controller": law,
+        "gains": st.sampled_from(sets),
+        "swaps": st.lists(st.builds("0.0{}:{}".format, st.integers(1, 9), law), max_size=1),
+        **{
+            f"{name}.{gain}": _FRACTIONS if gain in FRACTIONS else _AXES
+            for name in names
+            for gain in laws()[name].gain_descriptions()
+        },
     }
+
+
+def _parameters(names: list[str], sets: list[str]) -> st.SearchStrategy[Parameters]:
     nodes = {}
     for schema in SCHEMAS:
         allowed = {
@@ -312,7 +324,7 @@ def _any_parameters() -> st.SearchStrategy[Parameters]:
             for name, field in leaves(schema)
             if name not in _NOT_ALONE and f"{schema.node}.{name}" not in NOT_TO_BE_SET
         }
-        allowed |= gains if schema is ControllerNodeSettings else {}
+        allowed |= _of_laws(names, sets) if schema is ControllerNodeSettings else {}
         of_orbit = {name: allowed.pop(name) for name in _OF_ORBIT & allowed.keys()}
         orbit = {"orbit": allowed.pop("orbit")} if of_orbit else {}
         nodes[schema.node] = st.fixed_dictionaries({}, optional=allowed)
