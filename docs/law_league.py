@@ -1,10 +1,10 @@
 """Put tables and figures of the flown campaigns into law_league.md and rivals.md.
 
 `python docs/law_league.py` does so; with ``--geared DIR`` it makes the robot with gears of
-rivals.md. The pages name the folders: what stands between ``<!-- begin DIR -->`` and
-``<!-- end -->`` is what `space-robot campaign report DIR --markdown` writes of that folder, without
-what was flown. The figure goes beside the page, named like the folder. ``<!-- begin DIR medians
--->`` has one table, a metric a row. Folders that are not there are left out.
+rivals.md. The pages name the folders: between ``<!-- begin DIR -->`` and ``<!-- end -->`` are the
+tables in which `space-robot campaign report DIR --markdown` compares laws. The figure goes beside
+the page, named like the folder. ``<!-- begin DIR medians -->`` has one table, a metric a row.
+Folders that are not there are left out.
 """
 
 from __future__ import annotations
@@ -30,13 +30,14 @@ PAGES = [HERE / "law_league.md", HERE / "rivals.md"]
 BLOCK = re.compile(
     r"(<!-- begin (\S+)( medians| by law)?( with figure)? -->\n).*?(<!-- end -->)", re.DOTALL
 )
-OF_WHAT_WAS_FLOWN = 1
-"""Tables before those of the laws."""
+COMPARING = {"rank", "to fly"}
+"""Columns of tables that compare laws."""
 
 
 def block(findings: Findings) -> str:
-    """Return the tables of a campaign, and draw its figure."""
-    text = as_markdown("", [*tables(findings)][OF_WHAT_WAS_FLOWN:]).removeprefix("# \n\n")
+    """Return the tables that compare laws, and draw the campaign's figure."""
+    comparing = [t for t in tables(findings) if COMPARING & {c.name for c in t.columns}]
+    text = as_markdown("", comparing).removeprefix("# \n\n")
     return figure(findings) + re.sub(r"^## ", "### ", text, flags=re.MULTILINE)
 
 
