@@ -3,8 +3,8 @@
 `python docs/law_league.py` does so; with ``--geared DIR`` it makes the robot with gears of
 rivals.md. The pages name the folders: between ``<!-- begin DIR -->`` and ``<!-- end -->`` are the
 tables in which `space-robot campaign report DIR --markdown` compares laws. The figure goes beside
-the page, named like the folder. ``<!-- begin DIR medians -->`` has one table, a metric a row.
-Folders that are not there are left out.
+the page, named like the folder. ``<!-- begin DIR medians -->`` has one table, a metric a row,
+``<!-- begin DIR ranks -->`` one with medians and ranks. Folders that are not there are left out.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from space_robot.console.tables import Column, Group, Table, as_markdown
 HERE = Path(__file__).parent
 PAGES = [HERE / "law_league.md", HERE / "rivals.md"]
 BLOCK = re.compile(
-    r"(<!-- begin (\S+)( medians| by law)?( with figure)? -->\n).*?(<!-- end -->)", re.DOTALL
+    r"(<!-- begin (\S+)( medians| by law| ranks)?( with figure)? -->\n).*?(<!-- end -->)", re.DOTALL
 )
 COMPARING = {"rank", "to fly"}
 """Columns of tables that compare laws."""
@@ -79,6 +79,19 @@ def own_name(text: str, nominal: str) -> str:
     return re.sub(r"=equal_[a-z]+", "", text).replace("_nominal", nominal)
 
 
+def ranks(findings: Findings) -> str:
+    """Return medians and ranks as one table, a metric a row; the campaign has no grid."""
+    rows: dict[str, dict[str, str]] = {}
+    for table in tables(findings):
+        if "rank" in {column.name for column in table.columns}:
+            of_laws = {row[0]: f"{row[2]} ({row[1]})" for row in table.groups[0].rows}
+            rows[table.title] = of_laws
+    laws = list(findings.names.values())
+    columns = [Column("median (rank)", is_label=True), *(Column(law) for law in laws)]
+    cells = [[title, *(own[law] for law in laws)] for title, own in rows.items()]
+    return as_markdown("", [Table("", columns, [Group(cells)])]).lstrip("# \n")
+
+
 def renewed(found: re.Match[str]) -> str:
     """Return a block of the page with the tables of its folder; as it is if that is not there."""
     if not Path(found[2]).is_dir():
@@ -87,8 +100,9 @@ def renewed(found: re.Match[str]) -> str:
     subject = findings.subject
     runs = f"{subject.table['run'].nunique()} runs, seed {subject.seed}.\n\n"
     picture = figure(findings) if found[4] else ""
-    text_of = {" medians": medians, " by law": by_law}.get(found[3], block)
-    return f"{found[1]}{runs}{picture}{text_of(findings)}{found[5]}"
+    of_kind = {" medians": medians, " by law": by_law, " ranks": ranks}.get(found[3], block)
+    text = of_kind(findings)
+    return f"{found[1]}{runs}{picture}{text}{found[5]}"
 
 
 def geared(folder: Path) -> None:
