@@ -5,9 +5,9 @@ from __future__ import annotations
 from base_numbers import (
     ATTITUDE,
     DRIFT,
+    JOINTS_1_3,
     LAWS,
     MOMENTA,
-    OF_LAWS,
     PEAKS,
     attitude_error_at,
     first_at_limit,
@@ -19,15 +19,8 @@ from base_numbers import (
 from flown_tables import Number, Options, Page, Sentence, Table, Text
 
 ACTUATORS = ("ideal", "wheels", "small_wheels", "wheels_and_thrusters", "thrusters", "none")
-LAW_HEAD = (
-    "actuators",
-    "law",
-    "attitude",
-    "joints 1-3 (rad)",
-    "joints 4-6 (rad)",
-    "base ripple (N m)",
-    "ripple 4-6 (N m)",
-)
+SHOWN = (ATTITUDE, JOINTS_1_3, "ripple.rms.base_torque")
+"""In each cell of the table of laws and bases."""
 IDEAL: Options = {}
 STC_ON_SMALL_WHEELS: Options = {"actuators": "small_wheels", "controller": "tde_stc"}
 SLOW: Options = {
@@ -48,9 +41,9 @@ COMES_BACK: Options = {
 ROBUST_THRUSTERS: Options = {"actuators": "thrusters", "gains": "robust", "controller": "tde_stc"}
 
 
-def _law_row(label: str, options: Options) -> list[str | Number]:
-    law = str(options["controller"])
-    return [label, law, *(Number(options, quantity) for quantity in OF_LAWS)]
+def _bases(label: str, options: Options) -> list[str | Text]:
+    laws = ({**options, "controller": law} for law in LAWS)
+    return [label, *(Text("{}; {}; {}", tuple(Number(o, q) for q in SHOWN)) for o in laws)]
 
 
 def _asked(label: str, options: Options) -> list[str | Number | Text]:
@@ -89,25 +82,16 @@ PAGE = Page(
         ),
         Table(
             "bases",
-            LAW_HEAD,
+            ("actuators", *LAWS),
             [
-                _law_row(name, {"actuators": name, "controller": law})
-                for name in ACTUATORS
-                for law in LAWS
+                *(_bases(f"`{name}`", {"actuators": name}) for name in ACTUATORS),
+                _bases("`thrusters`, gains `robust`", ROBUST_THRUSTERS),
             ],
         ),
         Table(
             "after",
             ("law, gains `default`", "30 s", "60 s", "90 s", "120 s"),
             [_after(law) for law in LAWS],
-        ),
-        Table(
-            "robust",
-            LAW_HEAD,
-            [
-                _law_row("thrusters, `robust`", {**ROBUST_THRUSTERS, "controller": law})
-                for law in LAWS
-            ],
         ),
         Sentence(
             "The mission needs {} N m about a base axis and {} N m s of momentum.",

@@ -15,9 +15,6 @@ from space_robot_control.allocation.assumed_actuators import assumed_actuators
 
 ATTITUDE = "rms.mean_axis.attitude"
 JOINTS_1_3 = "rms.mean_axis.joints_1_3"
-JOINTS_4_6 = "rms.mean_axis.joints_4_6"
-OF_LAWS = (ATTITUDE, JOINTS_1_3, JOINTS_4_6, "ripple.rms.base_torque", "ripple.rms.torque_4_6")
-"""Columns of the tables that have a row for each law."""
 LAWS = ("ctc", "ctc_smc", "tde_smc", "tde_tsmc", "tde_stc")
 DRIFT = "attitude_drift.end_deg"
 PEAKS = tuple(f"sizing.axes.base_{axis}.peak_torque_n_m" for axis in "xyz")
