@@ -21,8 +21,6 @@ SETS = (
     ("ctc", "robust"),
     ("ctc_smc", "tuned"),
     ("tde_stc", "printed"),
-    ("tde_smc", "printed"),
-    ("tde_tsmc", "printed"),
     ("ctc", "tuned"),
 )
 ON_THRUSTERS: Options = {"actuators": "thrusters", "gains": "robust", "navigation": "filtered"}
