@@ -13,7 +13,7 @@ MISSIONS = ("ets_vii_out_and_back", "ets_vii_lift", "ets_vii_reactionless")
 LARGEST, END = "attitude_drift.max_deg", "attitude_drift.end_deg"
 ROBOT: Options = {"robot": "ets_vii", "controller": "ctc", "period": 0.002}
 FREE: Options = {**ROBOT, "actuators": "none"}
-READINGS = {"OnOrbitROS": "onorbitros.yaml", "TraceableRobotModels": "traceable.yaml"}
+READINGS = {"TraceableRobotModels": "traceable.yaml"}
 """Files that the page shows."""
 DURATIONS = (300.0, 600.0)
 ANOMALIES = (0.0, 45.0, 90.0)
