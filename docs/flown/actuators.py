@@ -117,13 +117,6 @@ PAGE = Page(
             (Number(_on_wheels("tde_stc"), ATTITUDE), Number({"controller": "tde_stc"}, ATTITUDE)),
         ),
         Sentence(
-            "Joints 1 to 3 need {} N m instead of {} (RMS)",
-            (
-                Number({"actuators": "none", "controller": "tde_stc"}, "rms.mean_axis.torque_1_3"),
-                Number({"controller": "tde_stc"}, "rms.mean_axis.torque_1_3"),
-            ),
-        ),
-        Sentence(
             "With the payload of case 4-2 the drift is {}°",
             (Number({"actuators": "none", "controller": "tde_stc", "case": "4-2"}, DRIFT, ".1f"),),
         ),
