@@ -2,29 +2,25 @@
 
 from __future__ import annotations
 
-import re
+from pathlib import Path
 from typing import Any
 
 import yaml
-from flown_tables import DOCS, Number, Options, Page, Table, Text
+from flown_tables import Number, Options, Page, Table, Text
 
 PATH = "explanation/ets_vii.md"
 MISSIONS = ("ets_vii_out_and_back", "ets_vii_lift", "ets_vii_reactionless")
 LARGEST, END = "attitude_drift.max_deg", "attitude_drift.end_deg"
 ROBOT: Options = {"robot": "ets_vii", "controller": "ctc", "period": 0.002}
 FREE: Options = {**ROBOT, "actuators": "none"}
-READINGS = {"TraceableRobotModels": "traceable.yaml"}
-"""Files that the page shows."""
+READINGS = {"TraceableRobotModels": "ets_vii_traceable.yaml"}
+"""Files beside this one."""
 DURATIONS = (300.0, 600.0)
 ANOMALIES = (0.0, 45.0, 90.0)
 
 
 def _robot_of(file: str) -> dict[str, Any]:
-    """Return the robot of a file that the page shows."""
-    text = (DOCS / PATH).read_text("utf-8")
-    block = re.search(rf"```yaml\n(# {file}\n.*?)```", text, re.DOTALL)
-    assert block is not None
-    content: dict[str, Any] = yaml.safe_load(block[1])
+    content: dict[str, Any] = yaml.safe_load(Path(__file__).with_name(file).read_text("utf-8"))
     return content
 
 
