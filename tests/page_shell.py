@@ -47,7 +47,6 @@ OF_GRAPHS = re.compile(
 """Commands that need a graph. All other options of `fly` are those of `simulate`, which flies the
 same bits (tests/laboratory/flight/graph holds it to that) and is asked in its place."""
 PLACEHOLDERS = {
-    "CASE": "3",
     "COMMAND": "fly",
     "D": "2",
     "F": "100",
