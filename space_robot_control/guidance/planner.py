@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from space_robot_model.elementary.spline import CubicSpline
 from space_robot_model.robot import Robot
+from space_robot_msgs_py.config.columns import read_columns
 from space_robot_msgs_py.errors import InputError
 
 from .checks import check_piece
@@ -23,7 +24,6 @@ from .segments import Segment, ToolGoal
 from .spline_courses import SplineCourse
 from .tool_courses import SegmentStart, ToolCourses
 from .tool_path import ToolFollower
-from .trajectory_file import read_columns
 from .trajectory_table import TrajectoryTable
 
 Array = NDArray[np.float64]

@@ -24,7 +24,9 @@ class MissionNodeSettings(MissionSettings, NodeSettings):
     selectors: ClassVar[tuple[str, ...]] = ("robot", "mission")
 
     mission: str = Field(
-        "", description="a mission of config/missions, or a path to its YAML (empty: the robot's)"
+        "",
+        description="a mission of config/missions, or a path to its YAML or to a trajectory in "
+        "CSV or Parquet (empty: the robot's)",
     )
     goto: str = Field(
         "",
@@ -44,13 +46,13 @@ class MissionNodeSettings(MissionSettings, NodeSettings):
         return [*super().layers(selected), *mission_layers(selected["robot"], selected["mission"])]
 
     @classmethod
-    def read_layer(cls, path: Path) -> Tree:
-        """Read a parameter file, or a mission's document.
+    def read_layer(cls, path: Path, selected: Mapping[str, str]) -> Tree:
+        """Read a parameter file, a mission's document, or a trajectory.
 
         Raises:
             InputError: the file cannot be read, or a key in it is wrong.
         """
-        layer = mission_layer(path, cls.node)
+        layer = mission_layer(path, cls.node, selected["robot"])
         if texts := layer.get("segments"):
             layer["segments"] = [with_columns(text, path.parent) for text in texts]
         return layer

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from space_robot_model.elementary.matrices import dot_rows, norms, unit_rows
 from space_robot_model.elementary.spline import CubicSpline
+from space_robot_model.robot.mission_document import QUATERNION
 from space_robot_msgs_py.config.validation import short
 from space_robot_msgs_py.errors import InputError
 
@@ -19,7 +20,6 @@ Array = NDArray[np.float64]
 Columns = Mapping[str, Sequence[float]]
 
 TIME, RATE = "time", "_rate"
-QUATERNION = ("q_w", "q_x", "q_y", "q_z")
 MOST_ROWS = 100_000
 SAME_PLACE = 1e-6
 """rad or m, that the first row may be away from where the segment begins."""

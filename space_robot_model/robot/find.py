@@ -36,6 +36,8 @@ ROBOTS = "robots"
 OWN = "robot"
 """Name, without suffix, of the robot's file in its own folder."""
 OWN_MISSION, OWN_GAINS = "mission.yaml", "gains"
+TRAJECTORIES = (".csv", ".parquet")
+"""Suffixes of missions that are tables of a trajectory."""
 
 
 @dataclass(frozen=True)
@@ -105,6 +107,9 @@ def mission_file(robot: str, mission: str = "") -> Path:
     Raises:
         InputError: there is no such mission or robot; with advice.
     """
+    if mission.endswith(TRAJECTORIES):
+        check_file(Path(mission))
+        return Path(mission)
     if mission:
         return named_file("missions", mission)
     files = robot_files(robot)

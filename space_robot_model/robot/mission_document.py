@@ -7,12 +7,14 @@
       limits: {base_torque: 2.0}
       events: []
 
-Older files hold ROS parameters of mission_node and plant_node; they are read on.
+Older files hold ROS parameters of mission_node and plant_node; they are read on. A trajectory in a
+CSV or Parquet file is a mission, too: it begins at its first row.
 """
 
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -20,14 +22,19 @@ from typing import Any
 import numpy as np
 from pydantic import Field
 
-from space_robot_msgs_py.config.files import node_parameters
+from space_robot_msgs_py.config.columns import read_columns
+from space_robot_msgs_py.config.files import GIVEN, node_parameters
 from space_robot_msgs_py.config.trees import Tree
 from space_robot_msgs_py.config.validation import StrictModel, read_yaml, validate
+from space_robot_msgs_py.errors import InputError
 
+from .find import TRAJECTORIES, find_robot
 from .orientation import Attitude
 
 KEY = "mission"
 PLANT = "plant"
+QUATERNION = ("q_w", "q_x", "q_y", "q_z")
+"""Columns of the base's attitude in a trajectory."""
 
 
 class Start(StrictModel):
@@ -66,16 +73,23 @@ OF_PLANT = ("initial_joints_deg", "initial_quaternion", "events")
 """Settings of a mission for the plant: its initial state, captures and releases."""
 
 
-def mission_layer(path: Path, node: str) -> Tree:
-    """Return the parameters of a node in a parameter file, or in a mission's document.
+def mission_layer(path: Path, node: str, robot: str) -> Tree:
+    """Return the parameters of a node in a parameter file, a mission's document or a trajectory.
+
+    Args:
+        path: of the file.
+        node: plant or mission.
+        robot: name or path of the robot, whose joints are the columns of a trajectory.
 
     Raises:
-        InputError: the file cannot be read, or is neither of both.
+        InputError: the file cannot be read, or is none of these.
     """
-    content = read_yaml(path)
-    if set(content) != {KEY}:
+    if path.suffix in TRAJECTORIES:
+        settings = trajectory_document(path, robot).parameters()
+    elif set(content := read_yaml(path)) == {KEY}:
+        settings = document_settings(content[KEY], f"{path}: {KEY}")
+    else:
         return node_parameters(path, node)
-    settings = document_settings(content[KEY], f"{path}: {KEY}")
     return {key: v for key, v in settings.items() if (key in OF_PLANT) is (node == PLANT)}
 
 
@@ -86,3 +100,31 @@ def document_settings(content: Mapping[str, Any], where: str) -> Tree:
         InputError: naming ``where``, key, value given and values allowed.
     """
     return validate(MissionDocument, content, where).parameters()
+
+
+def trajectory_document(path: Path, robot: str) -> MissionDocument:
+    """Return the mission that follows the trajectory of a file, from its first row on.
+
+    Args:
+        path: CSV or Parquet, with the columns of a segment ``file``.
+        robot: name or path of the robot.
+
+    Raises:
+        InputError: the file cannot be read, or lacks a column or rows; or the robot has no file.
+    """
+    if robot == GIVEN:
+        raise InputError(f"{path}: a trajectory is a mission of a robot with a file or name")
+    columns, model = read_columns(path), find_robot(robot)
+    joints = model.joint_names[: model.n]
+    if missing := [name for name in ("time", *joints) if name not in columns]:
+        raise InputError(f"{path}: column {missing[0]} is missing; there are {', '.join(columns)}")
+    if not columns["time"]:
+        raise InputError(f"{path}: there are no rows below the names of the columns")
+    first = {name: column[0] for name, column in columns.items()}
+    slides = dict(zip(joints, model.is_prismatic.tolist(), strict=False))
+    places = [first[name] if slides[name] else math.degrees(first[name]) for name in joints]
+    start: Tree = {"joints_deg": places}
+    if all(name in first for name in QUATERNION):
+        start["base"] = {"quaternion": [first[name] for name in QUATERNION]}
+    content = {"start": start, "segments": [{"trajectory": columns}]}
+    return validate(MissionDocument, content, str(path))

@@ -74,8 +74,12 @@ class NodeSettings(StrictModel):
         return [config_directory() / GRAPH_FILE]
 
     @classmethod
-    def read_layer(cls, path: Path) -> Tree:
+    def read_layer(cls, path: Path, selected: Mapping[str, str]) -> Tree:
         """Read what a file says to the node.
+
+        Args:
+            path: one of `layers`.
+            selected: the selectors' values.
 
         Raises:
             InputError: the file cannot be read.
@@ -95,7 +99,7 @@ class NodeSettings(StrictModel):
         chosen = validate(cls, merge(base, own), where)
         selected = {name: str(getattr(chosen, name)) for name in cls.selectors}
         for path in cls.layers(selected):
-            layer = cls.read_layer(path)
+            layer = cls.read_layer(path, selected)
             validate(cls, merge(tree, layer), str(path))
             tree = merge(tree, layer)
         return validate(cls, merge(tree, own), where)

@@ -121,10 +121,10 @@ class PlantNodeSettings(PlantSettings, NodeSettings):
         return settings
 
     @classmethod
-    def read_layer(cls, path: Path) -> Tree:
-        """Read a parameter file, or a mission's document.
+    def read_layer(cls, path: Path, selected: Mapping[str, str]) -> Tree:
+        """Read a parameter file, a mission's document, or a trajectory.
 
         Raises:
             InputError: the file cannot be read, or a key in it is wrong.
         """
-        return mission_layer(path, cls.node)
+        return mission_layer(path, cls.node, selected["robot"])
