@@ -31,7 +31,7 @@ def test_the_table_of_readme_is_what_simulate_prints() -> None:
 
 def test_the_sizing_of_analysis_is_what_analyze_prints(bags: Path) -> None:
     """Four small wheels beside what the first bag asked of its base."""
-    shown = block("docs/manual/analysis.md", "what actuators small_wheels", "wheels share what")
+    shown = block("docs/manual/analysis.md", "what actuators small_wheels", "stored momentum")
     printed = run("analyze", str(bags / "one"), "--actuators", "small_wheels", columns=100)
     check(shown, printed, "what actuators small_wheels")
 
