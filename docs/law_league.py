@@ -32,6 +32,8 @@ BLOCK = re.compile(
 )
 COMPARING = {"rank", "to fly"}
 """Columns of tables that compare laws."""
+LEFT_OUT = ", largest"
+"""Of the title of metrics that tables with a metric a row leave out: RMS decides."""
 
 
 def block(findings: Findings) -> str:
@@ -54,7 +56,7 @@ def figure(findings: Findings) -> str:
 
 def medians(findings: Findings) -> str:
     """Return the medians of all metrics as one table; the campaign has no grid."""
-    found = choice_tables(findings)
+    found = [table for table in choice_tables(findings) if LEFT_OUT not in table.title]
     rows = [[table.title, *row] for table in found for row in table.groups[0].rows]
     columns = [Column("median", is_label=True), *found[0].columns]
     return as_markdown("", [Table("", columns, [Group(rows)])]).lstrip("# \n")
@@ -83,7 +85,7 @@ def ranks(findings: Findings) -> str:
     """Return medians and ranks as one table, a metric a row; the campaign has no grid."""
     rows: dict[str, dict[str, str]] = {}
     for table in tables(findings):
-        if "rank" in {column.name for column in table.columns}:
+        if "rank" in {column.name for column in table.columns} and LEFT_OUT not in table.title:
             of_laws = {row[0]: f"{row[2]} ({row[1]})" for row in table.groups[0].rows}
             rows[table.title] = of_laws
     laws = list(findings.names.values())
