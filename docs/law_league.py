@@ -34,11 +34,18 @@ COMPARING = {"rank", "to fly"}
 """Columns of tables that compare laws."""
 LEFT_OUT = ", largest"
 """Of the title of metrics that tables with a metric a row leave out: RMS decides."""
+LEFT_OUT_BY_GRADE = "joints 1-3"
+"""The same of the tables by grade of sensors: the wrist tells the laws apart."""
 
 
 def block(findings: Findings) -> str:
     """Return the tables that compare laws, and draw the campaign's figure."""
-    comparing = [t for t in tables(findings) if COMPARING & {c.name for c in t.columns}]
+    comparing = [
+        table
+        for table in tables(findings)
+        if COMPARING & {column.name for column in table.columns}
+        and LEFT_OUT_BY_GRADE not in table.title
+    ]
     text = as_markdown("", comparing).removeprefix("# \n\n")
     return figure(findings) + re.sub(r"^## ", "### ", text, flags=re.MULTILINE)
 
