@@ -5,16 +5,10 @@ from __future__ import annotations
 from base_numbers import ATTITUDE, LAWS
 from flown_tables import Number, Options, Page, Table, Text
 
-GRADES = ("fine", "tactical", "coarse")
+GRADES = ("fine", "coarse")
 RIPPLE = "ripple.rms.base_torque"
 SMOOTH = {"controller": {"acceleration_filter_hz": 100.0}}
-DIVERGE = {
-    ("fine", "ctc"),
-    ("tactical", "ctc"),
-    ("coarse", "tde_smc"),
-    ("coarse", "tde_tsmc"),
-    ("coarse", "tde_stc"),
-}
+DIVERGE = {("fine", "ctc"), ("coarse", "tde_smc"), ("coarse", "tde_tsmc"), ("coarse", "tde_stc")}
 """Without the filter."""
 CORNERS_HZ = ((200.0, 300.0), (50.0, 75.0), (20.0, 30.0), (10.0, 15.0))
 
