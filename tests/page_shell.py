@@ -143,6 +143,7 @@ def _slow_gains(folder: Path) -> None:
 
 GIVEN: dict[str, Callable[[Path], None]] = {
     "README.md": _urdf,
+    "docs/recipes.md": _urdf,
     "docs/manual/analysis.md": _bag_of_others,
     "docs/manual/namespaces.md": _bag_of_two,
     "docs/manual/urdf.md": _urdf,

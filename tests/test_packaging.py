@@ -242,8 +242,8 @@ def test_tests_depend_on_what_setup_py_says() -> None:
 
 
 def test_the_recipe_for_apt_takes_its_packages_from_setup_py() -> None:
-    """No list of packages in README that could grow stale."""
-    text = (ROOT / "README.md").read_text("utf-8")
+    """No list of packages in the page for ROS users that could grow stale."""
+    text = (ROOT / "docs/manual/ros.md").read_text("utf-8")
     (installed,) = re.findall(r"pip install (.*?) &&", text)
     assert installed == '"./src/space_robot[apt]"'
     assert "apt" in setup_keyword("extras_require")

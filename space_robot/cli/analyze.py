@@ -19,6 +19,8 @@ if TYPE_CHECKING:
 
     from ..analysis.sizing import ActuatorSet
 
+SECTION = "Results"
+
 
 @click.command()
 @click.argument("bags", nargs=-1, required=True, type=click.Path(path_type=Path), metavar="BAG...")

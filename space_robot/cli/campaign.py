@@ -14,6 +14,8 @@ from .options import folder_option
 if TYPE_CHECKING:
     from ..campaign.flown.flights import Progress
 
+SECTION = "Gains and studies"
+
 
 @click.group()
 def campaign() -> None:

@@ -9,6 +9,8 @@ import click
 
 from .options import flight_option
 
+SECTION = "Results"
+
 LONGEST = 60
 """Maximum characters of a value on a terminal; --json shows all."""
 

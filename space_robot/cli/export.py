@@ -9,6 +9,8 @@ import click
 
 from .options import flight_options, plan_flight
 
+SECTION = "Flight code"
+
 
 @click.command()
 @flight_options(

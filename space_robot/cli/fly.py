@@ -9,6 +9,8 @@ import click
 
 from .options import ON_A_GRAPH, flight_options, plan_flight, remarks_on
 
+SECTION = "Fly"
+
 
 @click.command()
 @flight_options(*ON_A_GRAPH)

@@ -13,6 +13,8 @@ from click.core import ParameterSource
 from .numbers import FiniteRange
 from .options import flight_options
 
+SECTION = "Gains and studies"
+
 MASS_UNCERTAINTY = click.option(
     "--mass-uncertainty",
     type=FiniteRange(0.0, 0.9),

@@ -9,6 +9,8 @@ import click
 
 from .numbers import FiniteRange
 
+SECTION = "Fly"
+
 
 @click.command()
 @click.option("--tool", metavar="X,Y,Z", help="Position of the tool, m.")

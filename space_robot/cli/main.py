@@ -20,9 +20,10 @@ from ..console.streams import is_of_output, standard_streams
 from ..processes.interruption import Interrupted, raising_signals
 from ..processes.memory import COLLECTED_AT
 from ..processes.node_modules import MODULES, SUFFIX
+from .sections import SectionedGroup
 
 
-@click.group(context_settings={"help_option_names": ["-h", "--help"]})
+@click.group(cls=SectionedGroup, context_settings={"help_option_names": ["-h", "--help"]})
 @click.version_option(package_name="space_robot", prog_name="space-robot")
 def cli() -> None:
     """Fly a satellite with a robot arm: flight software on a ROS 2 graph, or in one process.

@@ -9,6 +9,8 @@ import click
 
 from .options import BASE, REPAIR, flight_options
 
+SECTION = "Robots, missions and own pieces"
+
 
 @click.command()
 @click.argument("robot")

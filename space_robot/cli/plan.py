@@ -10,6 +10,8 @@ import click
 from .numbers import FiniteRange
 from .options import file_option, flight_options, plan_flight
 
+SECTION = "Robots, missions and own pieces"
+
 
 @click.command()
 @click.argument("mission", default="")

@@ -10,6 +10,8 @@ import click
 from .numbers import FiniteRange
 from .options import NAMESPACE, REMAP, TRUST, file_option, flight_option
 
+SECTION = "Results"
+
 
 @click.command()
 @click.argument("bag", type=click.Path(path_type=Path))

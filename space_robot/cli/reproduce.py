@@ -14,6 +14,8 @@ from .options import flight_option
 if TYPE_CHECKING:
     from space_robot_control.navigation.settings import Mode
 
+SECTION = "Gains and studies"
+
 
 @click.command()
 @click.option(

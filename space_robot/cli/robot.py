@@ -8,6 +8,8 @@ import click
 
 from .options import BASE, REPAIR, file_option, flight_options
 
+SECTION = "Robots, missions and own pieces"
+
 
 @click.command()
 @click.argument("robot", default="paper")

@@ -9,6 +9,8 @@ import click
 
 from .options import ON_A_GRAPH, file_option, flight_options, plan_flight
 
+SECTION = "Fly"
+
 
 @click.command()
 @flight_options(*(name for name in ON_A_GRAPH if name != "bag"))

@@ -8,6 +8,8 @@ import click
 
 from .options import Decorator
 
+SECTION = "Fly"
+
 
 @click.group()
 def sim() -> None:

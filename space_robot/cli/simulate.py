@@ -10,6 +10,8 @@ import click
 
 from .options import ON_A_FLIGHT, flight_options, plan_flight, remarks_on
 
+SECTION = "Fly"
+
 
 @click.command()
 @flight_options(*ON_A_FLIGHT)

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import click
 
+SECTION = "Gains and studies"
+
 
 @click.command(hidden=True, context_settings={"ignore_unknown_options": True})
 @click.argument("options", nargs=-1, type=click.UNPROCESSED)

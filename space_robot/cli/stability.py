@@ -15,6 +15,8 @@ if TYPE_CHECKING:
 
     from ..flight.plan import Flight
 
+SECTION = "Gains and studies"
+
 
 @click.command()
 @flight_options(

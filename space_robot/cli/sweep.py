@@ -7,6 +7,8 @@ from pathlib import Path
 
 import click
 
+SECTION = "Gains and studies"
+
 POINTS = {"sensor_grades": 4, "base_actuators": 6}
 """Grid points of each campaign: one draw is this many runs."""
 
