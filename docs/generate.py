@@ -51,6 +51,49 @@ EXAMPLES = {
 }
 """An argument as it may be given, by the form of the kind."""
 
+FIELDS = {
+    "/joint_states": "`name`: n actuated joints, then passive ones; `position` (rad), `velocity` "
+    "(rad/s), `effort` (N m): torque *applied* over the tick that just ended, without friction; "
+    "passive joints 0",
+    "/base/state": "`joint_names` = `[base]`; `transforms[0].translation` (m; `inertial`): centre "
+    "of mass; `transforms[0].rotation`: from `base_link` to `inertial`, x, y, z, w; "
+    "`twist[0].linear` (m/s; `inertial`), `twist[0].angular` (rad/s; `base_link`); "
+    "`wrench[0].torque` (N m; `base_link`): *applied* over the tick that just ended",
+    "/command": "`name` = `base_x`, `base_y`, `base_z`, the joints, then wheels, thrusters and "
+    "magnetic torquers of the base; `effort`: torque (N m; base: `base_link`), thruster force (N) "
+    "or dipole (A m²) to apply from this stamp on",
+    "/reference/joints": "100 `points`, point i is i ticks after the stamp: `positions` (rad), "
+    "`velocities` (rad/s), `accelerations` (rad/s²)",
+    "/reference/base": "the same for the base: `transforms[0].rotation` (`inertial`), "
+    "`velocities[0].angular`, `accelerations[0].angular` (rad/s, rad/s²; `base_link`)",
+    "/controller/telemetry": "`data`: the tick, then four rows of n + 3, axes as in `/command`, in"
+    " rho-space: sliding variable s (rad/s), pseudo-acceleration u (rad/s²), time-delay estimate "
+    "N̂ (N m), error e (rad)",
+    "/controller/signals": "telemetry for plots: `position` e, `velocity` s, `effort` N̂",
+    "/controller/law": "`stamp`: of the first tick answered by this law and these gains; "
+    "parameters `controller` and `<law>.<gain>`, n + 3 values each in rho-space, units as in "
+    "[control laws](../manual/control_laws.md): `new_parameters` when a controller starts, "
+    "`changed_parameters` later",
+    "/clock": "`clock`: simulated time",
+    "/truth/joints": "true motion, 20 `points`, one tick apart, the first at the stamp; axes as in"
+    " `/command`: `positions` (base: vector part of the quaternion), `velocities` (base: angular "
+    "velocity), `effort` (N m) as *applied*",
+    "/truth/base": "the same for the base: `transforms`, `velocities`, frames as `/base/state`",
+    "/wheels/state": "`velocity` (rad/s) relative to the base, `effort` (N m) of the motor over "
+    "the tick that just ended, about each wheel's axis",
+    "/thrusters/state": "`effort` (N): mean force of each thruster over the tick that just ended",
+    "/motors/state": "of joints with gears: `position`, `velocity` of the motor, seen through the "
+    "gear (units of the joint)",
+    "/magnetometer": "with magnetic torquers: `magnetic_field` (T) at the base, base frame",
+    "/truth/orbit": "in an orbit, a point per tick: position and velocity of the origin (m, m/s; "
+    "inertial), magnetic field (T; base), torques by source (N m); `joint_names` names the numbers",
+    "/tf": "true poses, `inertial` → `base_link` → each body relative to its parent: `translation`"
+    " (m), `rotation` from `child_frame_id` to `header.frame_id`",
+    "/tf_static": "the same for the tools, which are fixed to their bodies",
+    "/robot_description": "a URDF of the robot; its links are the frames of `/tf`",
+}
+"""Fields of each recorded topic's messages, with units and frames."""
+
 
 def pages() -> dict[str, str]:
     """The text of each page by the name of its file."""
@@ -200,19 +243,30 @@ def topic_page() -> str:
             topics.PLANT_DESCRIPTION,
         )
     )
+    fields = (
+        (f"`{name}`", FIELDS[name])
+        for name in (topic.recorded.full_name for topic in topics.RECORDED)
+    )
     return (
         "\n\n".join(
             [
                 "# Topics",
                 MADE,
-                "All topics are reliable and keep the last messages (history). Fields, units, "
-                "frames and rates are in [bags](../manual/bags.md#topics). Every topic but the "
-                "last four is recorded; the plant's description is stored in the bag. These are "
+                "All topics are reliable and keep the last messages (history). Every topic but the"
+                " last four is recorded; the plant's description is stored in the bag. These are "
                 "the names without a namespace. In a namespace, for instance `/sat1`, all topics"
                 " but `/diagnostics` begin with it (`/sat1/joint_states`), and so do the frames in"
                 " `/tf` except `inertial`. If tf2_msgs is installed, the plant also publishes"
                 " `/tf` and `/tf_static` themselves.",
                 table(("topic", "type", "history", "durability", "published"), rows),
+                "## Fields",
+                "A tick is 0.5 ms by default, so a topic with a message each tick has 2 kHz; the "
+                "reference has 20 Hz, telemetry and clock have 100 Hz. `n` is the number of "
+                "actuated joints. Fields that are not listed are empty. For [prismatic joints]"
+                "(../manual/passive_joints.md) read rad as m, and N m as N. In rho-space the first"
+                " three axes are the vector part of the base's quaternion: read rad as 1 there. "
+                "The reference is sent up to 0.5 s ahead of the flight.",
+                table(("topic", "fields (unit; frame)"), fields),
             ]
         )
         + "\n"

@@ -32,11 +32,18 @@ BLOCK = re.compile(
 )
 COMPARING = {"rank", "to fly"}
 """Columns of tables that compare laws."""
+LEFT_OUT = re.compile("joints 1-3|, largest")
+"""Metrics that only the table with ranks has, or none: RMS decides, and the wrist."""
 
 
 def block(findings: Findings) -> str:
     """Return the tables that compare laws, and draw the campaign's figure."""
-    comparing = [t for t in tables(findings) if COMPARING & {c.name for c in t.columns}]
+    comparing = [
+        table
+        for table in tables(findings)
+        if COMPARING & {column.name for column in table.columns}
+        and not LEFT_OUT.search(table.title)
+    ]
     text = as_markdown("", comparing).removeprefix("# \n\n")
     return figure(findings) + re.sub(r"^## ", "### ", text, flags=re.MULTILINE)
 
@@ -54,7 +61,7 @@ def figure(findings: Findings) -> str:
 
 def medians(findings: Findings) -> str:
     """Return the medians of all metrics as one table; the campaign has no grid."""
-    found = choice_tables(findings)
+    found = [table for table in choice_tables(findings) if not LEFT_OUT.search(table.title)]
     rows = [[table.title, *row] for table in found for row in table.groups[0].rows]
     columns = [Column("median", is_label=True), *found[0].columns]
     return as_markdown("", [Table("", columns, [Group(rows)])]).lstrip("# \n")
@@ -83,7 +90,7 @@ def ranks(findings: Findings) -> str:
     """Return medians and ranks as one table, a metric a row; the campaign has no grid."""
     rows: dict[str, dict[str, str]] = {}
     for table in tables(findings):
-        if "rank" in {column.name for column in table.columns}:
+        if "rank" in {c.name for c in table.columns} and "largest" not in table.title:
             of_laws = {row[0]: f"{row[2]} ({row[1]})" for row in table.groups[0].rows}
             rows[table.title] = of_laws
     laws = list(findings.names.values())

@@ -73,7 +73,6 @@ NOT_RUN = {
     r"(source|python -m colcon|export ROS_|for node in)\b": "ROS 2 from apt",
     r"rerun\b": "a viewer of 100 MB",
     r"(git|mkdir -p ws|cp TraceableRobotModels|pip|python3 -m venv|sudo apt)\b": "from elsewhere",
-    r"for robot in": "18 exports of 30 s: tests/laboratory/export has each kind, shorter",
     r"for gains in": "3,000 flights",
     r"python docs/random_arms.py": "300 flights and 200 gain sets",
     r"python docs/flown": "its tables: tests/test_flown_pages.py",

@@ -18,7 +18,6 @@ JOINTS_1_3 = "rms.mean_axis.joints_1_3"
 LAWS = ("ctc", "ctc_smc", "tde_smc", "tde_tsmc", "tde_stc")
 DRIFT = "attitude_drift.end_deg"
 PEAKS = tuple(f"sizing.axes.base_{axis}.peak_torque_n_m" for axis in "xyz")
-MOMENTA = tuple(f"sizing.axes.base_{axis}.peak_momentum_n_m_s" for axis in "xyz")
 
 
 def largest_wheel_torque(flown: FlownFlight) -> float:

@@ -5,23 +5,16 @@ from __future__ import annotations
 from base_numbers import ATTITUDE, LAWS
 from flown_tables import Number, Options, Page, Table, Text
 
-GRADES = ("fine", "tactical", "coarse")
-BASE, JOINTS = "ripple.rms.base_torque", "ripple.rms.torque_1_3"
+GRADES = ("fine", "coarse")
+RIPPLE = "ripple.rms.base_torque"
 SMOOTH = {"controller": {"acceleration_filter_hz": 100.0}}
-DIVERGE = {
-    ("fine", "ctc"),
-    ("tactical", "ctc"),
-    ("coarse", "tde_smc"),
-    ("coarse", "tde_tsmc"),
-    ("coarse", "tde_stc"),
-}
+DIVERGE = {("fine", "ctc"), ("coarse", "tde_smc"), ("coarse", "tde_tsmc"), ("coarse", "tde_stc")}
 """Without the filter."""
 CORNERS_HZ = ((200.0, 300.0), (50.0, 75.0), (20.0, 30.0), (10.0, 15.0))
 
 
 def _cell(options: Options) -> Text:
-    ripple = (Number(options, BASE), Number(options, JOINTS))
-    return Text("{}; {}, {}", (Number(options, ATTITUDE, ".1e"), *ripple))
+    return Text("{}; {}", (Number(options, ATTITUDE, ".1e"), Number(options, RIPPLE)))
 
 
 def _direct(sensors: str, law: str) -> Text | Number:

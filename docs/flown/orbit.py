@@ -56,8 +56,7 @@ def stored(share: float) -> Callable[[FlownFlight], float]:
 
 
 def _source(key: str, label: str) -> list[str | Number]:
-    quantities = [f"disturbance_by_source.{key}.{name}" for name in ("rms_n_m", "max_n_m")]
-    quantities.append(f"disturbance_by_source.{key}.impulse_n_m_s")
+    quantities = [f"disturbance_by_source.{key}.{name}" for name in ("rms_n_m", "impulse_n_m_s")]
     return [label, *(Number(o, q, ".2g") for o in (AT_400_KM, AT_700_KM) for q in quantities)]
 
 
@@ -67,19 +66,16 @@ PAGE = Page(
     (
         Table(
             "sources",
-            ("", "400 km: RMS, N m", "max", "N m s", "700 km: RMS, N m", "max", "N m s"),
+            ("", "400 km: RMS, N m", "impulse, N m s", "700 km: RMS, N m", "impulse, N m s"),
             [_source(key, label) for key, label in SOURCES.items()],
         ),
         Table(
             "unloading",
-            ("unloaded by", "at the start, N m s", "1/4", "1/2", "3/4", "at the end"),
+            ("unloaded by", "at the start, N m s", "1/2", "at the end"),
             [
                 [
                     label,
-                    *(
-                        Number(_unloaded(dump), stored(share), ".2f")
-                        for share in (0.0, 0.25, 0.5, 0.75, 1.0)
-                    ),
+                    *(Number(_unloaded(dump), stored(share), ".2f") for share in (0.0, 0.5, 1.0)),
                 ]
                 for dump, label in DUMPS.items()
             ],

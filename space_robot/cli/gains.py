@@ -139,7 +139,7 @@ def tune(context: click.Context, /, output: Path, **options: Any) -> None:
     h_bar from the inertia along the mission, so that the time-delay estimate contracts with the
     margin asked for, whichever of the masses are wrong; a low-pass for it; poles below its lag;
     switching gains from the errors that are left. Sensors and navigation are listened to on a robot
-    at rest; nothing is flown. docs/manual/control_laws.md describes the method.
+    at rest; nothing is flown. space_robot/tuning/method.py has the method.
 
     \b
     Examples:

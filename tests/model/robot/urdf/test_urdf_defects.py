@@ -6,14 +6,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from paths import DOCS
 from urdf_defects import DEFECTS, FORE, GOOD, LIMIT, with_defect
 
 from space_robot_model.robot import Robot
 from space_robot_model.robot.urdf import read_urdf
 from space_robot_msgs_py.errors import InputError
-
-MANUAL = DOCS / "manual" / "urdf.md"
 
 
 @pytest.fixture
@@ -96,10 +93,3 @@ def test_next_to_no_mass_has_no_inertia(given: Path) -> None:
     assert [finding.repair.split()[-1] for finding in found.findings] == ["'upper'", "ignored"]
     robot = Robot.of_tree(found.name, found.bodies)
     np.testing.assert_allclose(np.linalg.eigvalsh(robot.inertia[1]), [0.5, 1.9, 2.1])
-
-
-def test_the_manual_lists_them_all() -> None:
-    """With the words of the errors."""
-    assert len(DEFECTS) > 40
-    manual = MANUAL.read_text()
-    assert [d.text for d in DEFECTS.values() if d.text.split(", got")[0] not in manual] == []
