@@ -43,7 +43,10 @@ campaign.add_command(report)
 @click.option(
     "--seed", type=click.IntRange(0), default=0, show_default=True, help="Seed of all draws."
 )
-@folder_option("--out", help="Folder of the campaign; one that was begun is gone on with.")
+@folder_option(
+    "--out",
+    help="Folder of the campaign; one that was begun is gone on with [default: campaigns/NAME].",
+)
 @click.option(
     "--workers",
     type=click.IntRange(0, 1024),
@@ -85,22 +88,19 @@ def run(
       space-robot campaign run my.yaml --runs 10000 --out campaigns/b --workers 8 --timeout 60
       space-robot campaign run my.yaml --out campaigns/b --scheduler tcp://cluster:8786
     """
-    from space_robot_msgs_py.errors import InputError
-
     from ..campaign.flown import Campaign
     from ..console.progress import rated_progress
     from ..console.terminal import echo_json, terminal
     from .campaign_display import as_record, print_summary
 
-    if out is None:
-        raise InputError("--out: the folder of the campaign is missing")
+    folder = out or Path("campaigns") / name_of(Path(file))
     latest: list[Progress] = []
     try:
         with rated_progress("flights") as show:
 
             def show_progress(progress: Progress) -> None:
                 if not latest and progress.kept:
-                    said = f"{out}: {progress.kept} of {progress.total} flights are there"
+                    said = f"{folder}: {progress.kept} of {progress.total} flights are there"
                     click.echo(f"{said}; going on", err=True)
                 latest[:] = [progress]
                 failed = f"{progress.failed} failed" if progress.failed else ""
@@ -109,7 +109,7 @@ def run(
             flown = Campaign.load(file).run(
                 runs,
                 seed,
-                out,
+                folder,
                 workers,
                 scheduler,
                 timeout_s,
@@ -118,15 +118,20 @@ def run(
             )
     except KeyboardInterrupt:
         if latest:
-            done = f"{latest[0].done} of {latest[0].total} flights are kept in {out}"
+            done = f"{latest[0].done} of {latest[0].total} flights are kept in {folder}"
             click.echo(f"{done}: the same line goes on with the others", err=True)
         raise
     if not latest:
-        click.echo(f"{out}: all {len(flown.table)} flights are there: nothing to fly", err=True)
+        click.echo(f"{folder}: all {len(flown.table)} flights are there: nothing to fly", err=True)
     if as_json:
         echo_json(as_record(flown))
     else:
         print_summary(flown, terminal())
+
+
+def name_of(file: Path) -> str:
+    """Return the name of a campaign: of its file, or of the folder of a ``campaign.yaml``."""
+    return file.parent.resolve().name if file.stem == "campaign" else file.stem
 
 
 @campaign.command()

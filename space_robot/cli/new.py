@@ -44,6 +44,7 @@ def new(
 
     from ..campaign.new_robot import check_replaceable, make_robot, robot_texts
     from ..campaign.new_robot.display import rms_table
+    from ..campaign.new_robot.texts import CAMPAIGN_FILE
     from ..console.terminal import echo_json, terminal
     from ..console.terminal_tables import print_table
     from ..flight.compilation import compile_kernels
@@ -59,7 +60,11 @@ def new(
     compile_kernels()
     with terminal(stderr=True).status("reading") as status:
         made = make_robot(texts, read, folder, command, status.update)
-    click.echo(f"made {folder}/: `space-robot fly --robot {folder}/` flies it", err=True)
+    click.echo(
+        f"made {folder}/: `space-robot fly --robot {folder}/` flies it, "
+        f"`space-robot campaign run {folder}/{CAMPAIGN_FILE}` with dispersed masses",
+        err=True,
+    )
     if as_json:
         echo_json(made.report())
     else:

@@ -12,6 +12,7 @@ from space_robot_model.robot.find import OWN_GAINS, OWN_MISSION
 from space_robot_msgs_py.errors import InputError
 
 from ...console.files import make_folder
+from .texts import CAMPAIGN_FILE
 
 
 def check_replaceable(folder: Path, force: bool, files: Collection[str]) -> None:
@@ -20,7 +21,8 @@ def check_replaceable(folder: Path, force: bool, files: Collection[str]) -> None
     Args:
         folder: to be created.
         force: True if an existing folder may be replaced.
-        files: names of the robot's files; only these, mission and gains may be overwritten.
+        files: names of the robot's files; only these, mission, gains and campaign may be
+            overwritten.
 
     Raises:
         InputError: something exists there that must not be overwritten.
@@ -31,7 +33,7 @@ def check_replaceable(folder: Path, force: bool, files: Collection[str]) -> None
         raise InputError(f"{folder}: exists already: choose another with --out, or use --force")
     if not folder.is_dir():
         raise InputError(f"{folder}: exists and is not a folder; it is not replaced")
-    known = {*files, OWN_MISSION, OWN_GAINS}
+    known = {*files, OWN_MISSION, OWN_GAINS, CAMPAIGN_FILE}
     if others := sorted(entry.name for entry in folder.iterdir() if entry.name not in known):
         raise InputError(f"{folder}: also contains {others[0]!r}: it is not replaced")
 

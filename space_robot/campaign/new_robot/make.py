@@ -30,6 +30,7 @@ from ...tuning.task import AUTO, TuningOptions
 from ...tuning.warning import estimate_remark
 from ..gain_set import tuned_set, write_set
 from .folder import whole_folder
+from .texts import CAMPAIGN_FILE, campaign_text
 
 SET, CASE = "tuned", "1"
 """Name of the tuned gain set, and the environment of tuning and flights."""
@@ -178,6 +179,7 @@ def make_robot(
     with whole_folder(folder) as place:
         for name, text in files.items():
             (place / name).write_text(text, "utf-8")
+        (place / CAMPAIGN_FILE).write_text(campaign_text(folder, command), "utf-8")
         step("mission")
         mission = rest_to_rest(robot)
         (place / OWN_MISSION).write_text(mission_text(robot, mission, command), "utf-8")

@@ -16,6 +16,7 @@ from click.testing import CliRunner
 from space_robot.campaign.flown import FlownCampaign
 from space_robot.campaign.store.manifest import read_manifest
 from space_robot.campaign.store.table import table_rows, write_table
+from space_robot.cli.campaign import name_of
 from space_robot.cli.main import cli
 from space_robot.processes.pool import cluster
 from space_robot_msgs_py.errors import InputError
@@ -34,6 +35,11 @@ def file(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("campaigns") / "my.yaml"
     path.write_text(FILE)
     return path
+
+
+def test_the_default_folder_is_named_by_the_file_or_by_its_folder() -> None:
+    assert name_of(Path("first")) == name_of(Path("some/first.yaml")) == "first"
+    assert name_of(Path("mine/campaign.yaml")) == "mine"
 
 
 @pytest.fixture(scope="module")
@@ -95,7 +101,6 @@ def test_rerun_says_that_the_digest_is_the_same_or_fails(flown: Path, tmp_path: 
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
-        (("run", "FILE"), "--out: the folder of the campaign is missing"),
         (("run", "FILE", "--out", "x"), "my.yaml: runs: missing"),
         (("run", "nothing", "--out", "x"), "unknown campaign 'nothing': choose one of"),
         (

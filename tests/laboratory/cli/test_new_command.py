@@ -12,6 +12,7 @@ import yaml
 from click.testing import CliRunner, Result
 from paths import CONFIG, DATA
 
+from space_robot.campaign.flown import Campaign
 from space_robot.campaign.new_robot import robot_texts
 from space_robot.campaign.new_robot.make import mission_text, rest_to_rest
 from space_robot.cli.main import cli
@@ -33,6 +34,14 @@ def _here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
 
 
+def _shorter(file: str) -> str:
+    """The same campaign with flights of a twentieth of a second."""
+    content = yaml.safe_load(Path(file).read_text("utf-8"))
+    content["scenario"]["duration"] = 0.05
+    Path(file).write_text(yaml.safe_dump(content))
+    return file
+
+
 def new(*arguments: str) -> Result:
     return CliRunner().invoke(cli, ["new", *arguments])
 
@@ -48,6 +57,14 @@ def test_a_file_becomes_a_folder_that_flies(tmp_path: Path) -> None:
     assert [entry.name for entry in tmp_path.iterdir()] == ["mine"]
     log = simulate(Flight(resolve(FlightPlan(robot="mine", controller="ctc", duration=0.01))))
     assert log.flight["mission"] == "mine"
+    study = Campaign.load("mine/campaign.yaml").study
+    assert study.scenario["robot"] == "mine/"
+    flown = CliRunner().invoke(
+        cli, ["campaign", "run", _shorter("mine/campaign.yaml"), "--runs", "2", "--workers", "0"]
+    )
+    assert flown.exit_code == 0, flown.exception
+    assert "pointing" in flown.stdout
+    assert (tmp_path / "campaigns/mine/table.parquet").is_file()
     assert isinstance(new(FILE, "--out", "mine").exception, InputError), "it is there"
 
 
