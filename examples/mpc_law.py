@@ -2,7 +2,7 @@
 
 Over ten steps, of 5 ms growing to 0.3 s, errors obey ``e'' = a = rhodd_d - u`` (H_S, c_S held). The
 sum of ``weight (W^4 e^2 + 2 W^2 edot^2 + a^2)`` over steps and axes becomes least, with torques
-within limits, by DAQP: `pip install 'space_robot[mpc]'`.
+within limits, by DAQP: `pip install 'daqp>=0.8'`.
 
     python examples/mpc_law.py
 

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from space_robot_msgs_py.bag.flight_log import FlightLog
+from space_robot_msgs_py.config.extras import install_command
 from space_robot_msgs_py.errors import InputError
 
 from ..console.files import csv_rows, csv_writer, whole_file
@@ -31,7 +32,7 @@ def dataframe(log: FlightLog) -> DataFrame:
     try:
         import pandas as pd
     except ImportError:
-        raise InputError("tables need pandas: pip install 'space_robot[campaign]'") from None
+        raise InputError(f"tables need pandas: {install_command('campaign')}") from None
     tick, *others = column_names(log)
     parts = list(batches(log))
     table = pd.DataFrame(np.vstack([numbers for _, numbers in parts]), columns=others)
@@ -46,7 +47,7 @@ def check_parquet() -> None:
         InputError: pyarrow is not installed.
     """
     if find_spec("pyarrow") is None:
-        raise InputError("Parquet files need pyarrow: pip install 'space_robot[parquet]'")
+        raise InputError(f"Parquet files need pyarrow: {install_command('parquet')}")
 
 
 def write_csv(log: FlightLog, path: Path) -> None:

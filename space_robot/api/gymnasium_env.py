@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from space_robot_msgs_py.config.arguments import as_numbers, as_whole_number
+from space_robot_msgs_py.config.extras import install_command
 from space_robot_msgs_py.config.validation import short
 from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.samples import RobotState
@@ -21,7 +22,7 @@ try:
     import gymnasium
     from gymnasium.spaces import Box
 except ImportError:
-    raise ImportError("gymnasium is not installed: pip install 'space_robot[gym]'") from None
+    raise ImportError(f"gymnasium is not installed: {install_command('gym')}") from None
 
 from .scenario import Scenario
 

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from space_robot_msgs_py.compiled.lanes import WIDTH
 from space_robot_msgs_py.compiled.records import Block
 from space_robot_msgs_py.config.arguments import as_numbers, as_whole_number
+from space_robot_msgs_py.config.extras import install_command
 from space_robot_msgs_py.errors import InputError
 from space_robot_sim.plant.plant import Plant, PlantMemory
 
@@ -24,7 +25,7 @@ try:
     from gymnasium.vector import AutoresetMode, VectorEnv
     from gymnasium.vector.utils import batch_space
 except ImportError:
-    raise ImportError("gymnasium is not installed: pip install 'space_robot[gym]'") from None
+    raise ImportError(f"gymnasium is not installed: {install_command('gym')}") from None
 
 from ..flight.batch.lane_loop import InLanes
 from ..flight.batch.lane_memory import in_lanes, numbers_of

@@ -12,6 +12,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from space_robot_msgs_py.config.extras import install_command
 from space_robot_msgs_py.errors import InputError
 
 from ...console.files import whole_file
@@ -39,7 +40,7 @@ def check_tables() -> None:
         import pyarrow.parquet  # noqa: F401
     except ImportError as error:
         raise InputError(
-            f"a campaign's table needs {error.name}: pip install 'space_robot[campaign]'"
+            f"a campaign's table needs {error.name}: {install_command('campaign')}"
         ) from None
 
 

@@ -17,6 +17,7 @@ from contextlib import contextmanager, suppress
 from queue import Empty, SimpleQueue
 from typing import TYPE_CHECKING, Any
 
+from space_robot_msgs_py.config.extras import install_command
 from space_robot_msgs_py.errors import InputError, SpaceRobotError
 
 from ..software import versions
@@ -169,7 +170,7 @@ def _connected(address: str) -> Iterator[Client]:
     try:
         from distributed import Client
     except ImportError:
-        raise InputError("a scheduler needs Dask: pip install 'space_robot[dask]'") from None
+        raise InputError(f"a scheduler needs Dask: {install_command('dask')}") from None
     with _quiet():
         client, failure = None, ""
         try:

@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from space_robot_msgs_py.config.choices import choices
+from space_robot_msgs_py.config.extras import install_command
 from space_robot_msgs_py.config.validation import one_of, short
 from space_robot_msgs_py.config.yaml_text import check_file, read_file
 from space_robot_msgs_py.errors import InputError
@@ -236,7 +237,7 @@ def expand_xacro(path: Path) -> str:
         import xacro
     except ImportError:
         raise InputError(
-            f"{path}: xacro is not installed: `pip install 'space_robot[xacro]'` or `apt install "
+            f"{path}: xacro is not installed: `{install_command('xacro')}` or `apt install "
             "ros-jazzy-xacro`, or expand the file elsewhere to a .urdf"
         ) from None
     said = io.StringIO()  # warnings, and the position of an error

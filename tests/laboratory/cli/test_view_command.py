@@ -21,6 +21,7 @@ from space_robot.cli.main import main
 from space_robot.flight.plan import Flight, FlightPlan, resolve
 from space_robot.flight.simulate import simulate
 from space_robot_msgs_py.bag.reader import read_flight
+from space_robot_msgs_py.config.extras import install_command
 
 LARGEST = 3e6
 """Bytes of a page of a flight of 30 s."""
@@ -193,7 +194,7 @@ def test_without_viser_one_line_says_what_to_install(
     monkeypatch.setattr("space_robot.view.stage.find_spec", lambda name: None)
     result = view(bags[1], "--no-open")
     assert result.code == 2
-    assert result.err == "space-robot: error: view needs viser: pip install 'space_robot[view]'\n"
+    assert result.err == f"space-robot: error: view needs viser: {install_command('view')}\n"
 
 
 def test_a_bag_has_no_shapes_of_a_urdf_until_it_is_named(view: Run, tmp_path: Path) -> None:

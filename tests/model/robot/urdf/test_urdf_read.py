@@ -184,7 +184,7 @@ class TestXacro:
         monkeypatch.setitem(sys.modules, "xacro", None)
         path = tmp_path / "arm.xacro"
         path.write_text(TEXT)
-        with pytest.raises(InputError, match=r"xacro is not installed: `pip install '"):
+        with pytest.raises(InputError, match=r"xacro is not installed: `pip install xacro"):
             Robot.from_urdf(path)
 
     def test_what_it_says_becomes_one_line(
