@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import click
 
 from .campaign_report import report
+from .completed_names import names_in
 from .numbers import FiniteRange
 from .options import folder_option
 
@@ -33,7 +34,7 @@ campaign.add_command(report)
 
 
 @campaign.command()
-@click.argument("file")
+@click.argument("file", shell_complete=names_in("campaigns"))
 @click.option(
     "--runs",
     type=click.IntRange(1),

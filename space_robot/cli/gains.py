@@ -10,6 +10,7 @@ from typing import Any
 import click
 from click.core import ParameterSource
 
+from .completed_names import names_in
 from .numbers import FiniteRange
 from .options import flight_options
 
@@ -34,6 +35,7 @@ def gains() -> None:
     "--controller",
     default="all",
     show_default=True,
+    shell_complete=names_in("gains/paper/tuned", ["all"]),
     help="A law's name, or file.py:Class of your own; all: every law that the gain set has.",
 )
 @MASS_UNCERTAINTY

@@ -7,13 +7,14 @@ from pathlib import Path
 
 import click
 
+from .completed_names import names_in
 from .options import BASE, REPAIR, flight_options
 
 SECTION = "Robots, missions and own pieces"
 
 
 @click.command()
-@click.argument("robot")
+@click.argument("robot", shell_complete=names_in("robots"))
 @click.option(
     "--out",
     type=click.Path(path_type=Path, file_okay=False),

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from ..scenario.option_table import Option, names, option
+from .completed_names import names_in
 from .scenario_option import NameOrNumbers, parameters, scenario
 
 if TYPE_CHECKING:
@@ -70,7 +71,7 @@ TRUST = click.option(
 def _list_faults(
     context: click.Context, option: click.Parameter, texts: Sequence[str]
 ) -> Sequence[str]:
-    if list(texts) == ["list"]:
+    if list(texts) == ["list"] and not context.resilient_parsing:  # as completion parses
         from space_robot_sim.faults.grammar import help_lines
 
         from ..scenario.faults import KINDS
@@ -127,6 +128,8 @@ def _click_option(entry: Option) -> Decorator:
         settings["type"] = NameOrNumbers()
     if entry.metavar:
         settings["metavar"] = entry.metavar
+    if entry.folder:
+        settings["shell_complete"] = names_in(entry.folder, entry.other_names)
     if entry.default not in (None, "") and entry.kind != "texts":
         settings["show_default"] = entry.kind != "switch" or bool(entry.default)
     if entry.name == "faults":

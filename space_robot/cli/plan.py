@@ -7,6 +7,7 @@ from typing import Any
 
 import click
 
+from .completed_names import names_in
 from .numbers import FiniteRange
 from .options import file_option, flight_options, plan_flight
 
@@ -14,7 +15,7 @@ SECTION = "Robots, missions and own pieces"
 
 
 @click.command()
-@click.argument("mission", default="")
+@click.argument("mission", default="", shell_complete=names_in("missions"))
 @flight_options("robot", "period", "set", "json")
 @click.option(
     "--base-torque",

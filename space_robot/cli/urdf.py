@@ -6,13 +6,14 @@ from pathlib import Path
 
 import click
 
+from .completed_names import names_in
 from .options import BASE, REPAIR, file_option
 
 SECTION = "Robots, missions and own pieces"
 
 
 @click.command()
-@click.argument("robot", default="paper")
+@click.argument("robot", default="paper", shell_complete=names_in("robots"))
 @BASE
 @REPAIR
 @file_option("--out", help="Write it to a file, in place of standard output.")

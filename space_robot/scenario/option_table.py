@@ -34,7 +34,9 @@ class Option:
     """On the command line (empty: --name)."""
     metavar: str = ""
     folder: str = ""
-    """Folder of config/ with the files that can be named."""
+    """Folder of config/ with the files, or folders, that can be named."""
+    other_names: tuple[str, ...] = ()
+    """Names without a file there."""
     needs_graph: bool = False
     """True if the option applies only to a graph of nodes."""
     is_launched: bool = True
@@ -46,7 +48,7 @@ class Option:
         from space_robot_msgs_py.config.directory import config_directory
 
         text = self.help
-        if self.folder:
+        if "{names}" in text:
             files = sorted((config_directory() / self.folder).glob("*.yaml"))
             text = text.replace("{names}", ", ".join(file.stem for file in files))
         return f"{text} [default: {self.default_text}]." if self.default_text else f"{text}."
@@ -68,7 +70,7 @@ OPTIONS = (
         "name",
         "Law: {names}, or file.py:Class of your own",
         "tde_stc",
-        folder="gains/paper/printed",
+        folder="gains/paper/tuned",
     ),
     Option(
         "case", "name", "Friction, disturbance and payload: {names}, or a path", "1", folder="cases"
@@ -88,6 +90,7 @@ OPTIONS = (
         "name",
         "Actuators of the base as the flight software assumes them",
         default_text="as they are",
+        folder="actuators",
     ),
     Option(
         "orbit",
@@ -102,6 +105,8 @@ OPTIONS = (
         "name",
         "Gain set: printed, tuned, robust, default (printed where it flies), or a path",
         "default",
+        folder="gains/paper",
+        other_names=("default",),
     ),
     Option(
         "robot",
@@ -115,8 +120,16 @@ OPTIONS = (
         "name",
         "Robot that flies, unknown to the laws and the mission",
         default_text="the same robot",
+        folder="robots",
     ),
-    Option("mission", "name", "Mission by name or path", "", default_text="the robot's"),
+    Option(
+        "mission",
+        "name",
+        "Mission by name or path",
+        "",
+        default_text="the robot's",
+        folder="missions",
+    ),
     Option(
         "duration", "number", "Seconds to fly", default_text="the mission's", above=0.0, high=1e6
     ),
