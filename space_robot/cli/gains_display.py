@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import TypeVar
-
 from rich.console import Console
 
 from ..console.tables import Column, JudgedCell, Table
@@ -13,11 +10,6 @@ from ..console.terminal_tables import print_table
 from ..tuning.mass_errors import DRAWS
 from ..tuning.spectrum import LEAST_MARGIN
 from .gains_checked import Checked
-
-T = TypeVar("T")
-
-A_TABLE, LONGEST = 5, 9
-"""Laws in a table, and letters of a name in one line."""
 
 
 def print_checks(checks: Checked, console: Console) -> None:
@@ -35,11 +27,9 @@ def print_checks(checks: Checked, console: Console) -> None:
     if checks.frequencies:
         print_table(_frequencies(checks), console)
         print_table(_with_gears(checks), console)
-    for table in _noise_gains(checks):
-        print_table(table, console)
+    print_table(_noise_gains(checks), console)
     if checks.ripple:
-        for table in _ripple(checks):
-            print_table(table, console)
+        print_table(_ripple(checks), console)
 
 
 def _margins(checks: Checked) -> Table:
@@ -153,31 +143,17 @@ def _holds(value: bool) -> tuple[str, str]:
     return ("holds", "good") if value else ("fails", "bad")
 
 
-def _noise_gains(checks: Checked) -> list[Table]:
-    names = _axes(checks, "N s/m")
-    tables = []
-    for some in _groups(checks.checks):
-        columns = [
-            Column("", is_label=True),
-            *(Column(_heading(check.law), spec=".3g") for check in some),
-        ]
-        rows = [
-            [name, *(float(check.noise_gain[axis]) for check in some)]
-            for axis, name in enumerate(names)
-        ]
-        title = "Torque that noise on the rate of an axis becomes, N m per rad/s"
-        tables.append(Table.of(title, columns, rows))
-    return tables
-
-
-def _groups(laws: Sequence[T]) -> list[Sequence[T]]:
-    """Return the laws in groups, each a table that fits a terminal."""
-    return [laws[start : start + A_TABLE] for start in range(0, len(laws), A_TABLE)]
-
-
-def _heading(law: str) -> str:
-    """Return the name of a law in two lines, if it is long."""
-    return law.replace("_", "_\n", 1) if len(law) > LONGEST else law
+def _noise_gains(checks: Checked) -> Table:
+    columns = [
+        Column("", is_label=True),
+        *(Column(check.law, spec=".3g") for check in checks.checks),
+    ]
+    rows = [
+        [name, *(float(check.noise_gain[axis]) for check in checks.checks)]
+        for axis, name in enumerate(_axes(checks, "N s/m"))
+    ]
+    title = "Torque that noise on the rate of an axis becomes, N m per rad/s"
+    return Table.of(title, columns, rows)
 
 
 def _axes(checks: Checked, of_prismatic: str) -> list[str]:
@@ -190,19 +166,14 @@ def _axes(checks: Checked, of_prismatic: str) -> list[str]:
     ]
 
 
-def _ripple(checks: Checked) -> list[Table]:
+def _ripple(checks: Checked) -> Table:
+    columns = [Column("", is_label=True), *(Column(law, spec=".3g") for law in checks.ripple)]
+    rows = [
+        [name, *(None if x is None else float(x[axis]) for x in checks.ripple.values())]
+        for axis, name in enumerate(_axes(checks, "N"))
+    ]
     sensors = checks.flight.plant_settings.sensors
-    tables = []
-    for some in _groups(list(checks.ripple)):
-        columns = [Column("", is_label=True), *(Column(_heading(law), spec=".3g") for law in some)]
-        ripple = [checks.ripple[law] for law in some]
-        rows = [
-            [name, *(None if x is None else float(x[axis]) for x in ripple)]
-            for axis, name in enumerate(_axes(checks, "N"))
-        ]
-        title = f"Torque ripple with sensors {sensors}, held still, N m RMS"
-        table = Table.of(title, columns, rows)
-        diverged = [law for law in some if checks.ripple[law] is None]
-        notes = [f"Held still, {', '.join(diverged)} diverged."] if diverged else []
-        tables.append(Table(table.title, table.columns, table.groups, notes))
-    return tables
+    table = Table.of(f"Torque ripple with sensors {sensors}, held still, N m RMS", columns, rows)
+    diverged = [law for law, ripple in checks.ripple.items() if ripple is None]
+    notes = [f"Held still, {', '.join(diverged)} diverged."] if diverged else []
+    return Table(table.title, table.columns, table.groups, notes)

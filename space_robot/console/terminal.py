@@ -1,7 +1,7 @@
 """Text and tables on a terminal of any width.
 
 Texts from bags and users are never interpreted as markup, and unprintable characters are
-replaced. A table with numbers that do not fit is printed as lines.
+replaced. A table that is too wide is printed in parts, or as lines.
 """
 
 from __future__ import annotations
@@ -12,13 +12,12 @@ from typing import Any
 
 import click
 from rich.console import Console
-from rich.table import Column, Table
+from rich.table import Table
 from rich.text import Text
 
 from space_robot_msgs_py.config.text import printable
 
-_START = 8
-"""Minimum visible characters of a label, to distinguish it from others."""
+from .table_layout import fitted, is_number, plain
 
 
 class _Console(Console):
@@ -51,54 +50,32 @@ def say(console: Console, text: str) -> None:
 
 
 def show(table: Table, console: Console) -> None:
-    """Print a table with wrapped labels, or as lines if numbers would be cut.
+    """Print a table, in parts or as lines if numbers or words of labels would be broken.
 
     Right-justified columns hold the numbers.
     """
-    numbers = [column for column in table.columns if column.justify == "right"]
-    if not (has_room := _has_room(table, numbers, console)):
-        for column in table.columns:
-            column.no_wrap = column in numbers
-            column.overflow = "fold"
-        has_room = _has_room(table, numbers, console)
-    if has_room:
-        console.print(table)
-    else:
-        _print_lines(table, numbers, console)
+    parts = fitted(table, console.width)
+    if not parts:
+        _print_lines(table, console)
+        return
+    _print_title(table, console)
+    for part in parts:
+        part.title = None  # it would be wrapped to the table's width
+        console.print(part)
 
 
-def _has_room(table: Table, numbers: list[Column], console: Console) -> bool:
-    """Return True if no number is wrapped and the start of each label is visible."""
-    padding = table.padding[1] + table.padding[3]
-    longest = (max((len(word) for word in _words(column)), default=0) for column in numbers)
-    if sum(length + padding for length in longest) > console.width:  # too wide in any case
-        return False
-    shown = {
-        word
-        for line in console.render_lines(table)
-        for word in "".join(segment.text for segment in line).split()
-    }
-    starts = {word[:_START] for word in shown}
-    for column in table.columns:
-        words = _words(column)
-        if column in numbers and not words <= shown:
-            return False
-        if not {word[:_START] for word in words} <= starts:
-            return False
-    return True
-
-
-def _words(column: Column) -> set[str]:
-    return {word for cell in column.cells for word in _plain(cell).split()}
-
-
-def _print_lines(table: Table, numbers: list[Column], console: Console) -> None:
-    """Print each row's labels, and below them one line per number."""
+def _print_title(table: Table, console: Console) -> None:
     for line in str(table.title or "").split("\n"):
         if line:
-            say(console, _plain(line))
-    cells = {id(column): [_plain(cell) for cell in column.cells] for column in table.columns}
-    labels = [column for column in table.columns if column not in numbers]
+            say(console, plain(line))
+
+
+def _print_lines(table: Table, console: Console) -> None:
+    """Print each row's labels, and below them one line per number."""
+    _print_title(table, console)
+    cells = {id(column): [plain(cell) for cell in column.cells] for column in table.columns}
+    numbers = [column for column in table.columns if is_number(column)]
+    labels = [column for column in table.columns if not is_number(column)]
     group = ""
     for row in range(table.row_count):
         first, *others = [cells[id(column)][row] for column in labels] or [""]
@@ -107,9 +84,5 @@ def _print_lines(table: Table, numbers: list[Column], console: Console) -> None:
             say(console, label)
         for column in numbers:
             if value := cells[id(column)][row]:
-                header = _plain(str(column.header).replace("-\n", ""))  # a hyphenated word
+                header = plain(str(column.header).replace("-\n", ""))  # a hyphenated word
                 say(console, f"  {header}: {value}" if header else f"  {value}")
-
-
-def _plain(cell: Any) -> str:
-    return " ".join((cell.plain if isinstance(cell, Text) else str(cell)).split())

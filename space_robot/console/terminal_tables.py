@@ -16,7 +16,7 @@ TONES = {"good": "green", "bad": "red", "open": "yellow"}
 
 
 def print_table(table: Table, console: Console, *, dense: bool = False) -> None:
-    """Print a table and its notes; a table that is too wide is printed as lines.
+    """Print a table and its notes; a table that is too wide is printed in parts or as lines.
 
     Args:
         table: to be printed.
@@ -26,7 +26,6 @@ def print_table(table: Table, console: Console, *, dense: bool = False) -> None:
     style: dict[str, Any] = {"box": SIMPLE_HEAD, "show_edge": False} if dense else {}
     shown = RichTable(
         title=table.title or None,
-        title_justify="left",
         show_header=any(column.heading for column in table.columns),
         **style,
     )
@@ -34,9 +33,7 @@ def print_table(table: Table, console: Console, *, dense: bool = False) -> None:
     if is_grouped:
         shown.add_column("", no_wrap=True)
     for column in table.columns:
-        shown.add_column(
-            column.heading, justify="left" if column.is_label else "right", overflow="fold"
-        )
+        shown.add_column(column.heading, justify="left" if column.is_label else "right")
     for group in table.groups:
         for number, row in enumerate(group.rows):
             name = [group.name if number == 0 else ""] if is_grouped else []
