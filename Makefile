@@ -5,7 +5,7 @@ VENV := .venv
 # Versions that are known to work; `make newest` goes without.
 CONSTRAINTS := constraints.txt
 # Extras with versions in it. Not apt, which has ROS's own NumPy, and not bench: Basilisk holds others back.
-CONSTRAINED := campaign dask docs gym mpc mutation notebooks parquet ros test view xacro
+CONSTRAINED := campaign dask dist docs gym mpc mutation notebooks parquet ros test view xacro
 PACKAGES := space_robot space_robot_control space_robot_model space_robot_msgs_py space_robot_sim
 # A file's tests run in one process; tests/conftest.py has the files in an order that fills both.
 PYTEST := $(VENV)/bin/python -m pytest --numprocesses 2 --dist loadfile --no-loadscope-reorder
@@ -25,7 +25,7 @@ export PYTHONPYCACHEPREFIX := $(CURDIR)/$(VENV)/pycache
 export ROS_AUTOMATIC_DISCOVERY_RANGE ?= LOCALHOST
 export FASTDDS_BUILTIN_TRANSPORTS ?= UDPv4
 
-.PHONY: help setup fly test check quick coverage hooks lint kernels docs bench mutation soak notebooks \
+.PHONY: help setup fly test check quick coverage hooks lint kernels docs dist bench mutation soak notebooks \
   newest constraints clean
 
 help:
@@ -39,6 +39,7 @@ help:
 	@echo "make lint                style and types only"
 	@echo "make kernels             compile the dynamics and the laws, once"
 	@echo "make docs                docs/ as a site in site/, to be read without a network"
+	@echo "make dist                a wheel and a source distribution in dist/"
 	@echo "make bench [ARGS=...]    how fast it is, e.g. make bench ARGS='plant laws'; --help tells more"
 	@echo "make mutation [ARGS=...] small faults put in, one at a time: do the tests notice?"
 	@echo "make soak [ARGS=...]     random flights with faults, e.g. make soak ARGS='--minutes 5'"
@@ -87,6 +88,13 @@ docs: $(VENV)/.docs
 	NO_MKDOCS_2_WARNING=1 $(VENV)/bin/python -m mkdocs --quiet build --strict
 	@echo "site/index.html"
 
+# The wheel is built from the source distribution, so that nothing is in one of them alone.
+dist: $(VENV)/.made
+	@$(PIP_INSTALL) 'build>=1.2'
+	rm -rf dist
+	$(VENV)/bin/python -m build
+	@ls dist/*
+
 bench: $(VENV)/.tests
 	@$(VENV)/bin/python tests/benchmarks $(ARGS)
 
@@ -117,7 +125,7 @@ constraints: $(VENV)/.made
 	  $(addprefix --extra ,$(CONSTRAINED)) setup.py -
 
 clean:
-	rm -rf $(VENV) .venv-newest build install log site *.egg-info .coverage .coverage.* .hypothesis .mypy_cache .pytest_cache .ruff_cache
+	rm -rf $(VENV) .venv-newest build dist install log site *.egg-info .coverage .coverage.* .hypothesis .mypy_cache .pytest_cache .ruff_cache
 	find $(PACKAGES) tests -name __pycache__ -prune -exec rm -rf {} +
 
 # Stamps: what is installed in .venv, renewed when the packaging changes.

@@ -1,10 +1,20 @@
 """Packaging for pip and colcon (ament_python); pyproject.toml only configures the tools."""
 
+import re
 from pathlib import Path
 
 from setuptools import find_packages, setup
 
 NAME = "space_robot"
+
+
+def version() -> str:
+    """Return the version of the first heading of the changelog, as in ``## 0.9.0 (unreleased)``."""
+    heading = re.search(r"^## (\S+) \(", Path("CHANGELOG.md").read_text("utf-8"), re.MULTILINE)
+    if heading is None:
+        raise SystemExit("setup.py: CHANGELOG.md has no heading such as '## 0.9.0 (unreleased)'")
+    return heading[1]
+
 
 # What `ros2 run` starts, all alike: each hands its name to bin/space-robot. As data files they land
 # in lib/space_robot, where it looks, whether pip or colcon installs them.
@@ -16,11 +26,19 @@ CONFIG = [
     if path.suffix == ".yaml" or path.parent.name == "views"
 ]
 
+# `space-robot examples` shows and copies them.
+EXAMPLES = [
+    (f"share/{NAME}/{path.parent}", [str(path)])
+    for folder in ("examples", "examples/flight_computer")
+    for path in sorted(Path(folder).iterdir())
+    if path.suffix in (".c", ".md", ".py", ".urdf") or path.name == "Makefile"
+]
+
 LAUNCH = [str(path) for path in sorted(Path("launch").glob("*.launch.py"))]
 
 setup(
     name=NAME,
-    version="0.9.0",
+    version=version(),
     description="Test bed for the flight software of space robots, on ROS 2",
     license="Apache-2.0",
     maintainer="space_robot maintainers",
@@ -63,6 +81,7 @@ setup(
         "bench": ["bsk", "hypothesis", "mujoco", "pin", "psutil>=5.9"],
         "campaign": ["pandas>=2.1", "pyarrow>=14"],  # tables of `campaign`
         "dask": ["distributed>=2024.1"],  # `campaign run --scheduler`
+        "dist": ["build>=1.2"],  # `make dist`
         # `make docs`
         "docs": [
             "mermaidx",
@@ -85,6 +104,7 @@ setup(
             "ros-rmw-fastrtps-cpp==8.4.3",  # Jazzy's: newer ones belong to other distributions
         ],
         "test": [
+            "build>=1.2",
             "cvxpy",
             "catkin_pkg",  # ROS's generators of interfaces
             "daqp>=0.8",
@@ -111,6 +131,7 @@ setup(
             "pytest-xdist",
             "ruff",
             "scipy-stubs",
+            "setuptools>=70.1",  # builds wheels by itself
             "trimesh>=4",
             "types-PyYAML",
             "types-psutil",
@@ -130,5 +151,6 @@ setup(
         (f"lib/{NAME}", EXECUTABLES),
         (f"share/{NAME}/docs/explanation", ["docs/explanation/errata.md"]),  # `reproduce` shows it
         *CONFIG,
+        *EXAMPLES,
     ],
 )

@@ -25,6 +25,8 @@ if TYPE_CHECKING:
     from .campaign.flown import Campaign, FlownCampaign
     from .learning import make, make_vec
 
+    __version__: str
+
 __all__ = [
     "Bench",
     "Campaign",
@@ -64,6 +66,10 @@ MODULES = {
 
 def __getattr__(name: str) -> Any:
     """Import a public name at its first use: commands that need none of them start sooner."""
+    if name == "__version__":
+        from .processes.software import installed_version
+
+        return installed_version(__name__) or "unknown"
     if name not in MODULES:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     return getattr(import_module(MODULES[name]), name)

@@ -98,6 +98,7 @@ SLOW = (
     "test_pages.py",
     "test_shown_outputs.py",
     "test_site.py",
+    "test_wheel.py",
 )
 """Folders and files whose tests take seconds each."""
 FLYING_UNTIL = 0.7

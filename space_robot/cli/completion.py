@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import click
 
+SECTION = "Begin"
+
 PROGRAM = "space-robot"
 VARIABLE = "_SPACE_ROBOT_COMPLETE"
 """Environment variable with which the script asks for completions, as click names it."""

@@ -23,8 +23,23 @@ from ..processes.node_modules import MODULES, SUFFIX
 from .sections import SectionedGroup
 
 
+def _show_version(context: click.Context, option: click.Parameter, is_asked: bool) -> None:
+    if is_asked and not context.resilient_parsing:
+        from ..processes.software import installed_version
+
+        click.echo(f"space-robot, version {installed_version('space_robot') or 'unknown'}")
+        context.exit()
+
+
 @click.group(cls=SectionedGroup, context_settings={"help_option_names": ["-h", "--help"]})
-@click.version_option(package_name="space_robot", prog_name="space-robot")
+@click.option(
+    "--version",
+    is_flag=True,
+    is_eager=True,
+    expose_value=False,
+    callback=_show_version,
+    help="Show the version and exit.",
+)
 def cli() -> None:
     """Fly a satellite with a robot arm: flight software on a ROS 2 graph, or in one process.
 
@@ -33,6 +48,7 @@ def cli() -> None:
       space-robot fly                               case 1 under TDE-STC, as a graph of nodes
       space-robot fly --controller ctc --case 3     another law, another case
       space-robot simulate --json                   the same flight without ROS
+      space-robot examples                          programs to run and to change
       space-robot robot my.urdf                     contents of a robot's file
       space-robot urdf paper                        a robot as a URDF, for RViz and others
       space-robot new my.urdf                       a folder for it: mission, gains, a first flight

@@ -5,7 +5,6 @@ from __future__ import annotations
 import platform
 import subprocess
 from functools import cache
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
 from space_robot_msgs_py.config.directory import config_directory
@@ -45,10 +44,16 @@ def commit() -> str | None:
 @cache
 def versions() -> dict[str, str | None]:
     """Return the versions of Python and the packages (None: not installed as a package)."""
-    return {"python": platform.python_version(), **{name: _version(name) for name in PACKAGES}}
+    return {
+        "python": platform.python_version(),
+        **{name: installed_version(name) for name in PACKAGES},
+    }
 
 
-def _version(package: str) -> str | None:
+def installed_version(package: str) -> str | None:
+    """Return the version of an installed package, or None."""
+    from importlib.metadata import PackageNotFoundError, version  # slow
+
     try:
         return version(package)
     except PackageNotFoundError:

@@ -6,14 +6,13 @@ import hashlib
 import json
 from collections.abc import Iterator
 from functools import cache
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
 from space_robot_control.laws.law_file import law_file
 
 from ...flight.plan import Flight
-from ...processes.software import versions
+from ...processes.software import installed_version, versions
 
 DECIDE = ("python", "space_robot", "numpy", "scipy", "numba", "llvmlite")
 """Packages whose version may affect the bits of a row."""
@@ -29,12 +28,8 @@ ROOT = Path(__file__).resolve().parents[3]
 def software() -> dict[str, str | None]:
     """Return the version of each package that a table depends on, and a digest of the sources."""
     known = versions()
-    try:
-        tables: str | None = version(OF_TABLES)
-    except PackageNotFoundError:
-        tables = None
     decisive = {name: known[name] for name in DECIDE}
-    return {**decisive, OF_TABLES: tables, "sources": source_digest(ROOT)}
+    return {**decisive, OF_TABLES: installed_version(OF_TABLES), "sources": source_digest(ROOT)}
 
 
 def file_digests(values: Any) -> dict[str, str]:

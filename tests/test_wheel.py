@@ -1,0 +1,213 @@
+"""The wheel of `make dist`, installed away from any clone: its commands work from any folder.
+
+The environment has the wheel alone; what it requires comes from the environment of the tests, and
+kernels from their cache, for to compile them takes minutes. `CONTRIBUTING.md` has the check by hand
+in an environment that takes everything from the registry.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import subprocess
+import sys
+import sysconfig
+from pathlib import Path
+from typing import NamedTuple
+from zipfile import ZipFile
+
+import pytest
+from import_graph import PACKAGES
+from pages import files
+from paths import CONFIG, DOCS, ROOT
+
+from space_robot.flight.compilation import ALLOCATION_MARK, MARK, mark_of
+from space_robot_msgs_py.compiled.cache import cache_directory
+
+pytest.importorskip("build")
+caching = pytest.importorskip("numba.core.caching")
+
+OF_THE_PROJECT = (
+    *("config", "examples", "launch", "resource", *PACKAGES),
+    *("CHANGELOG.md", "CITATION.cff", "CONTRIBUTING.md", "LICENSE", "MANIFEST.in", "README.md"),
+    *("constraints.txt", "package.xml", "pyproject.toml", "setup.py", "docs/explanation/errata.md"),
+)
+"""What a distribution is made of; the tests' copy has nothing else."""
+MADE = shutil.ignore_patterns("__pycache__")
+EXPORTED = ROOT / "examples/flight_computer/flight_code"
+"""Made by its Makefile."""
+VERSION = re.findall(r"^## (\S+)", (ROOT / "CHANGELOG.md").read_text("utf-8"), re.MULTILINE)[0]
+
+
+class Environment(NamedTuple):
+    """A virtual environment with the wheel, and an empty folder to work in."""
+
+    folder: Path
+    work: Path
+
+    def run(self, *words: str, code: int = 0) -> str:
+        """Run a command of the environment; return its output and messages."""
+        command = [str(self.folder / "bin" / words[0]), *words[1:]]
+        environment = {k: v for k, v in os.environ.items() if k not in LEFT_OUT}
+        environment["NUMBA_CACHE_DIR"] = str(self.folder / "kernels")
+        environment["PATH"] = f"{self.folder / 'bin'}{os.pathsep}{environment['PATH']}"
+        done = subprocess.run(
+            command,
+            cwd=self.work,
+            env=environment,
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+            timeout=500,
+            check=False,
+        )
+        assert done.returncode == code, f"{' '.join(words)}:\n{done.stdout[-3000:]}"
+        return done.stdout
+
+
+LEFT_OUT = {"PYTHONPATH", "PYTHONHOME", "ROS_DOMAIN_ID", "COVERAGE_PROCESS_CONFIG"}
+
+
+@pytest.fixture(scope="module")
+def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Built as `make dist` does: the source distribution, and the wheel from it."""
+    source = tmp_path_factory.mktemp("source")
+    for name in OF_THE_PROJECT:
+        (source / name).parent.mkdir(parents=True, exist_ok=True)
+        if (ROOT / name).is_dir():
+            shutil.copytree(ROOT / name, source / name, ignore=MADE)
+        else:
+            shutil.copy2(ROOT / name, source / name)
+    command = [sys.executable, "-m", "build", "--no-isolation", "--outdir", str(source / "dist")]
+    done = subprocess.run(command, cwd=source, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout[-3000:] + done.stderr[-3000:]
+    (built,) = (source / "dist").glob("*.whl")
+    return built
+
+
+def test_the_wheel_has_the_version_of_the_changelog(wheel: Path) -> None:
+    assert wheel.name == f"space_robot-{VERSION}-py3-none-any.whl"
+    assert wheel.with_name(f"space_robot-{VERSION}.tar.gz").is_file()
+
+
+def test_the_wheel_has_every_file_that_is_read(wheel: Path) -> None:
+    """All of the packages, the configuration, the examples and the launch files, unchanged."""
+    share = f"space_robot-{VERSION}.data/data/share/space_robot"
+    places = {name: f"{share}/{name}" for name in ("config", "examples", "launch")}
+    places |= {name: name for name in PACKAGES}
+    with ZipFile(wheel) as archive:
+        inside = {name: archive.getinfo(name) for name in archive.namelist()}
+        for folder, place in places.items():
+            for file in sorted((ROOT / folder).rglob("*.*")):
+                if file.is_dir() or "__pycache__" in file.parts or file.is_relative_to(EXPORTED):
+                    continue
+                name = f"{place}/{file.relative_to(ROOT / folder)}"
+                assert name in inside, name
+                assert archive.read(name) == file.read_bytes(), name
+        assert f"{share}/docs/explanation/errata.md" in inside
+
+
+@pytest.fixture(scope="module")
+def installed(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Environment:
+    folder, work = tmp_path_factory.mktemp("environment"), tmp_path_factory.mktemp("work")
+    subprocess.run([sys.executable, "-m", "venv", "--without-pip", str(folder)], check=True)
+    pip = [sys.executable, "-m", "pip", "--python", str(folder / "bin/python"), "install", "-q"]
+    options = ["--no-deps", "--no-index", "--no-compile", "--disable-pip-version-check"]
+    subprocess.run([*pip, *options, str(wheel)], check=True, capture_output=True)
+    (site,) = folder.glob("lib/python*/site-packages")
+    # the path alone: the editable installation of the clone is behind a .pth file there
+    (site / "tests.pth").write_text(f"{sysconfig.get_path('purelib')}\n")
+    environment = Environment(folder, work)
+    _take_kernels(environment, site)
+    return environment
+
+
+def _take_kernels(environment: Environment, site: Path) -> None:
+    """Copy the compiled kernels, under the names that they have for the installed sources.
+
+    Numba names a cache by the folder of the source, and finds it outdated if the source has another
+    time of change.
+    """
+    show = "from space_robot_msgs_py.compiled import cache; print(cache.cache_directory())"
+    theirs, ours = Path(environment.run("python", "-c", show).strip()), cache_directory()
+    theirs.mkdir(parents=True, exist_ok=True)
+    subpath = caching.UserProvidedCacheLocator.get_suitable_cache_subpath
+    for package in PACKAGES:
+        for source in sorted((ROOT / package).rglob("*.py")):
+            target = site / source.relative_to(ROOT)
+            shutil.copystat(source, target)
+            kernels = theirs / subpath(str(target))
+            if (ours / subpath(str(source))).is_dir() and not kernels.exists():
+                shutil.copytree(ours / subpath(str(source)), kernels)
+    for mark in (MARK, ALLOCATION_MARK):
+        if mark_of(mark).exists():
+            shutil.copy(mark_of(mark), theirs)
+
+
+def test_the_installed_packages_are_those_of_the_wheel(installed: Environment) -> None:
+    show = f"import {', '.join(PACKAGES)}; print(*(p.__file__ for p in ({', '.join(PACKAGES)})))"
+    for file in installed.run("python", "-c", show).split():
+        assert Path(file).is_relative_to(installed.folder), file
+
+
+def test_the_version_is_said_by_command_module_and_package(installed: Environment) -> None:
+    for words in (("space-robot",), ("python", "-m", "space_robot")):
+        assert installed.run(*words, "--version") == f"space-robot, version {VERSION}\n"
+    show = "import space_robot; print(space_robot.__version__)"
+    assert installed.run("python", "-c", show) == f"{VERSION}\n"
+
+
+def test_a_flight_its_view_and_its_analysis(installed: Environment) -> None:
+    flight = ("--controller", "ctc", "--case", "3", "--duration", "0.1")
+    installed.run("space-robot", "simulate", *flight, "--bag", "flights/one")
+    assert "attitude" in installed.run("space-robot", "analyze", "flights/one")
+    pytest.importorskip("viser")
+    installed.run("space-robot", "view", "flights/one", "--no-open", "--out", "one.html")
+    assert (installed.work / "one.html").stat().st_size > 100_000
+
+
+def test_a_graph_of_nodes(installed: Environment) -> None:
+    pytest.importorskip("rclpy")
+    said = installed.run("space-robot", "fly", "--duration", "0.1", "--bag", "flights/graph")
+    assert "messages lost: none" in said
+
+
+def test_examples_and_configuration_are_copied_and_fly(installed: Environment) -> None:
+    installed.run("space-robot", "examples", "copy", "copies")
+    flight = ("simulate", "--duration", "0.01")
+    installed.run("space-robot", *flight, "--robot", "copies/config/robots/seven_joint.yaml")
+    installed.run("space-robot", "robot", "copies/examples/two_link_arm.urdf")
+    assert "law" in installed.run("python", "copies/examples/own_robot.py")
+
+
+def test_a_scenario_of_the_docs(installed: Environment) -> None:
+    content = files(DOCS / "manual/configuration.md")
+    (installed.work / "plan.yaml").write_text(content["plan.yaml"])
+    said = installed.run("space-robot", "scenario", "--scenario", "plan.yaml")
+    assert "controller" in said
+
+
+def test_a_folder_for_a_robot_of_ones_own(installed: Environment) -> None:
+    urdf = ROOT / "examples/two_link_arm.urdf"
+    shutil.copy(urdf, installed.work / "arm.urdf")
+    installed.run("space-robot", "new", "arm.urdf", "--out", "arm")
+    installed.run("space-robot", "simulate", "--robot", "arm", "--duration", "0.01")
+
+
+def test_a_campaign(installed: Environment) -> None:
+    pytest.importorskip("pyarrow")
+    """By name, each flight alone: with a limit of time no lanes are needed, nor compiled."""
+    words = ("campaign", "run", "first", "--runs", "1", "--workers", "0", "--timeout", "100")
+    assert "1 runs" in installed.run("space-robot", *words, "--out", "campaigns/a")
+
+
+def test_executables_for_ros_are_where_it_looks(installed: Environment) -> None:
+    for name in ("fly", "simulate", "plant_node"):
+        assert os.access(installed.folder / "lib/space_robot" / name, os.X_OK)
+    assert installed.run("../lib/space_robot/simulate", "--help").startswith("Usage: space-robot")
+    assert (installed.folder / "share/space_robot/launch/fly.launch.py").is_file()
+    shipped = sum(1 for file in CONFIG.rglob("*.*") if file.is_file())
+    share = installed.folder / "share/space_robot/config"
+    assert sum(1 for file in share.rglob("*.*") if file.is_file()) == shipped
