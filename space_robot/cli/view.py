@@ -7,6 +7,7 @@ from pathlib import Path
 
 import click
 
+from ..view.plot_kinds import PLOT_KINDS, parse_kinds
 from .numbers import FiniteRange
 from .options import NAMESPACE, REMAP, TRUST, file_option
 
@@ -42,6 +43,13 @@ SECTION = "Results"
     help="The robot that flew, where the bag does not tell; of a URDF its shapes, too.",
 )
 @click.option("--title", default="", help="Of the page [default: the bags' names].")
+@click.option(
+    "--plots",
+    default="",
+    metavar="KIND,...",
+    help=f"Shown first, of {', '.join(PLOT_KINDS)}; others can be chosen on the page [default: "
+    "errors, drift, torques, actuators].",
+)
 @click.option("--light", is_flag=True, help="Dark on white, to print.")
 @REMAP
 @NAMESPACE
@@ -72,6 +80,7 @@ def view(
     to_s: float | None,
     robot: str,
     title: str,
+    plots: str,
     light: bool,
     remap: dict[str, str],
     namespace: str | None,
@@ -94,6 +103,7 @@ def view(
       space-robot view flights/tde_stc flights/ctc --out laws.html
       space-robot view flights/one flights/two --side-by-side --no-open
       space-robot view flights/mine --robot my.urdf --from 10 --to 12 --rate 200
+      space-robot view flights/one --plots attitude,rates,wheels
       space-robot view flights/one --out one.webp
       space-robot view --live
       space-robot view --live --domain 7 --namespace /sat1
@@ -110,9 +120,10 @@ def view(
     from .view_live import check_options, serve_live
 
     check_options(context, live, bags)
+    kinds = parse_kinds(plots) if plots else ()
     check_viser()
     if live:
-        serve_live(domain, namespace, robot, port, light, opens)
+        serve_live(domain, namespace, robot, port, light, opens, kinds)
         return
     names = bag_names(bags)
     page = out or Path(f"{'_'.join(names)}_view.html")
@@ -125,10 +136,10 @@ def view(
     robots = {name: shown_robot(log, robot) for name, log in logs.items()}
     for line in remarks_on(logs, robots):
         click.echo(line, err=True)
-    options = ViewOptions(side_by_side, rate, title, not light)
+    options = ViewOptions(side_by_side, rate, title, not light, kinds)
     with counting_progress("drawing") as advance:
         if page.suffix in FORMATS:
-            data = picture_of(logs, robots, title, page, advance)
+            data = picture_of(logs, robots, options, page, advance)
         else:
             data = flights_page(logs, robots, options, advance).encode()
     with whole_file(page, replace=True) as written:

@@ -11,7 +11,7 @@ import click
 NICENESS = 10
 """Niceness of the viewer, so that it does not delay the graph."""
 OF_LIVE = ("domain", "port")
-OF_BOTH = ("live", "opens", "robot", "light", "namespace")
+OF_BOTH = ("live", "opens", "robot", "light", "namespace", "plots")
 
 
 def check_options(context: click.Context, live: bool, bags: Collection[object]) -> None:
@@ -35,7 +35,13 @@ def check_options(context: click.Context, live: bool, bags: Collection[object]) 
 
 
 def serve_live(
-    domain: int | None, namespace: str | None, robot: str, port: int, light: bool, opens: bool
+    domain: int | None,
+    namespace: str | None,
+    robot: str,
+    port: int,
+    light: bool,
+    opens: bool,
+    plots: tuple[str, ...],
 ) -> None:
     """Serve the scene until the user ends it; its arguments are the command's options."""
     click.echo("starting the scene ...", err=True)  # where much else runs, that takes a while
@@ -55,6 +61,6 @@ def serve_live(
 
     named = robot_as_path(robot) if robot else ""
     try:
-        serve(LiveOptions(domain, namespace or "", named, port, not light), say, ready)
+        serve(LiveOptions(domain, namespace or "", named, port, not light, plots), say, ready)
     except Interrupted:
         say("ended")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 from itertools import pairwise
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -11,29 +10,23 @@ import numpy as np
 from numpy.typing import NDArray
 
 from space_robot_model.robot import Robot
-from space_robot_model.robot.shapes import Colour, even_box
 from space_robot_msgs_py.bag.flight_log import FlightLog
-from space_robot_msgs_py.errors import InputError
-from space_robot_msgs_py.simulated_time import tick_from
-from space_robot_sim.environment.events import Capture
-from space_robot_sim.environment.grasp import Grasp
 
-from ..analysis.described import captures_of, events_of
-from ..analysis.momentum import happens_in
 from ..analysis.tool_error import wanted_poses
+from .actuators import actuators
 from .frames import Frames
-from .free_body import FreeBody, before_capture
 from .goals import goals
 from .horizon import Horizon
 from .local_server import local_server
 from .orbit_frames import OrbitFrames
 from .orbit_scene import ArrowFrames, earth_frames
-from .scene import RobotScene, SceneStyle, add_shape, rgb, set_pose
+from .scene import RobotScene, SceneStyle, rgb
 from .stage import PAGE, Rendering, extent, set_stage
+from .targets import targets
 from .trails import Move, trails
 
 if TYPE_CHECKING:
-    from viser import SceneApi, ViserServer
+    from viser import ViserServer
 
 Array = NDArray[np.float64]
 
@@ -43,96 +36,6 @@ GAP = 0.15
 """Gap between robots side by side, relative to their width."""
 GHOST = 0.4
 """Opacity of robots that overlap another one."""
-
-
-COLOUR: Colour = (0.85, 0.38, 0.22, 1.0)
-
-
-def targets(
-    scene: SceneApi, root: str, robot_scene: RobotScene, log: FlightLog, robot: Robot, times: Array
-) -> list[Move]:
-    """Draw each target of a flight as a box of uniform density; nothing without targets.
-
-    Args:
-        scene: of a server.
-        root: name of the robot in the scene.
-        robot_scene: the robot that holds it.
-        log: the flight.
-        robot: that flew.
-        times: (K,) of the frames, s.
-    """
-    try:
-        captures = [
-            (met, Grasp.of(robot, met.target), after.time_s if after else np.inf)
-            for event, after in pairwise([*events_of(log), None])
-            if isinstance(event, Capture) and (met := _as_met(event, log))
-        ]
-    except InputError:
-        return []
-    moves: list[Move] = []
-    for number, (event, grasp, stop) in enumerate(captures):
-        start = _first(times, event.time_s)
-        moves.append(_holding(robot_scene, f"target_{number}", grasp, start, _first(times, stop)))
-        free = before_capture(event, log, robot)
-        if free is not None and start > 0:
-            path = f"{root}/free_target_{number}"
-            period = log.timebase.period
-            moment = tick_from(event.time_s, period) * period
-            moves.append(_drifting(scene, path, grasp, free, times[:start] - moment))
-    return moves
-
-
-def _as_met(event: Capture, log: FlightLog) -> Capture | None:
-    """Return a capture with the motion that its target has then; None if it misses its target.
-
-    Raises:
-        InputError: the robot or its environment are not known.
-    """
-    if not event.target.is_in_orbit:
-        return event
-    captures = captures_of(log)
-    exchange = next(exchange for exchange in captures.exchanges if exchange.event == event)
-    row = int(exchange.tick) - log.first_tick
-    if 0 <= row < log.ticks:
-        happens_in(captures, exchange, log.rows(row, row + 1))
-    if exchange.tick in captures.misses or exchange.meeting is None:
-        return None
-    motion = {"motion": exchange.meeting.motion}
-    return replace(event, target=event.target.model_copy(update=motion))
-
-
-def _holding(scene: RobotScene, name: str, grasp: Grasp, start: int, stop: int) -> Move:
-    box = even_box(grasp.mass, grasp.inertia, grasp.com, grasp.body, COLOUR)
-    shape = scene.add_shape(name, box)
-    shape.visible = False
-
-    def hold(k: int) -> None:
-        if k in (start, stop):
-            shape.visible = k == start
-
-    return hold
-
-
-def _drifting(scene: SceneApi, path: str, grasp: Grasp, free: FreeBody, times: Array) -> Move:
-    """Draw a target until its capture, at ``times`` (K,) relative to it, s."""
-    frame = scene.add_frame(path, show_axes=False)
-    box = even_box(grasp.mass, grasp.inertia, np.zeros(3), 0, COLOUR)
-    add_shape(scene, f"{path}/box", box, SceneStyle())
-    positions, quaternions = free.poses(times)
-
-    def drift(k: int) -> None:
-        if k < len(times):
-            set_pose(frame, "position", positions[k])
-            set_pose(frame, "wxyz", quaternions[k])
-        elif k == len(times):
-            frame.visible = False
-
-    return drift
-
-
-def _first(times: Array, event: float) -> int:
-    """Return the first frame at or after an event."""
-    return int(np.searchsorted(times, event - 1e-9))
 
 
 class FilmedFlight(NamedTuple):
@@ -234,6 +137,7 @@ def add_flights(
         moves += trails(scene, root, of, rgb(flight.colour), 0.0035 * size)
         if (poses := wanted[index]) is not None:
             goals(scene, root, flight.log, poses, 0.04 * size)
+        moves += actuators(scene, robot, flight.log, flight.robot, times, dark)
         moves += targets(scene, root, robot, flight.log, flight.robot, times)
         if own := arrows[index]:
             moves.append(own.add(scene, root, rendering.labels))

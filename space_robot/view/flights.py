@@ -15,6 +15,7 @@ from space_robot_msgs_py.bag.law_history import as_data, in_words, laws_of
 from space_robot_msgs_py.errors import InputError
 
 from ..analysis.described import check_joints, robot_of
+from .actuators import actuator_notes
 from .animation import animate, encoded
 from .arrows import ArrowKind, arrow_kinds
 from .film import FilmedFlight, film
@@ -43,6 +44,8 @@ class ViewOptions:
     """Title of the page; empty: the flights' names."""
     dark: bool = True
     """True for light on dark."""
+    plots: tuple[str, ...] = ()
+    """Kinds of the plots that are shown first, see `PLOT_KINDS`; empty: the usual ones."""
 
 
 def flights_page(
@@ -74,18 +77,19 @@ def flights_page(
         options.title or ", ".join(logs),
         scene,
         [Shown(f.name, f.colour, _told(f), f.log.defects) for f in flights],
-        plots_of(logs, robots, colours),
+        plots_of(logs, robots, colours, options.plots),
         shared_marks(logs),
         float(times[0]),
         options.dark,
         _legend(logs, options.dark),
+        list(dict.fromkeys(note for log in logs.values() for note in actuator_notes(log, times))),
     )
 
 
 def picture_of(
     logs: Mapping[str, FlightLog],
     robots: Mapping[str, Robot],
-    title: str,
+    options: ViewOptions,
     file: Path,
     advance: Callable[[int], Callable[[], None]],
 ) -> bytes:
@@ -94,7 +98,7 @@ def picture_of(
     Args:
         logs: exactly one, by name.
         robots: that flew, by the same names.
-        title: caption; empty: law, robot and case.
+        options: its title, empty: law, robot and case; its plots.
         file: with a suffix of `animation.FORMATS`.
         advance: called with the number of frames, then after each frame.
 
@@ -106,8 +110,13 @@ def picture_of(
         raise InputError(f"{file}: an animated picture shows one flight, got {len(logs)} bags")
     ((name, log),) = logs.items()
     flight = FilmedFlight(name, log, robots[name], _law(log), OF_TRAIL)
-    shown = [p for p in plots_of(logs, robots, ON_DARK) if p.title.startswith(PICTURED)]
-    return encoded(animate(flight, shown[:MOST_PLOTS], title or _told(flight), advance), file)
+    shown = [
+        plot
+        for plot in plots_of(logs, robots, ON_DARK, options.plots)
+        if plot.is_shown and (options.plots or plot.title.startswith(PICTURED))
+    ]
+    caption = options.title or _told(flight)
+    return encoded(animate(flight, shown[:MOST_PLOTS], caption, advance), file)
 
 
 def shown_robot(log: FlightLog, name: str = "") -> Robot:

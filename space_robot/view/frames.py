@@ -129,6 +129,13 @@ def held_rows(log: FlightLog, columns: Sequence[str], times: Array) -> NDArray[n
     return np.asarray(known[np.maximum(at, 0)])
 
 
+def frame_rows(log: FlightLog, times: Array) -> NDArray[np.intp]:
+    """Return the last row (K,) of a flight at or before each frame."""
+    due = times + 0.5 * log.timebase.period
+    at = np.searchsorted(tick_times(log), due, side="right") - 1
+    return np.asarray(np.maximum(at, 0))
+
+
 def _desired(log: FlightLog, robot: Robot, rows: NDArray[np.intp]) -> Array | None:
     """Return the first tool's desired positions, (K, 3) m, with passive joints at rest."""
     if not controls_base(log):

@@ -1,4 +1,4 @@
-"""Free motion of a target before its capture."""
+"""Free motion of a target before its capture and after its release."""
 
 from __future__ import annotations
 
@@ -110,6 +110,38 @@ def before_capture(capture: Capture, log: FlightLog, robot: Robot) -> FreeBody |
         velocity = axes @ velocity + (positions[1] - positions[0]) / period
         angular_velocity = axes @ angular_velocity + turned / period
     return FreeBody(positions[1], rotations[1], velocity, angular_velocity, grasp.inertia)
+
+
+def after_release(
+    grasp: Grasp, speed: float, tick: int, log: FlightLog, robot: Robot
+) -> FreeBody | None:
+    """Return the state of a target just after its release, with the axes of the grasping body.
+
+    Args:
+        grasp: that held it.
+        speed: m/s at which a spring pushes it off along z of the tool.
+        tick: of the release.
+        log: the flight.
+        robot: that flew.
+
+    Returns:
+        None if ``log`` does not have this tick and the next one.
+    """
+    row = tick - log.first_tick
+    if not 0 <= row < log.ticks - 1:
+        return None
+    positions, rotations = held_poses(grasp, log.rows(row, row + 2), robot)
+    if not np.isfinite(positions).all() or not np.isfinite(rotations).all():
+        return None
+    period = log.timebase.period
+    push = speed * (rotations[0] @ grasp.tool_axes)[:, 2]
+    return FreeBody(
+        positions[0],
+        rotations[0],
+        push + (positions[1] - positions[0]) / period,
+        Rotation.from_matrix(rotations[1] @ rotations[0].T).as_rotvec() / period,
+        grasp.inertia,
+    )
 
 
 def held_poses(grasp: Grasp, log: FlightLog, robot: Robot) -> tuple[Array, Array]:

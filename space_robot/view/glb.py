@@ -25,17 +25,20 @@ def unlit_glb(vertices: Array, colours: Array, faces: Indices, lines: Indices) -
 
     Args:
         vertices: (V, 3).
-        colours: (V, 3) red, green and blue of the vertices as in CSS, from 0 to 1.
+        colours: (V, 3) red, green and blue of the vertices as in CSS, from 0 to 1; or (V, 4) with
+            their opacity.
         faces: (F, 3) indices of vertices, counterclockwise as seen from outside.
         lines: (L, 2) indices of vertices.
     """
     places = vertices.astype("<f4")
-    opaque = np.ones((len(colours), 4))
-    opaque[:, :3] = _linear(colours)
+    shades = np.ones((len(colours), 4))
+    shades[:, : colours.shape[1]] = colours
+    shades[:, :3] = _linear(shades[:, :3])
+    is_opaque = bool((shades[:, 3] == 1.0).all())
     kind, width = (SHORT, "<u2") if len(vertices) < 2**16 - 1 else (INTEGER, "<u4")
     parts = [
         (places, FLOAT, "VEC3", VERTICES),
-        (np.round(opaque * 65535.0).astype("<u2"), SHORT, "VEC4", VERTICES),
+        (np.round(shades * 65535.0).astype("<u2"), SHORT, "VEC4", VERTICES),
         (faces.astype(width).reshape(-1), kind, "SCALAR", INDICES),
         (lines.astype(width).reshape(-1), kind, "SCALAR", INDICES),
     ]
@@ -67,7 +70,7 @@ def unlit_glb(vertices: Array, colours: Array, faces: Indices, lines: Indices) -
         "scenes": [{"nodes": [0]}],
         "nodes": [{"mesh": 0}],
         "meshes": [{"primitives": primitives}],
-        "materials": [{"extensions": {unlit: {}}}],
+        "materials": [{"extensions": {unlit: {}}} | ({} if is_opaque else {"alphaMode": "BLEND"})],
         "buffers": [{"byteLength": len(data)}],
         "bufferViews": views,
         "accessors": accessors,

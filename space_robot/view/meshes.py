@@ -18,6 +18,7 @@ from space_robot_msgs_py.ros.run_module import clean_environment, module_command
 
 from . import mesh_process
 from .mesh import Mesh
+from .spacecraft import panels_of_plates
 
 MOST_FACES = 60_000
 """Maximum number of faces of all meshes of a robot: about 0.7 MB of a page."""
@@ -46,7 +47,7 @@ def shown_shapes(robot: Robot) -> Shapes:
     """Return the shapes of a robot with their meshes.
 
     An unreadable mesh is omitted; a body without other shapes is drawn from kinematics and mass. A
-    mesh with too many faces is simplified.
+    mesh with too many faces is simplified. Plates of the file are added to derived shapes.
     """
     shapes = shapes_of(robot)
     files = tuple(dict.fromkeys(shape.mesh for shape in shapes if shape.shape == "mesh"))
@@ -63,6 +64,8 @@ def shown_shapes(robot: Robot) -> Shapes:
     bare = {shape.body for shape in shapes} - {shape.body for shape in drawn}
     if bare:
         drawn += [shape for shape in drawn_shapes(robot) if shape.body in bare]
+    if not robot.visuals:
+        drawn += panels_of_plates(robot, drawn)
     return Shapes(tuple(drawn), meshes, tuple(remarks))
 
 

@@ -37,6 +37,7 @@ def render(
     start: float,
     dark: bool,
     arrows: Sequence[ArrowKind] = (),
+    notes: Sequence[str] = (),
 ) -> str:
     """Render the self-contained page.
 
@@ -44,11 +45,12 @@ def render(
         title: of the page.
         scene: viser's page of the scene.
         bags: that are shown.
-        plots: in order.
+        plots: in order, with a common time.
         marks: on the time axis.
         start: time of the first frame, s.
         dark: whether the page is light on dark.
         arrows: at the bases of robots in orbit.
+        notes: on how things are drawn, a sentence each.
     """
     folder = files(__package__).joinpath("templates")
     data = {
@@ -58,7 +60,7 @@ def render(
                 "unit": plot.unit,
                 "logarithmic": plot.is_logarithmic,
                 "pulses": plot.are_pulses,
-                "time": _short(plot.time, 4),
+                "shown": plot.is_shown,
                 "series": [
                     {
                         "label": s.label,
@@ -79,6 +81,7 @@ def render(
             }
             for m in marks
         ],
+        "time": _short(plots[0].time, 4) if plots else [],
         "start": start,
         "dark": dark,
     }
@@ -92,6 +95,7 @@ def render(
         css=folder.joinpath("view.css").read_text("utf-8"),
         orbit_css=folder.joinpath("orbit.css").read_text("utf-8") if arrows else "",
         arrows=arrows,
+        notes=notes,
         script=folder.joinpath("view.js").read_text("utf-8"),
         data=data,
     )

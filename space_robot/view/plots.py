@@ -14,11 +14,12 @@ from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.config.text import shortened
 
 from ..analysis.plot_series import tick_times
-from .quantities import PlottedQuantity, quantities_of
+from .plotted_quantity import PlottedQuantity
+from .quantities import quantities_of
 
 Array = NDArray[np.float64]
 
-STRETCHES = 600
+STRETCHES = 400
 """Time intervals of a flight; minimum and maximum of each are drawn, so that chatter is visible."""
 MOST_LETTERS = 40
 """Maximum length of a label, in characters."""
@@ -44,10 +45,17 @@ class Plot(NamedTuple):
     is_logarithmic: bool = False
     are_pulses: bool = False
     """True if each series has a separate row, for values from 0 to 1."""
+    kind: str = ""
+    """One of `PLOT_KINDS`."""
+    is_shown: bool = True
+    """True if the page begins with it; a reader can choose others."""
 
 
 def plots_of(
-    flights: Mapping[str, FlightLog], robots: Mapping[str, Robot], colours: Sequence[str]
+    flights: Mapping[str, FlightLog],
+    robots: Mapping[str, Robot],
+    colours: Sequence[str],
+    kinds: Sequence[str] = (),
 ) -> list[Plot]:
     """Return the plots of some flights.
 
@@ -57,6 +65,7 @@ def plots_of(
         flights: by name.
         robots: that flew, by the same names.
         colours: of the flights; for one flight those of the axes.
+        kinds: of the plots that are shown first, see `PLOT_KINDS`; empty: the usual ones.
     """
     logs = list(flights.values())
     edges = np.linspace(
@@ -84,6 +93,8 @@ def plots_of(
                 [*before, *series],
                 quantity.is_error and not is_one,
                 quantity.are_pulses and is_one,
+                quantity.kind,
+                quantity.kind in kinds if kinds else quantity.is_shown,
             )
     return list(plots.values())
 

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import suppress
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,23 +18,10 @@ from ..analysis.described import assumed_robot_of, flown_actuators
 from ..analysis.figures.overlay import words
 from ..analysis.metrics import error_columns, torque_columns, tracking_error, unit_of
 from ..analysis.tool_error import ToolError, leads_tool
+from .plotted_quantity import AXES, PlottedQuantity
+from .state_quantities import by_unit, estimates, momentum, motion
 
 Array = NDArray[np.float64]
-
-AXES = "xyz"
-
-
-class PlottedQuantity(NamedTuple):
-    """Values with a common unit over the ticks of a flight."""
-
-    title: str
-    unit: str
-    labels: Sequence[str]
-    values: Array
-    """(N, len(labels))."""
-    is_error: bool = False
-    are_pulses: bool = False
-    """True for duty cycles per tick, from 0 to 1."""
 
 
 def quantities_of(log: FlightLog, robot: Robot) -> list[PlottedQuantity]:
@@ -49,10 +35,13 @@ def quantities_of(log: FlightLog, robot: Robot) -> list[PlottedQuantity]:
         *_errors(log),
         *_tool(log, robot),
         *_drift(log),
+        *motion(log),
         *_passive_joints(log, robot),
         *_gears(log, robot),
         *_torques(log),
         *_actuators(log),
+        *momentum(log),
+        *estimates(log),
         *_surroundings(log),
     ]
 
@@ -62,8 +51,9 @@ def _errors(log: FlightLog) -> Iterator[PlottedQuantity]:
     names, values = np.array([*AXES, *log.joint_names]), tracking_error(log)
     for name, axes in columns.items():
         unit = unit_of(name).strip("-")
+        kind = "attitude" if name == "attitude" else "joints"
         yield PlottedQuantity(
-            f"{words(name)} error", unit, names[axes].tolist(), values[:, axes], True
+            kind, f"{words(name)} error", unit, names[axes].tolist(), values[:, axes], True
         )
 
 
@@ -73,7 +63,7 @@ def _tool(log: FlightLog, robot: Robot) -> Iterator[PlottedQuantity]:
         return
     with suppress(InputError):  # the bag does not tell what the flight software assumed
         errors = ToolError(log, robot, assumed_robot_of(log)).errors(log)
-        yield PlottedQuantity("tool error", "m", ["distance"], errors[:, :1], True)
+        yield PlottedQuantity("tool", "tool error", "m", ["distance"], errors[:, :1], True)
 
 
 def _torques(log: FlightLog) -> Iterator[PlottedQuantity]:
@@ -81,7 +71,7 @@ def _torques(log: FlightLog) -> Iterator[PlottedQuantity]:
     names = np.array([*AXES, *log.joint_names])
     for name, axes in columns.items():
         yield PlottedQuantity(
-            words(name), unit_of(name), names[axes].tolist(), log.applied_torque[:, axes]
+            "torques", words(name), unit_of(name), names[axes].tolist(), log.applied_torque[:, axes]
         )
 
 
@@ -93,19 +83,17 @@ def _drift(log: FlightLog) -> Iterator[PlottedQuantity]:
     first = known[0]
     if not controls_base(log):
         turned = attitude_drift(log, log.quaternion[first])
-        yield PlottedQuantity("attitude drift", "deg", AXES, turned)
-    yield PlottedQuantity("base drift", "m", AXES, log.base_position - log.base_position[first])
+        yield PlottedQuantity("attitude", "attitude drift", "deg", AXES, turned)
+    away = log.base_position - log.base_position[first]
+    yield PlottedQuantity("base", "base drift", "m", AXES, away)
 
 
 def _passive_joints(log: FlightLog, robot: Robot) -> Iterator[PlottedQuantity]:
     """Yield the deflection of the passive joints from the rest positions of their springs."""
     rest = np.array([spring.rest for spring in robot.springs])
-    slides = np.array(log.prismatic[len(log.joint_names) :], dtype=bool)
-    for chosen, unit in ((~slides, "rad"), (slides, "m")):
-        if chosen.any():
-            names = np.array(log.passive_names)[chosen].tolist()
-            away = (log.passive_positions - rest)[:, chosen]
-            yield PlottedQuantity("deflection", unit, names, away)
+    slides = log.prismatic[len(log.joint_names) :]
+    away = log.passive_positions - rest
+    yield from by_unit("deflection", "deflection", log.passive_names, slides, away)
 
 
 def _gears(log: FlightLog, robot: Robot) -> Iterator[PlottedQuantity]:
@@ -117,12 +105,11 @@ def _gears(log: FlightLog, robot: Robot) -> Iterator[PlottedQuantity]:
         if name in log.geared_names and (has_truth or not _is_motors_encoder(robot, joint))
     ]
     motors = [log.geared_names.index(log.joint_names[joint]) for joint in joints]
-    slides = np.array(log.prismatic, dtype=bool)[joints]
+    names, slides = (
+        [of_all[joint] for joint in joints] for of_all in (log.joint_names, log.prismatic)
+    )
     away = log.motor_positions[:, motors] - log.joint_positions[:, joints]
-    for chosen, unit in ((~slides, "rad"), (slides, "m")):
-        if chosen.any():
-            names = np.array(log.joint_names)[joints][chosen].tolist()
-            yield PlottedQuantity("gear deflection", unit, names, away[:, chosen])
+    yield from by_unit("deflection", "gear deflection", names, slides, away)
 
 
 def _is_motors_encoder(robot: Robot, joint: int) -> bool:
@@ -138,9 +125,9 @@ def _surroundings(log: FlightLog) -> Iterator[PlottedQuantity]:
     for number, source in enumerate(SOURCES):
         torque = log.external_torques[:, 3 * number : 3 * number + 3]
         if np.nan_to_num(torque).any():
-            yield PlottedQuantity(f"{words(source)} torque", "N m", AXES, torque)
+            yield PlottedQuantity("orbit", f"{words(source)} torque", "N m", AXES, torque)
     if np.nan_to_num(log.magnetic_field).any():
-        yield PlottedQuantity("magnetic field", "T", AXES, log.magnetic_field)
+        yield PlottedQuantity("orbit", "magnetic field", "T", AXES, log.magnetic_field)
 
 
 def _actuators(log: FlightLog) -> Iterator[PlottedQuantity]:
@@ -148,18 +135,26 @@ def _actuators(log: FlightLog) -> Iterator[PlottedQuantity]:
     if not wheels and not thrusters:
         return
     names = [f"wheel_{k + 1}" for k in range(wheels)]
+    is_described = True
     try:
         actuators = flown_actuators(log)
-    except InputError:  # the bag does not describe them
-        if wheels:
-            yield PlottedQuantity("wheel speed", "rad/s", names, log.wheel_velocities)
+    except InputError:
+        is_described = False
         largest = np.nanmax(np.abs(log.thrusts), axis=0, initial=0.0)
         force = np.where(largest > 0.0, largest, 1.0)
     else:
         if wheels:
             held = actuators.wheels.spin_momenta(log.wheel_velocities)
-            yield PlottedQuantity("wheel momentum", "N m s", names, held)
+            yield PlottedQuantity("wheels", "wheel momentum", "N m s", names, held)
         force = actuators.thrusters.values("force")
+    if wheels:
+        speed, torque = log.wheel_velocities, log.wheel_torques
+        yield PlottedQuantity(
+            "wheels", "wheel speed", "rad/s", names, speed, is_shown=not is_described
+        )
+        yield PlottedQuantity("wheels", "wheel torque", "N m", names, torque, is_shown=False)
     if thrusters:
         names = [f"thruster_{k + 1}" for k in range(thrusters)]
-        yield PlottedQuantity("thruster pulses", "", names, log.thrusts / force, are_pulses=True)
+        yield PlottedQuantity(
+            "thrusters", "thruster pulses", "", names, log.thrusts / force, are_pulses=True
+        )

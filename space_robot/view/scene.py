@@ -15,6 +15,7 @@ from space_robot_model.robot.tree import Visual
 
 from .mesh import Mesh
 from .meshes import shown_shapes
+from .spacecraft import Part, parts_of
 
 if TYPE_CHECKING:
     from viser import FrameHandle, SceneApi, SceneNodeHandle
@@ -139,6 +140,12 @@ def add_shape(
     colour = rgb(look.tint) if look.tint else (red, green, blue)
     opacity = alpha * look.opacity if alpha * look.opacity < 1.0 else None
     position, turn, more = shape.position, wxyz(shape.rotation), look.growth
+    if not look.tint and not look.growth and (parts := parts_of(shape)):
+        first, *others = parts
+        node = _add_part(scene, path, first, look, position, turn)
+        for part in others:
+            _add_part(scene, f"{path}/{part.name}", part, look)
+        return node
     if mesh is not None:
         vertices = mesh.vertices * shape.size
         flips = np.prod(shape.size) < 0.0  # mirrored: faces must be reversed
@@ -162,6 +169,26 @@ def add_shape(
         )
     return scene.add_icosphere(
         path, shape.size[0] + more, colour, opacity=opacity, position=position, wxyz=turn
+    )
+
+
+def _add_part(
+    scene: SceneApi,
+    path: str,
+    part: Part,
+    look: SceneStyle,
+    position: Array | tuple[float, float, float] = (0.0, 0.0, 0.0),
+    turn: Array | tuple[float, float, float, float] = (1.0, 0.0, 0.0, 0.0),
+) -> SceneNodeHandle:
+    red, green, blue, _ = (round(255 * value) for value in part.colour)
+    return scene.add_mesh_simple(
+        path,
+        *part.mesh,
+        color=(red, green, blue),
+        opacity=look.opacity if look.opacity < 1.0 else None,
+        flat_shading=True,
+        position=position,
+        wxyz=turn,
     )
 
 

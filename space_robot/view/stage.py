@@ -220,7 +220,7 @@ def extent(robot: Robot, position: Array, quaternion: Array, joint_positions: Ar
     drawn = shown_shapes(robot)
     for shape in drawn.shapes:
         frame = frames[shape.body]
-        for corner in _corners(shape, drawn.meshes.get(shape.mesh)):
+        for corner in shape_corners(shape, drawn.meshes.get(shape.mesh)):
             place = frame.on_outer_axes(shape.position + shape.rotation @ corner)
             corners.append(position + (frame.origin + place).T)
     return np.concatenate(corners)
@@ -230,14 +230,14 @@ def body_reach(robot: Robot, body: int) -> float:
     """Return the largest distance, m, of a body's shapes from its frame's origin; 0 without."""
     drawn = shown_shapes(robot)
     corners = [
-        shape.position + _corners(shape, drawn.meshes.get(shape.mesh)) @ shape.rotation.T
+        shape.position + shape_corners(shape, drawn.meshes.get(shape.mesh)) @ shape.rotation.T
         for shape in drawn.shapes
         if shape.body == body
     ]
     return float(np.linalg.norm(np.concatenate(corners), axis=1).max()) if corners else 0.0
 
 
-def _corners(shape: Visual, mesh: Mesh | None) -> Array:
+def shape_corners(shape: Visual, mesh: Mesh | None) -> Array:
     """Return the corners of a shape's bounding box, (8, 3) m, in the shape's axes."""
     size = np.array(shape.size)
     middle = np.zeros(3)

@@ -61,22 +61,7 @@ def meet(target: Target, orbit: OrbitSettings, time: float) -> Meeting:
     Raises:
         InputError: there is no orbit, or the target turns too fast to be followed for so long.
     """
-    if not orbit.has_orbit:
-        raise InputError(
-            f"target {target.name!r}: motion.relative_to orbit needs an orbit: --orbit NAME"
-        )
-    motion = target.motion
-    origin, velocity = state_of(orbit.orbital_elements)
-    axes = hill_axes(origin, velocity)
-    rate = np.array([0.0, 0.0, norm(np.cross(origin, velocity)) / norm(origin) ** 2])
-    relative = np.array(motion.velocity) + np.cross(rate, motion.position)
-    quaternion = np.array(motion.quaternion)
-    x = np.concatenate(
-        [
-            *(origin, velocity, product(axes, motion.position), product(axes, relative)),
-            *(quaternion / norm(quaternion), motion.angular_velocity),
-        ]
-    )
+    x = _at_tick_0(target, orbit)
     inertia, has_j2 = inertia_tensor(target.inertia), float(orbit.gravity.j2)
     steps = _steps(target, time)
     for _ in range(steps):
@@ -90,7 +75,57 @@ def meet(target: Target, orbit: OrbitSettings, time: float) -> Meeting:
             velocity=x[9:12].tolist(),
             angular_velocity=product(rotation, x[16:19]).tolist(),
         ),
-        motion.reach,
+        target.motion.reach,
+    )
+
+
+def fall(target: Target, orbit: OrbitSettings, times: Array) -> tuple[Array, Array]:
+    """Return the poses of ``target`` in free fall, as `meet` follows it.
+
+    Args:
+        target: on a neighbouring orbit.
+        orbit: of the inertial frame's origin.
+        times: (K,) s, ascending from 0 on.
+
+    Returns:
+        (K, 3) centre of mass, m, inertial frame; (K, 4) attitude ``[w, x, y, z]``.
+
+    Raises:
+        InputError: there is no orbit, or the target turns too fast to be followed for so long.
+    """
+    x, now = _at_tick_0(target, orbit), 0.0
+    inertia, has_j2 = inertia_tensor(target.inertia), float(orbit.gravity.j2)
+    poses = np.empty((len(times), 7))
+    for k, time in enumerate(times):
+        steps = _steps(target, float(time) - now)
+        for _ in range(steps):
+            x = _step(x, (float(time) - now) / steps, inertia, has_j2)
+        now = float(time)
+        poses[k, :3], poses[k, 3:] = x[6:9], x[12:16]
+    return poses[:, :3], poses[:, 3:]
+
+
+def _at_tick_0(target: Target, orbit: OrbitSettings) -> Array:
+    """Return the state at tick 0, as in `_rates`.
+
+    Raises:
+        InputError: there is no orbit.
+    """
+    if not orbit.has_orbit:
+        raise InputError(
+            f"target {target.name!r}: motion.relative_to orbit needs an orbit: --orbit NAME"
+        )
+    motion = target.motion
+    origin, velocity = state_of(orbit.orbital_elements)
+    axes = hill_axes(origin, velocity)
+    rate = np.array([0.0, 0.0, norm(np.cross(origin, velocity)) / norm(origin) ** 2])
+    relative = np.array(motion.velocity) + np.cross(rate, motion.position)
+    quaternion = np.array(motion.quaternion)
+    return np.concatenate(
+        [
+            *(origin, velocity, product(axes, motion.position), product(axes, relative)),
+            *(quaternion / norm(quaternion), motion.angular_velocity),
+        ]
     )
 
 

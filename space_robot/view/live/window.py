@@ -14,7 +14,7 @@ from space_robot_model.robot import Robot
 
 from ...analysis.figures.overlay import words
 from ...analysis.metrics import error_columns, torque_columns, unit_of
-from ..quantities import AXES
+from ..plotted_quantity import AXES
 
 if TYPE_CHECKING:
     from viser import GuiApi

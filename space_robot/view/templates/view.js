@@ -1,5 +1,5 @@
 // Plots beside the scene: they follow its time, and a click on one sends the scene there.
-const { plots, marks, start, dark } = JSON.parse(document.getElementById("data").textContent);
+const { plots, marks, time: times, start, dark } = JSON.parse(document.getElementById("data").textContent);
 const frame = document.getElementById("scene");
 const ink = getComputedStyle(document.documentElement);
 const colourOf = (name) => ink.getPropertyValue(`--${name}`);
@@ -60,7 +60,6 @@ function drawTime(u) {
 }
 
 const sync = uPlot.sync("flight");
-const place = document.getElementById("plots");
 const axis = { stroke: colourOf("faint"), grid: { stroke: colourOf("line"), width: 1 }, ticks: { stroke: colourOf("line") } };
 const vertical = { ...axis, size: 58, space: 18, values: (_, v) => v.map(number) };
 
@@ -82,16 +81,22 @@ function axisOf(plot) {
 }
 
 let zooming = false;
-const drawn = plots.map((plot) => {
+const drawn = new Map(); // of the plots that are shown, in any order
+const place = document.getElementById("plots");
+const boxes = plots.map(() => document.createElement("section"));
+place.append(...boxes);
+
+function draw(plot, box) {
   const heading = document.createElement("h2");
   heading.textContent = plot.unit ? `${plot.title} (${plot.unit})` : plot.title;
-  place.append(heading);
+  box.append(heading);
   const zoomed = (u, scale) => {
     if (scale !== "x" || zooming) return;
     zooming = true; // all plots show the same stretch
-    for (const other of drawn ?? []) if (other !== u) other.setScale("x", { min: u.scales.x.min, max: u.scales.x.max });
+    for (const other of drawn.values()) if (other !== u) other.setScale("x", { min: u.scales.x.min, max: u.scales.x.max });
     zooming = false;
   };
+  const [shown] = drawn.values();
   const u = new uPlot(
     {
       width: place.clientWidth, height: heightOf(plot),
@@ -104,16 +109,63 @@ const drawn = plots.map((plot) => {
       ],
       hooks: { drawAxes: [drawMarks], draw: [drawTime], setScale: [zoomed] },
     },
-    [plot.time, ...plot.series.map((_, k) => curve(plot, k))],
-    place,
+    [times, ...plot.series.map((_, k) => curve(plot, k))],
+    box,
   );
+  if (shown) u.setScale("x", { min: shown.scales.x.min, max: shown.scales.x.max });
   let pressed = 0;
   u.over.addEventListener("mousedown", (event) => (pressed = event.clientX));
   u.over.addEventListener("click", (event) => {
     if (Math.abs(event.clientX - pressed) < 3) seek(u.posToVal(u.cursor.left, "x"));
   });
   return u;
+}
+
+function show(plot, isShown) {
+  const box = boxes[plots.indexOf(plot)];
+  if (isShown === drawn.has(plot)) return;
+  if (isShown) return drawn.set(plot, draw(plot, box));
+  drawn.get(plot).destroy();
+  drawn.delete(plot);
+  box.replaceChildren();
+}
+
+// The choice is kept in the address, as #plots=base-torque,wheel-speed.
+const nameOf = (plot) => plot.title.toLowerCase().replace(/[^a-z0-9]+/g, "-");
+const isDocument = location.protocol !== "about:"; // a page within another one has no address
+
+function chosen() {
+  const match = isDocument && /^#plots=(.*)$/.exec(location.hash);
+  if (!match) return null;
+  const names = new Set(match[1].split(","));
+  return plots.some((plot) => names.has(nameOf(plot))) || !match[1] ? (plot) => names.has(nameOf(plot)) : null;
+}
+
+function remember() {
+  const usual = plots.every((plot) => plot.shown === drawn.has(plot));
+  const names = plots.filter((plot) => drawn.has(plot)).map(nameOf);
+  if (isDocument) history.replaceState(null, "", usual ? "#" : `#plots=${[...new Set(names)].join(",")}`);
+}
+
+const inputs = plots.map((plot) => {
+  const input = document.createElement("input");
+  input.type = "checkbox";
+  input.addEventListener("change", () => {
+    show(plot, input.checked);
+    remember();
+  });
+  const label = document.createElement("label");
+  label.append(input, plot.title);
+  document.querySelector("#choice div").append(label);
+  return input;
 });
+
+function showChosen() {
+  const isChosen = chosen() ?? ((plot) => plot.shown);
+  plots.forEach((plot, k) => show(plot, (inputs[k].checked = isChosen(plot))));
+}
+showChosen();
+addEventListener("hashchange", showChosen);
 new ResizeObserver(() => drawn.forEach((u) => u.setSize({ width: place.clientWidth, height: u.height }))).observe(place);
 
 function buttonOf(mark) {
