@@ -58,10 +58,19 @@ def actuator_notes(log: FlightLog, times: Array) -> list[str]:
         times: (K,) of the frames, s.
     """
     flown = described_actuators(log)
+    slowdown = WheelFrames.of(log, flown.wheels, times).slowdown if flown.wheel_count else 1.0
+    return drawing_notes(flown, slowdown)
+
+
+def drawing_notes(flown: BaseActuatorSettings, slowdown: float) -> list[str]:
+    """Say how actuators are drawn whose wheels turn so many times slower, a sentence each."""
     notes = []
     if flown.wheel_count:
-        slowdown = WheelFrames.of(log, flown.wheels, times).slowdown
-        speed = "as recorded" if slowdown == 1.0 else f"{slowdown:g} times slower than recorded"
+        speed = (
+            "as fast as in flight"
+            if slowdown == 1.0
+            else f"{slowdown:g} times slower than in flight"
+        )
         notes.append(f"Wheels turn {speed}; red: at a limit of torque or momentum.")
     if flown.thruster_count:
         force = float(flown.thrusters.values("force").max())

@@ -73,16 +73,22 @@ def flights_page(
     of_one = len({(flight.robot.name, flight.robot.body_names) for flight in flights}) == 1
     times = shown_times(list(logs.values()), options.rate)
     scene = film(flights, times, options.side_by_side or not of_one, options.dark, advance)
+    plots = plots_of(logs, robots, colours, options.plots)
+    notes = list(
+        dict.fromkeys(note for log in logs.values() for note in actuator_notes(log, times))
+    )
+    if absent := set(options.plots) - {plot.kind for plot in plots}:
+        notes.append(f"Not in the recording: {', '.join(sorted(absent))}.")
     return render(
         options.title or ", ".join(logs),
         scene,
         [Shown(f.name, f.colour, _told(f), f.log.defects) for f in flights],
-        plots_of(logs, robots, colours, options.plots),
+        plots,
         shared_marks(logs),
         float(times[0]),
         options.dark,
         _legend(logs, options.dark),
-        list(dict.fromkeys(note for log in logs.values() for note in actuator_notes(log, times))),
+        notes,
     )
 
 
@@ -103,7 +109,8 @@ def picture_of(
         advance: called with the number of frames, then after each frame.
 
     Raises:
-        InputError: there are several flights, there is no browser, or the flight has no state.
+        InputError: there are several flights, there is no browser, or the flight has no state, or
+            nothing of the plots.
         FlightError: the browser did not start.
     """
     if len(logs) > 1:
@@ -115,6 +122,8 @@ def picture_of(
         for plot in plots_of(logs, robots, ON_DARK, options.plots)
         if plot.is_shown and (options.plots or plot.title.startswith(PICTURED))
     ]
+    if not shown:
+        raise InputError(f"the flight has nothing of --plots {','.join(options.plots)}")
     caption = options.title or _told(flight)
     return encoded(animate(flight, shown[:MOST_PLOTS], caption, advance), file)
 

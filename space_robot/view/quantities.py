@@ -105,9 +105,8 @@ def _gears(log: FlightLog, robot: Robot) -> Iterator[PlottedQuantity]:
         if name in log.geared_names and (has_truth or not _is_motors_encoder(robot, joint))
     ]
     motors = [log.geared_names.index(log.joint_names[joint]) for joint in joints]
-    names, slides = (
-        [of_all[joint] for joint in joints] for of_all in (log.joint_names, log.prismatic)
-    )
+    names = [log.joint_names[joint] for joint in joints]
+    slides = [log.prismatic[joint] for joint in joints]
     away = log.motor_positions[:, motors] - log.joint_positions[:, joints]
     yield from by_unit("deflection", "gear deflection", names, slides, away)
 

@@ -31,7 +31,8 @@ def foil(size: Array) -> Mesh:
     rng = np.random.default_rng(FOIL_SEED)
     line = np.linspace(-0.5, 0.5, FOIL_CELLS + 1)
     inside = np.pad(np.ones((FOIL_CELLS - 1, FOIL_CELLS - 1)), 1)
-    vertices, faces = [], []
+    vertices: list[Array] = []
+    faces: list[NDArray[np.int64]] = []
     for axis in range(3):
         for side in (1.0, -1.0):
             u, v = np.meshgrid(line, side * line, indexing="ij")  # its normal is outwards

@@ -71,7 +71,8 @@ class WheelFrames(NamedTuple):
         longest = float(gaps.max()) if len(gaps) else 0.0
         slowdown = slowdown_of(float(np.abs(speeds).max(initial=0.0)), longest)
         rows = frame_rows(log, times)
-        return cls(turned[rows] / slowdown, _since(_at_limit(log, wheels), rows), slowdown)
+        limited = at_limit(wheels, log.wheel_velocities, log.wheel_torques)
+        return cls(turned[rows] / slowdown, _since(limited, rows), slowdown)
 
 
 def slowdown_of(speed: float, frame_s: float = 0.0) -> float:
@@ -92,13 +93,18 @@ def _known(ticks: Array, values: Array) -> Array:
     return np.interp(ticks, ticks[known], values[known]) if known.any() else np.zeros(len(ticks))
 
 
-def _at_limit(log: FlightLog, wheels: WheelSettings) -> Mask:
-    momentum = np.abs(wheels.spin_momenta(log.wheel_velocities))
-    torque = np.abs(log.wheel_torques)
+def at_limit(wheels: WheelSettings, speeds: Array, torques: Array) -> Mask:
+    """Return whether wheels are at a limit, (..., W).
+
+    Args:
+        wheels: with their limits.
+        speeds: (..., W) rad/s.
+        torques: (..., W) of their motors, N m.
+    """
     # the comparison with NaN is false
     return np.asarray(
-        (momentum >= AT_LIMIT * wheels.limits("max_momentum"))
-        | (torque >= AT_LIMIT * wheels.limits("max_torque"))
+        (np.abs(wheels.spin_momenta(speeds)) >= AT_LIMIT * wheels.limits("max_momentum"))
+        | (np.abs(torques) >= AT_LIMIT * wheels.limits("max_torque"))
     )
 
 

@@ -3,26 +3,29 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from space_robot_model.hardware.base_actuators import BaseActuatorSettings
 from space_robot_model.robot import Robot
 from space_robot_model.robot.find import find_robot
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.config.settings import leaves
 from space_robot_msgs_py.config.trees import nest
-from space_robot_msgs_py.config.validation import validate
+from space_robot_msgs_py.config.validation import StrictModel, validate
 from space_robot_msgs_py.errors import InputError, MessageError
 from space_robot_msgs_py.samples import RobotNames, RobotState, Timebase
 from space_robot_msgs_py.wire.base_state import BaseState
 from space_robot_msgs_py.wire.controller_law import LawCodec
 from space_robot_msgs_py.wire.joint_states import JointStates
 from space_robot_msgs_py.wire.message import MessageDescription
+from space_robot_msgs_py.wire.thrusters_state import ThrustersState
 from space_robot_msgs_py.wire.truth_base import TruthBase
 from space_robot_msgs_py.wire.truth_joints import TruthJoints
 from space_robot_msgs_py.wire.truth_orbit import TruthOrbit
+from space_robot_msgs_py.wire.wheels_state import WheelsState
 from space_robot_sim.environment.orbit import state_of
 from space_robot_sim.environment.orbit_settings import OrbitSettings
 
@@ -32,10 +35,8 @@ from ...flight.graph.node_services import get_parameters
 from .finder import FlightPlace
 from .state_topic import StateTopic
 
-if TYPE_CHECKING:
-    pass
-
 Array = NDArray[np.float64]
+Schema = TypeVar("Schema", bound=StrictModel)
 
 MEASURED: tuple[type[MessageDescription], ...] = (JointStates, BaseState)
 TRUE: tuple[type[MessageDescription], ...] = (TruthJoints, TruthBase)
@@ -56,6 +57,10 @@ class Sample(NamedTuple):
     """(n+3,) torque applied over the last tick, N m; base, then joints."""
     error: Array | None
     """(n+3,) tracking error of the law; None: not received yet."""
+    wheels: Array
+    """(2, W) newest speeds, rad/s, and motor torques, N m, of the wheels."""
+    thrusts: Array
+    """(T,) newest thrusts, N."""
     orbit: Array | None
     """(6,) newest position, m, and velocity, m/s, of the origin in its orbit; None: no orbit."""
 
@@ -87,6 +92,7 @@ class Listener:
             self._law = RawSubscription(self._monitor.node, topics.LAW, self._group)
             self.robot, period = self._ask_plant(robot, check)
             self.orbit = self._ask_orbit(check)
+            self.actuators = self._ask(BaseActuatorSettings, check) or BaseActuatorSettings()
         except BaseException:
             self.close()
             raise
@@ -94,7 +100,9 @@ class Listener:
         self._names = RobotNames.of(self.robot.joint_names, passive=self.robot.passive_names)
         for topic in self._topics.values():
             topic.describe(self._names, self._timebase)
-        self._orbit_topic: StateTopic | None = None
+        self._hardware_names = self.actuators.robot_names(self.robot)
+        self._newest_topics: dict[type[MessageDescription], StateTopic] = {}
+        """Topics of which the newest row is taken, whatever its tick."""
         self._state = RobotState.allocate(self.robot.n)
         if self.orbit:
             start = state_of(self.orbit.orbital_elements)
@@ -118,13 +126,17 @@ class Listener:
 
     def _ask_orbit(self, check: Callable[[], None]) -> OrbitSettings | None:
         """Return the orbit of the plant; None: it has none, or is of a version without."""
-        names = [name for name, _ in leaves(OrbitSettings)]
+        orbit = self._ask(OrbitSettings, check)
+        return orbit if orbit and orbit.has_orbit else None
+
+    def _ask(self, schema: type[Schema], check: Callable[[], None]) -> Schema | None:
+        """Return some of the plant's parameters; None: it is of a version without."""
+        names = [name for name, _ in leaves(schema)]
         values = get_parameters(self._monitor.node, PLANT, names, check)
         if any(value is None for value in values):
             return None
         tree = nest(dict(zip(names, values, strict=True)))
-        orbit = validate(OrbitSettings, tree, "the plant's orbit")
-        return orbit if orbit.has_orbit else None
+        return validate(schema, tree, "the plant's parameters")
 
     def poll(self, with_states: bool, events: list[Event]) -> Sample | None:
         """Return the newest sample; None if there is no new one.
@@ -143,7 +155,9 @@ class Listener:
         self._stamp_ns = stamp_ns
         for topic in self._topics.values():
             topic.fill(self._state, stamp_ns)
+        self._take_newest()
         state, passive = self._state, len(self._names.passive)
+        wheels, thrusters = self.actuators.wheel_count, self.actuators.thruster_count
         angles = np.concatenate([state.joint_positions, state.passive_positions[:passive]])
         return Sample(
             1e-9 * stamp_ns,
@@ -152,20 +166,26 @@ class Listener:
             angles,
             state.applied_torque.copy(),
             self._monitor.error,
-            self._poll_orbit(),
+            np.array([state.wheel_velocities[:wheels], state.wheel_torques[:wheels]]),
+            state.thrusts[:thrusters].copy(),
+            np.concatenate([state.orbit_position, state.orbit_velocity]) if self.orbit else None,
         )
 
-    def _poll_orbit(self) -> Array | None:
-        """Return position and velocity (6,) in the orbit: they change little in a few ticks."""
-        if self.orbit is None:
-            return None
-        if self._orbit_topic is None:
-            self._orbit_topic = StateTopic(self._monitor.node, self._group, TruthOrbit)
-            self._orbit_topic.describe(self._names, self._timebase)
-        self._orbit_topic.take()
-        if rows := self._orbit_topic.rows:
-            self._orbit_topic.fill(self._state, max(rows))
-        return np.concatenate([self._state.orbit_position, self._state.orbit_velocity])
+    def _take_newest(self) -> None:
+        """Take what changes little in a few ticks: orbit, wheels and thrusters."""
+        kinds: list[type[MessageDescription]] = []
+        kinds += [TruthOrbit] if self.orbit else []
+        kinds += [WheelsState] if self.actuators.wheel_count else []
+        kinds += [ThrustersState] if self.actuators.thruster_count else []
+        for kind in kinds:
+            if kind not in self._newest_topics:
+                topic = StateTopic(self._monitor.node, self._group, kind)
+                topic.describe(self._hardware_names, self._timebase)
+                self._newest_topics[kind] = topic
+            topic = self._newest_topics[kind]
+            topic.take()
+            if rows := topic.rows:
+                topic.fill(self._state, max(rows))
 
     @property
     def time(self) -> float:
@@ -188,9 +208,8 @@ class Listener:
         kinds = (TRUE if is_sent or heard else MEASURED) if with_states else ()
         for kind in [kind for kind in self._topics if kind not in kinds]:
             self._topics.pop(kind).close()
-        if self._orbit_topic and not with_states:
-            self._orbit_topic.close()
-            self._orbit_topic = None
+        while self._newest_topics and not with_states:
+            self._newest_topics.popitem()[1].close()
         for kind in kinds:
             if kind not in self._topics:
                 topic = StateTopic(self._monitor.node, self._group, kind)

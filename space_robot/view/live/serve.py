@@ -49,6 +49,8 @@ class LiveOptions:
     """Port of the page; the next free one if it is in use."""
     dark: bool = True
     """True for light on dark."""
+    plots: tuple[str, ...] = ()
+    """Kinds of the curves that are shown first, see `PLOT_KINDS`; empty: the usual ones."""
 
 
 class OverError(FlightError):
@@ -136,7 +138,13 @@ class Follower:
                     self._view.close()
                 self._waiting.visible = False
                 self._view = LiveView(
-                    self._server, listener.robot, sample, self._options.dark, listener.orbit
+                    self._server,
+                    listener.robot,
+                    sample,
+                    self._options.dark,
+                    listener.orbit,
+                    listener.actuators,
+                    self._options.plots,
                 )
             say(f"showing it from {sample.time:.2f} s on")
             self._began = time.monotonic()

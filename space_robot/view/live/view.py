@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from space_robot_model.hardware.base_actuators import BaseActuatorSettings
 from space_robot_model.robot import Robot
 from space_robot_model.robot.tool import tool_pose
 from space_robot_model.robot.transforms import joint_transforms
@@ -20,6 +21,7 @@ from ...flight.graph.monitor import Event
 from ..palette import palette
 from ..scene import RobotScene, rgb
 from ..stage import extent, set_stage
+from .actuators import LiveActuators
 from .orbit import LiveOrbit
 from .window import Curves
 
@@ -111,6 +113,8 @@ class LiveView:
         sample: Sample,
         dark: bool,
         orbit: OrbitSettings | None = None,
+        actuators: BaseActuatorSettings | None = None,
+        plots: Sequence[str] = (),
     ) -> None:
         """Add the robot to the empty scene.
 
@@ -120,6 +124,9 @@ class LiveView:
             sample: its pose.
             dark: whether the page is light on dark.
             orbit: of the flight; None: none.
+            actuators: of its base; None: none.
+            plots: kinds of the curves that are shown first, see `PLOT_KINDS`; empty: all but the
+                wheels' speeds.
         """
         self._server, self._robot = server, robot
         colours, ink = palette(dark), "#c9d1d9" if dark else "#333333"
@@ -137,13 +144,16 @@ class LiveView:
         self._scene = RobotScene(server.scene, ROOT, robot)
         if self._orbit:
             self._orbit.draw(server.scene, stage, ROOT)
+        self._actuators = LiveActuators(
+            server.scene, self._scene, robot, actuators or BaseActuatorSettings(), dark
+        )
         self._tools = [replace(robot, tools=(tool,)) for tool in robot.tools]
         self._trails = [
             Trail(server.scene, f"{ROOT}/trail of {tool.name}", rgb(colour), width)
             for tool, colour in zip(robot.tools, cycle(colours), strict=False)
         ]
         self._words = server.gui.add_html("")
-        self._curves = Curves(server.gui, robot, colours, ink)
+        self._curves = Curves(server.gui, robot, sample.wheels.shape[1], colours, ink, plots)
         self._events: deque[Event] = deque(maxlen=MOST_EVENTS)
         self.show(sample)
 
@@ -154,6 +164,7 @@ class LiveView:
         links = joint_transforms(self._robot, np.tile(sample.angles, (2, 1)))
         with self._server.atomic():
             self._scene.move(position, quaternion[0], links, 0)
+            self._actuators.move(sample)
             if self._orbit and sample.orbit is not None:
                 self._orbit.move(position, sample.orbit)
             for robot, trail in zip(self._tools, self._trails, strict=True):
@@ -178,6 +189,7 @@ class LiveView:
             for node, mode in listener.complaints.items()
         ]
         lines += [html.escape(str(event).strip()) for event in self._events]
+        lines += [f"<small>{html.escape(text)}</small>" for text in self._actuators.notes]
         lines += [f"<i>{html.escape(note)}</i>"] if note else []
         content = "<br>".join(lines)
         with self._server.atomic():

@@ -17,7 +17,7 @@ from ...analysis.metrics import error_columns, torque_columns, unit_of
 from ..plotted_quantity import AXES
 
 if TYPE_CHECKING:
-    from viser import GuiApi
+    from viser import GuiApi, GuiCheckboxHandle, GuiEvent
 
     from .listener import Sample
 
@@ -32,25 +32,49 @@ HEIGHT = 150
 
 
 class Curves:
-    """Errors and torques over the last seconds, one plot per column of Table V."""
+    """Errors, torques and wheel speeds over the last seconds, which can be chosen."""
 
-    def __init__(self, gui: GuiApi, robot: Robot, colours: Sequence[str], ink: str) -> None:
+    def __init__(
+        self,
+        gui: GuiApi,
+        robot: Robot,
+        wheels: int,
+        colours: Sequence[str],
+        ink: str,
+        kinds: Sequence[str],
+    ) -> None:
         """Add empty plots.
 
         Args:
             gui: of a server.
             robot: of the flight.
+            wheels: number of its wheels.
             colours: of the curves.
             ink: colour of axes and text.
+            kinds: of the plots that are shown first, see `PLOT_KINDS`; empty: all but the wheels'.
         """
         self._rows: deque[tuple[float, Array]] = deque(maxlen=2 * POINTS)
         labels, prismatic = [*AXES, *robot.joint_names], robot.is_prismatic[: robot.n].tolist()
         axes = np.arange(len(labels))
-        self._plots = []
+        curves: list[tuple[str, str, str, dict[str, int]]] = []
         for columns, first in ((error_columns, 0), (torque_columns, len(labels))):
             for name, part in columns(len(labels), True, prismatic).items():
+                kind = "torques" if first else "attitude" if name == "attitude" else "joints"
                 shown = {labels[axis]: first + axis for axis in axes[part].tolist()}
-                self._plots.append(_Plot(gui, name, shown, colours, ink))
+                curves.append((kind, words(name), unit_of(name).strip("-"), shown))
+        if wheels:
+            shown = {f"wheel_{k + 1}": 2 * len(labels) + k for k in range(wheels)}
+            curves.append(("wheels", "wheel speed", "rad/s", shown))
+        self._folder = gui.add_folder("Plots", expand_by_default=False)
+        self._plots = []
+        for kind, title, unit, shown in curves:
+            is_shown = kind in kinds if kinds else kind != "wheels"
+            with self._folder:
+                box = gui.add_checkbox(title, is_shown)
+            plot = _Plot(gui, title, unit, shown, colours, ink)
+            plot.handle.visible = is_shown
+            box.on_update(plot.follow)
+            self._plots.append(plot)
 
     def add(self, sample: Sample) -> None:
         """Add a sample, unless it is too close to the previous one."""
@@ -58,7 +82,7 @@ class Curves:
         if rows and sample.time < rows[-1][0] + LENGTH_S / POINTS:
             return
         error = np.zeros_like(sample.torque) if sample.error is None else sample.error
-        rows.append((sample.time, np.concatenate([error, sample.torque])))
+        rows.append((sample.time, np.concatenate([error, sample.torque, sample.wheels[0]])))
         while rows[0][0] <= sample.time - LENGTH_S:
             rows.popleft()
 
@@ -72,15 +96,23 @@ class Curves:
 
     def remove(self) -> None:
         """Remove the plots."""
+        self._folder.remove()
         for plot in self._plots:
             plot.handle.remove()
 
 
 class _Plot:
     def __init__(
-        self, gui: GuiApi, name: str, columns: dict[str, int], colours: Sequence[str], ink: str
+        self,
+        gui: GuiApi,
+        name: str,
+        unit: str,
+        columns: dict[str, int],
+        colours: Sequence[str],
+        ink: str,
     ) -> None:
-        self._columns, self._name, self._exponent = list(columns.values()), name, 0
+        self._columns, self._name, self._unit = list(columns.values()), name, unit
+        self._exponent = 0
         nothing = np.zeros(2)
         axis: Any = {"stroke": ink, "grid": {"stroke": f"{ink}33"}, "ticks": {"stroke": f"{ink}33"}}
         series: list[Any] = [{"label": "s"}]
@@ -98,9 +130,12 @@ class _Plot:
 
     @property
     def _title(self) -> str:
-        unit = unit_of(self._name).strip("-")
         scale = f"1e{self._exponent}" if self._exponent else ""
-        return ", ".join(filter(None, (words(self._name), " ".join(filter(None, (scale, unit))))))
+        return ", ".join(filter(None, (self._name, " ".join(filter(None, (scale, self._unit))))))
+
+    def follow(self, event: GuiEvent[GuiCheckboxHandle]) -> None:
+        """Show the plot if its checkbox is checked."""
+        self.handle.visible = event.target.value
 
     def draw(self, time: Array, values: Array) -> None:
         shown = values[:, self._columns]

@@ -176,6 +176,8 @@ def test_the_page_is_opened_in_the_users_browser(
         (("--from", "5"), ["5"]),
         (("--rate", "0"), ["--rate"]),
         (("--out", "."), ["is a directory"]),
+        (("--plots", "wheel"), ["unknown plot 'wheel' for --plots", "wheels", "torques"]),
+        (("--plots", ","), ["--plots", "attitude"]),
     ],
 )
 def test_what_is_wrong_is_said_in_one_line(
@@ -186,6 +188,18 @@ def test_what_is_wrong_is_said_in_one_line(
     (line,) = [line for line in result.err.splitlines() if "rror: " in line]
     assert all(word in line for word in words), line
     assert list(tmp_path.iterdir()) == []
+
+
+def test_the_plots_of_the_chosen_kinds_are_shown_first(
+    view: Run, bags: tuple[Path, Path], tmp_path: Path
+) -> None:
+    result = view(bags[1], "--no-open", "--out", "p.html", "--plots", "rates, attitude,wheels")
+    assert result.code == 0, result.err
+    page = (tmp_path / "p.html").read_text("utf-8")
+    assert "Not in the recording: wheels." in page
+    plots = plot_data(page)["plots"]
+    assert [plot["title"] for plot in plots if plot["shown"]] == ["attitude error", "base rate"]
+    assert {"torque 1-3", "joint positions", "angular momentum"} <= {p["title"] for p in plots}
 
 
 def test_without_viser_one_line_says_what_to_install(

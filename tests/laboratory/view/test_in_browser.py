@@ -142,6 +142,30 @@ def test_the_robot_is_drawn_and_moves(seen: Seen) -> None:
     assert pictures[0] != pictures[1]
 
 
+def test_the_choice_of_plots_is_kept_in_the_address(seen: Seen) -> None:
+    page, headings = seen.page, seen.page.locator("#plots h2")
+    usual = headings.all_inner_texts()
+    page.locator("#choice summary").click()
+    page.get_by_label("base rate").check()
+    page.get_by_label("joints 1-3 error").uncheck()
+    chosen = headings.all_inner_texts()
+    assert "base rate (rad/s)" in chosen
+    assert len(chosen) == len(usual)
+    assert not any(text.startswith("joints 1-3") for text in chosen)
+    assert page.locator("#plots canvas").count() == len(chosen)
+    address = page.url
+    assert "base-rate" in address.partition("#plots=")[2].split(",")
+    page.get_by_label("base rate").uncheck()
+    page.get_by_label("joints 1-3 error").check()
+    assert headings.all_inner_texts() == usual
+    assert not page.url.partition("#")[2]
+    page.evaluate("location.hash = 'plots=base-rate'")
+    page.wait_for_function("document.querySelectorAll('#plots h2').length == 1")
+    assert headings.all_inner_texts() == ["base rate (rad/s)"]
+    page.evaluate("location.hash = ''")
+    page.wait_for_function(f"document.querySelectorAll('#plots h2').length == {len(usual)}")
+
+
 def assert_whole(seen: Seen) -> None:
     """Nothing was asked of the network, and nothing went wrong."""
     assert [

@@ -218,7 +218,7 @@ def test_values_have_four_digits_and_none_where_nothing_can_be_drawn(
             assert shown is None
         else:
             assert shown == pytest.approx(value, rel=5e-4, abs=0.0)
-    np.testing.assert_allclose(plot["time"], np.arange(len(values)) / 3.0, atol=5e-5)
+    np.testing.assert_allclose(data["time"], np.arange(len(values)) / 3.0, atol=5e-5)
 
 
 def test_a_name_of_100000_letters_is_shortened(paper_robot: Robot) -> None:

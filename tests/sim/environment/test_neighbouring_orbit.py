@@ -20,7 +20,7 @@ from orbiting_robots import (
 from scipy.spatial.transform import Rotation
 
 from space_robot_msgs_py.errors import InputError
-from space_robot_sim.environment.neighbouring_orbit import hill_axes, meet
+from space_robot_sim.environment.neighbouring_orbit import fall, hill_axes, meet
 from space_robot_sim.environment.orbit import state_of
 from space_robot_sim.environment.orbit_settings import OrbitSettings
 from space_robot_sim.environment.target import Target
@@ -271,3 +271,22 @@ def test_without_an_orbit_it_is_refused_in_one_line() -> None:
         meet(target_of(), OrbitSettings(), 1.0)
     assert "target 'drifter'" in str(caught.value)
     assert "\n" not in str(caught.value)
+
+
+def test_the_path_is_that_of_what_is_met() -> None:
+    """At each time, on the way of one integration."""
+    orbit = circular_orbit(HEIGHT, j2=True)
+    motion = {"velocity": [0.1, -0.2, 0.05], "angular_velocity": [0.02, -0.03, 0.01]}
+    target = target_of(position=[10.0, -20.0, 5.0], **motion)
+    times = np.array([0.0, 0.5, 30.0, 31.0, 400.0])
+    positions, quaternions = fall(target, orbit, times)
+    inertia = tensor_of(target)
+    path = np.concatenate(state_of(orbit.orbital_elements))
+    for time, position, quaternion in zip(times, positions, quaternions, strict=True):
+        meeting = meet(target, orbit, float(time))
+        np.testing.assert_allclose(position, meeting.position, atol=1e-6)
+        due, _ = tumbled(
+            inertia, target.motion.quaternion, target.motion.angular_velocity, path, float(time)
+        )
+        away = rotation_of(due).inv() * rotation_of(quaternion)
+        assert away.magnitude() < 1e-4
