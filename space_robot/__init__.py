@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from .api.together import bench_many, fly_many
     from .campaign.flown import Campaign, FlownCampaign
     from .learning import make, make_vec
+    from .scenario.disturbances import sampled
 
     __version__: str
 
@@ -43,6 +44,7 @@ __all__ = [
     "make_vec",
     "mass_matrix",
     "replay",
+    "sampled",
 ]
 MODULES = {
     "Bench": "space_robot.api",
@@ -60,6 +62,7 @@ MODULES = {
     "make_vec": "space_robot.learning",
     "mass_matrix": "space_robot_model.robot.dynamics",
     "replay": "space_robot.api.replayed",
+    "sampled": "space_robot.scenario.disturbances",
 }
 """The module of each name."""
 

@@ -30,6 +30,7 @@ from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.simulated_time import tick_from
 from space_robot_sim.actuators.actuators import ActuatorSettings
 from space_robot_sim.environment.captures import Captures
+from space_robot_sim.environment.disturbance_table import JSON
 from space_robot_sim.environment.environment import EnvironmentSettings
 from space_robot_sim.environment.events import Event, named_targets, parse_events
 from space_robot_sim.environment.orbit_settings import OrbitSettings
@@ -48,9 +49,11 @@ IDEAL = "ideal"
 """Name of the sensors without error."""
 MOST_LETTERS = 400
 """Of the joints' names in an error."""
+_LATER = {"disturbance.table", "disturbance.table_scale"}
+"""Settings that bags of earlier releases do not have: their flights had the defaults."""
 _NUMBERS = {
     name for schema in (EnvironmentSettings, ActuatorSettings) for name, _ in leaves(schema)
-}
+} - _LATER
 DIRECT = "direct"
 """Name of the navigation without filter."""
 
@@ -358,6 +361,8 @@ def _check_files(log: FlightLog, parameters: Mapping[str, Any]) -> None:
     if not log.trusted:
         for what in ("robot", "case", "mission", "gains", "sensors", "actuators", "orbit"):
             check_file(what, str(parameters.get(what, "")))
+        if not (table := str(parameters.get("disturbance.table", ""))).startswith(JSON):
+            check_file("disturbance", table)
 
 
 def _parameters(log: FlightLog, node: str) -> dict[str, Any]:

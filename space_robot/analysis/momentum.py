@@ -4,8 +4,8 @@ The base's inertia in the robot's file includes its wheels, locked. So the robot
 that of everything with locked wheels, and the wheels' is what their spin relative to the base adds,
 ``sum a_k J_k Omega_k``. So it is with the rotors of motors behind gears. Motors and joints only
 move it from one to the other: the sum changes by what comes from outside, that is thrusters,
-magnetic torquers, the disturbances of (61), what acts in orbit, and what a captured or released
-target has, and by nothing else.
+magnetic torquers, the disturbances of (61) and of the user's own, what acts in orbit, and what a
+captured or released target has, and by nothing else.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from space_robot_model.elementary.sine import sines_cosines
 from space_robot_model.hardware.base_actuators import BaseActuatorSettings
 from space_robot_model.hardware.wheels import WheelSettings
 from space_robot_model.robot import Robot
-from space_robot_model.robot.base_axes import base_axes, cross, to_inertial
+from space_robot_model.robot.base_axes import base_axes, to_inertial
 from space_robot_model.robot.gears import motor_momentum
 from space_robot_model.robot.momentum import Motion, robot_momentum
 from space_robot_msgs_py.bag.blocks import Metric, joined, last_rows
@@ -32,6 +32,7 @@ from space_robot_sim.environment.disturbance import DisturbanceSettings
 from space_robot_sim.environment.impact import Impact
 
 from .base_demand import axes_of
+from .external_torques import base_loads, torque_about_centre
 
 Array = NDArray[np.float64]
 
@@ -215,13 +216,23 @@ class _OfOneRobot:
                 wheels = product(rows.wheel_torques, self._flown.wheels.unit_axes)
                 torque = rows.applied_torque[:, :3] + wheels
             each = [  # turned as the base is before and after the interval
-                _torque(side, centre, force[1:], torque[1:])
+                torque_about_centre(side, centre, force[1:], torque[1:])
                 for side, centre in (
                     (axes[:, :, :-1], centre_of_mass[:-1]),
                     (axes[:, :, 1:], centre_of_mass[1:]),
                 )
             ]
             impulse[1:] = 0.5 * period * np.cumsum(each[0] + each[1], axis=0)
+        if self._disturbance.table:
+            before, after = base_loads(rows, self._disturbance)
+            each = [
+                torque_about_centre(side, centre, loads[:-1, :3], loads[:-1, 3:])
+                for side, centre, loads in (
+                    (axes[:, :, :-1], centre_of_mass[:-1], before),
+                    (axes[:, :, 1:], centre_of_mass[1:], after),
+                )
+            ]
+            impulse[1:] += 0.5 * period * np.cumsum(each[0] + each[1], axis=0)
         if rows.external_torques.shape[1]:
             by_axis = rows.external_torques[:-1].reshape(-1, len(SOURCES), 3).sum(axis=1)
             impulse[1:] += period * np.cumsum(by_axis, axis=0)
@@ -278,12 +289,6 @@ def disturbance_impulse(disturbance: DisturbanceSettings, time: Array) -> Array:
             integral += (sines_cosines(omega * time)[1] - 1.0) / omega
     impulse: Array = disturbance.scale * disturbance.base_amplitude * integral
     return impulse
-
-
-def _torque(axes: Array, centre_of_mass: Array, force: Array, torque: Array) -> Array:
-    """(N, 3) N m about the common CoM, inertial axes; of force and torque on the base's axes."""
-    pushed, turned = to_inertial(axes, force.T), to_inertial(axes, torque.T)
-    return (turned - cross(centre_of_mass.T, pushed)).T
 
 
 def _rows(log: FlightLog, start: int, stop: int) -> FlightLog:

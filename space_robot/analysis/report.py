@@ -141,6 +141,7 @@ class Analysis:
             **{key: block.flight.get(key) for key in DESCRIBED},
             "faults": [str(fault) for fault in block.flight.get("faults", ())],
             "events": event_labels(block),
+            **{k: str(block.flight[k]) for k in ("disturbance",) if k in block.flight},
             "start_step": start_step_of(block),
             "sensors": sensors_of(block),
             "navigation": navigation_of(block),
@@ -198,6 +199,11 @@ def _missed_deadlines(log: FlightLog) -> MissedDeadlines:
     return MissedDeadlines(int(log.flight.get("command_latency_ticks", 0)), limits, is_ideal)
 
 
+def _disturbance_by_source(log: FlightLog) -> DisturbanceBySource:
+    disturbance = environment_of(log).disturbance
+    return DisturbanceBySource(disturbance, captures_of(log) if disturbance.table else None)
+
+
 def _sizing(log: FlightLog, other: ActuatorSet | None) -> Sizing:
     return Sizing(log, ActuatorSet(actuators_of(log), flown_actuators(log)), other)
 
@@ -221,7 +227,7 @@ _METRICS: dict[str, Callable[[FlightLog], Metric]] = {
     "tool": lambda log: ToolError(log, robot_of(log), assumed_robot_of(log)),
     "sizing": lambda log: _sizing(log, None),
     "momentum": lambda log: MomentumBudget(momentum_of(log)),
-    "disturbance_by_source": lambda log: DisturbanceBySource(environment_of(log).disturbance),
+    "disturbance_by_source": _disturbance_by_source,
     "deflection": Deflection,
     "missed_captures": lambda log: MissedCaptures(captures_of(log)),
 }

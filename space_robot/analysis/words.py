@@ -46,6 +46,8 @@ def remarks(report: Report) -> list[str]:
         remarks.append(sentence(step))
     if report["events"]:
         remarks.append(f"events: {', '.join(report['events'])}")
+    if disturbance := report.get("disturbance"):
+        remarks.append(f"disturbance of the user's own, unknown to the law: {disturbance}")
     remarks += [
         f"{event} did not happen: the target was {distance:.3g} m from where the tool holds it"
         for event, distance in (report["missed_captures"] or {}).items()

@@ -19,6 +19,7 @@ FLOWN = (
     "swaps",
     "faults",
     "events",
+    "disturbance",
 )
 
 

@@ -17,7 +17,9 @@ from space_robot_msgs_py.config.validation import StrictModel, read_yaml, short,
 from space_robot_msgs_py.errors import InputError
 
 from ..api.scenario import OF_THE_GRAPH
+from ..scenario.disturbances import as_disturbance
 from ..scenario.options import FlightPlan
+from ..scenario.resolve import resolve
 
 Design = Literal["independent", "latin_hypercube", "sobol", "saltelli"]
 NOT_TO_BE_EXTENDED = ("latin_hypercube", "saltelli")
@@ -135,6 +137,11 @@ class Study(StrictModel):
     def _are_options(cls, scenario: dict[str, Any]) -> dict[str, Any]:
         for name in scenario:
             check_option(name)
+        if callable(scenario.get("disturbance")):  # numbers can go to any process and file
+            sampled = resolve(FlightPlan(**scenario)).options.disturbance
+            return {**scenario, "disturbance": sampled}
+        if "disturbance" in scenario:
+            return {**scenario, "disturbance": as_disturbance(scenario["disturbance"])}
         return scenario
 
     @field_validator("laws", mode="after")

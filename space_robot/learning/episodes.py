@@ -120,5 +120,7 @@ def _check_simple(flight: Flight) -> None:
         why = "delayed commands"
     elif np.isfinite(plant.next_change):
         why = "faults or events"
+    elif flight.plant_settings.disturbance.table:
+        why = "a disturbance of your own"
     if why:
         raise InputError(f"scenario: {why}: the task reach has none; see SpaceRobotEnv")

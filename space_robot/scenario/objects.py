@@ -30,6 +30,8 @@ from space_robot_sim.environment.environment import EnvironmentSettings
 from space_robot_sim.environment.events import Capture, Release
 from space_robot_sim.environment.orbit_settings import OrbitSettings
 
+from .disturbances import as_disturbance
+
 
 def _name(value: Any, otherwise: str) -> str:
     """Return the text of a name or a path; a number may stand for a name."""
@@ -122,6 +124,7 @@ MissionGiven = Annotated[Any, PlainValidator(_mission)]
 Case = Annotated[Any, PlainValidator(_settings(EnvironmentSettings))]
 Sensors = Annotated[Any, PlainValidator(_settings(SensorSettings))]
 Actuators = Annotated[Any, PlainValidator(_settings(ActuatorSettings))]
+DisturbanceGiven = Annotated[Any, PlainValidator(as_disturbance)]
 OrbitGiven = Annotated[Any, PlainValidator(_settings(OrbitSettings))]
 AssumedActuators = Annotated[Any, PlainValidator(_settings(BaseActuatorSettings))]
 EventText = Annotated[str, BeforeValidator(_plain)]

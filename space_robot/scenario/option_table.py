@@ -76,6 +76,15 @@ OPTIONS = (
         "case", "name", "Friction, disturbance and payload: {names}, or a path", "1", folder="cases"
     ),
     Option(
+        "disturbance",
+        "name",
+        "Your own disturbance, unknown to the law: a CSV or Parquet file with columns time, "
+        "base_force_x..z, base_torque_x..z (base frame) and joints by name, SI units",
+        "",
+        default_text="none",
+        metavar="FILE",
+    ),
+    Option(
         "sensors", "name", "Sensors: {names}, or a path to a YAML file", "ideal", folder="sensors"
     ),
     Option(

@@ -13,11 +13,13 @@ from space_robot_msgs_py.config.validation import StrictModel
 from space_robot_sim.faults.grammar import Kinds, parse_faults
 from space_robot_sim.plant.faults import PLANT_KINDS
 
+from .disturbances import table_parameters
 from .faults import KINDS
 from .objects import (
     Actuators,
     AssumedActuators,
     Case,
+    DisturbanceGiven,
     EventText,
     Gains,
     LawGiven,
@@ -52,6 +54,9 @@ class FlightPlan(StrictModel):
     """Also a `ControlLaw` class or object; a function, see
     `space_robot_control.controller.plain_laws`; None: none, on the bench."""
     case: Case = of("case")
+    disturbance: DisturbanceGiven = of("disturbance")
+    """A table's file; also its columns, numbers by name, or a function of time that is sampled at
+    100 Hz, see `space_robot.scenario.disturbances.sampled`."""
     gains: Gains = of("gains")
     """Also numbers by gain (or by law, then gain), over the default set."""
     sensors: Sensors = of("sensors")
@@ -118,6 +123,7 @@ class FlightPlan(StrictModel):
                 **({} if orbit == "none" else {"orbit": orbit}),
                 **start,
                 **world,
+                **table_parameters(self.disturbance),
                 **place,
                 **errors,
                 **hardware,

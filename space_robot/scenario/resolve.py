@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from space_robot_control.allocation.assumed_actuators import assumed_actuators
 from space_robot_control.controller.gains import build_laws
 from space_robot_control.controller.plain_laws import NoLaw
@@ -14,8 +16,10 @@ from space_robot_model.robot.find import robot_files
 from space_robot_msgs_py.config.files import GIVEN
 from space_robot_msgs_py.config.validation import one_of, validate
 from space_robot_msgs_py.errors import InputError
+from space_robot_sim.environment.disturbance_table import DisturbanceTable
 from space_robot_sim.faults.grammar import parse_faults
 
+from .disturbances import sampled
 from .faults import KINDS, PROCESS_KINDS
 from .node_settings import FlightSettings
 from .objects import resolve_law
@@ -52,7 +56,22 @@ def resolve(plan: FlightPlan) -> ResolvedScenario:
     )
     _check_composed(plan)
     _check_actuators(scenario)
-    return scenario
+    return _with_sampled_disturbance(scenario) if callable(plan.disturbance) else scenario
+
+
+def _with_sampled_disturbance(scenario: ResolvedScenario) -> ResolvedScenario:
+    """Return the scenario with numbers in place of a disturbance that is a function of time.
+
+    A function could not go to another process, and nobody could repeat its flight.
+    """
+    options, settings = scenario.options, scenario.settings
+    columns = sampled(options.disturbance, scenario.ticks * scenario.plant.period)
+    plant = settings.plant.with_table(DisturbanceTable(columns).text)
+    return replace(
+        scenario,
+        options=options.model_copy(update={"disturbance": columns}),
+        settings=settings._replace(plant=plant),
+    )
 
 
 def _laws(plan: FlightPlan, settings: FlightSettings, axes: int) -> dict[str, ControlLaw]:

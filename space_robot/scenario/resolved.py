@@ -23,6 +23,8 @@ from space_robot_msgs_py.bag.recorder_settings import RecorderNodeSettings
 from space_robot_msgs_py.config.trees import Tree
 from space_robot_msgs_py.errors import InputError
 from space_robot_sim.actuators.actuators import ActuatorSettings
+from space_robot_sim.environment.disturbance import DisturbanceSettings
+from space_robot_sim.environment.disturbance_table import DisturbanceTable
 from space_robot_sim.environment.environment import EnvironmentSettings
 from space_robot_sim.environment.friction import coefficients
 from space_robot_sim.environment.orbit_settings import OrbitSettings
@@ -214,6 +216,9 @@ def _tree(scenario: ResolvedScenario) -> dict[str, Any]:
         for option, schema in SECTIONS.items()
         if option != "orbit" or plant.has_orbit
     }
+    disturbance: Tree = {}
+    if text := sections["case"]["disturbance"].pop("table", ""):
+        disturbance = {"disturbance": DisturbanceTable.parse(text).columns}
     mission = settings.mission.model_dump(mode="json", include=set(MissionSettings.model_fields))
     navigation: Tree = {}
     if (filtered := controller.filter_settings) is not None:
@@ -232,6 +237,7 @@ def _tree(scenario: ResolvedScenario) -> dict[str, Any]:
         "mission": {**mission, **{name: numbers[name] for name in BY_THE_MISSION}},
         "events": events,
         **sections,
+        **disturbance,
         **({"assumed_actuators": own} if differs else {}),
         "duration": scenario.ticks * plant.period,
         **{name: numbers[name] for name in OF_PLANT},
@@ -283,6 +289,7 @@ def _rest(node: str, settings: BaseModel) -> dict[str, Any]:
 _LATER: Mapping[str, Any] = {
     "magnetic_torquers": MagneticTorquerSettings().model_dump(mode="json"),
     **{key: AllocationSettings.model_fields[key].default for key in ("dump", "magnetic_gain")},
+    **{key: DisturbanceSettings.model_fields[key].default for key in ("table", "table_scale")},
 }
 """Settings that flights of earlier releases did not have, with their defaults. At these they are
 left out, so that the digest of a flight without them stays."""

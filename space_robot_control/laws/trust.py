@@ -11,7 +11,7 @@ from space_robot_msgs_py.errors import InputError
 from . import laws
 
 _LONGEST_NAME = 100
-FILES = (".yaml", ".yml", ".urdf", ".xacro")
+FILES = (".yaml", ".yml", ".urdf", ".xacro", ".csv", ".parquet")
 
 
 class NotTrustedError(InputError):

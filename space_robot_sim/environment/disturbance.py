@@ -6,13 +6,15 @@ from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field
+from pydantic import AfterValidator, Field
 
 from space_robot_model.elementary.sine import sin_cos
 from space_robot_msgs_py.compiled.kernels import kernel
 from space_robot_msgs_py.compiled.lanes import any_lane, where
 from space_robot_msgs_py.compiled.records import Record, assign, shaped
 from space_robot_msgs_py.config.validation import StrictModel
+
+from .disturbance_table import check_table_text
 
 Array = NDArray[np.float64]
 
@@ -21,9 +23,12 @@ Frequencies = Annotated[list[float], Field(min_length=2, max_length=2)]
 
 
 class DisturbanceSettings(StrictModel):
-    """Disturbance torques: ``scale * amplitude * (sin(2 pi f1 t) + sin(2 pi f2 t))``, (61)."""
+    """Disturbance torques: ``scale * amplitude * (sin(2 pi f1 t) + sin(2 pi f2 t))``, (61).
 
-    scale: Amplitude = Field(0.0, description="factor on all disturbances, k of (61)-(63)")
+    ``table`` adds a disturbance of the user's own, see `DisturbanceTable`.
+    """
+
+    scale: Amplitude = Field(0.0, description="factor on the sines, k of (61)-(63)")
     base_amplitude: Amplitude = Field(0.010, description="amplitude on base x, y, z, N m")
     base_frequencies: Frequencies = Field(
         [0.5, 0.75], description="frequencies of the two sines of this disturbance, Hz (0: none)"
@@ -35,6 +40,14 @@ class DisturbanceSettings(StrictModel):
     outer_amplitude: Amplitude = Field(0.002, description="amplitude on joints 4 and up, N m")
     outer_frequencies: Frequencies = Field(
         [0.25, 0.0], description="frequencies of the two sines of this disturbance, Hz (0: none)"
+    )
+    table: Annotated[str, AfterValidator(check_table_text)] = Field(
+        "",
+        description="a disturbance of your own: a CSV or Parquet file with columns of time, see "
+        "docs/manual, or its numbers as JSON (empty: none)",
+    )
+    table_scale: Annotated[float, Field(ge=-1e6, le=1e6)] = Field(
+        1.0, description="factor on all numbers of the table"
     )
 
 

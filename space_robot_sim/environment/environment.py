@@ -17,6 +17,7 @@ from .friction import Friction, FrictionSettings, StuckJoint
 from .orbit import Orbit
 from .orbit_settings import OrbitSettings
 from .payload import PayloadSettings
+from .prescribed_loads import PrescribedLoads
 from .surfaces import Surfaces
 
 
@@ -52,6 +53,7 @@ class Environment(Record):
 
     friction: Friction = nested(Friction)
     disturbance: Disturbance = nested(Disturbance)
+    loads: PrescribedLoads = nested(PrescribedLoads)
     orbit: Orbit = nested(Orbit)
     surfaces: Surfaces = nested(Surfaces)
 

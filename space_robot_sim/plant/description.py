@@ -8,6 +8,7 @@ from typing import Any
 from space_robot_model.hardware.base_actuators import BaseActuatorSettings
 from space_robot_model.robot import Robot
 
+from ..environment.disturbance_table import DisturbanceTable
 from ..environment.friction import coefficients
 from .plant import Plant
 from .settings import PlantNodeSettings
@@ -28,6 +29,8 @@ def plant_description(
     prismatic = [name for name, is_prismatic in kinds if is_prismatic]
     faults = [text for text in settings.faults if text.strip()]
     events = [str(exchange.event) for exchange in plant.captures.exchanges]
+    table, scale = settings.disturbance.table, settings.disturbance.table_scale
+    factor = "" if scale == 1.0 else f", times {scale:g}"
     return {
         "case": settings.case,
         "sensors": settings.sensors,
@@ -41,6 +44,7 @@ def plant_description(
         "seed": settings.fault_seed,
         **({"faults": faults} if faults else {}),
         **({"events": events} if events else {}),
+        **({"disturbance": f"{DisturbanceTable.parse(table).label}{factor}"} if table else {}),
         **({"orbit": settings.orbit} if settings.has_orbit else {}),
         **({"prismatic_joints": prismatic} if prismatic else {}),
         **({"branches": list(branches)} if len(branches := robot.branches) > 1 else {}),

@@ -98,7 +98,12 @@ def _move_alone(
 
 @subroutine
 def _hold_alone(in_lanes: Environment, alone: Environment, bodies: int, lane: int) -> None:
-    """Copy what acts in an orbit over a tick to the flight of one lane."""
+    """Copy what acts over a tick to the flight of one lane: of the orbit, of the user's own."""
+    if uniform(in_lanes.loads.is_on) != 0.0:
+        alone.loads.begin[0] = lane_of(in_lanes.loads.begin[0], lane)
+        for i in range(alone.loads.value.size):
+            alone.loads.value[i] = lane_of(in_lanes.loads.value[i], lane)
+            alone.loads.slope[i] = lane_of(in_lanes.loads.slope[i], lane)
     for k in range(3):
         alone.orbit.magnetic_torque[k] = lane_of(in_lanes.orbit.magnetic_torque[k], lane)
     if uniform(in_lanes.surfaces.count) > 0.0:

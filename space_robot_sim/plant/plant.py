@@ -31,8 +31,10 @@ from ..actuators.actuators import (
 )
 from ..environment.captures import Captures
 from ..environment.environment import Environment, EnvironmentSettings
+from ..environment.load_schedule import LoadSchedule
 from ..environment.orbit_settings import OrbitSettings
 from ..environment.payload import with_payload
+from ..environment.prescribed_loads import begin_loads
 from ..sensors.sensors import Sensors, sense
 from .faults import FaultSettings, PartFaults
 from .gear_mounting import MOST_SUBSTEPS, check_springs, measured_motors, mount_gears
@@ -187,6 +189,7 @@ class Plant(RecordOwner):
         schedule = settings.schedule(self.names, period)
         check_faults(schedule, settings)
         self._part_faults = PartFaults(schedule)
+        self._loads = LoadSchedule.of(settings.disturbance, self.names.joints, period)
         if self._part_faults.are_in("sensors"):
             assign(sensors, are_ideal=False)
         assign(memory, sensors=sensors)
@@ -204,7 +207,7 @@ class Plant(RecordOwner):
         )
         """Topics of what of the truth `state` does not tell."""
         self.next_change = math.inf
-        """The first tick to come at which an event happens, or a fault begins or ends.
+        """The first tick to come with an event, a begin or end of a fault, or loads that are due.
 
         It needs `begin_tick`: compiled code may fly up to there.
         """
@@ -289,12 +292,16 @@ class Plant(RecordOwner):
             measure(self.block, tick, self.period)
 
     def change(self, tick: int) -> None:
-        """Let the events of ``tick`` happen, and faults begin and end; see `begin_tick`."""
+        """Let the events of ``tick`` happen, faults begin and end, and loads be known."""
         self.state.tick = self.truth.tick = tick
         memory = self.memory
         if self.captures.apply(tick, memory.model, memory.x):
             update_true_state(self.block, tick, self.period)
-        self.next_change = min(self._part_faults.apply(tick, memory), self.captures.next_tick(tick))
+        self.next_change = min(
+            self._part_faults.apply(tick, memory),
+            self.captures.next_tick(tick),
+            self._loads.apply(tick, memory.environment.loads),
+        )
 
     def save(self) -> PlantSnapshot:
         """Copy all that the rest of the flight depends on, but the commands to come."""
@@ -391,6 +398,7 @@ def begin_interval(
     actuation[6 : 6 + n] = truth.applied_torque[3:]
     for k in range(whole(memory.model.wheel_count)):
         actuation[6 + joints + k] = truth.wheel_torques[k]
+    begin_loads(memory.environment.loads, tick, period)
 
 
 @kernel

@@ -16,6 +16,7 @@ from space_robot_msgs_py.config.files import named_layers
 from space_robot_msgs_py.config.settings import NodeSettings, Texts
 from space_robot_msgs_py.config.trees import Tree
 
+from ..environment.disturbance_table import table_text
 from ..environment.orbit_file import orbit_layers
 from .plant import PlantSettings
 
@@ -111,14 +112,21 @@ class PlantNodeSettings(PlantSettings, NodeSettings):
 
     @classmethod
     def resolve(cls, overrides: Mapping[str, Any]) -> Self:
-        """Read the settings as `NodeSettings.resolve`.
+        """Read the settings as `NodeSettings.resolve`; those of a table of disturbances, too.
 
         Raises:
             InputError: also if something is set that needs an orbit, without one.
         """
         settings = super().resolve(overrides)
         settings.check_orbit(f"{cls.node} parameters")
-        return settings
+        return settings.with_table(table_text(settings.disturbance.table))
+
+    def with_table(self, text: str) -> Self:
+        """Return the same settings with another table of disturbances, see `DisturbanceTable`."""
+        if text == self.disturbance.table:
+            return self
+        disturbance = self.disturbance.model_copy(update={"table": text})
+        return self.model_copy(update={"disturbance": disturbance})
 
     @classmethod
     def read_layer(cls, path: Path, selected: Mapping[str, str]) -> Tree:
@@ -127,4 +135,8 @@ class PlantNodeSettings(PlantSettings, NodeSettings):
         Raises:
             InputError: the file cannot be read, or a key in it is wrong.
         """
-        return mission_layer(path, cls.node, selected["robot"])
+        layer = mission_layer(path, cls.node, selected["robot"])
+        disturbance = layer.get("disturbance")
+        if isinstance(disturbance, dict) and isinstance(text := disturbance.get("table"), str):
+            layer["disturbance"] = {**disturbance, "table": table_text(text, path.parent)}
+        return layer

@@ -23,9 +23,8 @@ from space_robot_model.dynamics.model import Model
 from space_robot_msgs_py.compiled.kernels import kernel, subroutine
 from space_robot_msgs_py.compiled.lanes import any_lane, negated, uniform, where, whole
 
-from ..environment.disturbance import disturbance_torque
 from ..environment.environment import Environment
-from .integrator import Stages, first_velocity, rk4_step, state_derivative, state_size
+from .integrator import Stages, disturb, first_velocity, rk4_step, state_derivative, state_size
 
 Array = NDArray[np.float64]
 
@@ -95,7 +94,7 @@ def slip_or_stick(
     for i in range(n):
         directions[i] = sticks * np.sign(x[first + i]) if coulomb[i] > 0.0 else 0.0
         data.locked[i] = sticks if x[first + i] == 0.0 and coulomb[i] > 0.0 else 0.0
-    disturbance_torque(environment.disturbance, time, disturbance)
+    disturb(environment, time, disturbance, stages)
     for _ in range(MOST_PIVOTS):
         state_derivative(model, environment, x, disturbance, stages, derivative)
         changed = NONE
@@ -134,7 +133,7 @@ def glide(
         directions[i] = where(has_friction, np.sign(x[first + i]), 0.0)
         locked[i] = where(has_friction & (x[first + i] == 0.0), 1.0, 0.0)
     disturbance = stages.disturbance[: 3 + whole(model.actuated_count)]
-    disturbance_torque(environment.disturbance, time, disturbance)
+    disturb(environment, time, disturbance, stages)
     state_derivative(model, environment, x, disturbance, stages, stages.slope[0])
     goes_on = True
     for i in range(n):

@@ -15,7 +15,7 @@ from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.bag.law_history import as_data, laws_of
 from space_robot_msgs_py.errors import InputError
 
-from ..described import environment_of, flown_actuators, momentum_of
+from ..described import captures_of, environment_of, flown_actuators, momentum_of
 from ..external_torques import torques_by_source
 from ..plot_series import PlotSeries
 from ..words import flown
@@ -159,7 +159,9 @@ def _of_orbit(log: FlightLog) -> Iterator[tuple[str, tuple[str, Figure]]]:
     Raises:
         InputError: the environment is unknown.
     """
-    torques = torques_by_source(log, environment_of(log).disturbance)
+    disturbance = environment_of(log).disturbance
+    captures = captures_of(log) if disturbance.table else None
+    torques = torques_by_source(log, disturbance, captures)
     caption = "Torques from outside about the common centre of mass"
     yield "torques_from_outside", (caption, torques_from_outside(log, torques))
 

@@ -18,7 +18,7 @@ DECIDE = ("python", "space_robot", "numpy", "scipy", "numba", "llvmlite")
 """Packages whose version may affect the bits of a row."""
 OF_TABLES = "pyarrow"
 """The package that writes the table."""
-SUFFIXES = (".yaml", ".yml", ".urdf", ".xacro", ".py")
+SUFFIXES = (".yaml", ".yml", ".urdf", ".xacro", ".py", ".csv", ".parquet")
 """Suffixes of files that a campaign's file may refer to."""
 ROOT = Path(__file__).resolve().parents[3]
 """The project's packages."""
