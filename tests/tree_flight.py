@@ -32,6 +32,7 @@ KINDS = (
 )
 TORQUE = np.array([60.0, -40.0, 50.0, 4.0, 9.0, -6.0])
 SEEDS = (0, 1, 2)
+NO_WRENCH = np.zeros(6)
 
 
 def tree(seed: int, lossless: bool = False) -> list[Body]:
@@ -109,16 +110,22 @@ class TreeFlight:
         stiffness = np.array([spring.stiffness for spring in self.robot.springs])
         return float(0.5 * stiffness @ stretched**2)
 
-    def derivative(self, torque: Array, q: Array, v: Array, disturbed: Array) -> Array:
+    def derivative(
+        self, torque: Array, q: Array, v: Array, disturbed: Array, wrench: Array = NO_WRENCH
+    ) -> Array:
         """Of ``[q, v]``: motors and springs push, friction brakes.
 
         ``disturbed`` (n+3,) N m: taken from the base, about inertial axes, and from the motors.
+        ``wrench``: force (N) at the base's CoM and torque (N m) on it, both on the base's axes.
         """
         robot, columns, n = self.robot, self.oracle.columns, self.robot.n
         tau, own = np.zeros(self.model.nv), np.array(robot.friction)[:, 1]
         usual = np.where(np.arange(robot.joint_count) < n, self.viscous, 0.0)
         turn = pin.Quaternion(q[3:7] / np.linalg.norm(q[3:7]))
         tau[3:6] = torque[:3] - turn.matrix().T @ disturbed[:3]
+        lever = self.model.frames[self.oracle.frame].placement.translation
+        tau[:3] += wrench[:3]
+        tau[3:6] += wrench[3:] + np.cross(lever, wrench[:3])
         tau[columns[:n]] = torque[3:] - disturbed[3:]
         tau[columns] -= np.where(np.isnan(own), usual, own) * v[columns]
         for column, spring in zip(columns[n:], robot.springs, strict=True):

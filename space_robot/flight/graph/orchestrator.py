@@ -28,14 +28,17 @@ from ...processes.scratch_folder import ScratchFolder
 from ..bag_path import check_bag_path
 from ..compilation import compile_kernels
 from ..plan import Flight
-from .composed import NAME, composed_command
+from .composed import NAME, composed_command, write_parameters
 from .domain import is_quiet, ros_domain
 from .following import follow
 from .listeners import RESET_WITH, wait_for
+from .node_server import Program
 from .processes import Command, Graph, node_command, node_environment
 
 COMPOSED_DRAIN_S = 0.002
 """Period of the recorder in one process with the other nodes, which wait while it writes."""
+LONGEST_ARGUMENT = 100_000
+"""Characters of an argument of a command line; Linux takes 131071 bytes."""
 
 
 def fly(
@@ -105,7 +108,18 @@ def _commands(
     namespace = flight.scenario.options.namespace
     if flight.scenario.options.composed:
         return {NAME: composed_command(started, namespace, folder)}
-    return {node: node_command(node, values, namespace) for node, values in started.items()}
+    return {node: _command(node, values, namespace, folder) for node, values in started.items()}
+
+
+def _command(node: str, values: Mapping[str, Any], namespace: str, folder: Path) -> Command:
+    """Return the command of a node; parameters that no command line can hold are in a file."""
+    command = node_command(node, values, namespace)
+    if isinstance(command, Program) or max(map(len, command)) <= LONGEST_ARGUMENT:
+        return command
+    own = folder / node
+    own.mkdir()
+    file = write_parameters({node: values}, own)
+    return [*node_command(node, {}, namespace), "--ros-args", "--params-file", str(file)]
 
 
 def _claim(bag: Path) -> None:

@@ -1,0 +1,209 @@
+"""A disturbance of the user's own: the same bits from file, numbers, function; in every process."""
+
+from __future__ import annotations
+
+import csv
+import json
+import math
+import pickle
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import yaml
+from conftest import Run
+from flights import Flown
+
+import space_robot as sr
+from space_robot.scenario.comparison import recorded_scenario
+from space_robot.scenario.options import FlightPlan
+from space_robot.scenario.resolve import resolve
+from space_robot_msgs_py.bag.flight_log import FlightLog
+from space_robot_msgs_py.bag.reader import read_flight
+from space_robot_msgs_py.errors import InputError
+
+DURATION = 0.3
+
+
+def wind(t: float) -> dict[str, float]:
+    return {
+        "base_force_y": 3.0 * math.sin(20.0 * t),
+        "base_torque_z": 0.4 * math.cos(9.0 * t),
+        "joint2": 0.3 * t,
+    }
+
+
+def columns() -> dict[str, Any]:
+    return sr.sampled(wind, DURATION)
+
+
+def write(path: Path, table: dict[str, Sequence[float]]) -> str:
+    with path.open("w", newline="") as file:
+        csv.writer(file).writerows([[*table], *zip(*table.values(), strict=True)])
+    return str(path)
+
+
+def assert_same(one: FlightLog, other: FlightLog) -> None:
+    for name, column in one.columns.items():
+        np.testing.assert_array_equal(other.columns[name], column, name)
+
+
+@pytest.fixture(scope="module")
+def expected() -> FlightLog:
+    """The flight under numbers."""
+    return sr.Scenario(disturbance=columns(), duration=DURATION).fly().log
+
+
+def test_file_function_and_numbers_fly_the_same_bits(tmp_path: Path, expected: FlightLog) -> None:
+    file = write(tmp_path / "wind.csv", columns())
+    given = [file, wind, lambda t: wind(t), {k: np.array(v) for k, v in columns().items()}]
+    resolved = sr.Scenario(disturbance=columns(), duration=DURATION).resolved()
+    for disturbance in given:
+        scenario = sr.Scenario(disturbance=disturbance, duration=DURATION)
+        assert scenario.resolved() == resolved
+        assert_same(scenario.fly().log, expected)
+    undisturbed = sr.Scenario(duration=DURATION).fly().log
+    assert np.abs(undisturbed.joint_positions - expected.joint_positions).max() > 1e-6
+
+
+def test_the_resolved_scenario_is_the_flight(tmp_path: Path, expected: FlightLog) -> None:
+    """As a mapping, as a file, and from a bag, without the file that it was read from."""
+    file = Path(write(tmp_path / "wind.csv", columns()))
+    scenario = sr.Scenario(disturbance=file, duration=DURATION)
+    scenario.fly(bag=tmp_path / "bag")
+    resolved = yaml.safe_load(yaml.safe_dump(scenario.resolved()))
+    file.unlink()
+    assert_same(sr.Scenario(**resolved).fly().log, expected)
+    recorded = recorded_scenario(tmp_path / "bag")
+    assert recorded["disturbance"] == columns()
+    assert_same(sr.Scenario(**recorded).fly().log, expected)
+    log = sr.load_bag(tmp_path / "bag")
+    said = "base_force_y, base_torque_z, joint2 from 0 to 0.3 s"
+    assert log.flight["disturbance"] == said
+    assert sr.replay(tmp_path / "bag").has_passed
+
+
+def test_a_flight_without_one_has_the_digest_it_had() -> None:
+    tree = sr.Scenario().resolved()
+    assert "disturbance" not in tree
+    assert set(tree["case"]["disturbance"]) == {
+        "scale",
+        *(
+            f"{group}_{kind}"
+            for group in ("base", "inner", "outer")
+            for kind in ("amplitude", "frequencies")
+        ),
+    }
+
+
+def test_eight_at_a_time_and_benches_fly_the_same_bits(expected: FlightLog) -> None:
+    """Each lane its own table, rows of their own, joints that stop and break away."""
+    tables = [
+        sr.sampled(wind, DURATION),
+        sr.sampled(wind, 0.1, period=0.0007),
+        sr.sampled(lambda t: {"joint1": 5.0 * math.sin(60.0 * t)}, 0.2, period=0.0005),
+        {"time": [0.1, 0.2], "base_force_x": [1.0, 1.0]},
+    ]
+    scenarios = [
+        sr.Scenario(case="2", controller="ctc", disturbance=table, duration=DURATION)
+        for table in tables
+    ]
+    for flight, scenario in zip(sr.fly_many(scenarios), scenarios, strict=True):
+        assert_same(flight.log, scenario.fly().log)
+    bench = sr.Scenario(disturbance=columns(), duration=DURATION).bench()
+    while not bench.done:
+        bench.step()
+    np.testing.assert_array_equal(bench.truth.applied_torque, expected.applied_torque[-1])
+    still = [scenario.replace(controller=None) for scenario in scenarios]
+    benches, alone = sr.bench_many(still), [scenario.bench() for scenario in still]
+    for _ in range(300):
+        states = benches.step(np.zeros((4, 9)))
+        for k, one in enumerate(alone):
+            one.step(np.zeros(9))
+            np.testing.assert_array_equal(states["quaternion"][k], one.state.quaternion)
+
+
+@pytest.mark.parametrize("words", [(), ("--composed",)])
+def test_the_graph_flies_the_same_bits(
+    tmp_path_factory: pytest.TempPathFactory,
+    fly: Callable[..., Flown],
+    expected: FlightLog,
+    words: tuple[str, ...],
+) -> None:
+    file = write(tmp_path_factory.mktemp("wind") / "wind.csv", columns())
+    flown = fly("--disturbance", file, "--duration", str(DURATION), *words)
+    log = read_flight(flown.bag)
+    for name in ("quaternion", "joint_positions", "applied_torque"):
+        np.testing.assert_array_equal(getattr(log, name), getattr(expected, name), name)
+    assert resolve(FlightPlan(**recorded_scenario(flown.bag))).tree["disturbance"] == columns()
+
+
+def test_the_command_says_under_what_it_flew(tmp_path: Path, space_robot: Run) -> None:
+    file = write(tmp_path / "wind.csv", columns())
+    ran = space_robot("simulate", "--disturbance", file, "--duration", "0.1")
+    assert ran.code == 0
+    assert "base_force_y, base_torque_z, joint2 from 0 to 0.3 s" in ran.out
+    ran = space_robot("simulate", "--disturbance", file, "--duration", "0.1", "--json")
+    assert json.loads(ran.out)["disturbance"].startswith("base_force_y")
+    ran = space_robot("simulate", "--disturbance", "no_such.csv")
+    assert (ran.code, ran.err.strip().count("\n")) == (2, 0)
+    assert "no_such.csv: no such file" in ran.err
+
+
+def test_a_case_may_name_a_table_beside_it(tmp_path: Path) -> None:
+    write(tmp_path / "wind.csv", columns())
+    case = {"/**/plant_node": {"ros__parameters": {"disturbance": {"table": "wind.csv"}}}}
+    (tmp_path / "windy.yaml").write_text(yaml.safe_dump(case))
+    scenario = sr.Scenario(case=tmp_path / "windy.yaml", duration=DURATION)
+    assert scenario.resolved()["disturbance"] == columns()
+    other = {"time": [0.0, 1.0], "joint1": [1.0, 1.0]}
+    assert scenario.replace(disturbance=other).resolved()["disturbance"] == other
+
+
+def test_campaigns_vary_its_scale(tmp_path: Path) -> None:
+    """The rows of a function are those of its numbers, flown in other processes."""
+    tables = []
+    for number, disturbance in enumerate((wind, columns())):
+        study = {
+            "laws": ["ctc"],
+            "scenario": {"disturbance": disturbance, "duration": DURATION},
+            "vary": {"plant.disturbance.table_scale": {"uniform": [0.5, 2.0]}},
+            "runs": 3,
+        }
+        flown = sr.Campaign.of(study).run(out=tmp_path / str(number), workers=1 - number)
+        assert list(flown.table["outcome"]) == ["complete"] * 3
+        tables.append(flown.table)
+    assert tables[0].equals(tables[1])
+    errors = tables[0]["rms.joints"] if "rms.joints" in tables[0] else tables[0].iloc[:, -1]
+    assert len(set(errors)) == 3
+
+
+@pytest.mark.parametrize(
+    ("disturbance", "said"),
+    [
+        (3.0, "disturbance: a CSV or Parquet file, columns .* or a function was expected, got 3.0"),
+        ("wind", "disturbance 'wind': a .csv or .parquet file was expected"),
+        ({"time": [0, 1], "joint9": [1, 1]}, "disturbance: unknown column 'joint9': choose one of"),
+        (lambda t: None, "the function returned None at 0 s; a mapping of numbers by column"),
+        (lambda t: [t], "the function returned 1 numbers at 0 s; a mapping or 6 were expected"),
+        (lambda t: {"joint1": math.nan}, "the function returned nan for joint1 at 0 s"),
+    ],
+)
+def test_what_is_wrong_is_said_in_a_line(disturbance: Any, said: str) -> None:
+    with pytest.raises(InputError, match=said) as refused:
+        sr.Scenario(disturbance=disturbance, duration=0.1).check()
+    assert "\n" not in str(refused.value)
+
+
+def test_a_function_is_sampled() -> None:
+    columns = sr.sampled(lambda t: np.arange(6.0) * t, 0.02, period=0.01)
+    assert columns["time"] == [0.0, 0.01, 0.02]
+    assert columns["base_torque_z"] == [0.0, 0.05, 0.1]
+    scenario = sr.Scenario(disturbance=lambda t: {"joint1": t}, duration=0.1)
+    flight = pickle.loads(pickle.dumps(scenario.check().scenario))
+    assert flight.tree == scenario.resolved()
+    for words in ({"duration": 0.0}, {"duration": 1.0, "period": -1.0}):
+        with pytest.raises(InputError, match="a number above 0 was expected"):
+            sr.sampled(wind, **words)
