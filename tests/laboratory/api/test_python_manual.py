@@ -26,7 +26,7 @@ def names() -> dict[str, Any]:
 
 
 def test_the_blocks_run(names: dict[str, Any]) -> None:
-    assert len(blocks(of_gym=False)) == 6
+    assert len(blocks(of_gym=False)) == 7
     bench = names["bench"]
     assert bench.outcome == "complete"
     assert bench.tick == bench.ticks == 60_000
