@@ -53,9 +53,9 @@ class Environment(Record):
 
     friction: Friction = nested(Friction)
     disturbance: Disturbance = nested(Disturbance)
-    loads: PrescribedLoads = nested(PrescribedLoads)
     orbit: Orbit = nested(Orbit)
     surfaces: Surfaces = nested(Surfaces)
+    loads: PrescribedLoads = nested(PrescribedLoads)
 
     @classmethod
     def build(

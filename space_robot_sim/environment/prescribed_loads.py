@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from space_robot_msgs_py.compiled.kernels import kernel
-from space_robot_msgs_py.compiled.lanes import any_lane, uniform, where
+from space_robot_msgs_py.compiled.lanes import any_lane, where
 from space_robot_msgs_py.compiled.records import Record, shaped
 
 Array = NDArray[np.float64]
@@ -37,13 +37,18 @@ class PrescribedLoads(Record):
     """Loads then."""
     slope: Array = shaped(lambda n: (6 + n,))
     """Their rates of change."""
+    actuation: Array = shaped(lambda n: (6,))
+    """What the actuators give over the tick: force and torque on the base, base frame."""
 
 
 @kernel
-def begin_loads(loads: PrescribedLoads, tick: int, period: float) -> None:
-    """Choose the segment of ``tick``, which lasts ``period`` s."""
-    if uniform(loads.is_on) == 0.0:
-        return
+def begin_loads(loads: PrescribedLoads, tick: int, period: float, actuation: Array) -> None:
+    """Choose the segment of ``tick``, which lasts ``period`` s.
+
+    ``actuation``: (6,) what the actuators give over the tick, see `PrescribedLoads`.
+    """
+    for i in range(6):
+        loads.actuation[i] = actuation[i]
     for k in range(SEGMENTS):
         is_present = (loads.first[k] <= 1.0 * tick) & (1.0 * tick < loads.first[k + 1])
         if any_lane(is_present):
@@ -54,8 +59,17 @@ def begin_loads(loads: PrescribedLoads, tick: int, period: float) -> None:
 
 
 @kernel
-def loads_at(loads: PrescribedLoads, time: float, out: Array) -> None:
-    """Write into ``out`` (n+6,) the loads at ``time`` (s) within the present tick, N and N m."""
+def add_loads(loads: PrescribedLoads, time: float, wrench: Array, disturbance: Array) -> None:
+    """Add the loads at ``time`` (s) within the present tick.
+
+    Args:
+        loads: of the robot.
+        time: s.
+        wrench: (6,) becomes the sum of what the actuators give and the loads on the base.
+        disturbance: (n+3,) N m, opposes motion; loads on joints are taken from it.
+    """
     since = time - loads.begin[0]
-    for i in range(out.size):
-        out[i] = loads.value[i] + loads.slope[i] * since
+    for i in range(6):
+        wrench[i] = loads.actuation[i] + (loads.value[i] + loads.slope[i] * since)
+    for i in range(6, loads.value.size):
+        disturbance[i - 3] -= loads.value[i] + loads.slope[i] * since

@@ -19,7 +19,7 @@ from ..environment.disturbance import disturbance_torque
 from ..environment.environment import Environment
 from ..environment.friction import friction_torque
 from ..environment.gravity import add_gravity_gradient, gravity
-from ..environment.prescribed_loads import loads_at
+from ..environment.prescribed_loads import add_loads
 from ..environment.surfaces import add_surface_wrenches
 
 Array = NDArray[np.float64]
@@ -47,18 +47,14 @@ class Stages(Record):
     """State at the end of a step."""
     actuation: Array = shaped(lambda n: (6 + MOST_MOVING,))
     """What the actuators give over the step: force (N) and torque (N m) on the base's axes, which
-    turn with it, torques on the joints, actuated ones first, then those of wheels' motors, N m."""
+    turn with it, torques on the joints, actuated ones first, then those of wheels' motors, N m.
+    The force and torque contain the user's own wrench, if there is one."""
     force: Array = shaped(lambda n: (6 + MOST_MOVING,))
     """Generalised force, base part on inertial axes."""
     of_field: Array = shaped(lambda n: (3,))
     """Torque of the magnetic field on the base, inertial axes, N m."""
     disturbance: Array = shaped(lambda n: (3 + MOST_JOINTS,))
-    """f_d of (61), N m; none on passive joints."""
-    loads: Array = shaped(lambda n: (6 + n,))
-    """Of the user's own disturbance: force (N) and torque (N m) on the base's axes, then torques on
-    the actuated joints."""
-    pushed: Array = shaped(lambda n: (3,))
-    """Its force, then its torque, on inertial axes."""
+    """f_d of (61) and of loads on joints, N m; none on passive joints."""
     friction: Array = shaped(lambda n: (MOST_MOVING,))
     """f_f of each joint, then of each wheel, then of each rotor seen through its gear, N m."""
     directions: Array = shaped(lambda n: (MOST_MOVING,))
@@ -96,10 +92,10 @@ def state_size(model: Model, environment: Environment) -> int:
 
 @subroutine
 def disturb(environment: Environment, time: float, disturbance: Array, stages: Stages) -> None:
-    """Write what disturbs the robot at ``time`` (s) into ``disturbance`` and ``stages.loads``."""
+    """Write f_d at ``time`` (s); a user's wrench on the base is added to ``stages.actuation``."""
     disturbance_torque(environment.disturbance, time, disturbance)
     if uniform(environment.loads.is_on) != 0.0:
-        loads_at(environment.loads, time, stages.loads)
+        add_loads(environment.loads, time, stages.actuation[:6], disturbance)
 
 
 @kernel
@@ -113,8 +109,8 @@ def state_derivative(
         environment: its friction.
         x: the state, see `Stages`.
         disturbance: (n+3,) f_d, N m, about inertial axes, then on the actuated joints.
-        stages: ``actuation``, ``loads``, and which joints and wheels slide in which sense and
-            which stand; scratch.
+        stages: ``actuation``, and which joints and wheels slide in which sense and which stand;
+            scratch.
         out: as ``x``.
     """
     n, friction, data = whole(model.joint_count), environment.friction, stages.data
@@ -145,8 +141,6 @@ def state_derivative(
             force[6 + j] = -spring - model.damping[j] * velocities[j] - resisting[j]
     for k in range(n, n + whole(model.wheel_count)):
         force[6 + k] = actuation[6 + k] - resisting[k]
-    if uniform(environment.loads.is_on) != 0.0:
-        _push(model, stages)
     for k in range(3):
         out[k] = v0[k]
     if uniform(environment.orbit.is_on) != 0.0:
@@ -155,18 +149,6 @@ def state_derivative(
     for i in range(n):
         out[7 + i] = velocities[i]
     aba(model, w0, velocities, force, data, out[7 + n :])
-
-
-@subroutine
-def _push(model: Model, stages: Stages) -> None:
-    """Add the user's own disturbance to the force."""
-    loads, force, pushed = stages.loads, stages.force, stages.pushed
-    for first in range(0, 6, 3):
-        rotate(stages.data.rotation, loads[first : first + 3], pushed)
-        for k in range(3):
-            force[first + k] += pushed[k]
-    for i in range(whole(model.actuated_count)):
-        force[6 + whole(model.row[i])] += loads[6 + i]
 
 
 @subroutine

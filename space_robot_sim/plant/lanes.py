@@ -101,6 +101,8 @@ def _hold_alone(in_lanes: Environment, alone: Environment, bodies: int, lane: in
     """Copy what acts over a tick to the flight of one lane: of the orbit, of the user's own."""
     if uniform(in_lanes.loads.is_on) != 0.0:
         alone.loads.begin[0] = lane_of(in_lanes.loads.begin[0], lane)
+        for k in range(6):
+            alone.loads.actuation[k] = lane_of(in_lanes.loads.actuation[k], lane)
         for i in range(alone.loads.value.size):
             alone.loads.value[i] = lane_of(in_lanes.loads.value[i], lane)
             alone.loads.slope[i] = lane_of(in_lanes.loads.slope[i], lane)

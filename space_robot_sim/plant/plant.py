@@ -16,7 +16,7 @@ from space_robot_model.hardware.sensors import SensorSettings
 from space_robot_model.robot import Robot
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.compiled.kernels import kernel
-from space_robot_msgs_py.compiled.lanes import where, whole
+from space_robot_msgs_py.compiled.lanes import uniform, where, whole
 from space_robot_msgs_py.compiled.records import Record, RecordOwner, assign, nested, shaped
 from space_robot_msgs_py.errors import DivergedError, InputError
 from space_robot_msgs_py.samples import MOST_WHEELS, Command, RobotState, State
@@ -398,7 +398,8 @@ def begin_interval(
     actuation[6 : 6 + n] = truth.applied_torque[3:]
     for k in range(whole(memory.model.wheel_count)):
         actuation[6 + joints + k] = truth.wheel_torques[k]
-    begin_loads(memory.environment.loads, tick, period)
+    if uniform(memory.environment.loads.is_on) != 0.0:
+        begin_loads(memory.environment.loads, tick, period, actuation[:6])
 
 
 @kernel

@@ -119,7 +119,9 @@ def _command(node: str, values: Mapping[str, Any], namespace: str, folder: Path)
     own = folder / node
     own.mkdir()
     file = write_parameters({node: values}, own)
-    return [*node_command(node, {}, namespace), "--ros-args", "--params-file", str(file)]
+    command = node_command(node, {}, namespace)
+    assert not isinstance(command, Program)
+    return [*command, "--ros-args", "--params-file", str(file)]
 
 
 def _claim(bag: Path) -> None:

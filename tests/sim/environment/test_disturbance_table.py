@@ -15,7 +15,7 @@ from space_robot_msgs_py.errors import InputError
 from space_robot_sim.environment.disturbance import DisturbanceSettings
 from space_robot_sim.environment.disturbance_table import DisturbanceTable, table_text
 from space_robot_sim.environment.load_schedule import LoadSchedule
-from space_robot_sim.environment.prescribed_loads import PrescribedLoads, begin_loads, loads_at
+from space_robot_sim.environment.prescribed_loads import PrescribedLoads, add_loads, begin_loads
 
 Array = NDArray[np.float64]
 PERIOD = 0.0005
@@ -124,13 +124,16 @@ def test_the_record_has_what_the_schedule_says(times: list[float], seed: int) ->
         return
     ticks = np.arange(int(rng.integers(0, 300)), 520)
     begin, end = own.over(ticks)
-    record, out = PrescribedLoads.allocate(len(JOINTS)), np.zeros(8)
+    record, given = PrescribedLoads.allocate(len(JOINTS)), rng.normal(size=6)
     due = own.apply(int(ticks[0]), record)
     for tick, first, last in zip(ticks.tolist(), begin, end, strict=True):
         if tick >= due:
             assert tick == due
             due = own.apply(tick, record)
-        begin_loads(record, tick, PERIOD)
+        begin_loads(record, tick, PERIOD, given)
         for time, expected in ((tick * PERIOD, first), ((tick + 1) * PERIOD, last)):
-            loads_at(record, time, out)
-            np.testing.assert_allclose(out, expected, rtol=0.0, atol=1e-9)
+            wrench, disturbance = np.full(6, np.nan), np.ones(5)
+            add_loads(record, time, wrench, disturbance)
+            np.testing.assert_allclose(wrench, given + expected[:6], rtol=0.0, atol=1e-9)
+            np.testing.assert_allclose(disturbance[3:], 1.0 - expected[6:], rtol=0.0, atol=1e-9)
+            assert (disturbance[:3] == 1.0).all()
