@@ -49,6 +49,7 @@ ROOMS = {
         "campaign",
         "paper",
         "view",
+        "doctor",
         "cli",
         "__main__",
     ),

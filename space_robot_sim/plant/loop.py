@@ -34,13 +34,12 @@ from .run_control import PAUSED, RunControl
 from .scene_output import SceneOutput
 from .settings import PlantNodeSettings
 from .truth_output import TruthOutput
-from .wall_clock import WallClock
+from .wall_clock import SPIN_BEFORE_DEADLINE_S, WallClock
 
 TIMEOUT_S = 0.02
 ASK_AGAIN_S = 0.2
 """Without an answer for this long the state is sent again (lockstep): well before a listener takes
 this plant for silent, and soon enough for one that believes a new time only after some states."""
-SPIN_BEFORE_DEADLINE_S = 100e-6
 GIVE_WAY = Wait(100e-6, is_for_others=True)
 HELD = Wait(0.02)
 """The wait of a paused plant: only a service call ends the pause, and those have their own time."""

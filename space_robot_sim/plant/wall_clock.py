@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 import time
 
+SPIN_BEFORE_DEADLINE_S = 100e-6
+"""The last part of the wait for a deadline, in which the plant polls and does not sleep, s."""
 SLIP_S = 0.25
 """A flight further behind the wall clock does not catch up."""
 REMARK_S = 5.0
