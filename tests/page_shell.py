@@ -142,6 +142,7 @@ def _slow_gains(folder: Path) -> None:
 
 
 GIVEN: dict[str, Callable[[Path], None]] = {
+    "space_robot/help/own-robot.md": _urdf,
     "README.md": _urdf,
     "docs/recipes.md": _urdf,
     "docs/manual/analysis.md": _bag_of_others,

@@ -9,9 +9,11 @@ from pathlib import Path
 
 from paths import DOCS, ROOT
 
+TOPICS = sorted((ROOT / "space_robot/help").glob("*.md"))
+"""What `space-robot help` shows."""
 PAGES = [
     page
-    for page in (ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted(DOCS.rglob("*.md")))
+    for page in (ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted(DOCS.rglob("*.md")), *TOPICS)
     if page.name != "tutorial.md"  # test_tutorial.py has it whole
 ]
 SHELL = {"", "bash", "console", "sh"}

@@ -50,6 +50,7 @@ ROOMS = {
         "paper",
         "view",
         "doctor",
+        "help",
         "cli",
         "__main__",
     ),

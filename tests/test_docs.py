@@ -16,7 +16,11 @@ from space_robot.flight.graph.listeners import LISTENERS
 from space_robot_msgs_py import topics
 
 ROOT = Path(__file__).resolve().parents[1]
-DOCUMENTS = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").rglob("*.md"))]
+DOCUMENTS = [
+    *(ROOT / "README.md", ROOT / "CONTRIBUTING.md"),
+    *sorted((ROOT / "docs").rglob("*.md")),
+    *sorted((ROOT / "space_robot/help").glob("*.md")),
+]
 PREFIXES = (
     "",
     "space_robot.",

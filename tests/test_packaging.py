@@ -325,6 +325,13 @@ def test_all_of_config_is_installed(prefix: Path) -> None:
         assert (prefix / "share/space_robot" / path.relative_to(ROOT)).is_file(), path
 
 
+def test_the_topics_of_help_are_installed(prefix: Path) -> None:
+    (installed,) = prefix.glob("lib/python*/site-packages/space_robot/help")
+    topics = {path.name for path in (ROOT / "space_robot/help").glob("*.md")}
+    assert topics == {path.name for path in installed.glob("*.md")}
+    assert topics
+
+
 def test_the_command_is_where_colcon_extends_the_path(prefix: Path) -> None:
     assert os.access(prefix / "bin/space-robot", os.X_OK)
 

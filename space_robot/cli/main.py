@@ -62,6 +62,7 @@ def cli() -> None:
       space-robot campaign run FILE --runs 1000     dispersed flights: verdicts with confidence
       space-robot reproduce                         the paper's Table V and figures
       space-robot doctor                            what this machine has for flights
+      space-robot help                              short answers by topic
     """
 
 

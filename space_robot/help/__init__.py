@@ -1,0 +1,1 @@
+"""Short answers to the questions of new users, one Markdown file each."""
