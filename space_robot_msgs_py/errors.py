@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any
 
 
@@ -9,6 +11,8 @@ class SpaceRobotError(Exception):
     """Base of this project's errors; the message says what was given, what is allowed, where."""
 
     exit_code = 1
+    help_topic = ""
+    """Topic of ``space-robot help`` that explains it; empty: none. The command line shows it."""
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Pickle by what the error holds: its constructor may want other arguments."""
@@ -17,6 +21,16 @@ class SpaceRobotError(Exception):
 
 def _remade(kind: type[SpaceRobotError], args: tuple[Any, ...]) -> SpaceRobotError:
     return kind.__new__(kind, *args)  # an exception's `__new__` keeps them as `args`
+
+
+@contextmanager
+def explained_by(topic: str) -> Iterator[None]:
+    """Set the `SpaceRobotError.help_topic` of errors that have none; also a decorator."""
+    try:
+        yield
+    except SpaceRobotError as error:
+        error.help_topic = error.help_topic or topic
+        raise
 
 
 class InputError(SpaceRobotError, ValueError):
@@ -43,6 +57,8 @@ class FlightError(SpaceRobotError):
 
 class DivergedError(FlightError):
     """The state left what any actuator could have brought about."""
+
+    help_topic = "gains"
 
     def __init__(self, tick: int, period: float, why: str) -> None:
         super().__init__(f"the flight diverged at tick {tick} (t = {tick * period:.4f} s): {why}")

@@ -14,7 +14,7 @@ from space_robot_msgs_py.config.arguments import path_text
 from space_robot_msgs_py.config.choices import choices
 from space_robot_msgs_py.config.files import named_file
 from space_robot_msgs_py.config.validation import StrictModel, read_yaml, short, validate
-from space_robot_msgs_py.errors import InputError
+from space_robot_msgs_py.errors import InputError, explained_by
 
 from ..api.scenario import OF_THE_GRAPH
 from ..scenario.disturbances import as_disturbance
@@ -218,6 +218,7 @@ def check_option(name: str) -> None:
         raise ValueError(f"unknown option {short(name)}: {choices(name, allowed)}")
 
 
+@explained_by("campaign")
 def read_study(path: str | Path) -> Study:
     """Read a campaign's file, by path or by a name of ``config/campaigns``.
 

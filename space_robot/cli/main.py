@@ -20,6 +20,7 @@ from ..console.streams import is_of_output, standard_streams
 from ..processes.interruption import Interrupted, raising_signals
 from ..processes.memory import COLLECTED_AT
 from ..processes.node_modules import MODULES, SUFFIX
+from .error_lines import error_line, usage_line
 from .sections import SectionedGroup
 
 
@@ -121,10 +122,11 @@ def _run(arguments: Sequence[str] | None) -> int:
         click.echo(f"space-robot: {interrupted}", err=True)
         return interrupted.exit_code if isinstance(interrupted, Interrupted) else 130
     except click.ClickException as error:
-        error.show()
+        _complain(usage_line(error))
         return 2
     except SpaceRobotError as error:
-        _complain(str(error))
+        words = sys.argv[1:] if arguments is None else arguments
+        _complain(error_line(error, words[0] if words else ""))
         return error.exit_code
     except OSError as error:
         return _lost(error)

@@ -44,7 +44,9 @@ def _set(tree: dict[str, dict[str, Any]], text: str, where: str) -> None:
     name, equals, value = text.partition("=")
     node, _, parameter = name.partition(".")
     if not (equals and parameter):
-        raise InputError(f"{where} {short(text)}: NODE.PARAM=VALUE expected")
+        raise InputError(
+            f"{where} {short(text)}: NODE.PARAM=VALUE expected, as in plant.hold_ticks=40"
+        )
     one_of(node, NODES, "node", f" in {where} {short(text)}")
     try:
         parsed = parse_yaml(value)

@@ -15,7 +15,7 @@ from space_robot_msgs_py.config.files import GIVEN
 from space_robot_msgs_py.config.settings import NodeSettings
 from space_robot_msgs_py.config.trees import Tree, flatten, merge, nest
 from space_robot_msgs_py.config.validation import one_of
-from space_robot_msgs_py.errors import InputError
+from space_robot_msgs_py.errors import InputError, explained_by
 from space_robot_sim.plant.settings import PlantNodeSettings
 
 SCHEMAS: tuple[type[NodeSettings], ...] = (
@@ -74,12 +74,10 @@ class FlightSettings(NamedTuple):
         if events := [str(event) for event in plant.parsed_events]:  # with the targets' numbers
             plant = plant.model_copy(update={"events": events})
         controller, gains = _controller(chosen["controller"], plant)
+        with explained_by("own-trajectory"):
+            mission = MissionNodeSettings.resolve(chosen["mission"])
         settings = cls(
-            plant,
-            controller,
-            MissionNodeSettings.resolve(chosen["mission"]),
-            RecorderNodeSettings.resolve(chosen["recorder"]),
-            gains,
+            plant, controller, mission, RecorderNodeSettings.resolve(chosen["recorder"]), gains
         )
         settings._check_periods()
         return settings

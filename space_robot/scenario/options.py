@@ -10,6 +10,7 @@ from space_robot_control.navigation.settings import Mode
 from space_robot_msgs_py.bag.mcap_file import Compression
 from space_robot_msgs_py.config.namespace import full_namespace
 from space_robot_msgs_py.config.validation import StrictModel
+from space_robot_msgs_py.errors import explained_by
 from space_robot_sim.faults.grammar import Kinds, parse_faults
 from space_robot_sim.plant.faults import PLANT_KINDS
 
@@ -93,6 +94,7 @@ class FlightPlan(StrictModel):
     parameters: dict[str, dict[str, Any]] = Field(default_factory=dict)
     """Further parameters by node, dotted names."""
 
+    @explained_by("disturbances")
     def faults_of(self, kinds: Kinds) -> list[str]:
         """Return the texts of the faults of the given ``kinds``.
 

@@ -12,12 +12,13 @@ from space_robot_control.guidance.mission import Mission
 from space_robot_control.laws import ControlLaw
 from space_robot_model.hardware.base_actuators import BaseActuatorSettings
 from space_robot_model.robot import Robot
-from space_robot_model.robot.find import robot_files
+from space_robot_model.robot.find import TRAJECTORIES, robot_files
+from space_robot_model.robot.source import YAML
 from space_robot_msgs_py.config.files import GIVEN
 from space_robot_msgs_py.config.validation import one_of, validate
-from space_robot_msgs_py.errors import InputError
+from space_robot_msgs_py.errors import InputError, explained_by
 from space_robot_sim.environment.disturbance_table import DisturbanceTable
-from space_robot_sim.faults.grammar import parse_faults
+from space_robot_sim.faults.grammar import Fault, parse_faults
 
 from .disturbances import sampled
 from .faults import KINDS, PROCESS_KINDS
@@ -38,21 +39,22 @@ def resolve(plan: FlightPlan) -> ResolvedScenario:
         InputError: a name does not exist, or settings conflict.
     """
     settings = FlightSettings.resolve(plan.options(), plan.parameters)
-    robots = Robots(settings, plan.robot, plan.plant_robot)
+    with explained_by("own-robot"):
+        robots = Robots(settings, plan.robot, plan.plant_robot)
     laws = _laws(plan, settings, robots.plant.n + 3)
     scenario = ResolvedScenario(
         plan,
         settings,
         settings.mission.mission or robot_files(settings.mission.robot).name,
         robots,
-        Mission(robots.controller, settings.mission, settings.plant.period),
+        _mission(settings, robots.controller),
         laws,
         [
             (tick, laws[one_of(name, laws, "controller", " of swaps")])
             for tick, name in parse_swaps(settings.controller.swaps, settings.plant.period)
         ],
         _assumed_actuators(plan, settings, robots.controller),
-        parse_faults(plan.faults_of(PROCESS_KINDS), KINDS),
+        _process_faults(plan),
     )
     _check_composed(plan)
     _check_actuators(scenario)
@@ -74,11 +76,29 @@ def _with_sampled_disturbance(scenario: ResolvedScenario) -> ResolvedScenario:
     )
 
 
+def _mission(settings: FlightSettings, robot: Robot) -> Mission:
+    """Build the mission; errors name its file."""
+    with explained_by("own-trajectory"):
+        try:
+            return Mission(robot, settings.mission, settings.plant.period)
+        except InputError as error:
+            file = settings.mission.mission
+            if not file.endswith((*YAML, *TRAJECTORIES)):
+                raise
+            raise InputError(f"{file}: {error}") from None
+
+
+@explained_by("disturbances")
+def _process_faults(plan: FlightPlan) -> list[Fault]:
+    return parse_faults(plan.faults_of(PROCESS_KINDS), KINDS)
+
+
 def _laws(plan: FlightPlan, settings: FlightSettings, axes: int) -> dict[str, ControlLaw]:
     if plan.controller is None:
         return {NoLaw.name: NoLaw({}, settings.plant.period, axes)}
     own = resolve_law(plan.controller)
-    return build_laws(settings.controller, axes, settings.gains, own or "")
+    with explained_by("gains"):
+        return build_laws(settings.controller, axes, settings.gains, own or "")
 
 
 def _assumed_actuators(
@@ -115,6 +135,7 @@ def _check_composed(plan: FlightPlan) -> None:
         )
 
 
+@explained_by("sensors")
 def _check_actuators(scenario: ResolvedScenario) -> None:
     both = [
         (s.base_actuation, s.wheel_count, s.thruster_count, s.torquer_count)

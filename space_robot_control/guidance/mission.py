@@ -76,6 +76,11 @@ class Mission:
                 of these; a segment is wrong or cannot be flown.
         """
         n, times = robot.n, np.array(settings.waypoint_times)
+        if settings.has_segments and len(times) == 1 and len(settings.waypoints_deg) != n:
+            raise InputError(
+                f"the start has {len(settings.waypoints_deg)} joints; the robot has {n} with "
+                f"motors: {', '.join(robot.joint_names)}"
+            )
         if len(settings.waypoints_deg) != n * len(times):
             raise InputError(
                 f"waypoints_deg has {len(settings.waypoints_deg)} values; "

@@ -8,7 +8,9 @@ from typing import Annotated, Any, Literal
 from pydantic import Field, model_validator
 
 from space_robot_model.robot.orientation import Attitude, Orientation, Vector
-from space_robot_msgs_py.config.validation import StrictModel, validate
+from space_robot_msgs_py.config.choices import choices
+from space_robot_msgs_py.config.text import printable
+from space_robot_msgs_py.config.validation import StrictModel, short, validate
 from space_robot_msgs_py.config.yaml_text import YamlTextError, parse_yaml
 from space_robot_msgs_py.errors import InputError
 
@@ -16,6 +18,11 @@ Seconds = Annotated[float, Field(gt=0.0, le=1e6)]
 Frame = Literal["inertial", "base", "start"]
 MOTIONS = ("joints_deg", "tool", "hold", "reactionless_deg", "file", "trajectory")
 """Keys of which a segment has one; a segment of the base alone has none."""
+WRITTEN = (
+    *("joints_deg", "bends_deg", "tool", "hold", "reactionless", "file"),
+    *("base", "duration"),
+)
+"""Keys of a segment in a mission's document."""
 ALONE = ("hold", "reactionless_deg", "file", "trajectory")
 """Those that go without ``base``."""
 
@@ -129,5 +136,16 @@ def read_segments(texts: Sequence[str]) -> list[Segment]:
             content = parse_yaml(text)
         except YamlTextError as error:
             raise InputError(f"segment {number}: {error}") from None
+        _check_keys(content, f"segment {number}")
         segments.append(validate(Segment, content, f"segment {number}"))
     return segments
+
+
+def _check_keys(content: Any, where: str) -> None:
+    """Refuse an unknown key with those that a document may have, not those of `Segment`."""
+    for key, value in content.items() if isinstance(content, dict) else ():
+        if key not in WRITTEN and key not in Segment.model_fields:
+            advice = choices(str(key), WRITTEN)
+            raise InputError(
+                f"{where}: {printable(str(key))}: unknown key, got {short(value)}: {advice}"
+            )

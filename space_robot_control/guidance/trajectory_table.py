@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from space_robot_model.elementary.matrices import dot_rows, norms, unit_rows
 from space_robot_model.elementary.spline import CubicSpline
 from space_robot_model.robot.mission_document import QUATERNION
+from space_robot_msgs_py.config.choices import nearest
 from space_robot_msgs_py.config.validation import short
 from space_robot_msgs_py.errors import InputError
 
@@ -38,8 +39,10 @@ class TrajectoryTable:
         """
         missing = [name for name in (TIME, *joint_names) if name not in columns]
         if missing:
+            near = " or ".join(nearest(missing[0], list(columns)))
             raise InputError(
                 f"trajectory: column {short(missing[0])} is missing; there are {', '.join(columns)}"
+                + (f" (did you mean {near}?)" if near else "")
             )
         time = np.array(columns[TIME], dtype=np.float64)
         if not 2 <= len(time) <= MOST_ROWS:

@@ -17,7 +17,7 @@ from inspect import isabstract
 from space_robot_msgs_py.config.choices import choices
 from space_robot_msgs_py.config.text import one_line_of
 from space_robot_msgs_py.config.validation import one_of, short
-from space_robot_msgs_py.errors import InputError
+from space_robot_msgs_py.errors import InputError, explained_by
 
 from .base import ControlLaw, LawGains, LawMemory
 from .compiled import CompiledLaw
@@ -51,6 +51,7 @@ def laws() -> dict[str, type[ControlLaw]]:
     return laws
 
 
+@explained_by("own-law")
 def find_law(name: str) -> type[ControlLaw]:
     """Return the law class by name, by ``path/file.py:Class``, or by ``module:Class``.
 
@@ -70,6 +71,8 @@ def find_law(name: str) -> type[ControlLaw]:
         imported = importlib.import_module(module) if file is None else import_file(file)
         if file and not hasattr(imported, attribute):
             own = [key for key, value in vars(imported).items() if _is_law(value)]
+            if not own:
+                raise InputError(f"{file} has no class that is derived from ControlLaw")
             one_of(attribute, own, "class", f" of {file}")
         law = getattr(imported, attribute)
     except InputError as error:

@@ -23,9 +23,10 @@ from space_robot_msgs_py.config.arguments import path_text
 from space_robot_msgs_py.config.choices import choices
 from space_robot_msgs_py.config.directory import config_directory
 from space_robot_msgs_py.config.files import GIVEN, is_named, named_file
+from space_robot_msgs_py.config.text import printable
 from space_robot_msgs_py.config.validation import short
 from space_robot_msgs_py.config.yaml_text import check_file, is_folder
-from space_robot_msgs_py.errors import InputError
+from space_robot_msgs_py.errors import InputError, explained_by
 
 from .choice import split_choice
 from .robot import Robot
@@ -58,6 +59,7 @@ def robot_names() -> list[str]:
     return sorted(file.stem for file in (config_directory() / ROBOTS).glob("*.yaml"))
 
 
+@explained_by("own-robot")
 def robot_files(robot: str) -> RobotFiles:
     """Find the files of a robot, by name or path.
 
@@ -77,8 +79,16 @@ def robot_files(robot: str) -> RobotFiles:
         raise InputError(
             f"unknown robot {short(robot)}: "
             f"{choices(robot, robot_names(), ', or a path to a .yaml or .urdf file or a folder')}"
+            f"{_file_here(path)}"
         )
     return _in_config(config_directory() / ROBOTS / f"{robot}.yaml")
+
+
+def _file_here(path: Path) -> str:
+    """Return a suggestion of a robot's file with the same stem; empty if there is none."""
+    files = (path.with_name(f"{path.stem}{suffix}") for suffix in (*URDF, *YAML))
+    same = next((str(file) for file in files if os.path.isfile(file)), "")
+    return f" (did you mean {printable(same)}?)" if same else ""
 
 
 def find_robot(robot: str, base: str | None = None, repair: bool = False) -> Robot:
@@ -124,6 +134,7 @@ def mission_file(robot: str, mission: str = "") -> Path:
     return files.mission
 
 
+@explained_by("own-trajectory")
 def mission_layers(robot: str, mission: str) -> list[Path]:
     """Return the `mission_file` in a list; an empty list for `GIVEN`.
 

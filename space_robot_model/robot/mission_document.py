@@ -26,7 +26,7 @@ from space_robot_msgs_py.config.columns import read_columns
 from space_robot_msgs_py.config.files import GIVEN, node_parameters
 from space_robot_msgs_py.config.trees import Tree
 from space_robot_msgs_py.config.validation import StrictModel, read_yaml, validate
-from space_robot_msgs_py.errors import InputError
+from space_robot_msgs_py.errors import InputError, explained_by
 
 from .find import TRAJECTORIES, find_robot
 from .orientation import Attitude
@@ -73,6 +73,7 @@ OF_PLANT = ("initial_joints_deg", "initial_quaternion", "events")
 """Settings of a mission for the plant: its initial state, captures and releases."""
 
 
+@explained_by("own-trajectory")
 def mission_layer(path: Path, node: str, robot: str) -> Tree:
     """Return the parameters of a node in a parameter file, a mission's document or a trajectory.
 

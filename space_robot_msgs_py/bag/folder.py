@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator
+from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 from mcap.writer import MCAP0_MAGIC
 
+from ..config.choices import MOST_COMPARED, MOST_NEAR, nearest
+from ..config.text import printable
 from ..errors import InputError
 from .batch import Batch
 from .contents import Bag, Storage
@@ -119,7 +122,7 @@ def open_bag(path: Path) -> Bag:
     if path.name == METADATA:
         path = path.parent
     if not path.exists():
-        raise InputError(f"{path}: no such bag")
+        raise InputError(f"{path}: no such bag{_suggestion(path.parent, path.name)}")
     if not path.is_dir():
         return _open_files([path], None, [], closed=True)
     information, damage = None, []
@@ -140,8 +143,20 @@ def open_bag(path: Path) -> Bag:
         there = _listed(path, information, there, damage)
     if not there:
         hint = damage[-1] if damage else f"not a bag folder (no {METADATA}, no .mcap)"
-        raise InputError(hint if damage else f"{path}: {hint}")
+        raise InputError(hint if damage else f"{path}: {hint}{_suggestion(path)}")
     return _open_files(there, information, damage, closed)
+
+
+def _suggestion(folder: Path, name: str = "") -> str:
+    """Return the bags in a folder as a suggestion: those with a similar name, or any of them."""
+    try:
+        entries = sorted(islice(folder.iterdir(), MOST_COMPARED))
+        bags = {file.name: file for file in entries if (file / METADATA).is_file()}
+    except OSError:
+        return ""
+    names = nearest(name, list(bags)) if name else list(bags)[:MOST_NEAR]
+    near = " or ".join(printable(str(bags[key])) for key in names)
+    return f" (did you mean {near}?)" if near else ""
 
 
 def _listed(

@@ -40,6 +40,11 @@ class StrictModel(BaseModel):
 Schema = TypeVar("Schema", bound=BaseModel)
 
 
+ON_NUMBERS = {
+    *("greater_than", "greater_than_equal", "less_than", "less_than_equal"),
+    *("float_type", "int_type", "byte_size", "byte_size_unit"),
+}
+"""Kinds of errors that show the description of their field, since it has the unit."""
 MOST_KEPT = 100_000
 """Maximum length of a text with cached content, in characters."""
 
@@ -93,8 +98,23 @@ def one_line(error: ValidationError, schema: type[BaseModel], where: str) -> str
     if first["type"] == "extra_forbidden":
         allowed = choices(str(first["loc"][-1]), _allowed_keys(schema, first["loc"][:-1]))
         text, got = f"unknown key{got}: {allowed}", ""
+    if first["type"] in ON_NUMBERS and (description := _description(schema, first["loc"])):
+        got += f" ({description.removesuffix('.')})"
     more = f" (and {len(faults) - 1} more)" if len(faults) > 1 else ""
     return f"{where}: {key + ': ' if key else ''}{text}{got}{more}"
+
+
+def _description(schema: Any, location: tuple[int | str, ...]) -> str:
+    """Return the description of a field, with its unit; empty if it has none."""
+    description = ""
+    for step in location:
+        while get_origin(schema) not in (None, list, dict):
+            schema = get_args(schema)[0]
+        fields = getattr(schema, "model_fields", {})
+        if step not in fields:
+            return ""
+        schema, description = fields[step].annotation, fields[step].description or ""
+    return description
 
 
 def _allowed_keys(schema: Any, location: tuple[int | str, ...]) -> list[str]:

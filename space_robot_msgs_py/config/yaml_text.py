@@ -10,12 +10,15 @@ import re
 import stat
 from collections.abc import Hashable, Iterator
 from contextlib import contextmanager
+from itertools import islice
 from pathlib import Path
 from typing import Any, BinaryIO
 
 import yaml
 
 from ..errors import InputError
+from .choices import MOST_COMPARED, nearest
+from .text import printable
 
 try:
     from yaml import CSafeLoader as SafeLoader  # four times as fast
@@ -83,11 +86,22 @@ def _opened(path: Path) -> Iterator[BinaryIO]:
     except InputError:
         raise
     except FileNotFoundError:
-        raise InputError(f"{name}: no such file") from None
+        raise InputError(f"{name}: no such file{_similar_file(path)}") from None
     except OSError as error:
         raise InputError(f"{name}: cannot be read ({error.strerror})") from None
     except ValueError as error:  # not UTF-8, or an invalid file name
         raise InputError(f"{name}: cannot be read ({error})") from None
+
+
+def _similar_file(path: Path) -> str:
+    """Return the file of the same folder with the most similar name; empty if none is similar."""
+    try:
+        with os.scandir(path.parent) as entries:
+            names = sorted(entry.name for entry in islice(entries, MOST_COMPARED))
+    except (OSError, ValueError):
+        return ""
+    near = nearest(path.name, names)[:1]
+    return f" (did you mean {printable(str(path.with_name(near[0])))}?)" if near else ""
 
 
 def is_folder(path: Path) -> bool:

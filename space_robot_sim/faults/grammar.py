@@ -152,7 +152,10 @@ def parse_fault(text: str, kinds: Kinds) -> Fault:
     where = f"fault {text!r}"
     match = _FAULT.fullmatch(text.strip())
     if match is None:
-        raise InputError(f"{where}: KIND@T[-END][:ARGUMENT] expected, as in drop_state@2-3:0.1")
+        raise InputError(
+            f"{where}: KIND@T[-END][:ARGUMENT] expected, T and END in simulated "
+            "seconds, as in drop_state@2-3:0.1"
+        )
     start, stop = float(match["start"]), float(match["stop"] or math.inf)
     try:
         check_time(start)

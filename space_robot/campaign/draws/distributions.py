@@ -12,6 +12,7 @@ from typing_extensions import Self
 
 from space_robot_model.elementary.exponential import exp, log
 from space_robot_model.elementary.normal import normal_cdf, quantile
+from space_robot_msgs_py.config.choices import nearest
 from space_robot_msgs_py.config.validation import StrictModel, short, validate
 from space_robot_msgs_py.errors import InputError
 
@@ -241,9 +242,11 @@ def read_distribution(value: Any, where: str) -> Distribution:
         for key, kind in KINDS.items():
             if key in value:
                 return validate(kind, value, where)
+    keys = [str(key) for key in value] if isinstance(value, dict) else []
+    near = " or ".join(dict.fromkeys(kind for key in keys for kind in nearest(key, list(KINDS))))
     raise InputError(
         f"{where}: a distribution was expected, a mapping with one of {', '.join(KINDS)}, "
-        f"got {short(value)}"
+        f"got {short(value)}" + (f" (did you mean {near}?)" if near else "")
     )
 
 

@@ -167,7 +167,8 @@ def node_variables(
             raise InputError(f"{where}: relative or offset, but {name} is {short(value)}")
         return [OfNode(f"{node}.{name}", key, distribution, node, name)]
     if not element:
-        raise InputError(f"{name} has {len(value)} elements: {node}.{name}[*], or [1] ...")
+        one = f"{node}.{name}[1] to [{len(value)}] for one of them"
+        raise InputError(f"{name} is a list: {node}.{name}[*] for all of it, or {one}")
     numbers = [str(number + 1) for number in range(len(value))]
     return [
         OfNode(f"{node}.{name}[{own}]", key, _numbers(distribution, where), node, name, number)

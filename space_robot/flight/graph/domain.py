@@ -105,10 +105,12 @@ def _see_that_nobody_is_there(domain: int, namespace: str) -> None:
 
 def _refusal(domain: int, namespace: str, holder: Holder) -> InputError:
     where = "" if namespace == ROOT else f"namespace {namespace} of "
-    return InputError(
+    error = InputError(
         f"{where}ROS domain {domain} is taken by {holder.name}: end that one, take another domain "
         "with --domain, or ROS_DOMAIN_ID, or fly in a namespace of its own with fly --namespace"
     )
+    error.help_topic = "ros"
+    return error
 
 
 def is_quiet(domain: int) -> bool:

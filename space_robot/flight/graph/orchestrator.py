@@ -155,10 +155,12 @@ def require_ros() -> None:
     try:
         import rclpy  # noqa: F401
     except ImportError as error:
-        raise FlightError(
+        missing = FlightError(
             f"rclpy cannot be imported ({error}): source your ROS 2 Jazzy, or install the [ros] "
             "extra; `space-robot simulate` flies without"
-        ) from None
+        )
+        missing.help_topic = "install"
+        raise missing from None
 
 
 def flight_parameters(flight: Flight, bag: Path) -> dict[str, dict[str, Any]]:

@@ -51,7 +51,9 @@ class Report:
     def error(self, line: int, part: str, defect: str, value: str | None = None) -> InputError:
         """Return the error for an irreparable defect, to be raised."""
         got = "" if value is None else f", got {short(value)}"
-        return InputError(f"{self.where}: line {line}: {part}: {defect}{got}")
+        error = InputError(f"{self.where}: line {line}: {part}: {defect}{got}")
+        error.help_topic = "own-robot"
+        return error
 
     def repaired(self, line: int, part: str, defect: str, value: str, repair: str) -> None:
         """Store a defect with its repair."""

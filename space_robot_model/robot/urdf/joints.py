@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from space_robot_msgs_py.config.choices import nearest
 from space_robot_msgs_py.config.validation import short
 
 from ...elementary.matrices import norm
@@ -119,7 +120,10 @@ def _end(element: Element, tag: str, links: Mapping[str, UrdfLink], fields: Fiel
     if end is None or not name:
         raise fields.report.error(element.line, fields.part, f'<{tag} link="..."/> is missing')
     if name not in links:
-        raise fields.report.error(end.line, fields.part, f"the {tag} is not a known link", name)
+        near = " or ".join(nearest(name, list(links)))
+        advice = f" (did you mean {near}?)" if near else ""
+        what = f"the {tag} is not a known link{advice}"
+        raise fields.report.error(end.line, fields.part, what, name)
     return name
 
 

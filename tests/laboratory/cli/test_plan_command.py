@@ -136,7 +136,7 @@ def test_the_figure_is_drawn(mission: Path, tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("change", "said"),
     [
-        ({"start": {"joints_deg": [0, 90]}}, "waypoints_deg has 2 values"),
+        ({"start": {"joints_deg": [0, 90]}}, "the start has 2 joints; the robot has 6"),
         ({"segments": []}, "segments"),
         ({"segments": [{"tool": {"xyz": [9, 9, 9]}, "duration": 5}]}, "segment 1: the tool cannot"),
         ({"limits": {"torque": 1.0}}, "limits.torque: unknown key"),
