@@ -15,6 +15,8 @@ COLOURS = {"ok": "green", "warning": "yellow", "missing": "red"}
 WIDTH = 16
 """Characters of the longest name of a check."""
 
+SECTION = "Begin"
+
 
 @click.command()
 @flight_option("json")

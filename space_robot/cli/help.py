@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import click
 
+SECTION = "Begin"
+
 
 @click.command()
 @click.argument("topic", default="")

@@ -44,6 +44,9 @@ def serve_live(
     plots: tuple[str, ...],
 ) -> None:
     """Serve the scene until the user ends it; its arguments are the command's options."""
+    from ..flight.graph.orchestrator import require_ros
+
+    require_ros()
     click.echo("starting the scene ...", err=True)  # where much else runs, that takes a while
     from space_robot_model.robot.find import robot_as_path
 

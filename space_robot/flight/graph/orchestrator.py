@@ -20,6 +20,7 @@ from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.bag.folder import open_bag
 from space_robot_msgs_py.bag.reader import read_flight
 from space_robot_msgs_py.bag.selection import Selection
+from space_robot_msgs_py.config.extras import install_command
 from space_robot_msgs_py.config.files import GIVEN
 from space_robot_msgs_py.errors import FlightError, InputError, SpaceRobotError
 
@@ -156,8 +157,8 @@ def require_ros() -> None:
         import rclpy  # noqa: F401
     except ImportError as error:
         missing = FlightError(
-            f"rclpy cannot be imported ({error}): source your ROS 2 Jazzy, or install the [ros] "
-            "extra; `space-robot simulate` flies without"
+            f"rclpy cannot be imported ({error}): source your ROS 2 Jazzy, or "
+            f"`{install_command('ros')}`; `space-robot simulate` flies without"
         )
         missing.help_topic = "install"
         raise missing from None

@@ -5,6 +5,7 @@ from __future__ import annotations
 import html
 import re
 import shutil
+import sys
 from functools import partial
 from html.parser import HTMLParser
 from pathlib import Path
@@ -240,3 +241,13 @@ def test_a_bag_has_no_shapes_of_a_urdf_until_it_is_named(view: Run, tmp_path: Pa
         for _, message in Scene((tmp_path / "shown.html").read_text("utf-8")).messages
     }
     assert {"MeshMessage", "IcosphereMessage", "BoxMessage", "CylinderMessage"} <= types
+
+
+def test_a_live_view_without_ros_ends_with_one_line(
+    space_robot: Run, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, "rclpy", None)
+    ended = space_robot("view", "--live", "--no-open")
+    assert ended.code == 1
+    assert ended.err.startswith("space-robot: error: rclpy cannot be imported")
+    assert install_command("ros") in ended.err
