@@ -5,8 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 
+from space_robot_msgs_py.config.extras import requirements
+
 from .checked_item import CheckedItem
-from .packages import check_packages, check_python, requirements
+from .packages import check_packages, check_python
 
 
 def examine(clock_s: float | None = None) -> Iterator[CheckedItem]:

@@ -6,11 +6,12 @@ import platform
 import re
 import sys
 from collections.abc import Iterator, Mapping, Sequence
-from importlib.metadata import PackageNotFoundError, requires, version
+from importlib.metadata import PackageNotFoundError, version
+
+from space_robot_msgs_py.config.extras import install_packages
 
 from .checked_item import CheckedItem
 
-PROJECT = "space_robot"
 OLDEST, NEWEST = (3, 10), (3, 13)
 """Versions of Python that setup.py admits."""
 USES = {
@@ -26,7 +27,6 @@ USES = {
 }
 """Extras for users, and what needs them."""
 _NAME = re.compile(r"[\w.-]+")
-_EXTRA = re.compile(r"extra\s*==\s*['\"]([\w-]+)['\"]")
 
 
 def check_python(python: tuple[int, int] = sys.version_info[:2]) -> CheckedItem:
@@ -48,26 +48,6 @@ def check_python(python: tuple[int, int] = sys.version_info[:2]) -> CheckedItem:
     return CheckedItem("Python", "missing", text, advice, values, is_required=True)
 
 
-def requirements(lines: Sequence[str] | None = None) -> dict[str, list[str]]:
-    """Return the requirements of each extra; those without an extra under "".
-
-    Args:
-        lines: as in a wheel's ``Requires-Dist``; None: those of the installed project, none where
-            it is not installed.
-    """
-    if lines is None:
-        try:
-            lines = requires(PROJECT) or []
-        except PackageNotFoundError:
-            lines = []
-    by_extra: dict[str, list[str]] = {}
-    for line in lines:
-        package, _, marker = line.partition(";")
-        extra = _EXTRA.search(marker)
-        by_extra.setdefault(extra[1] if extra else "", []).append(package.strip())
-    return by_extra
-
-
 def installed(packages: Sequence[str]) -> dict[str, str | None]:
     """Return the version of each required package by name; None if it is not installed."""
     versions: dict[str, str | None] = {}
@@ -85,7 +65,7 @@ def check_packages(required: Mapping[str, list[str]]) -> Iterator[CheckedItem]:
     """Report the required packages, and the extras one by one.
 
     Args:
-        required: of `requirements`.
+        required: requirements of each extra; those without an extra under "".
     """
     packages = required.get("", [])
     if not packages:
@@ -102,7 +82,7 @@ def _check_required(packages: Sequence[str]) -> CheckedItem:
     versions = installed(packages)
     lacking = _lacking(packages, versions)
     if lacking:
-        text, advice = f"not installed: {', '.join(lacking)}", install(lacking)
+        text, advice = f"not installed: {', '.join(lacking)}", install_packages(lacking)
         return CheckedItem("packages", "missing", text, advice, versions, is_required=True)
     shown = ("numpy", "numba", "scipy", "pydantic", "matplotlib", "mcap")
     text = ", ".join(f"{name} {versions[name]}" for name in shown if name in versions)
@@ -115,7 +95,9 @@ def _check_extra(extra: str, use: str, packages: Sequence[str]) -> CheckedItem:
     lacking = _lacking(packages, versions)
     if lacking:
         text = f"{use}: not installed: {', '.join(lacking)}"
-        return CheckedItem(name, "missing", text, f"{install(lacking)}, if you need it", versions)
+        return CheckedItem(
+            name, "missing", text, f"{install_packages(lacking)}, if you need it", versions
+        )
     if not packages:
         text = f"{use}: unknown, the installed space_robot does not list this extra"
         return CheckedItem(name, "warning", text, "install space_robot again")
@@ -126,10 +108,3 @@ def _check_extra(extra: str, use: str, packages: Sequence[str]) -> CheckedItem:
 def _lacking(packages: Sequence[str], versions: Mapping[str, str | None]) -> list[str]:
     """Return the requirements of packages that are not installed."""
     return [text for text, number in zip(packages, versions.values(), strict=True) if not number]
-
-
-def install(packages: Sequence[str]) -> str:
-    """Return the command that installs packages."""
-    import shlex
-
-    return shlex.join(["pip", "install", *packages])

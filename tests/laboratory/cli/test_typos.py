@@ -62,7 +62,7 @@ TYPOS = (
     # commands and options
     Typo(
         "simulte --case 3",
-        "no such command 'simulte': ...(did you mean simulate or sim?)... "
+        "no such command 'simulte': did you mean simulate or sim? (... in all) "
         "(see: space-robot --help)",
     ),
     Typo(
@@ -272,11 +272,6 @@ TYPOS = (
         "campaign run sensor_grade",
         "unknown campaign 'sensor_grade': choose one of ..., or a path to a .yaml file "
         "(did you mean sensor_grades?) (see: space-robot help campaign)",
-    ),
-    Typo(
-        "campaign run first",
-        "--out: the folder of the campaign is missing, such as --out campaigns/first "
-        "(see: space-robot help campaign)",
     ),
     Typo(
         "campaign run scle.yaml --out x",

@@ -13,9 +13,10 @@ from space_robot.doctor.clock import (
     check_scheduling,
     measure_lateness,
 )
-from space_robot.doctor.packages import check_packages, check_python, requirements
+from space_robot.doctor.packages import check_packages, check_python
 from space_robot.doctor.storage import check_disk, check_kernels, check_memory
 from space_robot.doctor.tools import check_tools
+from space_robot_msgs_py.config.extras import requirements
 
 
 def named(items: list[CheckedItem], name: str) -> CheckedItem:
