@@ -144,7 +144,7 @@ function chosen() {
 function remember() {
   const usual = plots.every((plot) => plot.shown === drawn.has(plot));
   const names = plots.filter((plot) => drawn.has(plot)).map(nameOf);
-  if (isDocument) history.replaceState(null, "", usual ? "#" : `#plots=${[...new Set(names)].join(",")}`);
+  if (isDocument) history.replaceState(null, "", usual ? location.pathname + location.search : `#plots=${[...new Set(names)].join(",")}`);
 }
 
 const inputs = plots.map((plot) => {
