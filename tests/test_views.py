@@ -170,7 +170,7 @@ def test_rviz_listens_as_we_send(seen: dict[str, Any]) -> None:
     found = yaml.safe_load((VIEWS / "fly.rviz").read_text("utf-8"))["Visualization Manager"]
     assert found["Global Options"]["Fixed Frame"] == topics.INERTIAL_FRAME
     displays = {display["Class"].rpartition("/")[2]: display for display in found["Displays"]}
-    assert set(displays) == {"Grid", "RobotModel", "TF", "MarkerArray"}
+    assert set(displays) == {"RobotModel", "TF", "MarkerArray"}  # and no floor
     assert all(display["Enabled"] for display in displays.values())
     heard = {
         SHOWN[given["Value"]]: given
