@@ -1,4 +1,4 @@
-"""Control laws in a user's Python file, selected by path and class: ``./my_laws.py:ADRC``.
+"""A user's own code, selected by path and name: ``./my_laws.py:ADRC``, or ``module:ADRC``.
 
 The file is imported under a unique module name, so that it cannot be confused with a module of
 another folder; its folder is not added to the search path.
@@ -8,13 +8,21 @@ from __future__ import annotations
 
 import hashlib
 import importlib.util
+import os.path
 import sys
+from collections.abc import Callable
 from pathlib import Path
 from types import ModuleType
+from typing import Any
 
+from space_robot_msgs_py.config.text import one_line_of
+from space_robot_msgs_py.config.validation import one_of
 from space_robot_msgs_py.config.yaml_text import check_file
+from space_robot_msgs_py.errors import InputError
 
 ENDING = ".py"
+LONGEST_REASON = 200
+"""Maximum length, in characters, of an error of a user's own code in a message."""
 _NAMES: dict[str, str] = {}
 """Path of each module imported here, by the module's name."""
 
@@ -49,6 +57,61 @@ def import_file(path: Path) -> ModuleType:
     return sys.modules[name]
 
 
-def importable_name(law: type) -> str:
-    """Return the name by which another process imports a law: ``module:Class`` or with a path."""
-    return f"{_NAMES.get(law.__module__, law.__module__)}:{law.__qualname__}"
+def import_named(
+    name: str,
+    what: str,
+    kind: str,
+    is_wanted: Callable[[object], bool],
+    advice: str,
+    derived: str = "",
+) -> Any:
+    """Return an object of a user's own code.
+
+    Args:
+        name: ``path/file.py:NAME`` or ``module:NAME``.
+        what: the name as the user knows it, for errors: "controller './mine.py:Mine'".
+        kind: of the object, for errors: "class".
+        is_wanted: True for an object of this kind.
+        advice: how to name one, for errors.
+        derived: what all of this kind have in common, for errors: " derived from ControlLaw".
+
+    Raises:
+        InputError: it cannot be imported, or is of another kind.
+    """
+    module, _, attribute = name.rpartition(":")
+    file = law_file(name)
+    try:
+        imported = importlib.import_module(module) if file is None else import_file(file)
+        if file and not hasattr(imported, attribute):
+            own = [key for key, value in vars(imported).items() if is_wanted(value)]
+            if not own:
+                raise InputError(f"{file} has no {kind}{derived}")
+            one_of(attribute, own, kind, f" of {file}")
+        value = getattr(imported, attribute)
+    except InputError as error:
+        where = "" if file is None or file.is_absolute() else " (paths are from the current folder)"
+        raise InputError(f"{what}: {error}{where}") from None
+    except (Exception, SystemExit) as error:  # a user's module may raise anything
+        why = one_line_of(error)
+        why = why if len(why) <= LONGEST_REASON else f"{why[:LONGEST_REASON]}..."
+        advice = _advice(module, attribute, error) or advice
+        raise InputError(f"{what} cannot be imported ({why}): {advice}") from None
+    return value
+
+
+def _advice(module: str, attribute: str, error: BaseException) -> str:
+    """Return advice for a module that was not found; empty for any other error."""
+    if not isinstance(error, ModuleNotFoundError):
+        return ""
+    own = f"{module.replace('.', '/')}{ENDING}"
+    if error.name and module.startswith(error.name) and os.path.isfile(own):
+        return f"the current folder is not searched for modules: name the file, {own}:{attribute}"
+    return "modules are searched for on PYTHONPATH; a file is named by its path, file.py:NAME"
+
+
+def importable_name(own: Any) -> str:
+    """Return the name by which another process imports a class or function of a user.
+
+    It is ``module:NAME``, or has the path of a file that `import_file` has imported.
+    """
+    return f"{_NAMES.get(own.__module__, own.__module__)}:{own.__qualname__}"
