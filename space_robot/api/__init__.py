@@ -1,6 +1,7 @@
 """Python interface: scenarios, flown flights, and the bench for flights step by step."""
 
-from ..flight.bench import Bench, Snapshot
+from ..flight.bench import Snapshot
+from .bench import Bench
 from .flown_flight import FlownFlight
 from .scenario import Scenario
 

@@ -17,8 +17,10 @@ from space_robot_msgs_py.errors import InputError
 from ..analysis import analyze
 from ..analysis.report_tables import rms_table
 from ..analysis.words import flown
+from ..flight.bag_path import check_bag_path
 from ..flight.ending import COMPLETE, Ending
 from ..flight.plan import Flight
+from ..flight.simulate import record
 from .report import flight_report
 
 if TYPE_CHECKING:
@@ -29,7 +31,7 @@ if TYPE_CHECKING:
 
 
 class FlownFlight:
-    """Result of `Scenario.fly`, also of a flight that ended early."""
+    """Result of `Scenario.fly` or `Bench.flown`, also of a flight that ended early."""
 
     def __init__(
         self,
@@ -153,6 +155,23 @@ class FlownFlight:
 
             save_figure(figure, file)
         return figure
+
+    def save(self, bag: str | Path) -> Path:
+        """Write the flight into a bag, as ``fly(bag=...)`` does; return its folder.
+
+        Args:
+            bag: folder to record to, which must not exist.
+
+        Raises:
+            InputError: no log was kept, the bag cannot be written, or messages failed in flight.
+        """
+        path = as_path(bag, "bag")
+        if self.flight.flies_by_messages:
+            raise InputError("messages of this flight failed: record them by fly(bag=...)")
+        check_bag_path(path)
+        record(self.flight, self.log, path)
+        self.bag = path
+        return path
 
     def __repr__(self) -> str:
         end = "" if self.is_complete else f": {self.reason}"

@@ -81,7 +81,7 @@ class SpaceRobotEnv(gymnasium.Env[Array, Array]):
         first = scenario if isinstance(scenario, Scenario) else _drawn(scenario, 0)
         self._ticks = as_whole_number(ticks_per_step, "ticks_per_step", 1)
         scale = as_numbers(torque_scale, "torque_scale")
-        self.bench = first.bench()
+        self.bench = first.bench(record=False)
         m = self.bench.axes
         if scale.shape not in ((), (m,)) or not np.all((scale > 0.0) & np.isfinite(scale)):
             raise InputError(f"torque_scale: 1 or {m} numbers above 0 are allowed, got {scale}")
@@ -97,7 +97,7 @@ class SpaceRobotEnv(gymnasium.Env[Array, Array]):
         """Start an episode; ``options`` is not used."""
         super().reset(seed=seed)
         if self._draw is not None:
-            bench = _drawn(self._draw, self.np_random).bench()
+            bench = _drawn(self._draw, self.np_random).bench(record=False)
             if bench.axes != self.bench.axes:
                 raise InputError(
                     f"scenario: {self.bench.axes} axes were expected, got {bench.axes}"

@@ -1,4 +1,4 @@
-"""Bench: a flight step by step, to develop and learn control laws.
+"""A flight step by step, to develop and learn control laws.
 
     state = bench.reset(seed=1)
     while not bench.done:
@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from space_robot_control.controller.controller import Controller, ControllerSnapshot
-from space_robot_control.laws import ControlLaw
+from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.compiled.records import Block, RecordOwner
 from space_robot_msgs_py.config.arguments import as_numbers, as_whole_number
 from space_robot_msgs_py.config.validation import short
@@ -24,6 +24,8 @@ from space_robot_msgs_py.errors import FlightError, InputError
 from space_robot_msgs_py.samples import Command, Reference, RobotState
 from space_robot_sim.plant.plant import Plant, PlantSettings, PlantSnapshot
 
+from .bench_history import BenchHistory
+from .bench_log import BenchLog, law_at
 from .ending import Ending
 from .plan import Flight
 
@@ -42,6 +44,8 @@ class Snapshot(NamedTuple):
     answered: int
     """The last tick that the law has answered; -1: none."""
     ending: Ending | None
+    history: BenchHistory | None = None
+    """Commands of the ticks flown; None: not recorded."""
 
 
 def check_for_bench(flight: Flight) -> None:
@@ -67,7 +71,7 @@ def seeded(flight: Flight, seed: int, name: str = "seed") -> PlantSettings:
     return flight.plant_settings.model_copy(update={"fault_seed": number})
 
 
-class Bench(RecordOwner):
+class FlightBench(RecordOwner):
     """Plant flown tick by tick under external torques, or under the flight's law.
 
     States are views of the memory of one flight, overwritten by every step: `RobotState.copy`
@@ -77,8 +81,12 @@ class Bench(RecordOwner):
 
     _views = ("_reference",)
 
-    def __init__(self, flight: Flight) -> None:
+    def __init__(self, flight: Flight, record: bool = False) -> None:
         """Put a flight on the bench.
+
+        Args:
+            flight: to be flown.
+            record: keep the commands, for `log`.
 
         Raises:
             InputError: the flight needs a graph of nodes or has faults of messages.
@@ -93,6 +101,7 @@ class Bench(RecordOwner):
         """m = n+3."""
         self._shape = (len(self.names.commanded),)
         self._given = Command(0, np.zeros(self._shape))
+        self._records = record
         self._desired: Block = np.empty(0, Reference.dtype(flight.robot.n))
         self._first = 0
         """Tick of the first row of ``_desired``."""
@@ -119,6 +128,8 @@ class Bench(RecordOwner):
         """The controller, with the law in force; its signals are those of the last answer."""
         self._answered = -1
         self._ending: Ending | None = None
+        self._history = BenchHistory(settings.fault_seed) if self._records else None
+        self._log: BenchLog | None = None
         self.done = False
         """True once the flight is over; see `outcome`."""
         return self._plant.state
@@ -138,7 +149,13 @@ class Bench(RecordOwner):
             raise InputError(f"the flight is over ({self.outcome}): reset or restore the bench")
         plant = self._plant
         try:
-            plant.step(self.command() if torque is None else self._command_of(torque))
+            command = self.command() if torque is None else self._command_of(torque)
+            if (history := self._history) is not None:
+                if self._answered == plant.state.tick:
+                    history.add(command.torque, self.controller.telemetry())
+                else:
+                    history.add(command.torque)
+            plant.step(command)
         except FlightError as error:
             self._end(Ending.early(error, self.period))
         else:
@@ -160,7 +177,7 @@ class Bench(RecordOwner):
         if self.flight.scenario.options.controller is None:
             raise InputError("controller is None: give every step a torque")
         if tick != self._answered:
-            law = self._law_at(tick)
+            law = law_at(self._law, self._swaps, tick)
             if law is not controller.law:
                 controller.law = law
             elif tick and tick != self._answered + 1:
@@ -172,7 +189,10 @@ class Bench(RecordOwner):
 
     def save(self) -> Snapshot:
         """Save the complete state of the flight."""
-        return Snapshot(self._plant.save(), self.controller.save(), self._answered, self._ending)
+        history = None if self._history is None else self._history.copy()
+        return Snapshot(
+            self._plant.save(), self.controller.save(), self._answered, self._ending, history
+        )
 
     def restore(self, snapshot: Snapshot) -> RobotState:
         """Restore a snapshot of this scenario; the flight continues bit-identically.
@@ -198,8 +218,40 @@ class Bench(RecordOwner):
         self._plant.restore(snapshot.plant)
         self.controller.restore(snapshot.controller, self._laws)
         self._answered, self._ending = snapshot.answered, snapshot.ending
+        history = snapshot.history if self._records else None
+        self._history = None if history is None else history.copy()
+        self._log = None
         self.done = self._ending is not None
         return self._plant.state
+
+    def log(self) -> FlightLog:
+        """Return the log of all ticks flown since the last `reset`, as that of a whole flight.
+
+        The recorded commands are flown again for it, unless nothing was flown since the last call.
+        The log of a law's own steps has its telemetry.
+
+        Raises:
+            InputError: nothing was flown or recorded; the log does not fit into memory; or the
+                state reached is not the bench's, whose scenario is another one then.
+        """
+        return self._flown().log
+
+    def _flown(self) -> BenchLog:
+        history = self._history
+        if history is None:
+            why = "was not recorded (record=False), or a snapshot restored that was not"
+            raise InputError(f"log: the flight {why}")
+        if not len(history) and self._ending is None:
+            raise InputError("log: no tick has been flown yet")
+        if self._log is None or self._log.log.ticks < len(history):
+            flown = BenchLog(self.flight, history, self._ending.error if self._ending else None)
+            if flown.flight.plant.block.tobytes() != self._plant.block.tobytes():
+                raise InputError(
+                    "log: the recorded commands lead to another state: a snapshot of another "
+                    "scenario was restored, or the plant was changed in flight"
+                )
+            self._log = flown
+        return self._log
 
     @property
     def state(self) -> RobotState:
@@ -256,14 +308,6 @@ class Bench(RecordOwner):
                 f"torque: {counts} numbers were expected, got an array of shape {numbers.shape}"
             )
         return self.controller.allocate_torque(self._plant.state, numbers)
-
-    def _law_at(self, tick: int) -> ControlLaw:
-        """Return the law in force at this tick, after swaps."""
-        law = self._law
-        for swapped_at, other in self._swaps:
-            if swapped_at <= tick:
-                law = other
-        return law
 
     def _look_up(self, tick: int) -> None:
         """Write the reference of a tick into its block."""

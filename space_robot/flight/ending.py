@@ -10,6 +10,8 @@ from space_robot_msgs_py.errors import DivergedError, FlightError, UnusableState
 COMPLETE, DIVERGED, UNANSWERED, FAILED = "complete", "diverged", "unanswered", "failed"
 """Outcomes: flown to its end; the state left the physics; the law has no command for a state (the
 attitude is near 180 degrees, a number is not finite); a node or its messages failed."""
+STOPPED = "stopped"
+"""Outcome of a flight on a bench that goes on, or was left there."""
 _DIVERGED = re.compile(r"diverged at tick (\d+)")
 
 
@@ -17,7 +19,7 @@ class Ending(NamedTuple):
     """The end of a flight."""
 
     outcome: str
-    """`COMPLETE`, `DIVERGED`, `UNANSWERED` or `FAILED`."""
+    """`COMPLETE`, `DIVERGED`, `UNANSWERED`, `FAILED` or `STOPPED`."""
     reason: str
     """Reason of an early end, in one line; empty otherwise."""
     tick: int | None
@@ -43,6 +45,12 @@ class Ending(NamedTuple):
         elif match := _DIVERGED.search(str(error)):
             outcome, tick = DIVERGED, int(match[1])
         return cls(outcome, str(error), tick, _seconds(tick, period), error)
+
+    @classmethod
+    def stopped(cls, tick: int, period: float) -> Ending:
+        """Return the end of a flight that was left at a tick on a bench."""
+        seconds = _seconds(tick, period)
+        return cls(STOPPED, f"stopped on the bench at {seconds:g} s", tick, seconds)
 
     def as_record(self) -> dict[str, Any]:
         """Return the end as a record for reports."""

@@ -114,6 +114,8 @@ class Messages:
             if laws and laws[0].tick == tick:
                 record(topics.LAW, self._law.encode(laws.pop(0)))
             if tick % flight.controller_settings.telemetry_decimation == 0:
+                if np.isnan(log.telemetry[row]).all():  # the law was not asked, on a bench
+                    continue
                 s, u, n_hat, e = log.telemetry[row]
                 record(topics.TELEMETRY, self._telemetry.encode(tick, (s, u, n_hat, e)))
                 record(topics.SIGNALS, self._signals.encode(tick, e, s, n_hat))
@@ -234,6 +236,25 @@ def fly_blocks(
     progress(flight.ticks)
 
 
+def record(flight: Flight, log: FlightLog, bag: Path) -> None:
+    """Write a flown flight into a bag, with the messages that `fly_blocks` would have written.
+
+    Args:
+        flight: that was flown.
+        log: of all its ticks, in memory.
+        bag: folder to write.
+
+    Raises:
+        InputError: the bag cannot be written.
+    """
+    answered = log.ticks - log.unanswered
+    with _recording(flight, bag) as messages:
+        assert messages
+        for block in blocks_of(log):
+            start, stop = block.first_tick, block.first_tick + block.ticks
+            messages.stretch(block, start, stop, min(stop, answered))
+
+
 def simulate(
     flight: Flight, bag: Path | None = None, progress: Callable[[int], None] = lambda tick: None
 ) -> FlightLog:
@@ -246,7 +267,7 @@ def simulate(
     flight.check_in_process()
     if flight.flies_by_messages:
         return _flown_by_messages(flight, bag, progress)
-    _check_memory(flight)
+    check_memory(flight, flight.ticks)
     log, flown = empty_log(flight), 0
     try:
         for block in fly_blocks(flight, bag, progress, log.rows):
@@ -341,19 +362,24 @@ def ended_early(block: FlightLog, measured: int, answered: int) -> FlightLog:
     return block.rows(0, measured)
 
 
-def _check_memory(flight: Flight) -> None:
-    """Check that a log of the whole flight fits into memory.
+def check_memory(flight: Flight, ticks: int) -> None:
+    """Check that a log of the first ``ticks`` of a flight fits into memory.
 
     Raises:
         InputError: the log does not fit.
     """
     from ..processes.memory import available_bytes
 
-    row = empty_log(flight, 0, 1)
-    columns = [*row.columns.values(), *(row.measured.columns.values() if row.measured else ())]
-    needed, free = flight.ticks * sum(column.nbytes for column in columns), available_bytes()
+    needed, free = ticks * row_bytes(flight), available_bytes()
     if needed > free:
         raise InputError(
-            f"duration {flight.ticks * flight.period:g} s: the whole flight in memory needs "
+            f"duration {ticks * flight.period:g} s: the whole flight in memory needs "
             f"{needed / 1e9:.1f} GB, {free / 1e9:.1f} GB are free: fly a shorter one"
         )
+
+
+def row_bytes(flight: Flight) -> int:
+    """Return the size of a tick in a log."""
+    row = empty_log(flight, 0, 1)
+    columns = [*row.columns.values(), *(row.measured.columns.values() if row.measured else ())]
+    return sum(column.nbytes for column in columns)

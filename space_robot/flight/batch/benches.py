@@ -4,7 +4,7 @@
     while not benches.done.all():
         states = benches.step(torques_of(states))
 
-Each flight has the bits of its `space_robot.flight.bench.Bench`.
+Each flight has the bits of its `space_robot.flight.bench.FlightBench`.
 """
 
 from __future__ import annotations

@@ -17,6 +17,7 @@ from space_robot_control.controller.gains import (
     gains_as_path,
     split_gains,
 )
+from space_robot_control.controller.plain_laws import NoLaw
 from space_robot_control.controller.settings import DEFAULT, ControllerNodeSettings
 from space_robot_control.controller.swaps import parse_swaps
 from space_robot_control.laws import ControlLaw, find_law
@@ -65,7 +66,13 @@ class ControllerChoice:
         controller = str(chosen.get("controller", controller))
         gains = str(chosen.get("gains", gains))
         flown = recorded_parameters(flight)
-        if not (named := controller or flown.get("controller") or flight.get("controller")):
+        named = controller or flown.get("controller") or flight.get("controller")
+        if named == NoLaw.name:
+            raise InputError(
+                "no law flew: the torques of this flight came from outside, on a bench: name the "
+                "law that shall answer with --controller"
+            )
+        if not named:
             raise InputError(
                 "the bag does not say which law was flown: name it with --controller, and its "
                 "gains with --gains"

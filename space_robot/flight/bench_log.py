@@ -1,0 +1,116 @@
+"""The log of a flight on a bench: its commands, flown again into a log."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from contextlib import suppress
+from dataclasses import replace
+from itertools import islice
+from typing import Any
+
+import numpy as np
+
+from space_robot_control.controller.law_changes import LawChanges
+from space_robot_control.controller.plain_laws import NoLaw
+from space_robot_control.laws import ControlLaw
+from space_robot_msgs_py.bag.flight_log import FlightLog
+from space_robot_msgs_py.errors import DivergedError, FlightError
+from space_robot_msgs_py.samples import Command
+
+from .bench_history import BenchHistory
+from .closed_loop import measured_ticks
+from .plan import Flight
+from .simulate import check_memory, empty_log, ended_early, note_beliefs
+
+STRETCH_TICKS = 10_000
+"""Ticks whose states are in memory beside the log."""
+
+
+class BenchLog:
+    """A flight and its log as `space_robot.flight.simulate.simulate` makes it."""
+
+    def __init__(self, flight: Flight, history: BenchHistory, error: FlightError | None) -> None:
+        """Fly the commands of a history again.
+
+        Args:
+            flight: that was put on the bench.
+            history: of the ticks flown.
+            error: that ended the flight; None: it is complete, or goes on.
+
+        Raises:
+            InputError: the log does not fit into memory.
+        """
+        self.flight = flight_of(flight, history)
+        """The flight that was flown, with its plant at the end: of the seed that was flown, and
+        without a law if the law was never asked."""
+        check_memory(self.flight, len(history))
+        self.log = self._fly(history, error)
+        """All ticks flown."""
+
+    def _fly(self, history: BenchHistory, error: FlightError | None) -> FlightLog:
+        flight, plant, ticks = self.flight, self.flight.plant, len(history)
+        is_unanswered = error is not None and not isinstance(error, DivergedError)
+        log = empty_log(flight, 0, ticks + is_unanswered)
+        assert log.commanded_torque is not None
+        assert log.telemetry is not None
+        width, axes = len(plant.names.commanded), log.axes
+        rows, changes = history.rows(), LawChanges()
+        no_law = NoLaw({}, flight.period, axes)
+        last: ControlLaw | None = None
+        command = Command(0, np.zeros(width))
+        for start in range(0, log.ticks, STRETCH_TICKS):
+            count = min(STRETCH_TICKS, log.ticks - start)
+            states = np.empty(count, plant.state.block.dtype)
+            truths, torques = states.copy(), np.full((count, width), np.nan)
+            for k, row in enumerate(islice(rows, count)):
+                states[k], truths[k], torques[k] = plant.state.block, plant.truth.block, row[:width]
+                law: ControlLaw = no_law
+                if len(row) > width:
+                    log.telemetry[start + k] = row[width:].reshape(4, axes)
+                    law = law_at(flight.law, flight.swaps, start + k)
+                if law is not last and (change := changes.at(start + k, law)):
+                    log.laws += (change.law,)
+                last = law
+                command.torque[:] = row[:width]
+                with suppress(DivergedError):  # in the last step of a flight that ended by it
+                    plant.step(command)
+            if start + count > ticks:
+                states[-1], truths[-1] = plant.state.block, plant.truth.block
+            log.put(start, states if log.measured is None else truths)
+            log.put_measured(start, states)
+            log.put_commands(start, torques)
+        note_beliefs(flight, log, 0, log.ticks)
+        if error is not None:
+            return ended_early(log, measured_ticks(plant, error), plant.tick)
+        return log
+
+
+def law_at(law: ControlLaw, swaps: Sequence[tuple[int, ControlLaw]], tick: int) -> ControlLaw:
+    """Return the law in force at a tick, after the planned ``swaps`` from ``law``."""
+    for swapped_at, other in swaps:
+        if swapped_at <= tick:
+            law = other
+    return law
+
+
+def flight_of(flight: Flight, history: BenchHistory) -> Flight:
+    """Return the flight that describes what was flown on a bench, with a plant at tick 0.
+
+    It has the seed of the history, and no law if none was ever asked.
+    """
+    scenario, width = flight.scenario, len(flight.plant.names.commanded)
+    options: dict[str, Any] = {}
+    settings = scenario.settings
+    if history.seed != settings.plant.fault_seed:
+        options["seed"] = history.seed
+        plant = settings.plant.model_copy(update={"fault_seed": history.seed})
+        settings = settings._replace(plant=plant)
+    laws, swaps = scenario.laws, scenario.swaps
+    is_by_hand = len(history) and all(len(row) == width for row in history.rows())
+    if is_by_hand and scenario.law.name != NoLaw.name:
+        options |= {"controller": None, "swaps": []}
+        controller = settings.controller.model_copy(update={"controller": "", "swaps": [""]})
+        settings = settings._replace(controller=controller, gains={})
+        laws, swaps = {NoLaw.name: NoLaw({}, flight.period, flight.robot.n + 3)}, []
+    changed = scenario.options.model_copy(update=options)
+    return Flight(replace(scenario, options=changed, settings=settings, laws=laws, swaps=swaps))
