@@ -55,6 +55,7 @@ DEFINITIONS = {
     "first tick",
     "asked of the base": "largest torque commanded on each axis of the base, and the largest "
     "momentum that wheels have to hold for it",
+    "own metric": "what a function of your own returned for the flight",
     "recording": "what is missing of the flight or was found wrong with the bag",
 }
 """The meaning of each group of metrics, for someone who sees it for the first time."""
@@ -210,6 +211,7 @@ def lines(reports: Sequence[Report], brief: bool = False) -> list[Line]:
                 text=partial(_of_axis, key=key),
                 label=partial(_named, name=name),
             )
+    rows += each("own metric", ("own_metrics",))
     return [
         *rows,
         one("recording", "messages lost", "", lambda r: str(sum(r["lost"].values()))),

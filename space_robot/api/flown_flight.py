@@ -15,6 +15,7 @@ from space_robot_msgs_py.config.validation import one_of
 from space_robot_msgs_py.errors import InputError
 
 from ..analysis import analyze
+from ..analysis.own_metric import MetricFunction, finite_value
 from ..analysis.report_tables import rms_table
 from ..analysis.words import flown
 from ..flight.bag_path import check_bag_path
@@ -107,6 +108,18 @@ class FlownFlight:
         """
         report = self._report
         return {**report["rms"]["mean_axis"], **report} if report else {}
+
+    def metric(self, function: MetricFunction | str) -> float:
+        """Return a metric of your own.
+
+        Args:
+            function: of the flight's log, or its name, ``file.py:FUNCTION``.
+
+        Raises:
+            InputError: no log was kept; the function cannot be imported, raised an error, or
+                returned no finite number.
+        """
+        return finite_value(function, self.log)
 
     @cached_property
     def table(self) -> DataFrame:

@@ -16,6 +16,7 @@ from space_robot_msgs_py.config.files import named_file
 from space_robot_msgs_py.config.validation import StrictModel, read_yaml, short, validate
 from space_robot_msgs_py.errors import InputError, explained_by
 
+from ..analysis.own_metric import check_names, text_of
 from ..api.scenario import OF_THE_GRAPH
 from ..scenario.disturbances import as_disturbance
 from ..scenario.options import FlightPlan
@@ -116,6 +117,8 @@ class Study(StrictModel):
     """Each as ``LAW`` or ``LAW=GAINS``."""
     vary: dict[str, Any] = Field(default_factory=dict)
     """Distribution of each variable, by the variable's name."""
+    metrics: dict[str, Any] = Field(default_factory=dict)
+    """Function of each metric of the user's own, ``file.py:FUNCTION``, by the metric's name."""
     require: dict[str, Requirement] = Field(default_factory=dict)
     keep: Keep = Keep()
     until: Until | None = None
@@ -153,6 +156,12 @@ class Study(StrictModel):
         if len({Law.parse(law) for law in laws}) < len(laws):
             raise ValueError("the same law twice")
         return laws
+
+    @field_validator("metrics", mode="after")
+    @classmethod
+    def _are_functions(cls, metrics: dict[str, Any]) -> dict[str, str]:
+        check_names(metrics)
+        return {name: text_of(function) for name, function in metrics.items()}
 
     @field_validator("until", mode="after")
     @classmethod
@@ -196,6 +205,8 @@ class Study(StrictModel):
         """Return all keys except the number of runs, as JSON data."""
         content: dict[str, Any] = json.loads(self.model_dump_json(by_alias=True))
         del content["runs"]
+        if not self.metrics:  # as in folders of earlier releases
+            del content["metrics"]
         return content
 
     def named(self, where: str) -> Study:

@@ -17,6 +17,7 @@ from .options import NAMESPACE, REMAP, TRUST, file_option, folder_option
 if TYPE_CHECKING:
     from space_robot_msgs_py.bag.flight_log import FlightLog
 
+    from ..analysis.own_metric import OwnMetric
     from ..analysis.sizing import ActuatorSet
 
 SECTION = "Results"
@@ -39,6 +40,14 @@ SECTION = "Results"
 )
 @file_option("--html", help="One page with tables and figures, to send to a colleague.")
 @click.option(
+    "--metric",
+    "metrics",
+    multiple=True,
+    metavar="FILE.py:FUNCTION",
+    help="A number of your own: what the function returns for the flight's log; may be repeated. "
+    "NAME=FILE.py:FUNCTION names it.",
+)
+@click.option(
     "--actuators",
     metavar="NAME-or-FILE",
     help="Whether these would have what each flight asks of its base (default: those that flew).",
@@ -57,6 +66,7 @@ def analyze(
     csv: Path | None,
     parquet: Path | None,
     html: Path | None,
+    metrics: tuple[str, ...],
     actuators: str | None,
     from_s: float | None,
     to_s: float | None,
@@ -77,6 +87,7 @@ def analyze(
       space-robot analyze flights/one flights/two --plot figures --html flights.html
       space-robot analyze flights/one --from 14 --to 16 --json
       space-robot analyze flights/one --actuators wheels
+      space-robot analyze flights/one --metric my_metrics.py:overshoot
       space-robot analyze flights/one --parquet one.parquet
       space-robot analyze theirs --remap /arm/joint_states:=/joint_states
       space-robot analyze both --namespace /sat1
@@ -89,6 +100,7 @@ def analyze(
 
     if parquet:
         check_parquet()
+    own = own_metrics(metrics)
     names = bag_names(bags)
     exports = [
         (write, dict(zip(names, _files(where, names, suffix), strict=True)))
@@ -110,6 +122,8 @@ def analyze(
     for name, bag in zip(names, bags, strict=True):
         log = excerpt(read_flight(bag, remap, trust, namespace), from_s, to_s)
         reports[name], descriptions[name] = analyze(log, _set(log, actuators)), log.flight
+        if own:
+            reports[name]["own_metrics"] = {m.name: m.finite_value(log) for m in own}
         for write, paths in exports:
             write(log, paths[name])
             click.echo(f"wrote {paths[name]}", err=True)
@@ -130,6 +144,27 @@ def analyze(
                 write_text(render(reports, descriptions, shown), html)
                 click.echo(f"wrote {html}", err=True)
     _print(reports, as_json)
+
+
+def own_metrics(texts: Sequence[str]) -> list[OwnMetric]:
+    """Import the functions of ``--metric``.
+
+    Raises:
+        InputError: one cannot be imported, or two have the same name.
+    """
+    if not texts:
+        return []
+    from space_robot_msgs_py.errors import InputError
+
+    from ..analysis.own_metric import parse
+
+    own = [parse(text) for text in texts]
+    names = [metric.name for metric in own]
+    if twice := [name for name in names if names.count(name) > 1]:
+        raise InputError(
+            f"--metric: {twice[0]} is the name of two: name one as OTHER=FILE.py:FUNCTION"
+        )
+    return own
 
 
 def _set(log: FlightLog, name: str | None) -> ActuatorSet | None:

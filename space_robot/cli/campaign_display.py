@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shlex
+from collections.abc import Sequence
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
@@ -48,7 +49,7 @@ def print_summary(flown: FlownCampaign, console: Console) -> None:
     """Print the number of completed flights, medians, verdicts, and next steps."""
     findings = Findings(subject_of(flown))
     names = findings.names
-    print_table(medians(flown.table, names, flown.seed), console)
+    print_table(medians(flown.table, names, flown.seed, list(flown.study.metrics)), console)
     if verdicts := findings.verdicts:
         print_table(
             Table.of(
@@ -81,9 +82,16 @@ def print_summary(flown: FlownCampaign, console: Console) -> None:
     say(console, f"{again}    # the worst")
 
 
-def medians(table: DataFrame, names: dict[str, str], seed: int) -> Table:
-    """Tabulate the medians of each law; a failed flight ranks below all others."""
-    shown = [name for name in SHOWN if is_known(table, f"metric.{name}")]
+def medians(table: DataFrame, names: dict[str, str], seed: int, own: Sequence[str] = ()) -> Table:
+    """Tabulate the medians of each law; a failed flight ranks below all others.
+
+    Args:
+        table: of the campaign.
+        names: of the laws in the table.
+        seed: of the draws.
+        own: names of the user's own metrics.
+    """
+    shown = [name for name in (*SHOWN, *own) if is_known(table, f"metric.{name}")]
     rows = []
     for law in laws_of(table):
         own = of_law(table, law)

@@ -9,7 +9,7 @@ from __future__ import annotations
 import re
 import shutil
 import warnings
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
@@ -21,6 +21,7 @@ from space_robot_msgs_py.config.validation import short, validate
 from space_robot_msgs_py.config.yaml_text import read_file
 from space_robot_msgs_py.errors import FlightError, InputError
 
+from ...analysis.own_metric import SESSION, MetricFunction, check_names, text_of
 from ...console.files import make_folder
 from ...flight.ending import DIVERGED, UNANSWERED
 from ...flight.simulate import fly_blocks
@@ -113,40 +114,60 @@ def _has_failed(study: Study, row: Row) -> bool:
 class Campaign:
     """A campaign: each random variation of a study, flown with each of its laws."""
 
-    def __init__(self, study: Study) -> None:
+    def __init__(
+        self, study: Study, metrics: Mapping[str, MetricFunction | str] | None = None
+    ) -> None:
         """Store a study; `run` resolves the files and laws that it names.
 
+        Args:
+            study: content of a campaign's file.
+            metrics: functions of the log of a flight, by the name of the metric that each returns,
+                or their names as in a file; beside those of the study.
+
         Raises:
-            InputError: ``study`` is not a `Study`.
+            InputError: ``study`` is not a `Study`, or a metric is no function.
         """
         if not isinstance(study, Study):
             raise InputError(
                 f"study: a Study was expected, got {short(study)}; "
                 "Campaign.load reads a file, Campaign.of a mapping"
             )
-        self.study = study
+        self.study = with_metrics(study, metrics or {})
         self._text = ""
 
     @classmethod
-    def load(cls, path: str | Path) -> Campaign:
+    def load(
+        cls, path: str | Path, metrics: Mapping[str, MetricFunction | str] | None = None
+    ) -> Campaign:
         """Read a campaign's file, by its path or by a name of ``config/campaigns``.
+
+        Args:
+            path: of the file.
+            metrics: beside those of the file, see `Campaign`.
 
         Raises:
             InputError: in one line, naming file and key.
         """
-        campaign = cls(read_study(path))
-        campaign._text = read_file(Path(campaign.study.where))
+        campaign = cls(read_study(path), metrics)
+        if not metrics:
+            campaign._text = read_file(Path(campaign.study.where))
         return campaign
 
     @classmethod
-    def of(cls, content: Mapping[str, Any]) -> Campaign:
+    def of(
+        cls, content: Mapping[str, Any], metrics: Mapping[str, MetricFunction | str] | None = None
+    ) -> Campaign:
         """Build a campaign from the content of a file: ``{"laws": ["ctc"], "vary": {...}}``.
+
+        Args:
+            content: of a file.
+            metrics: beside those of the content, see `Campaign`.
 
         Raises:
             InputError: in one line, naming the key.
         """
         is_mapping = isinstance(content, Mapping)
-        return cls(validate(Study, dict(content) if is_mapping else content, "campaign"))
+        return cls(validate(Study, dict(content) if is_mapping else content, "campaign"), metrics)
 
     def run(
         self,
@@ -178,9 +199,14 @@ class Campaign:
                 flown again, and for each law whose flights are flown one by one.
 
         Raises:
-            InputError: something cannot be flown; the folder is another campaign's; disk full.
+            InputError: something cannot be flown; the folder is another campaign's; disk full; a
+                metric's function fails, or cannot be sent to the workers or kept in a folder.
         """
         check_tables()
+        if local := [n for n, text in self.study.metrics.items() if text.startswith(SESSION)]:
+            check_local(local, out, workers, scheduler)
+            workers = 0
+            warn(f"metrics {', '.join(local)}: {OF_SESSION}: this process flies alone")
         asked = Preparation.of(self.study, seed, runs)
         manifest = asked.manifest
         temporary = None if out is not None else ScratchFolder()
@@ -201,6 +227,8 @@ class Campaign:
                         for line in asked.notes:
                             warn(line)
                         asked.compile()
+                        if self.study.metrics and not flights.kept:
+                            asked.try_metrics()
                         journal.make_note(WRITTEN, "")  # the table is outdated
                         flights.fly(progress or (lambda _: None), options)
                 finally:  # also after an error: write the table of all flown rows
@@ -208,6 +236,40 @@ class Campaign:
                     write_if_older(folder, journal, manifest, runs_of_table)
                 fly_bags(folder, asked.flyer, journal, runs_of_table, processes)
         return FlownCampaign(folder, True, temporary, flights.kept)
+
+
+OF_SESSION = "of this Python session (a notebook's or script's function, or a lambda)"
+
+
+def check_local(
+    names: Sequence[str], out: str | Path | None, workers: int | None, scheduler: str | None
+) -> None:
+    """Check that a campaign needs the metrics of this session in this process only.
+
+    Raises:
+        InputError: other processes or a folder would need them; says what to do.
+    """
+    if workers or scheduler is not None or out is not None:
+        option = "out" if out is not None else "scheduler" if scheduler is not None else "workers"
+        raise InputError(
+            f"{option}: metrics {', '.join(names)} are {OF_SESSION}, which no other process can "
+            f"import: put them into a file, mine.py, and name them as 'mine.py:{names[0]}', or "
+            "leave out, workers and scheduler away"
+        )
+
+
+def with_metrics(study: Study, metrics: Mapping[str, MetricFunction | str]) -> Study:
+    """Return a study with further metrics.
+
+    Raises:
+        InputError: a name is taken or invalid, or a metric is no function.
+    """
+    for name, function in metrics.items():
+        if name in study.metrics:
+            raise InputError(f"{study.where}: metrics: {name} is defined twice")
+        check_names([name])
+        study = study.model_copy(update={"metrics": {**study.metrics, name: text_of(function)}})
+    return study
 
 
 def as_yaml(study: Study) -> str:

@@ -10,13 +10,12 @@ from typing import TYPE_CHECKING
 
 from typing_extensions import Self
 
-from space_robot_control.laws.trust import check_file, check_law
-from space_robot_msgs_py.bag.blocks import blocks_of
-from space_robot_msgs_py.config.arguments import as_path
+from space_robot_control.laws.trust import NotTrustedError, check_file, check_law
+from space_robot_msgs_py.config.arguments import as_path, as_whole_number
 from space_robot_msgs_py.config.validation import one_of, validate
 from space_robot_msgs_py.errors import InputError
 
-from ...api import FlownFlight
+from ...api import FlownFlight, Scenario
 from ...api.in_process import fly_in_process
 from ..row.fly import RowFlyer
 from ..row.row import Task
@@ -106,6 +105,49 @@ class FlownCampaign:
         """Verdicts on each requirement, for each law and grid point."""
         return verdicts(self.table, self.study, self.runs, list(self.manifest.table.grid))
 
+    def scenario(self, run: int, law: str | None = None) -> Scenario:
+        """Return the scenario of a run, with its draws.
+
+        Args:
+            run: number of the run.
+            law: as in the campaign's file; None: its first law.
+
+        Raises:
+            InputError: there is no such law, or the draws cannot be flown.
+            NotTrustedError: an untrusted campaign refers to a module or a file, see `open`.
+        """
+        if not self._trust:
+            check_study(self.study)
+        law = one_of(law or self.study.laws[0], self.study.laws, "law")
+        return self._flyer.draws.scenario(as_whole_number(run, "run", 0, self.runs - 1), law)
+
+    def row_of(self, flight: FlownFlight, run: int, law: str) -> DataFrame:
+        """Return a flight as a row of this campaign's table, to be appended to it.
+
+            found.scenario(3).bench() ... found.row_of(bench.flown(), run=3, law="by hand")
+
+        Args:
+            flight: with its log, such as one of `scenario` flown on a bench.
+            run: number of the run whose draws it flew.
+            law: its name in the column ``law``.
+
+        Raises:
+            InputError: the flight has no log or other columns, or a metric's function fails.
+        """
+        import pandas
+
+        run = as_whole_number(run, "run", 0, self.runs - 1)
+        schema, task = self.manifest.table, Task(run, law)
+        row = self._flyer.row_of_log(task, flight.flight, flight.ending, flight.log)
+        if other := sorted(set(row.metrics) - set(schema.metrics)):
+            raise InputError(f"the flight has {other[0]}, which is no column of {self.folder}")
+        names = [name for name, _ in schema.columns()]
+        return pandas.DataFrame([list(schema.values(row))], columns=names)
+
+    @property
+    def _flyer(self) -> RowFlyer:
+        return RowFlyer.of(self.study, self.seed, self.runs)
+
     def rerun(self, run: int, law: str | None = None, bag: str | Path | None = None) -> Rerun:
         """Fly a row's flight again, bit for bit, and return its complete log.
 
@@ -125,10 +167,10 @@ class FlownCampaign:
         rows = table[(table["run"] == task.run) & (table["law"] == task.law)]
         if rows.empty:
             raise InputError(f"run {run}: {self.folder} has no row of this run under {task.law}")
-        flyer = RowFlyer.of(self.study, self.seed, self.runs)
+        flyer = self._flyer
         flight = flyer.draws.scenario(task.run, task.law).check()
         flown = fly_in_process(flight, None if bag is None else Path(bag))
-        row = flyer.row_of_log(task, flight, flown.ending, blocks_of(flown.log))
+        row = flyer.row_of_log(task, flight, flown.ending, flown.log)
         return Rerun(
             flown,
             task,
@@ -162,6 +204,11 @@ def check_study(study: Study) -> None:
     laws = [Law.parse(law).gains for law in study.laws]
     for text in texts_of([laws, study.scenario, study.vary]):
         check_file("value of an option", text, CAMPAIGN)
+    if study.metrics:
+        raise NotTrustedError(
+            f"the {CAMPAIGN} has metrics of its own ({', '.join(study.metrics)}): --trust imports "
+            "their functions, which runs their code"
+        )
 
 
 class Rerun(FlownFlight):

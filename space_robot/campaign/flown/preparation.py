@@ -5,12 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 
-from space_robot_msgs_py.errors import InputError
+from space_robot_msgs_py.errors import FlightError, InputError
 
+from ...analysis.own_metric import check_names, function_of, of_mapping
 from ...flight.batch.compilation import compile_lanes
 from ...flight.batch.sharing import reason_to_fly_alone
 from ...flight.compilation import compile_kernels
 from ...flight.plan import Flight
+from ...flight.simulate import simulate
 from ...processes.software import commit
 from ..row.bands import BINS
 from ..row.columns import Columns
@@ -67,12 +69,13 @@ class Preparation:
         Raises:
             InputError: something cannot be flown, or a required metric does not exist.
         """
-        where = self.study.where
+        where, own = self.study.where, self.study.metrics
         for flight in self.flights.values():
-            check_requirements(flight, self.study.require, where)
+            self._check_metrics(flight)
+            check_requirements(flight, self.study.require, where, own=own)
         if self.study.require:
             for option, flight in self.flyer.draws.flights_of_options():
-                check_requirements(flight, self.study.require, where, option)
+                check_requirements(flight, self.study.require, where, option, own)
         study = self.study.content
         return Manifest(
             seed=self.seed,
@@ -91,12 +94,44 @@ class Preparation:
         reasons = {law: reason_to_fly_alone(flight) for law, flight in self.flights.items()}
         return [f"{law}: flown one by one: {why}" for law, why in reasons.items() if why]
 
+    def try_metrics(self) -> None:
+        """Fly the nominal flight of the first law, and evaluate the user's own metrics of it.
+
+        A flight that ends early has no metrics, and is left to its rows.
+
+        Raises:
+            InputError: a function raised an error, or returned no finite number.
+        """
+        law, where = self.study.laws[0], self.study.where
+        try:
+            log = simulate(self.flyer.draws.nominal(law).check())
+        except FlightError:
+            return
+        for metric in of_mapping(self.study.metrics):
+            try:
+                metric.finite_value(log)
+            except InputError as error:
+                raise InputError(f"{where}: {error}, of the nominal flight of {law}") from None
+
     def compile(self) -> None:
         """Compile the kernels once, before several processes need them."""
         has_hardware = any(flight.plant.names.actuators for flight in self.flights.values())
         is_varied = any(name.endswith(ACTUATORS) for name in self.flyer.draws.names)
         compile_kernels(has_hardware or is_varied)
         compile_lanes()
+
+    def _check_metrics(self, flight: Flight) -> None:
+        """Check names and functions of the user's own metrics, which have columns of their own.
+
+        Raises:
+            InputError: a name is taken, or a function cannot be imported.
+        """
+        try:
+            check_names(self.study.metrics, Columns.of_flight(flight).metrics)
+            for text in self.study.metrics.values():
+                function_of(text)
+        except InputError as error:
+            raise InputError(f"{self.study.where}: metrics: {error}") from None
 
     def _schema(self) -> Schema:
         nominal = next(iter(self.flights.values()))
@@ -105,7 +140,7 @@ class Preparation:
         return Schema(
             vary={n: "str" if isinstance(first[n], str) else "float64" for n in draws.names},
             grid=draws.grid,
-            metrics=list(columns.metrics),
+            metrics=[*columns.metrics, *self.study.metrics],
             require=list(self.study.require),
             bands=list(columns.names),
             bins=min(BINS, nominal.ticks),

@@ -39,7 +39,8 @@ class Findings:
 
     def __init__(self, subject: Subject, metrics: Sequence[str] = ()) -> None:
         self.subject = subject
-        self.metrics = chosen(subject.table, subject.study.require, metrics)
+        study = subject.study
+        self.metrics = chosen(subject.table, study.require, metrics, study.metrics)
         self.required = [of_requirement(*item) for item in subject.study.require.items()]
         self.grid = list(subject.grid)
         self.rows = independent_rows(subject.table, subject.study.design)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 from space_robot_msgs_py.config.validation import one_of
@@ -75,16 +75,21 @@ def of_requirement(name: str, requirement: Requirement) -> Quantity:
 
 
 def chosen(
-    table: DataFrame, require: Mapping[str, Requirement], asked: Sequence[str] = ()
+    table: DataFrame,
+    require: Mapping[str, Requirement],
+    asked: Sequence[str] = (),
+    own: Collection[str] = (),
 ) -> list[Quantity]:
     """Return the metrics to compare laws by: the requested ones, else the default ones.
 
-    Defaults are RMS errors, the ripple of the base's torque, and the requirements.
+    Defaults are RMS errors, the ripple of the base's torque, the user's own metrics, and the
+    requirements.
 
     Args:
         table: rows of a campaign.
         require: its requirements by name.
         asked: names of requested metrics.
+        own: names of the user's own metrics.
 
     Raises:
         InputError: there is no such metric.
@@ -95,6 +100,7 @@ def chosen(
     there = metrics_of(table)
     usual = [name for name in there if name.startswith(ERRORS) and name.endswith("_rms")]
     usual += [name for name in there if name == f"{RIPPLE}base_torque"]
+    usual += [name for name in own if name in there]
     usual += [r.metric for r in require.values() if r.metric in there]
     return [of_metric(name) for name in dict.fromkeys(usual or there[:4])]
 

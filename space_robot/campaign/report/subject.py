@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import yaml
 
@@ -114,9 +114,10 @@ def judged_by(study: Study, table: DataFrame, flown: Study) -> DataFrame:
     now, then = study.content, flown.content
     for part in FLOWN:
         for key, old, new in differences(then[part], now[part], part):
-            raise InputError(
-                f"{study.where}: {key}: {short(old)} was flown, not {short(new)}: fly the new study"
-            )
+            raise _other(study, key, old, new)
+    for name, function in study.metrics.items():
+        if function != (was := flown.metrics.get(name)):
+            raise _other(study, f"metrics.{name}", was, function)
     known = {_measured(demand): f"require.{name}" for name, demand in flown.require.items()}
     columns = {}
     for name, demand in study.require.items():
@@ -131,6 +132,12 @@ def judged_by(study: Study, table: DataFrame, flown: Study) -> DataFrame:
         columns[f"require.{name}"] = table[column]
     others = [column for column in table if not str(column).startswith("require.")]
     return table[others].assign(**columns)
+
+
+def _other(study: Study, key: str, flown: Any, now: Any) -> InputError:
+    return InputError(
+        f"{study.where}: {key}: {short(flown)} was flown, not {short(now)}: fly the new study"
+    )
 
 
 def _measured(demand: Requirement) -> tuple[str, Window]:

@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 
 from space_robot_model.elementary.matrices import norms
 from space_robot_msgs_py.bag.flight_log import FlightLog
-from space_robot_msgs_py.config.validation import one_of
 
 from ...analysis.attitude_drift import controls_base
 from ...analysis.metrics import AxisIndex, error_columns, largest_of_columns, torque_columns
@@ -79,18 +78,6 @@ class Columns(NamedTuple):
             *(f"{RIPPLE}{name}" for name in self.torques),
             *(f"{FAST_RIPPLE}{name}" for name in self.torques),
         )
-
-    def check(self, metric: str, where: str) -> str:
-        """Return the name of a metric if these columns have it.
-
-        Args:
-            metric: its name.
-            where: source of the name, for the error.
-
-        Raises:
-            InputError: there is no such metric; lists the existing ones.
-        """
-        return one_of(metric, self.metrics, "metric", f" in {where}")
 
     def sizes(self, log: FlightLog, error: Array) -> dict[str, Array]:
         """Compute the magnitude of each column at every tick, (N,).

@@ -2,24 +2,30 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from contextlib import closing
 from dataclasses import dataclass
 from functools import lru_cache
 
+from space_robot_msgs_py.bag.blocks import blocks_of
 from space_robot_msgs_py.bag.flight_log import FlightLog
+from space_robot_msgs_py.compiled.lanes import WIDTH
 from space_robot_msgs_py.config.text import one_line_of
 from space_robot_msgs_py.errors import FlightError, InputError, SpaceRobotError
 
+from ...analysis.own_metric import MetricError, of_mapping
 from ...flight.batch.batch import FlightBatch
 from ...flight.batch.sharing import batches
 from ...flight.ending import FAILED, Ending
 from ...flight.plan import Flight
-from ...flight.simulate import fly_blocks
+from ...flight.simulate import fly_blocks, row_bytes, simulate
 from ..draws import Draws
 from ..study import Study
 from .measure import Measure
 from .row import REFUSED, Row, Task, Value
+
+LARGEST_LOGS = 2**30
+"""Bytes of the logs of flights that are flown together for own metrics; longer ones fly alone."""
 
 
 @dataclass(frozen=True)
@@ -82,8 +88,8 @@ class RowFlyer:
                 rows.append(_unflown(task, self.draws.values(task.run), error))
         for group in batches(enumerate(flights)):
             numbers = [number for number, _ in group]
-            if len(group) == 1:
-                rows.append(self(flown[numbers[0]]))
+            if len(group) == 1 or not self._fits(flights[numbers[0]]):
+                rows += [self(flown[k]) for k in numbers]
                 continue
             try:
                 rows += self._rows_of([flown[k] for k in numbers], [flights[k] for k in numbers])
@@ -93,11 +99,16 @@ class RowFlyer:
 
     def _rows_of(self, tasks: Sequence[Task], flights: Sequence[Flight]) -> list[Row]:
         """Fly flights that can share a batch."""
-        measures = [Measure(flight, self.study.require) for flight in flights]
+        has_own = bool(self.study.metrics)
+        measures = [self._measure(flight) for flight in flights]
         endings = [Ending.complete(flight.ticks, flight.period) for flight in flights]
-        with closing(FlightBatch(flights).fly(is_brief=True)) as blocks:
+        batch = FlightBatch(flights).fly(is_whole=has_own, is_brief=not has_own)
+        with closing(batch) as blocks:
             for block in blocks:
-                measures[block.flight].add(block.log)
+                if has_own and block.error is None:
+                    _measure_whole(measures[block.flight], block.log)
+                elif not has_own:
+                    measures[block.flight].add(block.log)
                 if block.error is not None:
                     endings[block.flight] = Ending.early(block.error, flights[block.flight].period)
         return [
@@ -106,9 +117,14 @@ class RowFlyer:
         ]
 
     def row_of(self, task: Task, vary: dict[str, Value], flight: Flight) -> Row:
-        """Fly a flight block by block and return its row; memory holds one block."""
+        """Fly a flight and return its row.
+
+        Memory holds one block, or with own metrics the whole log.
+        """
+        if self.study.metrics:
+            return self._row_of_whole(task, flight)
         ending = Ending.complete(flight.ticks, flight.period)
-        measure = Measure(flight, self.study.require)
+        measure = self._measure(flight)
         with closing(fly_blocks(flight)) as blocks:
             try:
                 for block in blocks:
@@ -117,22 +133,45 @@ class RowFlyer:
                 ending = Ending.early(error, flight.period)
         return _row(task, vary, flight, ending, measure)
 
-    def row_of_log(
-        self, task: Task, flight: Flight, ending: Ending, blocks: Iterable[FlightLog]
-    ) -> Row:
+    def row_of_log(self, task: Task, flight: Flight, ending: Ending, log: FlightLog) -> Row:
         """Return the row of a flown flight, bit for bit equal to that of `row_of`.
 
         Args:
             task: run and law.
             flight: with its plant in the state at the end.
             ending: of the flight.
-            blocks: of its log, from `blocks_of`.
+            log: of the whole flight.
+
+        Raises:
+            MetricError: an own metric's function raised an error, or returned no number.
         """
-        measure = Measure(flight, self.study.require)
+        measure = self._measure(flight)
         if ending.error is None:
-            for block in blocks:
-                measure.add(block)
+            _measure_whole(measure, log)
         return _row(task, self.draws.values(task.run), flight, ending, measure)
+
+    def _row_of_whole(self, task: Task, flight: Flight) -> Row:
+        try:
+            log, ending = simulate(flight), Ending.complete(flight.ticks, flight.period)
+        except FlightError as error:
+            if error.log is None:
+                raise
+            log, ending = error.log, Ending.early(error, flight.period)
+        return self.row_of_log(task, flight, ending, log)
+
+    def _measure(self, flight: Flight) -> Measure:
+        return Measure(flight, self.study.require, of_mapping(self.study.metrics))
+
+    def _fits(self, flight: Flight) -> bool:
+        """Return True if flights like this one may be flown together."""
+        return not self.study.metrics or WIDTH * flight.ticks * row_bytes(flight) < LARGEST_LOGS
+
+
+def _measure_whole(measure: Measure, log: FlightLog) -> None:
+    """Evaluate a complete flight, block by block as without its log."""
+    for block in blocks_of(log):
+        measure.add(block)
+    measure.add_whole(log)
 
 
 def _row(
@@ -157,7 +196,7 @@ def _row(
 
 def _unflown(task: Task, vary: dict[str, Value], error: Exception) -> Row:
     """Return the row of a task that raised an error."""
-    if isinstance(error, InputError):
+    if isinstance(error, InputError) and not isinstance(error, MetricError):
         return Row(task, REFUSED, str(error), vary=vary).digested()
     if isinstance(error, SpaceRobotError):  # such as a mistake in a user's law
         return Row(task, FAILED, str(error), vary=vary).digested()

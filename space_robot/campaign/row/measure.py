@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping, Sequence
 from functools import cached_property
 
 import numpy as np
@@ -10,10 +10,12 @@ from numpy.typing import NDArray
 
 from space_robot_model.elementary.matrices import norms
 from space_robot_msgs_py.bag.flight_log import FlightLog
+from space_robot_msgs_py.config.validation import one_of
 from space_robot_msgs_py.errors import InputError
 
 from ...analysis.attitude_drift import attitude_drift
 from ...analysis.metrics import tracking_error
+from ...analysis.own_metric import OwnMetric
 from ...analysis.tool_error import ToolError
 from ...flight.plan import Flight
 from ..study import Requirement
@@ -25,8 +27,21 @@ from .window import Window, WindowMetrics
 class Measure:
     """Accumulates metrics, requirements' metrics and bands of a flight block by block."""
 
-    def __init__(self, flight: Flight, require: Mapping[str, Requirement]) -> None:
-        """Prepare the sums for a flight (not flown yet) and the requirements by name."""
+    def __init__(
+        self, flight: Flight, require: Mapping[str, Requirement], own: Sequence[OwnMetric] = ()
+    ) -> None:
+        """Prepare the sums for a flight.
+
+        Args:
+            flight: not flown yet.
+            require: the requirements by name.
+            own: metrics of the user, which need `add_whole`.
+        """
+        self._own, self._demands = own, require
+        self._own_results: dict[str, float] = {}
+        self._own_windows: dict[str, float] = {}
+        """By requirement."""
+        names = {metric.name for metric in own}
         self._robot, columns = flight.robot, Columns.of_flight(flight)
         self._columns = columns
         self._assumed = flight.scenario.robots.controller
@@ -37,7 +52,7 @@ class Measure:
         self._require = {
             name: WindowMetrics(_window(demand), [demand.metric], columns)
             for name, demand in require.items()
-            if not _is_whole(demand)
+            if not _is_whole(demand) and demand.metric not in names
         }
         self._same = {name: demand.metric for name, demand in require.items() if _is_whole(demand)}
         self._bands = Bands(flight.ticks)
@@ -56,9 +71,22 @@ class Measure:
         for metrics in (self._whole, *self._require.values()):
             metrics.add(block, error, sizes, self._robot)
 
+    def add_whole(self, log: FlightLog) -> None:
+        """Evaluate the user's own metrics of a complete flight, and those that are required.
+
+        Raises:
+            MetricError: a function raised an error, or returned no number.
+        """
+        for metric in self._own:
+            self._own_results[metric.name] = metric.value(log)
+            for name, demand in self._demands.items():
+                if demand.metric == metric.name and not _is_whole(demand):
+                    within = _window(demand).rows(log)
+                    self._own_windows[name] = metric.value(log.rows(within.start, within.stop))
+
     def metrics(self) -> dict[str, float]:
         """Return the available metrics of the whole flight, by name."""
-        return dict(self._results)
+        return self._results | _finite(self._own_results)
 
     @cached_property
     def _results(self) -> dict[str, float]:
@@ -66,10 +94,11 @@ class Measure:
 
     def require(self) -> dict[str, float]:
         """Return the metric of each requirement in its window, by the requirement's name."""
-        whole = self._results
+        whole = self.metrics()
         values = {name: whole.get(metric) for name, metric in self._same.items()}
         for name, window in self._require.items():
             values[name] = next(iter(window.result().values()), None)
+        values |= _finite(self._own_windows)
         return {name: value for name, value in values.items() if value is not None}
 
     def bands(self) -> dict[str, NDArray[np.float32]]:
@@ -78,7 +107,11 @@ class Measure:
 
 
 def check_requirements(
-    flight: Flight, require: Mapping[str, Requirement], where: str, context: str = ""
+    flight: Flight,
+    require: Mapping[str, Requirement],
+    where: str,
+    context: str = "",
+    own: Collection[str] = (),
 ) -> None:
     """Check that a flight has the metrics of all requirements.
 
@@ -87,6 +120,7 @@ def check_requirements(
         require: the requirements by name.
         where: the file, for errors.
         context: difference from the nominal flight, for errors.
+        own: names of the user's own metrics.
 
     Raises:
         InputError: an unknown metric, a window without ticks, or one too short for the metric.
@@ -96,7 +130,7 @@ def check_requirements(
     for name, demand in require.items():
         key = f"{where}: require.{name}"
         try:
-            columns.check(demand.metric, f"{key}.metric")
+            one_of(demand.metric, (*columns.metrics, *own), "metric", f" in {key}.metric")
         except InputError as error:
             raise InputError(f"{error}{context}") from None
         if demand.from_s >= end:
@@ -110,8 +144,13 @@ def check_requirements(
                 f"{key}.to_s: no tick between {demand.from_s:g} and {demand.to_s:g} s, "
                 f"the period is {flight.period:g} s{context}"
             )
-        if lacking := missing_for_ripple(demand.metric, ticks, flight.period):
+        lacking = missing_for_ripple(demand.metric, ticks, flight.period)
+        if lacking and demand.metric not in own:
             raise InputError(f"{key}.metric: {demand.metric} {lacking}{context}")
+
+
+def _finite(values: Mapping[str, float]) -> dict[str, float]:
+    return {name: value for name, value in values.items() if np.isfinite(value)}
 
 
 def _window(demand: Requirement) -> Window:
