@@ -48,6 +48,7 @@ setup(
         "space_robot.analysis": ["templates/*.j2"],
         "space_robot.analysis.figures": ["*.mplstyle"],
         "space_robot.campaign.report": ["templates/*.j2"],
+        "space_robot.cli": ["templates/*.txt"],
         "space_robot.help": ["*.md"],
         "space_robot.paper.reproduction": ["templates/*.j2"],
         "space_robot.view": ["templates/*"],

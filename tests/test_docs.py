@@ -101,7 +101,7 @@ def test_commands_and_options_exist(document: Path) -> None:
         command = cli.commands.get(name)
         assert command is not None, f"space-robot {name}"
         if isinstance(command, click.Group) and words:
-            command = command.commands.get(words[0])
+            command = command.get_command(click.Context(command), words[0])
             assert command is not None, f"space-robot {name} {words[0]}"
         known = {
             option

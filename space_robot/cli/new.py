@@ -1,19 +1,60 @@
-"""The command ``space-robot new``: make a folder for a robot and fly it once."""
+"""The command ``space-robot new``: a folder for a robot, or a template of a user's own piece."""
 
 from __future__ import annotations
 
 import shlex
+from collections.abc import Sequence
 from pathlib import Path
 
 import click
+from click.shell_completion import CompletionItem
 
+from . import new_files
 from .completed_names import names_in
 from .options import BASE, REPAIR, flight_options
 
 SECTION = "Robots, missions and own pieces"
 
 
-@click.command()
+class NewGroup(click.Group):
+    """Group whose command ``robot`` needs no name: ``new my.urdf``."""
+
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        """Parse the arguments, with ``robot`` before those that name no command."""
+        is_named = not args or args[0] in (*self.commands, *ctx.help_option_names)
+        return super().parse_args(ctx, args if is_named else ["robot", *args])
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
+        """Return the command of a name, or ``robot`` for a robot's file."""
+        return self.commands.get(cmd_name, self.commands["robot"])
+
+    def list_commands(self, ctx: click.Context) -> Sequence[str]:  # type: ignore[override]
+        """Return the commands, the robot first."""
+        return list(self.commands)
+
+    def shell_complete(self, ctx: click.Context, incomplete: str) -> list[CompletionItem]:
+        """Complete the names of commands and of robots."""
+        robot = self.commands["robot"].params[0]
+        return [*super().shell_complete(ctx, incomplete), *robot.shell_complete(ctx, incomplete)]
+
+
+@click.group(cls=NewGroup)
+def new() -> None:
+    """Make a folder for a robot, or a template: a law, sensors, a metric, a mission.
+
+    A template is a commented file that flies at once, and its tests.
+
+    \b
+    Examples:
+      space-robot new my.urdf                 model, mission, gains for all laws; a first flight
+      space-robot new law my_law              a control law with its gains
+      space-robot new sensor my_sensors       sensors, with the numbers of data sheets
+      space-robot new metric overshoot        a number of a flight, for analyze and campaigns
+      space-robot new mission inspect         a motion in segments
+    """
+
+
+@new.command("robot", short_help="Make a folder for a robot, and fly it.")
 @click.argument("robot", shell_complete=names_in("robots"))
 @click.option(
     "--out",
@@ -25,14 +66,15 @@ SECTION = "Robots, missions and own pieces"
 @REPAIR
 @click.option("--force", is_flag=True, help="Replace an older folder of this command.")
 @flight_options("json")
-def new(
+def new_robot(
     robot: str, out: Path | None, base: str | None, repair: bool, force: bool, as_json: bool
 ) -> None:
     """Make a folder for a robot: model, mission, gains for all laws; fly each law once.
 
     ROBOT is a URDF, a xacro (where xacro is installed), or a YAML file. The mission goes from rest
     to rest within the limits of the joints, the gains are those of `gains tune --h-bar auto`. Exit
-    code 1 if a law could not fly with its gains; the folder is made nevertheless.
+    code 1 if a law could not fly with its gains; the folder is made nevertheless. The word
+    ``robot`` may be left out.
 
     \b
     Examples:
@@ -74,3 +116,7 @@ def new(
         raise SpaceRobotError(
             f"{', '.join(failed)}: {made.flights[failed[0]].failure}: the gains are of {folder}"
         )
+
+
+for command in (new_files.law, new_files.sensor, new_files.metric, new_files.mission):
+    new.add_command(command)

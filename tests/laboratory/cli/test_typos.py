@@ -219,7 +219,7 @@ TYPOS = (
     ),
     Typo(
         "simulate --controller laws.py:Mime",
-        "controller 'laws.py:Mime': laws.py has no class that is derived from ControlLaw "
+        "controller 'laws.py:Mime': laws.py has no class derived from ControlLaw "
         "(paths are from the current folder) (see: space-robot help own-law)",
     ),
     # robots
