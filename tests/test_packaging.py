@@ -100,6 +100,7 @@ def test_the_version_is_that_of_the_changelog_everywhere() -> None:
     version = found[0][0]
     assert dependencies("version") == {version}
     assert f"\nversion: {version}\n" in (ROOT / "CITATION.cff").read_text("utf-8")
+    assert f"version = {{{version}}}," in (ROOT / "README.md").read_text("utf-8")
     named = [sys.executable, "setup.py", "--version"]
     said = subprocess.run(named, cwd=ROOT, capture_output=True, text=True, check=True).stdout
     assert said.splitlines()[-1] == version
