@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from functools import cached_property
-from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -11,6 +10,7 @@ from typing_extensions import Self
 
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.config.arguments import as_path
+from space_robot_msgs_py.config.html import html_table
 from space_robot_msgs_py.config.validation import one_of
 from space_robot_msgs_py.errors import InputError
 
@@ -18,10 +18,12 @@ from ..analysis import analyze
 from ..analysis.own_metric import MetricFunction, finite_value
 from ..analysis.report_tables import rms_table
 from ..analysis.words import flown
+from ..console.notebook import is_in_notebook
 from ..flight.bag_path import check_bag_path
 from ..flight.ending import COMPLETE, Ending
 from ..flight.plan import Flight
 from ..flight.simulate import record
+from .flight_page import HEIGHT_PX, FlightPage, draw_page, show_page
 from .report import flight_report
 
 if TYPE_CHECKING:
@@ -186,6 +188,56 @@ class FlownFlight:
         self.bag = path
         return path
 
+    def view(
+        self,
+        *others: FlownFlight,
+        path: str | Path | None = None,
+        rate: float = 30.0,
+        title: str = "",
+        light: bool = False,
+        side_by_side: bool = False,
+        opens: bool = True,
+        height: int = HEIGHT_PX,
+    ) -> FlightPage:
+        """Show the flight in 3-D with plots, as ``space-robot view``.
+
+        In a notebook the page appears as the value of the cell, and needs no network. Elsewhere it
+        is written to a file and opened in a browser.
+
+        Args:
+            others: flights drawn over this one, named by their laws.
+            path: file to write, replaced if it exists; None: none in a notebook, elsewhere
+                ``<law>_view.html`` in the working folder.
+            rate: poses per second of flight.
+            title: of the page; empty: the laws.
+            light: dark on white, to print.
+            side_by_side: a place for each robot.
+            opens: False: the file is not opened in a browser.
+            height: of the page in a notebook, px.
+
+        Raises:
+            InputError: viser is not installed, no log was kept, or the file cannot be written.
+        """
+        flights = (self, *others)
+        page = FlightPage(
+            draw_page(
+                [flight.log for flight in flights],
+                [flight.flight.robot for flight in flights],
+                rate,
+                title,
+                light,
+                side_by_side,
+            ),
+            height,
+        )
+        if is_in_notebook():
+            if path is not None:
+                page.save(path)
+        else:
+            law = str(self.log.flight.get("controller", "flight"))
+            show_page(page, f"{law}_view.html" if path is None else path, opens)
+        return page
+
     def __repr__(self) -> str:
         end = "" if self.is_complete else f": {self.reason}"
         what = flown(self.flight.description)
@@ -193,18 +245,12 @@ class FlownFlight:
 
     def _repr_html_(self) -> str:
         """Show outcome and RMS in a notebook."""
-        lines = [f"<p>{escape(repr(self)[1:-1])}</p>"]
-        if self.metrics:
-            table = rms_table(self.report())
-            heads = "".join(f"<th>{escape(column.heading)}</th>" for column in table.columns)
-            rows = [
-                "".join(f"<td>{escape(text)}</td>" for text in row)
-                for group in table.groups
-                for row in table.texts(group)
-            ]
-            body = "".join(f"<tr>{row}</tr>" for row in rows)
-            lines.append(f"<table><tr>{heads}</tr>{body}</table>")
-        return "".join(lines)
+        caption = repr(self)[1:-1]
+        if not self.metrics:
+            return html_table((), (), caption)
+        table = rms_table(self.report())
+        rows = [row for group in table.groups for row in table.texts(group)]
+        return html_table([column.heading for column in table.columns], rows, caption)
 
     @cached_property
     def _figures(self) -> FigureSet:

@@ -9,6 +9,7 @@ from pathlib import Path
 from space_robot_msgs_py.errors import FlightError
 
 from ..analysis import Analysis
+from ..console.progress import flight_progress
 from ..flight.bag_path import check_bag_path
 from ..flight.compilation import compile_kernels
 from ..flight.ending import Ending
@@ -45,6 +46,25 @@ def fly_in_process(
 
     fly = _into_a_log if keep_log else _into_metrics
     return fly(flight, bag, show)
+
+
+def fly_with_progress(
+    flight: Flight,
+    bag: Path | None,
+    progress: Callable[[float], object] | bool | None,
+    keep_log: bool,
+) -> FlownFlight:
+    """Fly as `fly_in_process` does; ``progress`` True shows a progress line.
+
+    Raises:
+        InputError: see `fly_in_process`.
+    """
+    if progress is not True:
+        return fly_in_process(flight, bag, progress or None, keep_log)
+    _ = flight.supervisor  # compiled, or refused, before the line begins
+    compile_kernels(bool(flight.plant.names.actuators))  # has a progress line of its own
+    with flight_progress(flight.ticks * flight.period, flight.law.name) as show:
+        return fly_in_process(flight, bag, show, keep_log)
 
 
 def _into_a_log(flight: Flight, bag: Path | None, show: Callable[[int], None]) -> FlownFlight:

@@ -14,13 +14,15 @@ from space_robot_msgs_py.config.arguments import as_path
 from space_robot_msgs_py.config.validation import one_line, one_of, short
 from space_robot_msgs_py.errors import InputError
 
+from ..console.progress import check_progress
 from ..flight.compilation import compile_kernels
 from ..flight.plan import Flight, resolve
 from ..flight.start_step import sentence
 from ..scenario.options import FlightPlan
 from .bench import Bench
 from .flown_flight import FlownFlight
-from .in_process import fly_in_process
+from .in_process import fly_with_progress
+from .options_html import options_html
 
 OF_THE_GRAPH = (
     "realtime",
@@ -110,7 +112,7 @@ class Scenario(FlightPlan):
     def fly(
         self,
         bag: str | Path | None = None,
-        progress: Callable[[float], object] | None = None,
+        progress: Callable[[float], object] | bool | None = None,
         keep_log: bool = True,
     ) -> FlownFlight:
         """Fly in this process; the bits are those of ``simulate``, and of ``fly`` in lockstep.
@@ -121,7 +123,8 @@ class Scenario(FlightPlan):
 
         Args:
             bag: folder to record to, which must not exist.
-            progress: called regularly with the simulated time, s.
+            progress: called regularly with the simulated time, s; True: a progress line, in a
+                terminal or a notebook.
             keep_log: False: only the metrics are kept, for flights too long for memory.
 
         Raises:
@@ -129,12 +132,11 @@ class Scenario(FlightPlan):
         """
         if self.controller is None:
             raise InputError("controller is None, so there is nothing to fly: use bench()")
-        if progress is not None and not callable(progress):
-            raise InputError(f"progress: a function was expected, got {short(progress)}")
+        check_progress(progress)
         path, flight = None if bag is None else as_path(bag, "bag"), self.check()
         if step := flight.start_step:
             warnings.warn(sentence(step), stacklevel=2)
-        return fly_in_process(flight, path, progress, keep_log)
+        return fly_with_progress(flight, path, progress, keep_log)
 
     def bench(self, record: bool = True) -> Bench:
         """Return a bench at the flight's first tick.
@@ -149,6 +151,10 @@ class Scenario(FlightPlan):
         flight = self.check()
         compile_kernels(bool(flight.plant.names.actuators))
         return Bench(flight, record)
+
+    def _repr_html_(self) -> str:
+        """Show the options that differ from their defaults in a notebook."""
+        return options_html(self.given)
 
     def __repr__(self) -> str:
         said = ", ".join(f"{name}={short(value)}" for name, value in self.given.items())

@@ -11,6 +11,7 @@ from space_robot_msgs_py.config.validation import short
 from space_robot_msgs_py.errors import InputError
 
 from ..analysis import Analysis
+from ..console.progress import check_progress, flights_progress
 from ..flight.batch.batch import FlightBatch
 from ..flight.batch.benches import Benches
 from ..flight.batch.compilation import compile_lanes
@@ -27,7 +28,7 @@ from .scenario import Scenario
 def fly_many(
     scenarios: Iterable[Scenario],
     keep_log: bool = True,
-    progress: Callable[[int], object] | None = None,
+    progress: Callable[[int], object] | bool | None = None,
 ) -> list[FlownFlight]:
     """Fly scenarios in this process, eight at a time where they can share a batch.
 
@@ -40,7 +41,7 @@ def fly_many(
     Args:
         scenarios: to be flown.
         keep_log: False: only the metrics are kept, for flights too long or too many for memory.
-        progress: called with the number of flights that are over.
+        progress: called with the number of flights that are over; True: a progress line.
 
     Returns:
         The flights, in the order of ``scenarios``.
@@ -48,19 +49,12 @@ def fly_many(
     Raises:
         InputError: a scenario cannot be flown; names its place.
     """
-    if progress is not None and not callable(progress):
-        raise InputError(f"progress: a function was expected, got {short(progress)}")
-    flown: dict[int, FlownFlight] = {}
-    for group in batches(_checked(scenarios)):
-        flights = [flight for _, flight in group]
-        if len(flights) == 1:
-            over = [fly_in_process(flights[0], keep_log=keep_log)]
-        else:
-            over = _fly_batch(flights, keep_log)
-        flown |= zip((number for number, _ in group), over, strict=True)
-        if progress:
-            progress(len(flown))
-    return [flown[number] for number in sorted(flown)]
+    check_progress(progress)
+    if progress is True:
+        several = list(scenarios)
+        with flights_progress(len(several)) as show:
+            return _fly_groups(several, keep_log, show, is_shown_at_start=True)
+    return _fly_groups(scenarios, keep_log, progress or None)
 
 
 def bench_many(scenarios: Iterable[Scenario]) -> Benches:
@@ -103,10 +97,38 @@ def _checked(scenarios: Iterable[Scenario], is_flown: bool = True) -> Iterator[t
         yield number, flight
 
 
-def _fly_batch(flights: list[Flight], keep_log: bool) -> list[FlownFlight]:
-    """Fly the flights of one batch."""
+def _fly_groups(
+    scenarios: Iterable[Scenario],
+    keep_log: bool,
+    progress: Callable[[int], object] | None,
+    is_shown_at_start: bool = False,
+) -> list[FlownFlight]:
+    """Fly scenarios group by group; ``is_shown_at_start``: call ``progress`` with 0, too."""
+    flown: dict[int, FlownFlight] = {}
+    for group in batches(_checked(scenarios)):
+        flights = [flight for _, flight in group]
+        _compile(flights)  # has a progress line of its own
+        if progress and is_shown_at_start and not flown:
+            progress(0)
+        if len(flights) == 1:
+            over = [fly_in_process(flights[0], keep_log=keep_log)]
+        else:
+            over = _fly_batch(flights, keep_log)
+        flown |= zip((number for number, _ in group), over, strict=True)
+        if progress:
+            progress(len(flown))
+    return [flown[number] for number in sorted(flown)]
+
+
+def _compile(flights: list[Flight]) -> None:
+    """Compile what the flights of a group need, once an installation."""
     compile_kernels(any(flight.plant.names.actuators for flight in flights))
-    compile_lanes()
+    if len(flights) > 1:
+        compile_lanes()
+
+
+def _fly_batch(flights: list[Flight], keep_log: bool) -> list[FlownFlight]:
+    """Fly the flights of one batch, whose kernels are compiled."""
     analyses = [Analysis() for _ in flights]
     logs: list[FlightLog | None] = [None for _ in flights]
     endings = [Ending.complete(flight.ticks, flight.period) for flight in flights]

@@ -1,4 +1,4 @@
-"""Progress lines on standard error, for flights and for series of tasks."""
+"""Progress lines on standard error, or in a notebook, for flights and for series of tasks."""
 
 from __future__ import annotations
 
@@ -18,6 +18,10 @@ from rich.progress import (
 )
 from rich.text import Text
 
+from space_robot_msgs_py.config.validation import short
+from space_robot_msgs_py.errors import InputError
+
+from .notebook import NotebookProgress, is_in_notebook
 from .terminal import say, terminal
 
 LINE_S = 60.0
@@ -53,8 +57,10 @@ def flight_progress(total_s: float, what: str) -> Iterator[FlightProgress]:
 
 
 @contextmanager
-def counting_progress(what: str) -> Iterator[Callable[[int], Callable[[], None]]]:
-    """Show a progress line for a series of tasks.
+def counting_progress(
+    what: str, is_transient: bool = False
+) -> Iterator[Callable[[int], Callable[[], None]]]:
+    """Show a progress line for a series of tasks; ``is_transient``: it is removed at the end.
 
     Yields:
         A function that takes the number of tasks, and returns a function to call after each task.
@@ -62,7 +68,8 @@ def counting_progress(what: str) -> Iterator[Callable[[int], Callable[[], None]]
     with ExitStack() as stack:
 
         def begin(total: int) -> Callable[[], None]:
-            progress = stack.enter_context(_bar("{task.completed:.0f}/{task.total:.0f}"))
+            counts = "{task.completed:.0f}/{task.total:.0f}"
+            progress = stack.enter_context(_bar(counts, is_transient=is_transient))
             task = progress.add_task(what, total=total)
             return lambda: progress.advance(task)
 
@@ -82,7 +89,8 @@ def rated_progress(what: str, line_s: float = LINE_S) -> Iterator[Callable[[int,
 
         def show(done: int, total: int, remark: str) -> None:
             nonlocal progress, told_at
-            if not console.is_terminal and time.monotonic() >= told_at + line_s:
+            is_file = not console.is_terminal and not is_in_notebook()
+            if is_file and time.monotonic() >= told_at + line_s:
                 told_at = time.monotonic()
                 line = f"{what} {done}/{total}"
                 say(console, f"{line}, {remark}" if remark else line)
@@ -97,6 +105,25 @@ def rated_progress(what: str, line_s: float = LINE_S) -> Iterator[Callable[[int,
                 progress.update(progress.task_ids[0], completed=done, total=total, remark=remark)
 
         yield show
+
+
+@contextmanager
+def flights_progress(total: int) -> Iterator[Callable[[int], None]]:
+    """Show a progress line for ``total`` flights; call what it yields with the number of done."""
+    with rated_progress("flights") as show:
+        yield lambda done: show(done, total, "")
+
+
+def check_progress(progress: object) -> None:
+    """Check the argument ``progress`` of a function: a function, a truth value or None.
+
+    Raises:
+        InputError: it is something else.
+    """
+    if not (progress is None or isinstance(progress, bool) or callable(progress)):
+        raise InputError(
+            f"progress: a function was expected, or True for a progress line, got {short(progress)}"
+        )
 
 
 @contextmanager
@@ -135,14 +162,17 @@ class _Rate(ProgressColumn):
         return Text(f"{speed:.3g}/s" if speed else "")
 
 
-def _bar(done: str, *more: ProgressColumn) -> Progress:
+def _bar(done: str, *more: ProgressColumn, is_transient: bool = False) -> Progress:
     """Return a line with a bar; ``done`` is the format of the progress beside it."""
-    return Progress(
+    columns = (
         TextColumn("{task.description}", markup=False),
         BarColumn(bar_width=24),
         TextColumn(done),
         TimeElapsedColumn(),
         *more,
-        console=terminal(stderr=True),
-        refresh_per_second=5,
+    )
+    if is_in_notebook():
+        return NotebookProgress(*columns, is_transient=is_transient)
+    return Progress(
+        *columns, console=terminal(stderr=True), refresh_per_second=5, transient=is_transient
     )

@@ -27,8 +27,11 @@ class _Console(Console):
 
 
 def terminal(**options: Any) -> Console:
-    """Return a console without markup; ``options`` are those of `rich.console.Console`."""
-    return _Console(markup=False, emoji=False, highlight=False, **options)
+    """Return a console without markup; ``options`` are those of `rich.console.Console`.
+
+    In a notebook it prints text, too: rich's HTML for notebooks has a fixed width.
+    """
+    return _Console(markup=False, emoji=False, highlight=False, force_jupyter=False, **options)
 
 
 def echo_json(report: Any) -> None:

@@ -109,6 +109,12 @@ class Robot(TreeArrays):
         robot = cls.of_tree(urdf.name, urdf.bodies, where)
         return replace(robot, repairs=tuple(map(str, urdf.findings)), source=where)
 
+    def _repr_html_(self) -> str:
+        """Show bodies, joints and limits in a notebook."""
+        from .html import robot_html
+
+        return robot_html(self)
+
     @property
     def content(self) -> dict[str, Any]:
         """All numbers without visuals, as lists and texts; `from_dict` builds the same robot."""

@@ -10,7 +10,7 @@ import re
 import shutil
 import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import closing
+from contextlib import closing, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -23,6 +23,7 @@ from space_robot_msgs_py.errors import FlightError, InputError
 
 from ...analysis.own_metric import SESSION, MetricFunction, check_names, text_of
 from ...console.files import make_folder
+from ...console.progress import check_progress, rated_progress
 from ...flight.ending import DIVERGED, UNANSWERED
 from ...flight.simulate import fly_blocks
 from ...processes.pool import check_scheduler, cores, run_many
@@ -34,6 +35,7 @@ from ..store.journal import Journal
 from ..store.recovery import open_journal
 from ..store.table import check_tables
 from ..study import Study, read_study
+from .campaign_html import study_html
 from .current_table import WRITTEN, write_if_older
 from .flights import Flights, Progress
 from .flown_campaign import FlownCampaign
@@ -177,7 +179,7 @@ class Campaign:
         workers: int | None = None,
         scheduler: str | None = None,
         timeout_s: float | None = None,
-        progress: Callable[[Progress], object] | None = None,
+        progress: Callable[[Progress], object] | bool | None = None,
         warn: Callable[[str], object] = warnings.warn,
     ) -> FlownCampaign:
         """Fly the campaign, or its remaining flights, and write its table.
@@ -194,7 +196,8 @@ class Campaign:
             scheduler: address of a Dask scheduler whose workers fly instead.
             timeout_s: longest wall-clock time of a flight; its outcome is then ``out_of_time``.
                 With such a limit flights are flown one by one, not eight at a time.
-            progress: called at the beginning and after each group of up to eight flights.
+            progress: called at the beginning and after each group of up to eight flights; True: a
+                progress line, in a terminal or a notebook.
             warn: called with a line for each damaged file of the folder, whose lost rows are
                 flown again, and for each law whose flights are flown one by one.
 
@@ -203,6 +206,7 @@ class Campaign:
                 metric's function fails, or cannot be sent to the workers or kept in a folder.
         """
         check_tables()
+        check_progress(progress)
         if local := [n for n, text in self.study.metrics.items() if text.startswith(SESSION)]:
             check_local(local, out, workers, scheduler)
             workers = 0
@@ -230,12 +234,29 @@ class Campaign:
                         if self.study.metrics and not flights.kept:
                             asked.try_metrics()
                         journal.make_note(WRITTEN, "")  # the table is outdated
-                        flights.fly(progress or (lambda _: None), options)
+                        with _shown(progress) as show:
+                            flights.fly(show, options)
                 finally:  # also after an error: write the table of all flown rows
                     runs_of_table = flights.precision.stop
                     write_if_older(folder, journal, manifest, runs_of_table)
                 fly_bags(folder, asked.flyer, journal, runs_of_table, processes)
         return FlownCampaign(folder, True, temporary, flights.kept)
+
+    def _repr_html_(self) -> str:
+        """Show flights, variables and requirements in a notebook."""
+        return study_html(self.study)
+
+
+@contextmanager
+def _shown(
+    progress: Callable[[Progress], object] | bool | None,
+) -> Iterator[Callable[[Progress], object]]:
+    """Yield the function that is called with the progress: the user's, or that of a line."""
+    if progress is not True:
+        yield progress or (lambda _: None)
+        return
+    with rated_progress("flights") as show:
+        yield lambda p: show(p.done, p.total, f"{p.failed} failed" if p.failed else "")
 
 
 OF_SESSION = "of this Python session (a notebook's or script's function, or a lambda)"

@@ -25,6 +25,7 @@ from ..store.software import software, texts_of
 from ..store.table import check_table, read_table
 from ..study import Law, Study
 from ..verdicts.requirements import Verdict, verdicts
+from .campaign_html import verdicts_html
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -186,6 +187,10 @@ class FlownCampaign:
     def __repr__(self) -> str:
         laws = ", ".join(self.study.laws)
         return f"<FlownCampaign: {self.folder}, {len(self.table)} flights of {laws}>"
+
+    def _repr_html_(self) -> str:
+        """Show the verdicts in a notebook."""
+        return verdicts_html(repr(self)[1:-1], self.verdicts)
 
 
 CAMPAIGN = "campaign"
