@@ -141,7 +141,7 @@ $(VENV)/.tests: setup.py pyproject.toml $(CONSTRAINTS) | $(VENV)/.flies
 
 $(VENV)/.docs: setup.py $(CONSTRAINTS) | $(VENV)/.made
 	@echo "installing space_robot and what makes its site into $(VENV): a minute, once"
-	@$(PIP_INSTALL) --editable '.[docs]'
+	@$(PIP_INSTALL) --editable '.[docs,view,campaign]'
 	@touch $@
 
 $(VENV)/.made:

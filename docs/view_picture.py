@@ -1,39 +1,71 @@
-"""Makes a picture of a page of `space-robot view`, as Chromium shows it.
+"""Makes pictures of pages of `space-robot view`, as Chromium shows them.
 
     python docs/view_picture.py PAGE PICTURE [SECONDS]
+    python docs/view_picture.py --gallery
 
-Needs playwright (`pip install playwright`) and Chromium of the system.
+The second form flies what docs/gallery.md shows and makes its pictures. Needs `websockets`, which
+comes with the extra `view`, and Chromium of the system.
 """
 
 from __future__ import annotations
 
-import shutil
+import io
 import sys
+import tempfile
+import time
 from pathlib import Path
 
-from playwright.sync_api import sync_playwright
+from devtools import Browser
+from PIL import Image
 
-ARGUMENTS = ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
-PATIENCE_MS = 240_000
+DOCS = Path(__file__).resolve().parent
+SIZE = (1300, 720)
+OF_GALLERY = (650, 360)
+SHARE = 0.6
+"""Part of a flight after which it is shown, unless another time is asked for."""
+LIGHT_S = 5.0
+"""Until the light is right without a graphics card."""
+QUALITY = 80
+TIMES = "JSON.parse(document.getElementById('data').textContent).plots[0].time"
+NOTICES = "document.getElementById('scene').contentDocument.querySelectorAll('{}')"
 
 
-def picture(page: Path, file: Path, seconds: float) -> None:
-    """Write the picture of a page at so many seconds of its flight."""
-    chromium = next(filter(None, map(shutil.which, ("chromium", "google-chrome"))))
-    with sync_playwright() as started:
-        browser = started.chromium.launch(executable_path=chromium, args=ARGUMENTS)
-        shown = browser.new_page(viewport={"width": 1300, "height": 720})
-        shown.set_default_timeout(PATIENCE_MS)
-        shown.goto(page.absolute().as_uri())
-        shown.wait_for_function("spaceRobot.time() > 0")
-        shown.evaluate(f"spaceRobot.seek({seconds})")
-        notice = shown.frame_locator("#scene").locator(".mantine-CloseButton-root")
-        for _ in range(notice.count()):  # viser's, that there is no graphics card
-            notice.first.evaluate("button => button.click()")
-        shown.wait_for_timeout(5000)  # for the light
-        shown.screenshot(path=file)
-        browser.close()
+def picture(
+    page: Path, file: Path, seconds: float | None = None, size: tuple[int, int] = SIZE
+) -> None:
+    """Write the picture of a page at so many seconds of its flight; of another page, as it is."""
+    with Browser() as browser:
+        tab = browser.tab(*SIZE)
+        tab.open(page.absolute().as_uri())
+        if tab.value("document.getElementById('scene') !== null"):
+            tab.wait("window.spaceRobot && spaceRobot.time() > 0")
+            if seconds is None:
+                first, last = tab.value(f"(t => [t[0], t[t.length - 1]])({TIMES})")
+                seconds = first + SHARE * (last - first)
+            tab.value(f"spaceRobot.seek({seconds})")
+            close = NOTICES.format(".mantine-CloseButton-root")  # that there is no graphics card
+            tab.value(f"{close}.forEach(button => button.click())")
+            time.sleep(LIGHT_S)
+        shown = Image.open(io.BytesIO(tab.picture())).convert("RGB")
+    shown.resize(size, Image.Resampling.LANCZOS).save(file, quality=QUALITY)
+
+
+def gallery() -> None:
+    """Write the pictures of the gallery."""
+    sys.path.insert(0, str(DOCS / "hooks"))
+    from gallery import GALLERY, pages
+
+    for name, content in pages((DOCS / GALLERY).read_text("utf-8")):
+        with tempfile.TemporaryDirectory() as folder:
+            page = Path(folder) / f"{name}.html"
+            page.write_bytes(content)
+            picture(page, DOCS / f"gallery/{name}.webp", size=OF_GALLERY)
+        print(name)
 
 
 if __name__ == "__main__":
-    picture(Path(sys.argv[1]), Path(sys.argv[2]), float((*sys.argv[3:], "0")[0]))
+    if sys.argv[1:] == ["--gallery"]:
+        gallery()
+    else:
+        seconds = float(sys.argv[3]) if len(sys.argv) > 3 else None
+        picture(Path(sys.argv[1]), Path(sys.argv[2]), seconds)

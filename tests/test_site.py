@@ -5,22 +5,48 @@ from __future__ import annotations
 import json
 import os
 import re
-import shutil
 import subprocess
 import sys
 from collections import Counter
+from collections.abc import Iterator
 from html.parser import HTMLParser
 from pathlib import Path
+from typing import Any
 
 import pytest
 from paths import DOCS, ROOT
 
 MarkdownIt = pytest.importorskip("markdown_it").MarkdownIt
-for tool in ("material", "mermaidx", "mkdocstrings", "nbconvert", "ziamath"):
+for tool in ("material", "mermaidx", "mkdocstrings", "nbconvert", "pandas", "viser", "ziamath"):
     pytest.importorskip(tool)
 
-CHROMIUM = shutil.which("chromium") or shutil.which("google-chrome")
 PAGES = sorted(path for path in DOCS.rglob("*.md") if path != DOCS / "README.md")
+SECTIONS = re.compile(r"^(?:\*\*[^*]+\*\*.*|- .*)$", re.MULTILINE)
+"""Lines of docs/README.md that the navigation is made of."""
+NARROW = (
+    "index.html",
+    "gallery.html",
+    "compare.html",
+    "tutorial.html",
+    "law_league.html",
+    "notebooks/real_spacecraft.html",
+    "explanation/theory.html",
+    "reference/parameters.html",
+    "reference/commands.html",
+    "reference/api/space_robot_control/laws.html",
+)
+"""Pages with wide tables, code, equations, diagrams, outputs and long names."""
+OF_NO_GRAPHICS_CARD = re.compile(r"GL Driver Message|GPU stall|WebGL|swiftshader", re.IGNORECASE)
+LOOK = """(() => {
+    const style = (selector, name) => getComputedStyle(document.querySelector(selector))[name];
+    return [
+        style("body", "backgroundColor"),
+        style("article p", "color"),
+        style(".diagram .node rect, .diagram .node path", "fill"),
+        style(".diagram .nodeLabel, .diagram text", "color"),
+    ];
+})()"""
+"""Colours of the page, its text, and a diagram's boxes and labels."""
 OUTSIDE = re.compile(r"^(?:https?:)?//")
 
 
@@ -53,7 +79,7 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
         cwd=ROOT,
         text=True,
         capture_output=True,
-        env={**os.environ, "NO_MKDOCS_2_WARNING": "1"},
+        env={**os.environ, "NO_MKDOCS_2_WARNING": "1", "GALLERY_S": "0.2"},
     )
     said = made.stdout + made.stderr
     assert made.returncode == 0, said
@@ -127,28 +153,141 @@ def test_the_search_knows_all_pages(site: Path) -> None:
     assert {path.relative_to(DOCS).with_suffix(".html").as_posix() for path in PAGES} <= known
 
 
-@pytest.mark.skipif(CHROMIUM is None, reason="no Chromium")
-def test_a_browser_without_network_reads_and_searches_it(site: Path, tmp_path: Path) -> None:
+def test_the_navigation_has_no_page_and_no_title_twice(site: Path) -> None:
+    """And what a beginner looks for is at the beginning."""
+    home = (site / "index.html").read_text("utf-8")
+    (bar,) = re.findall(r'<nav class="md-tabs".*?</nav>', home, re.DOTALL)
+    tabs = [text.strip() for text in re.findall(r">\s*([^<>]+?)\s*</a>", bar)]
+    assert tabs[:3] == ["Home", "Getting started", "Manual"]
+    titles, targets = [], []
+    for section in SECTIONS.findall((DOCS / "README.md").read_text("utf-8")):
+        for title, target in re.findall(r"\[([^]]+)\]\(([^):#]+)\)", section):
+            titles.append(title.lower())
+            targets.append(target)
+    assert len(set(titles)) == len(titles)
+    assert len(set(targets)) == len(targets)
+    beginning = (site / "your_robot.html").read_text("utf-8")
+    assert re.search(r'md-tabs__item--active">\s*<a[^>]*>\s*Getting started', beginning)
+
+
+def test_each_picture_of_the_gallery_leads_to_a_page_made_by_its_commands(site: Path) -> None:
+    text = (DOCS / "gallery.md").read_text("utf-8")
+    names = re.findall(r"\(gallery/(\w+)\.webp\)", text)
+    assert len(names) == text.count("\n## ") == 8
+    shown = (site / "gallery.html").read_text("utf-8")
+    for name in names:
+        assert (DOCS / f"gallery/{name}.webp").stat().st_size < 100_000, name
+        assert f'<a href="gallery/{name}.html"><img' in shown
+        assert f'src="gallery/{name}.html"' in shown
+        assert 1e4 < (site / f"gallery/{name}.html").stat().st_size < 3e6, name
+    flown = (site / "gallery/five_laws.html").read_text("utf-8")
+    for law in re.findall(r"--controller (\w+)", text):
+        assert law in flown
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Any]:
+    """Headless Chromium without a network."""
+    pytest.importorskip("websockets")
+    sys.path.insert(0, str(DOCS))
+    from devtools import Browser, chromium
+
+    if chromium() is None:
+        pytest.skip("no Chromium")
+    with Browser() as started:
+        yield started
+
+
+@pytest.mark.parametrize(
+    ("words", "page"),
+    [
+        ("bounded real lemma", "explanation/theory.html"),
+        ("echo_scale", "reference/parameters.html"),
+        ("plant.echo_scale", "reference/parameters.html"),
+        ("tde_stc", "manual/control_laws.html"),
+        ("mass_matrix", "reference/api/index.html"),
+    ],
+)
+def test_the_search_finds(site: Path, browser: Any, words: str, page: str) -> None:
     """As files, without a server: what could not be loaded would be told on the console."""
-    address = f"{(site / 'index.html').as_uri()}?q=bounded+real+lemma"
-    shown = subprocess.run(
-        [
-            str(CHROMIUM),
-            "--headless",
-            "--no-sandbox",
-            "--disable-gpu",
-            "--dump-dom",
-            f"--user-data-dir={tmp_path}",
-            "--host-resolver-rules=MAP * ~NOTFOUND",
-            "--enable-logging=stderr",
-            "--virtual-time-budget=20000",
-            address,
-        ],
-        text=True,
-        capture_output=True,
-        timeout=120,
-        check=True,
+    tab = browser.tab()
+    tab.open(f"{(site / 'index.html').as_uri()}?q={words.replace(' ', '+')}")
+    results = tab.wait(
+        "[...document.querySelectorAll('.md-search-result__link')].map(a => a.href).join(' ')"
     )
-    assert not re.findall(r".*:CONSOLE.*", shown.stderr)
-    (results,) = re.findall(r'<ol class="md-search-result__list".*?</ol>', shown.stdout, re.DOTALL)
-    assert "explanation/theory.html" in results
+    assert page in results
+    assert not complaints(tab)
+    tab.shut()
+
+
+def test_the_gallery_turns_without_a_message(site: Path, browser: Any) -> None:
+    """A page opened within the gallery draws its flight and says nothing."""
+    tab = browser.tab()
+    tab.open((site / "gallery.html").as_uri())
+    tab.value("document.querySelector('details.gallery').open = true")
+    tab.wait("document.querySelector('details.gallery iframe').contentDocument !== undefined")
+    assert not complaints(tab)
+    assert all(url.startswith(("file:", "data:", "blob:", "about:")) for url in tab.requests)
+    tab.open((site / "gallery/case_1.html").as_uri())
+    tab.wait("window.spaceRobot && spaceRobot.time() > 0")
+    assert not complaints(tab)
+    tab.open((site / "gallery/verdict_of_a_campaign.html").as_uri())
+    assert tab.value("document.querySelectorAll('table').length")
+    tab.shut()
+
+
+def test_no_page_is_wider_than_a_phone(site: Path, browser: Any) -> None:
+    """Tables scroll in themselves; those of the reference are one column of blocks."""
+    tab = browser.tab(390, 800, is_phone=True)
+    tab.ask("Network.setBlockedURLs", urls=["*search*"])  # as large as all the rest
+    wide = {}
+    for name in NARROW:
+        tab.open((site / name).as_uri())
+        if (width := tab.value("document.documentElement.scrollWidth")) > 390:
+            wide[name] = width
+    assert not wide
+    tab.open((site / "reference/parameters.html").as_uri())
+    cells = "[...document.querySelectorAll('.rows td')].map(td => td.getBoundingClientRect())"
+    assert tab.value(f"{cells}.every(box => box.right <= 390)")
+    size = "parseFloat(getComputedStyle(document.querySelector('.rows td')).fontSize)"
+    assert tab.value(size) >= 11.0
+    tab.shut()
+
+
+def test_the_dark_page_can_be_read(site: Path, browser: Any) -> None:
+    """The switch darkens page and diagrams; pictures keep their own background."""
+    tab = browser.tab()
+    tab.open((site / "index.html").as_uri())
+    light = tab.value(LOOK)
+    tab.value("document.querySelector('form[data-md-component=palette] label').click()")
+    tab.wait("document.body.dataset.mdColorScheme === 'slate'")
+    tab.wait(f"JSON.stringify({LOOK}) !== {json.dumps(json.dumps(light, separators=(',', ':')))}")
+    dark = tab.value(LOOK)
+    for look in (light, dark):
+        page, text, box, label = (luminance(colour) for colour in look)
+        assert contrast(page, text) > 4.5, look
+        assert contrast(box, label) > 4.5, look
+    assert luminance(light[0]) > 0.8
+    assert luminance(dark[0]) < 0.1
+    tab.shut()
+
+
+def complaints(tab: Any) -> list[str]:
+    """Messages but for viser's log, and what a browser without a graphics card warns of."""
+    return [
+        text
+        for text in tab.messages
+        if not text.startswith("log:") and not OF_NO_GRAPHICS_CARD.search(text)
+    ]
+
+
+def luminance(colour: str) -> float:
+    """Relative luminance of ``rgb(...)`` or ``rgba(...)``, as in WCAG 2."""
+    numbers = [float(text) / 255.0 for text in re.findall(r"[\d.]+", colour)[:3]]
+    linear = [c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in numbers]
+    return 0.2126 * linear[0] + 0.7152 * linear[1] + 0.0722 * linear[2]
+
+
+def contrast(one: float, other: float) -> float:
+    """Contrast of two luminances, as in WCAG 2."""
+    return (max(one, other) + 0.05) / (min(one, other) + 0.05)
