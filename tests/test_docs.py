@@ -90,6 +90,19 @@ def test_files_of_the_source_tree_exist(document: Path) -> None:
         assert (ROOT / name).exists(), name
 
 
+def test_the_comparison_has_the_figures_of_the_measurements() -> None:
+    """And little to read beside its table."""
+    text = (ROOT / "docs/compare.md").read_text("utf-8")
+    measured = (ROOT / "docs/measurements/performance.md").read_text("utf-8")
+    (row,) = re.findall(r"^\| us per step .*$", text, re.MULTILINE)
+    figures = re.findall(r"\d+\.\d+", row)
+    assert len(figures) == 4
+    for figure in figures:
+        assert re.search(rf"\| {re.escape(figure)}\b", measured), figure
+    words = [word for line in text.splitlines() if line[:1] != "|" for word in line.split()]
+    assert len(words) <= 400
+
+
 def commands(text: str) -> Iterator[list[str]]:
     for match in COMMAND.findall(text):
         yield match.split()
