@@ -31,7 +31,7 @@ Array = NDArray[np.float64]
 TIME = "time"
 BASE = tuple(f"base_{kind}_{axis}" for kind in ("force", "torque") for axis in "xyz")
 """Columns of the wrench on the base."""
-MOST_VALUES = 100_000
+MOST_VALUES = 50_000
 """Largest number of values, those of ``time`` included: a bag holds all of them."""
 JSON = "{"
 """Begin of a text that holds the numbers; any other text is a path."""
