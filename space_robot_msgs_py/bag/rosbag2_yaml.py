@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from io import StringIO
 from typing import Any, NamedTuple
+from uuid import uuid4
 
 import yaml
 
@@ -14,6 +16,8 @@ from ..wire.definitions import jazzy
 _FOREVER = {"sec": 9223372036, "nsec": 854775807}
 _NEVER_NS = 2**63 - 1
 """The start of a bag without a message."""
+_LONG = 10_000
+"""Characters of a text that PyYAML takes too long for: it looks at each of them in Python."""
 
 
 class FileSummary(NamedTuple):
@@ -32,6 +36,19 @@ class _Dumper(yaml.SafeDumper):
         """No anchors, which other readers need not know."""
         return True
 
+    def __init__(self, *arguments: Any, **options: Any) -> None:
+        super().__init__(*arguments, **options)
+        self.long_texts: dict[str, str] = {}
+        """By what stands for them."""
+
+    def represent_text(self, text: str) -> yaml.ScalarNode:
+        """Represent a text; a long one of JSON by a short one that stands for it."""
+        if len(text) > _LONG and text[0] in "{[" and text.isascii() and text.isprintable():
+            name = f"{{{uuid4()}}}"
+            self.long_texts[f"'{name}'"] = "'" + text.replace("'", "''") + "'"
+            text = name
+        return self.represent_scalar("tag:yaml.org,2002:str", text, style=None if text else '"')
+
     def increase_indent(self, flow: bool = False, indentless: bool = False) -> None:
         """Sequences are indented below their key."""
         super().increase_indent(flow, False)
@@ -40,19 +57,20 @@ class _Dumper(yaml.SafeDumper):
 _Dumper.add_representer(
     type(None), lambda dumper, _: dumper.represent_scalar("tag:yaml.org,2002:null", "~")
 )
-_Dumper.add_representer(
-    str,
-    lambda dumper, text: dumper.represent_scalar(
-        "tag:yaml.org,2002:str", text, style=None if text else '"'
-    ),
-)
+_Dumper.add_representer(str, _Dumper.represent_text)
 
 
 def to_yaml(value: Any) -> str:
     """Text as rosbag2 writes it, without a line's end."""
-    return yaml.dump(
-        value, Dumper=_Dumper, sort_keys=False, default_flow_style=False, width=math.inf
-    ).strip()
+    stream = StringIO()
+    dumper = _Dumper(stream, sort_keys=False, default_flow_style=False, width=math.inf)
+    dumper.open()
+    dumper.represent(value)
+    dumper.close()
+    text = stream.getvalue()
+    for name, long_text in dumper.long_texts.items():
+        text = text.replace(name, long_text)
+    return text.strip()
 
 
 def qos_profiles(topic: Topic) -> list[dict[str, Any]]:

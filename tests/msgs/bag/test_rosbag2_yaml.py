@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 
+import pytest
 import yaml
 from hypothesis import given
 from hypothesis import strategies as st
@@ -43,3 +44,15 @@ def test_bag_spans_its_files(files: list[FileSummary]) -> None:
         assert (start, end) == (min(s[0] for s in spans), max(s[1] for s in spans))
     else:
         assert (start, end) == (2**63 - 1, 2**63 - 1)  # as rosbag2 says of an empty bag
+
+
+@pytest.mark.parametrize("filling", ["0.5, ", "it's, ", "é", "\n", ": # "])
+def test_long_texts_are_written_as_short_ones(filling: str) -> None:
+    """As PyYAML would write them, which takes long."""
+    text = "{" + filling * 10_000
+    value = {"a": [text, "b"], "c": text}
+    written = to_yaml(value)
+    assert yaml.safe_load(written) == value
+    if text.isprintable():  # no line of it is indented
+        plain = yaml.safe_dump(value, width=10**9).strip()
+        assert written == plain.replace("\n- ", "\n  - ")
