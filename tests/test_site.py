@@ -114,7 +114,8 @@ def test_equations_and_diagrams_are_drawn(site: Path) -> None:
         text = html.read_text("utf-8")
         assert "arithmatex" not in text
         assert 'class="diagram"><code>' not in text
-    assert '<figure class="diagram"><svg' in (site / "index.html").read_text("utf-8")
+    drawn = (site / "explanation/architecture.html").read_text("utf-8")
+    assert '<figure class="diagram"><svg' in drawn
 
 
 def test_commands_and_the_names_for_users_are_there(site: Path) -> None:
@@ -257,7 +258,7 @@ def test_no_page_is_wider_than_a_phone(site: Path, browser: Any) -> None:
 def test_the_dark_page_can_be_read(site: Path, browser: Any) -> None:
     """The switch darkens page and diagrams; pictures keep their own background."""
     tab = browser.tab()
-    tab.open((site / "index.html").as_uri())
+    tab.open((site / "explanation/architecture.html").as_uri())
     light = tab.value(LOOK)
     tab.value("document.querySelector('form[data-md-component=palette] label').click()")
     tab.wait("document.body.dataset.mdColorScheme === 'slate'")

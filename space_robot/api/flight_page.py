@@ -7,6 +7,7 @@ import webbrowser
 from collections.abc import Sequence
 from html import escape
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from space_robot_model.robot import Robot
 from space_robot_msgs_py.bag.flight_log import FlightLog
@@ -14,6 +15,9 @@ from space_robot_msgs_py.config.arguments import as_path
 
 from ..console.files import check_writable, make_folder, whole_file
 from ..console.progress import counting_progress
+
+if TYPE_CHECKING:
+    from ..view.flights import ViewOptions
 
 HEIGHT_PX = 600
 
@@ -57,25 +61,17 @@ class FlightPage:
         )
 
 
-def draw_page(
-    logs: Sequence[FlightLog],
-    robots: Sequence[Robot],
-    rate: float,
-    title: str,
-    light: bool,
-    side_by_side: bool,
-) -> str:
+def draw_page(logs: Sequence[FlightLog], robots: Sequence[Robot], options: ViewOptions) -> str:
     """Return the page of flights, named by their laws.
 
     Raises:
         InputError: viser is not installed, or a flight has no state.
     """
-    from ..view.flights import ViewOptions, flights_page  # slow to import
+    from ..view.flights import flights_page  # slow to import
     from ..view.stage import check_viser
 
     check_viser()
     names = unique_names([str(log.flight.get("controller", "flight")) for log in logs])
-    options = ViewOptions(side_by_side, rate, title, not light)
     with counting_progress("drawing", is_transient=True) as advance:
         return flights_page(
             dict(zip(names, logs, strict=True)),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -196,6 +197,7 @@ class FlownFlight:
         title: str = "",
         light: bool = False,
         side_by_side: bool = False,
+        plots: Sequence[str] = (),
         opens: bool = True,
         height: int = HEIGHT_PX,
     ) -> FlightPage:
@@ -212,24 +214,22 @@ class FlownFlight:
             title: of the page; empty: the laws.
             light: dark on white, to print.
             side_by_side: a place for each robot.
+            plots: kinds shown first, as by ``--plots``; empty: the usual ones.
             opens: False: the file is not opened in a browser.
             height: of the page in a notebook, px.
 
         Raises:
-            InputError: viser is not installed, no log was kept, or the file cannot be written.
+            InputError: viser is not installed, no log was kept, a plot is unknown, or the file
+                cannot be written.
         """
+        from ..view.flights import ViewOptions  # slow to import
+        from ..view.plot_kinds import parse_kinds
+
         flights = (self, *others)
-        page = FlightPage(
-            draw_page(
-                [flight.log for flight in flights],
-                [flight.flight.robot for flight in flights],
-                rate,
-                title,
-                light,
-                side_by_side,
-            ),
-            height,
-        )
+        kinds = parse_kinds(",".join(plots)) if plots else ()
+        options = ViewOptions(side_by_side, rate, title, not light, kinds)
+        logs, robots = zip(*((flight.log, flight.flight.robot) for flight in flights), strict=True)
+        page = FlightPage(draw_page(logs, robots, options), height)
         if is_in_notebook():
             if path is not None:
                 page.save(path)

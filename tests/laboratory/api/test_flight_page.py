@@ -53,6 +53,13 @@ def test_others_are_drawn_over_it(flight: FlownFlight, opened: list[str], tmp_pa
     assert any("ctc" in label for label in labels)
 
 
+def test_plots_are_chosen_by_their_names(flight: FlownFlight, opened: list[str]) -> None:
+    page = flight.view(plots=["momentum"], opens=False)
+    assert page.html != flight.view(opens=False).html
+    with pytest.raises(InputError, match="unknown plot 'moment'"):
+        flight.view(plots=["moment"])
+
+
 def test_a_file_that_cannot_be_written_is_told(flight: FlownFlight, opened: list[str]) -> None:
     Path("file").touch()
     with pytest.raises(InputError, match="file"):
