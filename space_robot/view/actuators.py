@@ -13,10 +13,10 @@ from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.errors import InputError
 
 from ..analysis.described import flown_actuators
-from .plumes import PlumeFrames, Plumes
+from .plumes import DrawnPlumes, PlumeFrames
 from .scene import RobotScene
 from .trails import Move
-from .wheels import WheelFrames, Wheels
+from .wheels import DrawnWheels, WheelFrames
 
 if TYPE_CHECKING:
     from viser import SceneApi
@@ -40,11 +40,11 @@ def actuators(
     flown = described_actuators(log)
     moves: list[Move] = []
     if flown.wheel_count:
-        wheels = Wheels(scene, robot_scene, robot, flown.wheels)
+        wheels = DrawnWheels(scene, robot_scene, robot, flown.wheels)
         motion = WheelFrames.of(log, flown.wheels, times)
         moves.append(lambda k: wheels.move(motion.angles[k], motion.is_saturated[k]))
     if flown.thruster_count:
-        plumes = Plumes(scene, robot_scene, robot, flown.thrusters, dark)
+        plumes = DrawnPlumes(scene, robot_scene, robot, flown.thrusters, dark)
         thrusts = PlumeFrames.of(log, times).thrusts
         moves.append(lambda k: plumes.move(thrusts[k]))
     return moves

@@ -63,7 +63,7 @@ class PlumeFrames(NamedTuple):
         return cls((sums[rows + 1] - sums[starts]) / counts)
 
 
-class Plumes:
+class DrawnPlumes:
     """The thrusters on a robot's base."""
 
     def __init__(

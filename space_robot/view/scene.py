@@ -15,7 +15,7 @@ from space_robot_model.robot.tree import Visual
 
 from .mesh import Mesh
 from .meshes import shown_shapes
-from .spacecraft import Part, parts_of
+from .spacecraft import ShapePart, parts_of
 
 if TYPE_CHECKING:
     from viser import FrameHandle, SceneApi, SceneNodeHandle
@@ -175,7 +175,7 @@ def add_shape(
 def _add_part(
     scene: SceneApi,
     path: str,
-    part: Part,
+    part: ShapePart,
     look: SceneStyle,
     position: Array | tuple[float, float, float] = (0.0, 0.0, 0.0),
     turn: Array | tuple[float, float, float, float] = (1.0, 0.0, 0.0, 0.0),

@@ -37,7 +37,7 @@ BACK_COLOUR: Colour = (0.70, 0.71, 0.74, 1.0)
 CELL_COLOUR: Colour = (0.06, 0.12, 0.34, 1.0)
 
 
-class Part(NamedTuple):
+class ShapePart(NamedTuple):
     """A mesh of one colour, in the axes of its shape."""
 
     name: str
@@ -45,7 +45,7 @@ class Part(NamedTuple):
     colour: Colour
 
 
-def parts_of(shape: Visual) -> list[Part]:
+def parts_of(shape: Visual) -> list[ShapePart]:
     """Return what a box in one of the colours of derived shapes is drawn as; empty: as it is."""
     if shape.shape != "box" or shape.colour is None:
         return []
@@ -54,13 +54,13 @@ def parts_of(shape: Visual) -> list[Part]:
         width = FRAME * float(size.min())
         inner = size - 2.0 * INSET * width
         return [
-            Part("foil", foil(inner), shape.colour),
-            Part("frame", frame(size, width), FRAME_COLOUR),
+            ShapePart("foil", foil(inner), shape.colour),
+            ShapePart("frame", frame(size, width), FRAME_COLOUR),
         ]
     thinnest, next_one, _ = np.sort(size)
     if shape.colour == PANEL_COLOUR and thinnest < FLAT * next_one:
         back, cells = panel(size)
-        return [Part("back", back, BACK_COLOUR), Part("cells", cells, CELL_COLOUR)]
+        return [ShapePart("back", back, BACK_COLOUR), ShapePart("cells", cells, CELL_COLOUR)]
     return []
 
 

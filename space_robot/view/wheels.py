@@ -115,7 +115,7 @@ def _since(flags: Mask, rows: NDArray[np.intp]) -> Mask:
     return np.asarray(counts[rows + 1] > counts[np.minimum(before + 1, rows)])
 
 
-class Wheels:
+class DrawnWheels:
     """The wheels on a robot's base."""
 
     def __init__(

@@ -11,9 +11,9 @@ from space_robot_model.hardware.base_actuators import BaseActuatorSettings
 from space_robot_model.robot import Robot
 
 from ..actuators import drawing_notes
-from ..plumes import Plumes
+from ..plumes import DrawnPlumes
 from ..scene import RobotScene
-from ..wheels import Wheels, at_limit, slowdown_of
+from ..wheels import DrawnWheels, at_limit, slowdown_of
 
 if TYPE_CHECKING:
     from viser import SceneApi
@@ -48,9 +48,9 @@ class LiveActuators:
         """
         wheels, thrusters = actuators.wheels, actuators.thrusters
         self._settings = wheels
-        self._wheels = Wheels(scene, robot_scene, robot, wheels) if wheels.count else None
+        self._wheels = DrawnWheels(scene, robot_scene, robot, wheels) if wheels.count else None
         self._plumes = (
-            Plumes(scene, robot_scene, robot, thrusters, dark) if thrusters.count else None
+            DrawnPlumes(scene, robot_scene, robot, thrusters, dark) if thrusters.count else None
         )
         self._angles, self._time = np.zeros(wheels.count), np.inf
         speeds = np.minimum(
