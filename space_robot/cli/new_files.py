@@ -14,10 +14,8 @@ from typing import NamedTuple
 
 import click
 
-from space_robot_msgs_py.config.validation import short
 from space_robot_msgs_py.errors import InputError
 
-from ..console.files import check_free, write_text
 from .options import flight_option, folder_option
 
 
@@ -92,7 +90,7 @@ def check_word(name: str, piece: PieceTemplate) -> None:
     is_word = name.isidentifier() and name.isascii() and name == name.lower()
     if not is_word or keyword.iskeyword(name) or name.startswith(("_", "test")):
         raise InputError(
-            f"{short(name)} is no name of a {piece.name}: lower-case letters, digits and _ are "
+            f"{name!r} is no name of a {piece.name}: lower-case letters, digits and _ are "
             "allowed, a letter first; not a word of Python, and not test..."
         )
 
@@ -124,6 +122,8 @@ def write_files(piece: PieceTemplate, name: str, folder: Path, words: Mapping[st
     Raises:
         InputError: the name is not allowed, or a file exists or cannot be written.
     """
+    from ..console.files import check_free, write_text  # slow to import
+
     check_word(name, piece)
     paths = {
         key: folder / Template(file).substitute(name=name) for key, file in piece.files.items()
