@@ -6,6 +6,7 @@ import re
 from pathlib import Path
 from typing import Any
 
+import numba
 import numpy as np
 import pytest
 from hypothesis import given
@@ -271,3 +272,15 @@ def test_the_law_of_ones_own_in_the_manual_flies(
     flight = Flight(resolve(FlightPlan(controller=own, gains=f"{tmp_path}/gains", duration=0.05)))
     errors = simulate(flight).telemetry[:, 3]  # type: ignore[index]
     assert np.abs(errors).max() < 1e-6
+
+
+def test_numba_finds_one_type_for_all_laws_and_keeps_it() -> None:
+    """Else a kernel that is called with a law looks for the type anew, at every tick."""
+    flown = Flight(resolve(FlightPlan())).laws.values()
+    codes = [law.code for law in flown if isinstance(law, CompiledLaw)]
+    first, again = ([numba.typeof(code) for code in codes] for _ in range(2))
+    assert len(codes) == len(laws())
+    assert set(first) == {first[0]}
+    assert [id(kind) for kind in first] == [id(kind) for kind in again]
+    parts = [numba.typeof(part) for part in codes[0]]
+    assert list(first[0].types) == parts
