@@ -209,7 +209,8 @@ def test_without_viser_one_line_says_what_to_install(
     monkeypatch.setattr("space_robot.view.stage.find_spec", lambda name: None)
     result = view(bags[1], "--no-open")
     assert result.code == 2
-    assert result.err == f"space-robot: error: view needs viser: {install_command('view')}\n"
+    what = f"view needs viser: {install_command('view')} (see: space-robot help install)"
+    assert result.err == f"space-robot: error: {what}\n"
 
 
 def test_a_bag_has_no_shapes_of_a_urdf_until_it_is_named(view: Run, tmp_path: Path) -> None:
