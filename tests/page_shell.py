@@ -17,6 +17,7 @@ import pytest
 import yaml
 from bags import entries_of, mcap_of, rosbags_bag, within
 from flights import space_robot_here
+from page_results import PageResults, content
 from pages import Item, files, items, name
 from paths import CONFIG, DATA, DOCS
 
@@ -38,8 +39,10 @@ SHORTER = {
     r"view": "--no-open",
 }
 """What is added to a command that begins so; {} is half a second after the last time in it."""
-TIME = re.compile(r"(?:@|--swap )([\d.]+)(?:-([\d.]+))?")
-LASTS_S = {"docs/manual/analysis.md": 16.0, "docs/manual/view.md": 15.0}
+TIME = re.compile(r"(@|--(?:swap|from|to)\0)(\d[\d.]*)(?:(-)(\d[\d.]*))?")
+SOONER = 20.0
+"""What times of faults, swaps, events and parts are divided by, so flights are short."""
+LASTS_S = {"docs/manual/analysis.md": 16.0, "docs/manual/view.md": 15.2}
 """Flights of pages that look at a later time."""
 OF_GRAPHS = re.compile(
     r"fly .*(--(composed|domain|realtime|restart-controller|scenario)|list|\w:[A-Z])|replay"
@@ -186,8 +189,7 @@ class PageShell:
 
     def __init__(self, root: Path) -> None:
         self.root = root
-        self.seen: set[tuple[str, ...]] = set()
-        """Commands that named no file of their page: they do the same on every page."""
+        self.results = PageResults(root / "results")
 
     def run(self, page: Path) -> list[str]:
         """Run commands and snippets from top to end; return what failed."""
@@ -266,11 +268,12 @@ class PageShell:
     def _space_robot(self, page: Path, given: list[str]) -> tuple[str, str]:
         """What the command printed, and how it failed."""
         command = shorter(given, LASTS_S.get(name(page), 0.0))
-        if command in self.seen:
-            return "", ""
-        ended = space_robot_here(*command)
-        if not any(Path(part).exists() for word in command for part in re.split("[=@]", word)):
-            self.seen.add(command)
+        key = self.results.key(command)
+        ended = self.results.again(key)
+        if ended is None:
+            before = content()
+            ended = space_robot_here(*command)
+            self.results.keep(key, command, before, ended)
         line = " ".join(given)
         wanted = next((code for p, code in EXIT_CODES.items() if re.match(p, line)), 0)
         if ended.returncode == wanted:
@@ -281,17 +284,23 @@ class PageShell:
 
 def shorter(given: list[str], lasts_s: float) -> tuple[str, ...]:
     """The command as it is run: with its flights cut short."""
-    line = " ".join(given)
     command = list(given)
-    if given[0] == "fly" and "--help" not in given and not OF_GRAPHS.match(line):
+    if given[0] == "fly" and "--help" not in given and not OF_GRAPHS.match(" ".join(given)):
         command[0] = "simulate"
     if given[:2] == ["campaign", "run"]:
         command[2] = short_campaign(given[2])
     if "--help" in given or "list" in given:
         return tuple(command)
-    times = [float(text) for found in TIME.findall(line) for text in found if text]
+    times = [lasts_s / SOONER]
+
+    def sooner(found: re.Match[str]) -> str:
+        before, *rest = found.groups(default="")
+        times.extend(float(text) / SOONER for text in rest[::2] if text)
+        return before + "-".join(f"{float(text) / SOONER:g}" for text in rest[::2] if text)
+
+    command = TIME.sub(sooner, "\0".join(command)).split("\0")
     added = next((a for p, a in SHORTER.items() if re.match(p, " ".join(command))), "")
-    return (*command, *added.format(max([lasts_s, *times]) + 0.5).split())
+    return (*command, *added.format(f"{max(times) + 0.5:g}").split())
 
 
 def short_campaign(file: str) -> str:
