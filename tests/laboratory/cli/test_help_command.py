@@ -31,7 +31,7 @@ def test_every_file_is_listed(space_robot: Run) -> None:
 
 @pytest.mark.parametrize("name", ORDER)
 def test_a_topic_fits_a_screen_and_leads_on(name: str, space_robot: Run) -> None:
-    """Its commands are run by test_pages.py and test_pages_with_graphs.py."""
+    """Its commands are run by test_pages.py."""
     code, out, err = space_robot("help", name)
     assert (code, err) == (0, "")
     lines = out.rstrip("\n").split("\n")
