@@ -199,7 +199,7 @@ def test_a_robot_that_is_not_here_costs_only_its_figures(analyze: Run, tmp_path:
         (["{bag}", "--from", "0.2", "--to", "0.1"], "the start must come before the end"),
         (["{bag}", "{bag}"], "the same bag was given twice"),
         (["{bag}", "{other}", "--csv", "x.csv"], "one file for 2 bags: name a folder"),
-        ([], "Missing argument 'BAG...'"),
+        ([], "missing argument 'BAG...'"),
     ],
 )
 def test_what_cannot_be_is_one_line(
