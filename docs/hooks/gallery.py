@@ -31,9 +31,10 @@ LOOK = """\
 [![{alt}]({picture})](gallery/{name}.html)
 {{ .gallery }}
 
-<details class="gallery"><summary>Turn it with the mouse, here</summary>
-<iframe loading="lazy" src="gallery/{name}.html" title="{alt}"></iframe></details>
+<details class="gallery" ontoggle="this.lastElementChild.src ||= 'gallery/{name}.html'">
+<summary>Turn it with the mouse, here</summary><iframe title="{alt}"></iframe></details>
 """
+"""Beside the link a frame, which is empty until it is opened: eight scenes at once are slow."""
 
 
 def on_files(files: Files, config: MkDocsConfig) -> Files:
