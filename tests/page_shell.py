@@ -95,6 +95,7 @@ NOT_RUN = {
 }
 """Commands that are not run, and why."""
 PYTHON_ELSEWHERE = {
+    "README.md": "tests/laboratory/api/test_python_manual.py",
     "docs/explanation/errata.md": "tests/test_docs.py",
     "docs/manual/python.md": "tests/laboratory/api/test_python_manual.py",
 }

@@ -86,7 +86,8 @@ def robot_files(robot: str) -> RobotFiles:
 
 def _file_here(path: Path) -> str:
     """Return a suggestion of a robot's file with the same stem; empty if there is none."""
-    files = (path.with_name(f"{path.stem}{suffix}") for suffix in (*URDF, *YAML))
+    stem = path.parent / path.stem
+    files = (Path(f"{stem}{suffix}") for suffix in (*URDF, *YAML))
     same = next((str(file) for file in files if os.path.isfile(file)), "")
     return f" (did you mean {printable(same)}?)" if same else ""
 

@@ -1,12 +1,13 @@
-"""The code of docs/manual/python.md runs as it stands there, block after block."""
+"""The code of docs/manual/python.md and of README runs as it stands there, block after block."""
 
 from __future__ import annotations
 
 import re
+from pathlib import Path
 from typing import Any
 
 import pytest
-from paths import DOCS
+from paths import DOCS, ROOT
 
 BLOCK = re.compile(r"```python( gym)?\n(.*?)```", re.DOTALL)
 
@@ -42,3 +43,19 @@ def test_the_block_of_gymnasium_runs(names: dict[str, Any]) -> None:
     assert found["is_over"]
     exec(compile(reach, "python.md", "exec"), found)
     assert found["observations"].shape == (16, 18)
+
+
+def test_the_lines_of_readme_fly_three_laws_and_show_them(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    pytest.importorskip("viser")
+    opened: list[str] = []
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("webbrowser.open", lambda url: bool(opened.append(url)) or True)
+    ((_, code),) = BLOCK.findall((ROOT / "README.md").read_text("utf-8"))
+    exec(compile(code, "README.md", "exec"), {})
+    rows = [line.split() for line in capsys.readouterr().out.splitlines()]
+    assert [row[0] for row in rows[:3]] == ["tde_stc", "ctc", "ctc_smc"]
+    assert all(0.0 < float(error) < 1e-3 for row in rows[:3] for error in row[1:])
+    assert {"tde_stc.png", "tde_stc.svg"} < {file.name for file in tmp_path.iterdir()}
+    assert len(opened) == 1
