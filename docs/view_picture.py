@@ -26,7 +26,7 @@ SHARE = 0.6
 LIGHT_S = 5.0
 """Until the light is right without a graphics card."""
 QUALITY = 80
-TIMES = "JSON.parse(document.getElementById('data').textContent).plots[0].time"
+TIMES = "JSON.parse(document.getElementById('data').textContent).time"
 NOTICES = "document.getElementById('scene').contentDocument.querySelectorAll('{}')"
 
 
