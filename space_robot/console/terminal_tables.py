@@ -6,12 +6,15 @@ from typing import Any
 
 from rich.box import SIMPLE_HEAD
 from rich.console import Console
+from rich.measure import Measurement
 from rich.table import Table as RichTable
 from rich.text import Text
 
 from .tables import Column, JudgedCell, Table, Value, text_of
 from .terminal import say, show
 
+UNLIMITED = 10_000
+"""Width of a terminal on which every table fits."""
 TONES = {"good": "green", "bad": "red", "open": "yellow"}
 
 
@@ -39,6 +42,12 @@ def print_table(table: Table, console: Console, *, dense: bool = False) -> None:
             name = [group.name if number == 0 else ""] if is_grouped else []
             cells = [_cell(value, c) for value, c in zip(row, table.columns, strict=True)]
             shown.add_row(*name, *cells, end_section=number == len(group.rows) - 1)
+    if Measurement.get(console, console.options.update(width=UNLIMITED), shown).maximum > (
+        console.width
+    ):
+        for column, heading in zip(reversed(table.columns), reversed(shown.columns), strict=False):
+            if column.unit:  # stays whole, as N m
+                heading.header = f"{column.name},\n{column.unit}"
     show(shown, console)
     for note in table.notes:
         say(console, note)

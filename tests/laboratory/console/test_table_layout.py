@@ -80,6 +80,13 @@ def test_a_cell_of_numbers_is_broken_only_if_the_table_is_too_wide() -> None:
     assert printed(table, 70).split().count("holds") == 4
 
 
+def test_a_unit_is_broken_from_its_name_only() -> None:
+    columns = [Column("law", is_label=True), *(Column(f"torque_{k}", "N m") for k in range(6))]
+    table = Table.of("", columns, [["tde_stc", *([0.5] * 6)]])
+    assert printed(table, 80).count(" N m ") == printed(table, 200).count(" N m ") == 6
+    assert printed(table, 200).count("torque_3, N m") == 1
+
+
 def test_a_path_is_folded_and_all_of_it_is_shown() -> None:
     path = "/".join(["a_folder"] * 20)
     table = Table.of("", [Column("file", is_label=True), Column("n")], [[path, "1.5"]])
