@@ -17,7 +17,7 @@ PIP_INSTALL := $(PIP) $(foreach file,$(CONSTRAINTS),--constraint $(file) --build
 
 # A ROS sourced in this terminal must not mix with the one in .venv.
 unexport AMENT_PREFIX_PATH CMAKE_PREFIX_PATH COLCON_PREFIX_PATH LD_LIBRARY_PATH PYTHONHOME PYTHONPATH
-unexport RMW_IMPLEMENTATION
+unexport RMW_IMPLEMENTATION _ROS_WHEELS_BOOTSTRAP_COMPLETE
 # A flight starts five processes: none of them should compile Python sources anew.
 unexport PYTHONDONTWRITEBYTECODE
 export PYTHONPYCACHEPREFIX := $(CURDIR)/$(VENV)/pycache

@@ -132,6 +132,8 @@ AREAS = {
         marks="not ros",
     ),
     "console": _room("laboratory/console", "laboratory/cli/test_output.py", marks="not ros"),
+    "doctor": _room("laboratory/doctor", marks="not ros"),
+    "help": Area(("space_robot/help/*.py",), ("tests/laboratory/cli/test_help_command.py",)),
     "processes": _room("laboratory/processes", marks="not ros"),
     "navigation": _room("control/navigation"),
     "allocation": _room("control/allocation"),

@@ -9,7 +9,7 @@ import os
 import socket
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from space_robot_msgs_py.errors import FlightError, InputError
@@ -25,8 +25,8 @@ from space_robot_msgs_py.ros.locks import (
 from space_robot_msgs_py.ros.process_environment import defaults
 from space_robot_msgs_py.topics import ROOT
 
-DOMAINS = range(1, 102)
-"""Domains whose ports stay below Linux' ephemeral range."""
+DOMAINS = range(1, 101)
+"""Domains with all ports below Linux' ephemeral range, which begins at 32768."""
 LOOK_S = 0.05
 PORT_BASE, PORTS = 7400, 250
 UDP_TABLES = (Path("/proc/net/udp"), Path("/proc/net/udp6"))
@@ -74,7 +74,7 @@ def _free_domain(namespace: str) -> tuple[int, FileLock]:
         if len(commands_in(domain)) == 1 and not _in_use(domain):
             return domain, lock
         lock.release()
-    raise FlightError("no free ROS domain between 1 and 101: set ROS_DOMAIN_ID")
+    raise FlightError("no free ROS domain between 1 and 100: set ROS_DOMAIN_ID")
 
 
 def _take(domain: int, namespace: str) -> FileLock | None:
@@ -121,13 +121,22 @@ def is_quiet(domain: int) -> bool:
     environment = {**defaults(), **os.environ}
     if environment["ROS_AUTOMATIC_DISCOVERY_RANGE"] != "LOCALHOST" or environment.get(PEERS):
         return False
-    first = PORT_BASE + PORTS * domain
     try:
-        lines = [line for file in UDP_TABLES for line in file.read_text("ascii").splitlines()[1:]]
+        return not _ports_in_use(domain)
     except OSError:
         return False
+
+
+def _ports_in_use(domain: int) -> bool:
+    """Return True if a port of the domain is in use on this machine.
+
+    Raises:
+        OSError: the tables of ports cannot be read.
+    """
+    first = PORT_BASE + PORTS * domain
+    lines = [line for file in UDP_TABLES for line in file.read_text("ascii").splitlines()[1:]]
     ports = (int(line.split()[1].rpartition(":")[2], 16) for line in lines)
-    return not any(first <= port < first + PORTS for port in ports)
+    return any(first <= port < first + PORTS for port in ports)
 
 
 def _is_alive(pid: int) -> bool:
@@ -140,7 +149,9 @@ def _is_alive(pid: int) -> bool:
 
 
 def _in_use(domain: int) -> bool:
-    """Return True if some participant has the domain's first unicast port (DDS-RTPS 9.6.2)."""
+    """Return True if a port of the domain is in use, at least its first unicast port."""
+    with suppress(OSError):
+        return _ports_in_use(domain)
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
         try:
             probe.bind(("", PORT_BASE + 10 + PORTS * domain))

@@ -111,6 +111,7 @@ def test_every_line_is_its_figure(reports: list[dict[str, Any]]) -> None:
         "pushed by thrusters",
         "disturbance torque",
         "deflection",
+        "own metric",
     }
 
 

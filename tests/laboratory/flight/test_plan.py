@@ -269,6 +269,7 @@ _SPECIAL: dict[str, st.SearchStrategy[Any]] = {
     "waypoints_deg": st.lists(st.integers(-90, 90), min_size=18, max_size=18),
     "controller_code": st.sampled_from(["python", "c"]),
     "shadow": st.sampled_from(["none", "c"]),
+    "disturbance.table": st.sampled_from(["", '{"time":[0,1],"base_force_x":[0,2.5]}']),
     "compression": st.sampled_from(["none", "lz4", "zstd"]),
     "split_size": st.sampled_from([0, 100_000, "2M"]),
     "sensors": st.sampled_from(["ideal", "white_l1"]),
