@@ -43,13 +43,13 @@ class AllocationBench:
             }
         if thrusters:
             hardware["thrusters"] = thrusters
-        believed = BaseActuatorSettings(**hardware)
-        self.count, self.thruster_count = believed.wheel_count, believed.thruster_count
-        self.axes, self.torques = believed.wheels.unit_axes, believed.thrusters.torques
+        assumed = BaseActuatorSettings(**hardware)
+        self.count, self.thruster_count = assumed.wheel_count, assumed.thruster_count
+        self.axes, self.torques = assumed.wheels.unit_axes, assumed.thrusters.torques
         self.allocation = Allocation.build(
-            1, believed, AllocationSettings(wheels=sharing, **settings), PERIOD
+            1, assumed, AllocationSettings(wheels=sharing, **settings), PERIOD
         )
-        self.inertia = believed.wheels.values("rotor_inertia") if self.count else np.empty(0)
+        self.inertia = assumed.wheels.values("rotor_inertia") if self.count else np.empty(0)
         self.state = State.allocate(1)
         self.momenta = np.zeros(self.count) + momenta
         self.failed: set[int] = set()

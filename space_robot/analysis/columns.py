@@ -84,9 +84,9 @@ def _columns(log: FlightLog) -> Iterator[tuple[list[str], Array]]:
         yield _of_joints("measured_position_{}", joints, lengths), measured.joint_positions
         yield _of_joints("measured_velocity_{}", joints, lengths, "_s"), measured.joint_velocities
         yield _with_units("reported_torque", axes, torques), measured.applied_torque
-    if log.believed_error is not None:
-        yield _each("believed_error_q", XYZ), log.believed_error[:, :3]
-        yield _of_joints("believed_error_{}", joints, lengths), log.believed_error[:, 3:]
+    if log.assumed_error is not None:
+        yield _each("assumed_error_q", XYZ), log.assumed_error[:, :3]
+        yield _of_joints("assumed_error_{}", joints, lengths), log.assumed_error[:, 3:]
     if log.commanded_torque is not None:
         yield _with_units("commanded_torque", axes, torques), log.commanded_torque
     wheels, thrusters = log.wheel_velocities.shape[1], log.thrusts.shape[1]

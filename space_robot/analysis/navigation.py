@@ -1,8 +1,8 @@
-"""Navigation error: how far what the law believed was from the truth.
+"""Navigation error: how far the state that the law assumed was from the true one.
 
 The law tells the error e that it sees in its telemetry. Less the true one this is the true state
-less the one believed, in the coordinates rho = [eps, theta], whatever stands between sensors and
-law: ``e - e_true = rho - rho_believed``. So it holds of measured states and of filtered ones, but
+less the assumed one, in the coordinates rho = [eps, theta], whatever stands between sensors and
+law: ``e - e_true = rho - rho_assumed``. So it holds of measured states and of filtered ones, but
 is known at the ticks of the telemetry only.
 """
 
@@ -33,7 +33,7 @@ class NavigationError(Metric):
 
     def add(self, log: FlightLog, error: Array) -> None:
         """Take further rows."""
-        if log.believed_error is None:
+        if log.assumed_error is None:
             return
         errors = navigation_error(log, error)
         self._rms.add(errors)
@@ -52,15 +52,15 @@ class NavigationError(Metric):
 
 
 def navigation_error(log: FlightLog, error: Array) -> Array:
-    """(K, n+3) true coordinates less those believed at the ticks with telemetry.
+    """(K, n+3) true coordinates less the assumed ones at the ticks with telemetry.
 
     They are eps, then rad or m.
 
     Args:
-        log: with `FlightLog.believed_error`.
+        log: with `FlightLog.assumed_error`.
         error: (N, n+3) its true tracking error.
     """
-    assert log.believed_error is not None
-    known = np.isfinite(log.believed_error).all(axis=1)
-    difference: Array = log.believed_error[known] - error[known]
+    assert log.assumed_error is not None
+    known = np.isfinite(log.assumed_error).all(axis=1)
+    difference: Array = log.assumed_error[known] - error[known]
     return difference

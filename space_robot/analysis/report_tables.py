@@ -21,7 +21,7 @@ DEFINITIONS = {
     "maximum": "largest absolute value on any axis of the column",
     "attitude drift": "angle by which the base has turned from where it was at the first tick, of "
     "a flight in which nothing turns it",
-    "navigation error": "what the law believed of attitude and joints, beside the truth, at the "
+    "navigation error": "true attitude and joints less those that the law assumed, at the "
     "ticks of its telemetry: RMS, mean of axes",
     "variation per s": "how far the torque moves up and down in a second, mean over the axes",
     "power > 100 Hz": "share of the torque's power above 100 Hz, mean over the axes: chatter",

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import subprocess
 import time
-from contextlib import AbstractContextManager
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -25,6 +26,7 @@ from space_robot_msgs_py.wire.codecs import CommandCodec, StateCodec
 from space_robot_msgs_py.wire.compiled_codec import read, write
 
 from ..processes.child_process import child_process
+from ..processes.interruption import not_lost_in_callbacks
 from .closed_loop import fly_ticks
 from .plan import Flight, FlightPlan, resolve
 
@@ -74,7 +76,8 @@ def _compile_flights() -> None:
     mark.touch()
 
 
-def compiling(what: str, *kernels: Any, again: bool = False) -> AbstractContextManager[None]:
+@contextmanager
+def compiling(what: str, *kernels: Any, again: bool = False) -> Iterator[None]:
     """Show the progress of compilation, including other processes.
 
     ``again``: the kernels have been compiled for other types before.
@@ -84,7 +87,9 @@ def compiling(what: str, *kernels: Any, again: bool = False) -> AbstractContextM
     click.echo(f"compiling {what} (once an installation, a minute or two) ...", err=True)
     files = index_files(kernels)
     since = time.time_ns() if again else 0
-    return watching_progress("kernels", len(files), lambda: count_compiled(files, since))
+    shown = watching_progress("kernels", len(files), lambda: count_compiled(files, since))
+    with shown, not_lost_in_callbacks():
+        yield
 
 
 def load_kernels() -> None:

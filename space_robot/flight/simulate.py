@@ -344,12 +344,12 @@ def _fly_block(
 
 def note_beliefs(flight: Flight, block: FlightLog, start: int, stop: int) -> None:
     """Copy the errors in the law's telemetry of the ticks ``start`` to ``stop``."""
-    if block.believed_error is None:
+    if block.assumed_error is None:
         return
     assert block.telemetry is not None
     every = flight.controller_settings.telemetry_decimation
     rows = slice(-(-start // every) * every - block.first_tick, stop - block.first_tick, every)
-    block.believed_error[rows] = block.telemetry[rows, SIGNALS.index("e")]
+    block.assumed_error[rows] = block.telemetry[rows, SIGNALS.index("e")]
 
 
 def ended_early(block: FlightLog, measured: int, answered: int) -> FlightLog:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import signal
+import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -40,6 +41,35 @@ def raising_signals() -> Iterator[None]:
 
     with handled_signals(raise_interrupted):
         yield
+
+
+@contextmanager
+def not_lost_in_callbacks() -> Iterator[None]:
+    """Raise an `Interrupted` anew that a library written in C, as the compiler, has lost.
+
+    Python prints and drops exceptions in callbacks of such libraries; an error of the library, a
+    RuntimeError, may follow.
+    """
+    lost: Interrupted | None = None
+    show_unraisable = sys.unraisablehook
+
+    def keep(unraisable: Any) -> None:
+        nonlocal lost
+        if isinstance(unraisable.exc_value, Interrupted):
+            lost = unraisable.exc_value
+        else:
+            show_unraisable(unraisable)
+
+    sys.unraisablehook = keep
+    try:
+        yield
+    except RuntimeError:
+        if lost is None:
+            raise
+    finally:
+        sys.unraisablehook = show_unraisable
+    if lost is not None:
+        raise lost
 
 
 @contextmanager

@@ -6,10 +6,8 @@ from abc import abstractmethod
 from collections.abc import Callable
 from functools import cache
 from typing import Any, NamedTuple
-from weakref import WeakKeyDictionary
 
-from numba.core.typing.typeof import typeof_impl
-
+from space_robot_msgs_py.compiled.kept_types import keep_types
 from space_robot_msgs_py.compiled.kernels import RecordFunction
 from space_robot_msgs_py.compiled.records import Block, Record, prefix
 
@@ -42,26 +40,7 @@ class LawCode(NamedTuple):
     """See `ControlLaw.adds_inertia`."""
 
 
-def _known_type(kind: type, key: Callable[[Any], Any]) -> None:
-    """Let Numba keep its types of values of a ``kind``.
-
-    A kernel called from Python asks for the types of its arguments. Numba makes those of functions
-    and of tuples with functions anew for every call, which takes longer than a law.
-    """
-    of_numba = typeof_impl.dispatch(kind)
-    types: WeakKeyDictionary[Any, Any] = WeakKeyDictionary()
-
-    def type_of(value: Any, context: Any) -> Any:
-        known = types.get(key(value))
-        if known is None:
-            known = types[key(value)] = of_numba(value, context)
-        return known
-
-    typeof_impl.register(kind, type_of)
-
-
-_known_type(RecordFunction, lambda function: function)
-_known_type(LawCode, lambda code: code.run)
+keep_types(LawCode, lambda code: code.run)
 
 
 class CompiledLaw(ControlLaw):

@@ -48,7 +48,7 @@ class JointFilter(Record):
     """Of the same filter on a unit inertia under the torque: by how much its angle lags, and..."""
     rate_lag: Array = shaped(lambda n: (n,))
     """...its rate, and..."""
-    torque_believed: Array = shaped(lambda n: (n,))
+    torque_assumed: Array = shaped(lambda n: (n,))
     """...what it takes the acceleration for: N m."""
     torque: Array = shaped(lambda n: (n,))
     """The torque that lags as the rate does, N m."""
@@ -159,7 +159,7 @@ def begin_joints(filter: JointFilter, angle: Array, rate: Array, torque: Array) 
     filter.acceleration[:] = 0.0
     filter.angle_lag[:] = 0.0
     filter.rate_lag[:] = 0.0
-    filter.torque_believed[:] = torque
+    filter.torque_assumed[:] = torque
     filter.torque[:] = torque
 
 
@@ -189,14 +189,14 @@ def filter_joints(
         filter.rate[i] = v + of_rate[1] * innovation
         filter.acceleration[i] = a + of_rate[2] * innovation
         # the same for the torque, in its filter's errors, for its angle would grow without bound
-        surprise = torque[i] - filter.torque_believed[i]
+        surprise = torque[i] - filter.torque_assumed[i]
         before = filter.rate_lag[i]
         x = filter.angle_lag[i] + t * (before + 0.5 * t * surprise)
         v = before + t * surprise
-        a = filter.torque_believed[i] + of_angle[2] * x
+        a = filter.torque_assumed[i] + of_angle[2] * x
         v -= of_angle[1] * x
         x -= of_angle[0] * x
-        filter.torque_believed[i] = a + of_rate[2] * v
+        filter.torque_assumed[i] = a + of_rate[2] * v
         filter.angle_lag[i] = x - of_rate[0] * v
         filter.rate_lag[i] = v - of_rate[1] * v
         filter.torque[i] = torque[i] - (filter.rate_lag[i] - before) / t

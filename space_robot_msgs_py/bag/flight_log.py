@@ -176,9 +176,9 @@ class FlightLog:
     """Tick of row 0; not 0 in a part of a flight."""
     measured: MeasuredStates | None = None
     """Measured states and reported torque; None: see above."""
-    believed_error: Array | None = None
-    """(N, n+3) e of the telemetry, the tracking error as the law saw it (NaN: not of this tick);
-    None without `measured`."""
+    assumed_error: Array | None = None
+    """(N, n+3) e of the telemetry, the tracking error that the law computed (NaN: not at this
+    tick); None without `measured`."""
     trusted: bool = True
     """True if ``flight`` is trusted: files and modules that it names may be opened.
 
@@ -313,14 +313,14 @@ class FlightLog:
     def record_measured(self, new: Callable[[tuple[int, ...]], Array] = of_nan) -> None:
         """Allocate columns of NaN for measured states and the law's error."""
         self.measured = MeasuredStates.unknown(self, new)
-        self.believed_error = np.full_like(self.applied_torque, np.nan)
+        self.assumed_error = np.full_like(self.applied_torque, np.nan)
 
     def as_measured(self) -> FlightLog:
         """The flight as the flight software knows it, with `measured` as its states."""
         if self.measured is None:
             return self
         columns: dict[str, Any] = self.measured.columns
-        return replace(self, **columns, measured=None, believed_error=None)
+        return replace(self, **columns, measured=None, assumed_error=None)
 
     def state(self, tick: int) -> RobotState:
         """Return the state of a tick, the true one if it is known."""

@@ -159,10 +159,10 @@ class Rows:
         if topics.COMMAND.full_name not in self.accounting:
             log.commanded_torque = None
         if log.measured is not None:
-            log.believed_error = np.full((ticks, log.axes), np.nan)
+            log.assumed_error = np.full((ticks, log.axes), np.nan)
             for at, error in self._errors:
                 there = (at >= 0) & (at < ticks)
-                log.believed_error[at[there]] = error[there]
+                log.assumed_error[at[there]] = error[there]
         sent, answered = self._sent_ns[topics.BASE_STATE], self._sent_ns[topics.COMMAND]
         if self._wall_clock and topics.COMMAND.full_name in self.accounting:
             both = (answered != _NEVER) & (sent != _NEVER)

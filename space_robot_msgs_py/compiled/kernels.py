@@ -24,6 +24,7 @@ from numba.experimental import function_type  # noqa: F401  (what Numba makes of
 from ..errors import InputError
 from . import block_type, lane_arithmetic, lane_words  # noqa: F401  (they register with Numba)
 from .cache import cache_directory
+from .kept_types import keep_types
 from .record_type import record_type
 from .records import Record
 
@@ -130,6 +131,9 @@ class RecordFunction(_FunctionType):  # type: ignore[misc]
     def signature(self) -> Any:
         """Return the function type as seen by a loop, for Numba."""
         return self._signature
+
+
+keep_types(RecordFunction, lambda function: function)
 
 
 def _reason(error: NumbaError) -> str:

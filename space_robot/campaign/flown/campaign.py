@@ -230,7 +230,7 @@ class Campaign:
                     if not flights.are_complete:
                         for line in asked.notes:
                             warn(line)
-                        asked.compile()
+                        asked.compile(is_in_lanes=timeout_s is None)
                         if self.study.metrics and not flights.kept:
                             asked.try_metrics()
                         journal.make_note(WRITTEN, "")  # the table is outdated

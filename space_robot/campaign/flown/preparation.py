@@ -113,12 +113,17 @@ class Preparation:
             except InputError as error:
                 raise InputError(f"{where}: {error}, of the nominal flight of {law}") from None
 
-    def compile(self) -> None:
-        """Compile the kernels once, before several processes need them."""
+    def compile(self, is_in_lanes: bool) -> None:
+        """Compile the kernels once, before several processes need them.
+
+        Args:
+            is_in_lanes: flights may fly eight at a time; those of some law can, see `notes`.
+        """
         has_hardware = any(flight.plant.names.actuators for flight in self.flights.values())
         is_varied = any(name.endswith(ACTUATORS) for name in self.flyer.draws.names)
         compile_kernels(has_hardware or is_varied)
-        compile_lanes()
+        if is_in_lanes and len(self.notes) < len(self.flights):
+            compile_lanes()
 
     def _check_metrics(self, flight: Flight) -> None:
         """Check names and functions of the user's own metrics, which have columns of their own.

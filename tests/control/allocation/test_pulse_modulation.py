@@ -46,7 +46,7 @@ def slanted() -> tuple[list[float], list[float]]:
 class Bench:
     def __init__(self, kind: str, layout: Any = couples, pulse: float = 0.01, **more: Any) -> None:
         positions, directions = layout()
-        believed = ThrusterSettings(
+        assumed = ThrusterSettings(
             positions=positions,
             directions=directions,
             force=[10.0],
@@ -54,10 +54,10 @@ class Bench:
             delay=[more.pop("delay", 0.0)],
         )
         settings = AllocationSettings(modulation=kind, **more)  # type: ignore[arg-type]
-        self.count = believed.count
-        self.torques = believed.torques
-        self.forces = believed.unit_directions * 10.0
-        self.thrusters = AssumedThrusters.build(1, believed, settings, PERIOD)
+        self.count = assumed.count
+        self.torques = assumed.torques
+        self.forces = assumed.unit_directions * 10.0
+        self.thrusters = AssumedThrusters.build(1, assumed, settings, PERIOD)
         self.modulation = Modulation.build(1, self.thrusters, settings, PERIOD)
 
     def fly(self, demands: Array, first: int = 0) -> Array:

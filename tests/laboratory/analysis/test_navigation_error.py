@@ -1,4 +1,4 @@
-"""Errors are of the truth; the navigation error is what the law believed beside it."""
+"""Errors are of the truth; the navigation error is of what the law assumed."""
 
 from __future__ import annotations
 

@@ -101,18 +101,18 @@ def test_a_delay_that_is_known_costs_nothing_and_one_that_is_not_does() -> None:
 
 
 def test_the_filter_is_for_the_flights_sensors_unless_told_otherwise() -> None:
-    def believed(**plan: Any) -> dict[str, Any]:
+    def assumed(**plan: Any) -> dict[str, Any]:
         found = Flight(resolve(FlightPlan(navigation="filtered", duration=0.1, **plan))).description
         numbers: dict[str, Any] = found["navigation_filter"]
         return numbers
 
-    assert believed(sensors="tactical")["tracker_across"] == 4e-5
+    assert assumed(sensors="tactical")["tracker_across"] == 4e-5
     other = {"controller": {"navigation_sensors": "coarse"}}
-    assert believed(sensors="tactical", parameters=other)["tracker_across"] == 1e-4
+    assert assumed(sensors="tactical", parameters=other)["tracker_across"] == 1e-4
     single = {"controller": {"navigation_filter.tracker_across": 1e-3}}
-    assert believed(sensors="tactical", parameters=single)["tracker_across"] == 1e-3
+    assert assumed(sensors="tactical", parameters=single)["tracker_across"] == 1e-3
     with pytest.raises(InputError, match="unknown sensor 'good'"):
-        believed(parameters={"controller": {"navigation_sensors": "good"}})
+        assumed(parameters={"controller": {"navigation_sensors": "good"}})
     assert "navigation_filter" not in Flight(resolve(FlightPlan(duration=0.1))).description
 
 

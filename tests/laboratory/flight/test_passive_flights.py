@@ -125,7 +125,7 @@ def test_columns_of_an_export_have_their_units(log: FlightLog) -> None:
         "error_boom_m",
         "reference_boom_acceleration_m_s2",
         "reference_wrist_position_rad",
-        "believed_error_boom_m",
+        "assumed_error_boom_m",
     ):
         assert name in names, name
     assert len(set(names)) == len(names)

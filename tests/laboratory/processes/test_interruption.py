@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import ctypes
 import os
 import signal
 import subprocess
@@ -14,7 +15,12 @@ from pathlib import Path
 import psutil
 import pytest
 
-from space_robot.processes.interruption import Interrupted, handled_signals, raising_signals
+from space_robot.processes.interruption import (
+    Interrupted,
+    handled_signals,
+    not_lost_in_callbacks,
+    raising_signals,
+)
 
 COMMAND = [sys.executable, "-m", "space_robot.cli.main"]
 LONG = ["--duration", "60", "--jobs", "2"]
@@ -109,6 +115,27 @@ def test_signals_are_raised_once_and_put_back(
         assert signal.getsignal(number) is default
     finally:
         signal.signal(number, original)
+
+
+@pytest.mark.parametrize("error", [None, RuntimeError("no compiled object yet")])
+def test_a_signal_in_a_callback_of_c_is_raised_after_it(error: RuntimeError | None) -> None:
+    @ctypes.CFUNCTYPE(None)
+    def callback() -> None:
+        signal.raise_signal(signal.SIGTERM)
+
+    def compile_kernels() -> None:
+        with not_lost_in_callbacks():
+            callback()
+            if error:
+                raise error
+
+    with raising_signals(), pytest.raises(Interrupted, match="stopped by SIGTERM"):
+        compile_kernels()
+
+
+def test_other_errors_beside_callbacks_stay() -> None:
+    with pytest.raises(RuntimeError, match="another"), not_lost_in_callbacks():
+        raise RuntimeError("another")
 
 
 def test_nohup_is_respected() -> None:

@@ -57,7 +57,7 @@ def assert_same(log: FlightLog, other: FlightLog) -> None:
         np.testing.assert_array_equal(getattr(log, name), getattr(other, name), name)
         told = getattr(other.measured, name)
         np.testing.assert_array_equal(getattr(log.measured, name), told, name)
-    np.testing.assert_array_equal(log.believed_error, other.believed_error)
+    np.testing.assert_array_equal(log.assumed_error, other.assumed_error)
 
 
 def test_a_bag_has_truth_and_measurement_as_flown(flown: tuple[FlightLog, Path]) -> None:
@@ -96,7 +96,7 @@ def test_sensors_that_tell_the_truth_need_no_second_word(tmp_path: Path) -> None
     recorded = read_flight(tmp_path / "bag")
     for one in (log, recorded):
         assert one.measured is None
-        assert one.believed_error is None
+        assert one.assumed_error is None
         assert one.as_measured() is one
     assert recorded.lost == {topic.full_name: 0 for topic in topics.ALL}
     for topic in topics.TRUTH:

@@ -25,7 +25,7 @@ FAULTS = [
 
 
 @pytest.mark.parametrize(("lost", "how"), [([], ()), (["drop_state@0-0.5:0.02"], ("--composed",))])
-def test_truth_measured_and_believed_are_those_of_one_process(
+def test_truth_measured_and_assumed_are_those_of_one_process(
     fly: Callable[..., Flown], lost: list[str], how: tuple[str, ...]
 ) -> None:
     """To the last bit, and so is the report; nothing is lost, but for what a fault keeps back."""
@@ -42,7 +42,7 @@ def test_truth_measured_and_believed_are_those_of_one_process(
         np.testing.assert_array_equal(getattr(recorded.measured, name), column, name)
     for name in ("quaternion", "omega_base", "joint_positions", "applied_torque"):
         assert np.any(getattr(log, name) != getattr(log.measured, name)), name
-    np.testing.assert_array_equal(recorded.believed_error, log.believed_error)
+    np.testing.assert_array_equal(recorded.assumed_error, log.assumed_error)
     here, there = json.loads(json.dumps(analyze(log))), flown.bag_report
     for key in ("latency", "unavailable"):
         assert here.pop(key) != there.pop(key)

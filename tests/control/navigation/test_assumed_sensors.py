@@ -67,7 +67,7 @@ def test_no_file_is_read_where_every_number_is_given() -> None:
 
 
 @pytest.mark.parametrize("period", [PERIOD, 0.02])
-def test_what_is_believed_of_sensors_is_what_they_do(period: float) -> None:
+def test_what_is_assumed_of_sensors_is_what_they_do(period: float) -> None:
     """Noise and whole steps of every sensor, against the errors of 1500 measurements."""
     settings: dict[str, Any] = {
         "star_tracker": {"noise_across": 2e-5, "noise_about": 9e-5, "step": 1e-4},
@@ -87,19 +87,19 @@ def test_what_is_believed_of_sensors_is_what_they_do(period: float) -> None:
             [*turn, *rates[0], *(told.joint_positions - state.joint_positions), *rates[1]]
         )
     found = np.sqrt(np.mean(np.square(errors), axis=0))
-    believed = assumed_numbers(SensorSettings.model_validate(settings), period)
-    sample = believed["gyro_angle_walk"] / period**0.5
+    assumed = assumed_numbers(SensorSettings.model_validate(settings), period)
+    sample = assumed["gyro_angle_walk"] / period**0.5
     expected = [
-        *[believed["tracker_across"]] * 2,
-        believed["tracker_about"],
+        *[assumed["tracker_across"]] * 2,
+        assumed["tracker_about"],
         *[sample] * 3,
-        *[believed["joint_angle_noise"]] * 6,
-        *[believed["joint_rate_noise"]] * 6,
+        *[assumed["joint_angle_noise"]] * 6,
+        *[assumed["joint_rate_noise"]] * 6,
     ]
     np.testing.assert_allclose(found, expected, rtol=5.0 * (2.0 * len(errors)) ** -0.5)
 
 
-def test_nothing_is_believed_to_be_perfect() -> None:
+def test_nothing_is_assumed_to_be_perfect() -> None:
     """Ideal sensors make a filter that can be built."""
     found = assumed_numbers(SensorSettings(), PERIOD)
     assert found["tracker_across"] == found["tracker_about"] == LEAST_ANGLE
