@@ -32,6 +32,8 @@ class ServiceCalls(SingleThreadedExecutor):
         """True if calls arrive faster than they are executed; more than 1000 of a kind are lost."""
         self._unfinished: list[Any] = []
         """Calls whose callback waits for the node's loop."""
+        self._created: list[Any] = []
+        """Tasks of rclpy's own, as of an action's goals and results, that have not ended."""
         self._began_at: float | None = None
         """Start time of the last call; None if no further call waited."""
         self._busy_s = 0.0
@@ -59,6 +61,11 @@ class ServiceCalls(SingleThreadedExecutor):
             raise error
         return True
 
+    def create_task(self, callback: Any, *args: Any, **kwargs: Any) -> Any:
+        """Execute a callback by one of the next calls of `run_one`."""
+        self._created.append(super().create_task(callback, *args, **kwargs))
+        return self._created[-1]
+
     def _take_a_break(self) -> bool:
         """Reset the measure of overload, since no call waits."""
         self._began_at, self._busy_s, self.is_overloaded = None, 0.0, False
@@ -80,8 +87,9 @@ class ServiceCalls(SingleThreadedExecutor):
             callback()
 
     def _is_worth_a_look(self) -> bool:
-        """Return True if a request waits, or if the slow check of all entities is due."""
-        if self._unfinished:
+        """Return True if a task or request waits, or if the slow check of all entities is due."""
+        self._created = [task for task in self._created if not task.done()]
+        if self._unfinished or self._created:
             return True
         if (now := time.monotonic()) < self._full_look_at:
             return self._requests.is_called()

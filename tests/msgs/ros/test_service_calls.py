@@ -190,3 +190,17 @@ def test_in_flight_a_report_never_comes_with_a_call() -> None:
     assert max(turns) == 1
     assert told.count("report") == 3
     assert told.count("call") > 3
+
+
+def test_tasks_of_rclpy_wait_for_no_request(node: Any) -> None:
+    """As an action's, of which one starts a goal and another one sends its result."""
+    calls = ServiceCalls(node)
+    while calls.run_one():
+        pass
+    done: list[int] = []
+    for k in range(3):
+        calls.create_task(done.append, k)
+    assert all(calls.run_one() for _ in range(3))
+    assert sorted(done) == [0, 1, 2]
+    assert not calls.run_one()
+    calls.shutdown()
