@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import os
 import re
 import shlex
@@ -268,7 +269,7 @@ class PageShell:
 
     def _space_robot(self, page: Path, given: list[str]) -> tuple[str, str]:
         """What the command printed, and how it failed."""
-        command = shorter(given, LASTS_S.get(name(page), 0.0))
+        command = with_bag(shorter(given, LASTS_S.get(name(page), 0.0)))
         key = self.results.key(command)
         ended = self.results.again(key)
         if ended is None:
@@ -302,6 +303,14 @@ def shorter(given: list[str], lasts_s: float) -> tuple[str, ...]:
     command = TIME.sub(sooner, "\0".join(command)).split("\0")
     added = next((a for p, a in SHORTER.items() if re.match(p, " ".join(command))), "")
     return (*command, *added.format(f"{max(times) + 0.5:g}").split())
+
+
+def with_bag(command: tuple[str, ...]) -> tuple[str, ...]:
+    """A graph's flight whose bag has a name: pages that repeat it are given copies."""
+    if command[0] != "fly" or {"--bag", "--help", "--json", "list"}.intersection(command):
+        return command
+    digest = hashlib.sha256("\0".join(command).encode()).hexdigest()
+    return (*command, "--bag", f"flights/{digest[:8]}")
 
 
 def short_campaign(file: str) -> str:
