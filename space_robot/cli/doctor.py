@@ -16,8 +16,6 @@ COLOURS = {"ok": "green", "warning": "yellow", "missing": "red"}
 WIDTH = 16
 """Characters of the longest name of a check."""
 
-SECTION = "Begin"
-
 
 @click.command()
 @flight_option("json")
@@ -34,7 +32,7 @@ def doctor(as_json: bool) -> None:
       space-robot doctor --json > doctor.json
     """
     from ..console.terminal import echo_json
-    from ..doctor import can_fly, examine
+    from ..doctor import can_fly, can_fly_with_ros, examine
     from ..processes.software import commit, versions
 
     items: list[CheckedItem] = []
@@ -47,16 +45,25 @@ def doctor(as_json: bool) -> None:
         echo_json(
             {
                 "can_fly_in_process": is_able,
+                "can_fly_with_ros": can_fly_with_ros(items),
                 "commit": commit(),
                 "versions": versions(),
                 "items": [item.as_record() for item in items],
             }
         )
     else:
-        click.echo(
-            "flights in one process can run" if is_able else "flights in one process cannot run"
-        )
+        click.echo(_verdict(items))
     click.get_current_context().exit(0 if is_able else 1)
+
+
+def _verdict(items: list[CheckedItem]) -> str:
+    from ..doctor import can_fly, can_fly_with_ros
+
+    if not can_fly(items):
+        return "flights cannot run"
+    if not can_fly_with_ros(items):
+        return "flights can run in one process (simulate), but not as ROS 2 nodes (fly)"
+    return "flights can run, in one process (simulate) and as ROS 2 nodes (fly)"
 
 
 def _show(item: CheckedItem) -> None:

@@ -6,6 +6,8 @@ from collections.abc import Mapping
 from typing import Any, Literal, NamedTuple
 
 Status = Literal["ok", "warning", "missing"]
+ROS = "ROS 2"
+"""Name of the check of ROS 2 itself."""
 
 
 class CheckedItem(NamedTuple):

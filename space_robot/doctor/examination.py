@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 
 from space_robot_msgs_py.config.extras import requirements
 
-from .checked_item import CheckedItem
+from .checked_item import ROS, CheckedItem
 from .packages import check_packages, check_python
 
 
@@ -66,3 +66,8 @@ def _examine_machine(clock_s: float | None) -> Iterator[CheckedItem]:
 def can_fly(items: Iterable[CheckedItem]) -> bool:
     """Return True if nothing prevents flights in one process."""
     return not any(item.prevents_flights for item in items)
+
+
+def can_fly_with_ros(items: Sequence[CheckedItem]) -> bool:
+    """Return True if nothing prevents flights as ROS 2 nodes."""
+    return can_fly(items) and any(i.name == ROS and i.status != "missing" for i in items)

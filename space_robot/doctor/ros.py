@@ -14,7 +14,7 @@ from space_robot_msgs_py.ros.process_environment import defaults
 
 from ..flight.graph.domain import domain_asked_for, is_quiet, ros_domain
 from ..flight.graph.processes import has_ros2_run
-from .checked_item import CheckedItem
+from .checked_item import ROS, CheckedItem
 
 WHEEL = "ros-jazzy-rclpy"
 """Package that brings rclpy by pip."""
@@ -36,7 +36,7 @@ def check_ros(environment: Mapping[str, str] = os.environ) -> Iterator[CheckedIt
         identifier: str = import_module("rclpy.utilities").get_rmw_implementation_identifier()
     except Exception as error:  # a broken installation fails in many ways
         text = f"rclpy cannot be imported ({one_line_of(error)})"
-        yield CheckedItem("ROS 2", "missing", text, INSTALL)
+        yield CheckedItem(ROS, "missing", text, INSTALL)
         return
     yield check_distribution(str(rclpy.__file__), environment)
     yield check_middleware(identifier, environment)
@@ -57,9 +57,9 @@ def check_distribution(file: str, environment: Mapping[str, str]) -> CheckedItem
     text = f"{distribution}, rclpy from {file} ({origin}); nodes are started through {starts}"
     values = {"distribution": distribution, "rclpy": file, "wheel": wheel}
     if distribution == DISTRIBUTION:
-        return CheckedItem("ROS 2", "ok", text, values=values)
+        return CheckedItem(ROS, "ok", text, values=values)
     advice = "the project is tested with ROS 2 Jazzy: source /opt/ros/jazzy/setup.bash"
-    return CheckedItem("ROS 2", "warning", text, advice, values)
+    return CheckedItem(ROS, "warning", text, advice, values)
 
 
 def check_middleware(identifier: str, environment: Mapping[str, str]) -> CheckedItem:

@@ -22,8 +22,16 @@ NAMES = (
 def test_the_report_as_json(space_robot: Run) -> None:
     code, out, _ = space_robot("doctor", "--json")
     report = json.loads(out)
-    assert report.keys() == {"can_fly_in_process", "commit", "versions", "items"}
+    assert report.keys() == {
+        "can_fly_in_process",
+        "can_fly_with_ros",
+        "commit",
+        "versions",
+        "items",
+    }
     assert (code, report["can_fly_in_process"]) == (0, True)
+    (ros,) = [item["status"] for item in report["items"] if item["name"] == "ROS 2"]
+    assert report["can_fly_with_ros"] is (ros != "missing")
     assert report["versions"].keys() >= {"python", "space_robot", "numba"}
     for item in report["items"]:
         assert item.keys() == {"name", "status", "text", "advice", "values"}
@@ -45,7 +53,7 @@ def test_where_flights_cannot_run_it_says_why_and_ends_with_1(tmp_path: Path) ->
     (line,) = [text for text in lines if " flights:" in text]
     assert line.startswith("missing")
     assert "ImportError: compiled for another NumPy" in line
-    assert lines[-1] == "flights in one process cannot run"
+    assert lines[-1] == "flights cannot run"
 
 
 def test_no_process_is_left() -> None:
