@@ -54,8 +54,6 @@ setup: $(VENV)/.flies
 fly: $(VENV)/.flies
 	@$(VENV)/bin/space-robot fly --controller tde_stc --case 1 $(ARGS)
 
-# Two processes of tests have two cores; each one's linear algebra would take both.
-test quick coverage: export OPENBLAS_NUM_THREADS := 1
 test: kernels $(VENV)/.tests
 	$(PYTEST) $(ARGS)
 

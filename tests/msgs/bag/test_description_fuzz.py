@@ -1,6 +1,6 @@
 """Descriptions edited in any way: one line, or a flight that is analyzed and shown; no traceback.
 
-``BAG_FUZZ_EXAMPLES=5000 pytest tests/msgs/bag/test_description_fuzz.py`` looks further.
+``BAG_FUZZ_EXAMPLES=5000 pytest tests/control/test_description_fuzz.py`` looks further.
 """
 
 from __future__ import annotations
