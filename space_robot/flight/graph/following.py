@@ -183,12 +183,13 @@ class _Follower:
         self._keep(monitor.poll(), show)
         show(self.total_s, "")
 
-    def _keep(self, news: Sequence[Event], show: FlightProgress) -> None:
+    def _keep(self, news: Sequence[Event], show: FlightProgress | None = None) -> None:
         """Show and keep events before the plant's last clock message; later ends are normal."""
         for event in news:
             if event.simulated_s < self._last_clock_s:
-                show.say(str(event))
                 self._events.append(event)
+                if show:
+                    show.say(str(event))
 
     def end(self) -> dict[str, Any]:
         """Stop the other nodes; return a report."""
@@ -196,7 +197,7 @@ class _Follower:
         self._watch.check_recorder_exit()
         if self._stopped:
             raise InterruptedFlightError("stopped when the flight was complete", self._stopped[0])
-        self._monitor.poll()  # the nodes' last reports
+        self._keep(self._monitor.poll())  # the nodes' last reports
         degraded = degradation(self._monitor.values, self._fault_kinds, self._realtime)
         return {
             "events": [
