@@ -134,7 +134,7 @@ def hangs(tmp_path_factory: pytest.TempPathFactory) -> Story:
     return Story(
         tmp_path_factory.mktemp("hangs") / "bag",
         "--duration",
-        "8",
+        "9",
         "--set",
         "plant.silence_timeout=0.5",
         "--set",
@@ -146,14 +146,14 @@ def hangs(tmp_path_factory: pytest.TempPathFactory) -> Story:
         "--fault",
         "stop_controller@1.5:2.5",
         "--fault",
-        "stop_mission@5:2",
+        "stop_mission@5:1.8",
     )
 
 
 def test_stopped_recorder_loses_nothing(hangs: Story) -> None:
     assert hangs.result.returncode == 0, hangs.result.stderr
     assert not any(hangs.report["lost"].values())
-    assert hangs.report["ticks"] == 16_000
+    assert hangs.report["ticks"] == 18_000
     assert hangs.report["filled_ticks"] == 0
 
 
