@@ -158,9 +158,10 @@ def test_the_version_is_said_by_command_module_and_package(installed: Environmen
     assert installed.run("python", "-c", show) == f"{VERSION}\n"
 
 
-def test_a_flight_and_its_view(installed: Environment) -> None:
+def test_a_flight_its_view_and_its_analysis(installed: Environment) -> None:
     flight = ("--controller", "ctc", "--case", "3", "--duration", "0.1")
     installed.run("space-robot", "simulate", *flight, "--bag", "flights/one")
+    assert "attitude" in installed.run("space-robot", "analyze", "flights/one")
     pytest.importorskip("viser")
     installed.run("space-robot", "view", "flights/one", "--no-open", "--out", "one.html")
     assert (installed.work / "one.html").stat().st_size > 100_000
@@ -174,8 +175,9 @@ def test_a_graph_of_nodes(installed: Environment) -> None:
 
 def test_examples_and_configuration_are_copied_and_fly(installed: Environment) -> None:
     installed.run("space-robot", "examples", "copy", "copies")
-    robot = "copies/config/robots/seven_joint.yaml"
-    installed.run("space-robot", "simulate", "--duration", "0.01", "--robot", robot)
+    flight = ("simulate", "--duration", "0.01")
+    installed.run("space-robot", *flight, "--robot", "copies/config/robots/seven_joint.yaml")
+    installed.run("space-robot", "robot", "copies/examples/two_link_arm.urdf")
     assert "joints at most" in installed.run("python", "copies/examples/own_robot.py")
 
 
@@ -190,7 +192,7 @@ def test_a_folder_for_a_robot_of_ones_own(installed: Environment) -> None:
     urdf = ROOT / "examples/two_link_arm.urdf"
     shutil.copy(urdf, installed.work / "arm.urdf")
     installed.run("space-robot", "new", "arm.urdf", "--out", "arm")
-    assert (installed.work / "arm").is_dir()
+    installed.run("space-robot", "simulate", "--robot", "arm", "--duration", "0.01")
 
 
 def test_a_campaign(installed: Environment) -> None:

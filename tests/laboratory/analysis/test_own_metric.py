@@ -113,7 +113,11 @@ def test_analyze_shows_it(bag: Path) -> None:
         ("mine.py:tick", "metric 'mine.py:tick': unknown function 'tick' of mine.py"),
         ("mine.py:NUMBER", "metric 'mine.py:NUMBER' is no function"),
         ("mine.py", "metric 'mine.py': name the function as well, mine.py:FUNCTION"),
-        ("none.py:x", "metric 'none.py:x': none.py: no such file (did you mean mine.py?"),
+        (
+            "none.py:x",
+            "metric 'none.py:x': none.py: no such file (did you mean mine.py?) (paths are from the "
+            "current",
+        ),
         ("mine:ticks", "the current folder is not searched for modules: name the file, mine.py:"),
         ("no_such:x", "modules are searched for on PYTHONPATH; a file is named by its path"),
         ("ticks", "metric 'ticks': a metric is named as file.py:FUNCTION or module:FUNCTION"),

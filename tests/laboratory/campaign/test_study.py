@@ -97,7 +97,12 @@ WRONG_VARIABLES: list[tuple[str, Any, str]] = [
     ("scenario.duration", {"uniform": [0.9, 1.1], "offset": True, "low": 1}, "low: unknown key"),
     ("plant.friction.columb", 0.1, "unknown parameter of the plant"),
     ("plant.friction.coulomb", {"normal": 0.02, "sigma": 0.005}, "plant.friction.coulomb can be -"),
-    ("plant.initial_joints_deg", 1.0, "is a list: plant.initial_joints_deg[*] for all"),
+    (
+        "plant.initial_joints_deg",
+        1.0,
+        "is a list: plant.initial_joints_deg[*] for all of it, or plant.initial_joints_deg[1] to "
+        "[6] for one of them",
+    ),
     ("plant.fault_seed", {"uniform": [0, 1]}, "fault_seed"),
     ("plant.case", {"choice": ["1", "3"]}, "scenario.case"),
     ("gains.k_9", {"uniform": [0.9, 1.1], "relative": True}, "unknown gain 'k_9' of the laws"),

@@ -96,10 +96,18 @@ def test_single_numbers_come_over_those_of_the_file() -> None:
             "star_tracker.noise_acros: unknown key, got 1e-05: "
             "choose one of boresight, delay, noise_about, noise_across, rate, step ",
         ),
-        ("gyro: {noise: -1}", "gyro.noise: Input should be greater than or equal to 0, got -1 "),
+        (
+            "gyro: {noise: -1}",
+            "gyro.noise: Input should be greater than or equal to 0, got -1 "
+            r"\(white noise of each sample, independent of the period, rad/s\)$",
+        ),
         ("gyro: {initial_bias: 0}", "gyro.initial_bias: Input should be a valid list, got 0$"),
         ("gyro: {initial_bias: [0, 0]}", "gyro.initial_bias: List should have at least 3 items"),
-        ("encoders: {bits: 12.5}", "encoders.bits: Input should be a valid integer, got 12.5 "),
+        (
+            "encoders: {bits: 12.5}",
+            r"encoders.bits: Input should be a valid integer, got 12.5 \(resolution: 2\^bits steps "
+            r"per revolution, or per metre \(0: continuous\)\)$",
+        ),
         ("encoders: {bits: 64}", "encoders.bits: Input should be less than or equal to 32, got 64"),
         ("encoders: fine", "encoders: a mapping was expected, got 'fine'"),
         ("sun_sensor: {}", "sun_sensor: unknown key, got {}: "),
