@@ -74,7 +74,9 @@ def _free_domain(namespace: str) -> tuple[int, FileLock]:
         if len(commands_in(domain)) == 1 and not _in_use(domain):
             return domain, lock
         lock.release()
-    raise FlightError("no free ROS domain between 1 and 100: set ROS_DOMAIN_ID")
+    raise FlightError(
+        f"no free ROS domain between {DOMAINS[0]} and {DOMAINS[-1]}: set ROS_DOMAIN_ID"
+    )
 
 
 def _take(domain: int, namespace: str) -> FileLock | None:

@@ -7,7 +7,9 @@ from contextlib import suppress
 
 import pytest
 
-from space_robot.flight.graph.domain import is_quiet
+from space_robot.flight.graph import domain
+from space_robot.flight.graph.domain import is_quiet, ros_domain
+from space_robot_msgs_py.errors import FlightError
 
 RANGE = "ROS_AUTOMATIC_DISCOVERY_RANGE"
 
@@ -26,6 +28,25 @@ def test_a_taken_port_is_somebody(free_domain: int, port: int, family: int) -> N
         somebody.bind(("", beside))
         assert [before, is_quiet(free_domain)] == [True, False]
     assert is_quiet(free_domain)
+
+
+@pytest.mark.parametrize("port", [0, 10, 12, 249])
+def test_a_domain_with_any_taken_port_is_not_free(
+    free_domain: int, port: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A participant that outlives the first one of its flight has no port 10."""
+    monkeypatch.delenv("ROS_DOMAIN_ID", raising=False)
+    monkeypatch.setattr(domain, "DOMAINS", range(free_domain, free_domain + 1))
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as somebody:
+        somebody.bind(("", 7400 + 250 * free_domain + port))
+        with pytest.raises(FlightError, match=f"between {free_domain} and"), ros_domain():
+            pass
+    with ros_domain() as found:
+        assert found == free_domain
+
+
+def test_no_domain_has_ports_that_linux_gives_to_any_program() -> None:
+    assert 7400 + 250 * (domain.DOMAINS[-1] + 1) <= 32768
 
 
 @pytest.mark.parametrize("port", [-1, 250])
