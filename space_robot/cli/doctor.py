@@ -40,28 +40,26 @@ def doctor(as_json: bool) -> None:
         items.append(item)
         if not as_json:
             _show(item)
-    is_able = can_fly(items)
+    is_able, is_able_with_ros = can_fly(items), can_fly_with_ros(items)
     if as_json:
         echo_json(
             {
                 "can_fly_in_process": is_able,
-                "can_fly_with_ros": can_fly_with_ros(items),
+                "can_fly_with_ros": is_able_with_ros,
                 "commit": commit(),
                 "versions": versions(),
                 "items": [item.as_record() for item in items],
             }
         )
     else:
-        click.echo(_verdict(items))
+        click.echo(_verdict(is_able, is_able_with_ros))
     click.get_current_context().exit(0 if is_able else 1)
 
 
-def _verdict(items: list[CheckedItem]) -> str:
-    from ..doctor import can_fly, can_fly_with_ros
-
-    if not can_fly(items):
+def _verdict(is_able: bool, is_able_with_ros: bool) -> str:
+    if not is_able:
         return "flights cannot run"
-    if not can_fly_with_ros(items):
+    if not is_able_with_ros:
         return "flights can run in one process (simulate), but not as ROS 2 nodes (fly)"
     return "flights can run, in one process (simulate) and as ROS 2 nodes (fly)"
 

@@ -20,7 +20,7 @@ from space_robot_msgs_py.samples import Command
 from .bench_history import BenchHistory
 from .closed_loop import measured_ticks
 from .plan import Flight
-from .simulate import check_memory, empty_log, ended_early, note_beliefs
+from .simulate import check_memory, empty_log, ended_early, note_assumed_errors
 
 STRETCH_TICKS = 10_000
 """Ticks whose states are in memory beside the log."""
@@ -79,7 +79,7 @@ class BenchLog:
             log.put(start, states if log.measured is None else truths)
             log.put_measured(start, states)
             log.put_commands(start, torques)
-        note_beliefs(flight, log, 0, log.ticks)
+        note_assumed_errors(flight, log, 0, log.ticks)
         if error is not None:
             return ended_early(log, measured_ticks(plant, error), plant.tick)
         return log

@@ -333,16 +333,16 @@ def _fly_block(
         try:
             close_loop(plant, controller, block, start, stop)
         except Exception as error:
-            note_beliefs(flight, block, start, plant.tick)
+            note_assumed_errors(flight, block, start, plant.tick)
             if messages:
                 messages.stretch(block, start, measured_ticks(plant, error), plant.tick)
             raise
-        note_beliefs(flight, block, start, stop)
+        note_assumed_errors(flight, block, start, stop)
         if messages:
             messages.stretch(block, start, stop, stop)
 
 
-def note_beliefs(flight: Flight, block: FlightLog, start: int, stop: int) -> None:
+def note_assumed_errors(flight: Flight, block: FlightLog, start: int, stop: int) -> None:
     """Copy the errors in the law's telemetry of the ticks ``start`` to ``stop``."""
     if block.assumed_error is None:
         return

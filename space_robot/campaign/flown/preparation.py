@@ -117,12 +117,13 @@ class Preparation:
         """Compile the kernels once, before several processes need them.
 
         Args:
-            is_in_lanes: flights may fly eight at a time; those of some law can, see `notes`.
+            is_in_lanes: flights may fly eight at a time; only if those of some law can, its kernels
+                are compiled.
         """
         has_hardware = any(flight.plant.names.actuators for flight in self.flights.values())
         is_varied = any(name.endswith(ACTUATORS) for name in self.flyer.draws.names)
         compile_kernels(has_hardware or is_varied)
-        if is_in_lanes and len(self.notes) < len(self.flights):
+        if is_in_lanes and not all(map(reason_to_fly_alone, self.flights.values())):
             compile_lanes()
 
     def _check_metrics(self, flight: Flight) -> None:

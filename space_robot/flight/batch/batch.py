@@ -17,7 +17,7 @@ from space_robot_msgs_py.samples import LawInForce
 
 from ..closed_loop import measured_ticks
 from ..plan import Flight
-from ..simulate import ended_early, note_beliefs
+from ..simulate import ended_early, note_assumed_errors
 from .lane_log import LogsInLanes
 from .lane_loop import fly_lanes, measure_lanes
 from .lane_memory import LawInLanes, begin_tick, copy_back, copy_command, memory_of
@@ -87,7 +87,7 @@ class FlightBatch:
         flight, start, error = self.flights[k], log.first_tick, None
         reached = int(self._memory.tick[0, k]) if not self._memory.flies[0, k] else None
         stop = start + log.ticks if reached is None else reached
-        note_beliefs(flight, log, start, stop)
+        note_assumed_errors(flight, log, start, stop)
         self._laws[k] = log.laws
         if reached is not None:
             error = self._error(k, reached)
