@@ -57,6 +57,7 @@ def resolve(plan: FlightPlan) -> ResolvedScenario:
         _process_faults(plan),
     )
     _check_composed(plan)
+    _check_disturbance(scenario)
     _check_actuators(scenario)
     return _with_sampled_disturbance(scenario) if callable(plan.disturbance) else scenario
 
@@ -133,6 +134,15 @@ def _check_composed(plan: FlightPlan) -> None:
         raise InputError(
             f"{', '.join(asked)}: that needs a process for each node: fly without --composed"
         )
+
+
+@explained_by("disturbances")
+def _check_disturbance(scenario: ResolvedScenario) -> None:
+    """Check the columns of a file, which the plant does not know, against the robot."""
+    file, text = scenario.options.disturbance, scenario.plant.disturbance.table
+    if isinstance(file, str) and text:
+        joints = scenario.plant.robot_names(scenario.robots.plant).joints
+        DisturbanceTable.parse(text).loads(joints, file)
 
 
 @explained_by("sensors")

@@ -105,11 +105,12 @@ class DisturbanceTable(NamedTuple):
         time = self.columns[TIME]
         return f"{names} from {time[0]:g} to {time[-1]:g} s"
 
-    def loads(self, joint_names: Sequence[str]) -> Array:
+    def loads(self, joint_names: Sequence[str], where: str = "disturbance") -> Array:
         """Return the loads (K, n+6) of the rows: on the base as `BASE`, then on the joints.
 
         Args:
             joint_names: of the n joints with motors.
+            where: the table's file, or key, for errors.
 
         Raises:
             InputError: a column is neither of the base nor of such a joint.
@@ -120,7 +121,7 @@ class DisturbanceTable(NamedTuple):
             if name == TIME:
                 continue
             if name not in names:
-                raise InputError(f"disturbance: unknown column {name!r}: {choices(name, names)}")
+                raise InputError(f"{where}: unknown column {name!r}: {choices(name, names)}")
             loads[:, names.index(name)] = values
         return loads
 

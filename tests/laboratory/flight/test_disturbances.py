@@ -198,6 +198,13 @@ def test_what_is_wrong_is_said_in_a_line(disturbance: Any, said: str) -> None:
     assert "\n" not in str(refused.value)
 
 
+def test_a_wrong_column_is_named_with_its_file(tmp_path: Path) -> None:
+    file = tmp_path / "wind.csv"
+    file.write_text("time,joint9\n0,1\n1,1\n")
+    with pytest.raises(InputError, match=f"^{file}: unknown column 'joint9': choose one of "):
+        sr.Scenario(disturbance=str(file), duration=0.1).check()
+
+
 def test_a_function_is_sampled() -> None:
     columns = sr.sampled(lambda t: np.arange(6.0) * t, 0.02, period=0.01)
     assert columns["time"] == [0.0, 0.01, 0.02]
