@@ -18,7 +18,8 @@ from random_robots import State
 from space_robot_model.robot import Robot
 from space_robot_msgs_py.samples import Command, RobotState
 from space_robot_sim.environment.friction import FrictionSettings
-from space_robot_sim.plant.plant import Plant, PlantSettings, update_true_state
+from space_robot_sim.plant.plant import Plant, PlantSettings
+from space_robot_sim.plant.tick import update_true_state
 
 Array = NDArray[np.float64]
 Exact = tuple[Decimal, Decimal, Decimal]

@@ -13,7 +13,8 @@ from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.compiled.kernels import RecordFunction, kernel
 from space_robot_msgs_py.compiled.records import Block
 from space_robot_msgs_py.errors import DivergedError
-from space_robot_sim.plant.plant import RATE_LIMIT, Plant, advance
+from space_robot_sim.plant.plant import Plant
+from space_robot_sim.plant.tick import RATE_LIMIT, advance
 from space_robot_sim.sensors.sensors import sense
 
 Array = NDArray[np.float64]

@@ -11,7 +11,8 @@ from space_robot_msgs_py.compiled.records import Block
 from space_robot_msgs_py.config.arguments import as_numbers, as_whole_number
 from space_robot_msgs_py.config.validation import short
 from space_robot_msgs_py.errors import InputError
-from space_robot_sim.plant.plant import Plant, update_true_state
+from space_robot_sim.plant.plant import Plant
+from space_robot_sim.plant.tick import update_true_state
 
 from ..api.scenario import Scenario
 from ..flight.compilation import compile_kernels

@@ -15,7 +15,7 @@ from space_robot_msgs_py.compiled.lanes import WIDTH, where, with_lane
 from space_robot_msgs_py.compiled.records import Block, Record, shaped
 from space_robot_msgs_py.samples import State
 from space_robot_sim.plant.lanes import move_lanes
-from space_robot_sim.plant.plant import RATE_LIMIT, advance, begin_interval, end_interval
+from space_robot_sim.plant.tick import RATE_LIMIT, advance, begin_interval, end_interval
 
 Array = NDArray[np.float64]
 

@@ -17,7 +17,8 @@ from space_robot_msgs_py.compiled.records import Block
 from space_robot_msgs_py.config.arguments import as_numbers, as_whole_number
 from space_robot_msgs_py.config.extras import install_command
 from space_robot_msgs_py.errors import InputError
-from space_robot_sim.plant.plant import Plant, PlantMemory
+from space_robot_sim.plant.plant import Plant
+from space_robot_sim.plant.tick import PlantMemory
 
 try:
     import gymnasium

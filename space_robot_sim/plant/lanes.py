@@ -25,8 +25,8 @@ from space_robot_msgs_py.compiled.records import Block
 
 from ..environment.environment import Environment
 from .integrator import state_size
-from .plant import PlantMemory, begin_interval, end_interval
 from .stick_slip import glide, integrate
+from .tick import PlantMemory, begin_interval, end_interval
 
 Array = NDArray[np.float64]
 

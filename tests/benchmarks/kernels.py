@@ -15,7 +15,7 @@ from space_robot_msgs_py.compiled.lane_words import as_lanes
 from space_robot_msgs_py.compiled.records import Block
 from space_robot_sim.plant.integrator import state_derivative
 from space_robot_sim.plant.lanes import advance_lanes
-from space_robot_sim.plant.plant import advance
+from space_robot_sim.plant.tick import advance
 
 Array = NDArray[np.float64]
 

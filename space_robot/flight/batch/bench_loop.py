@@ -10,7 +10,7 @@ from space_robot_msgs_py.compiled.lane_words import as_lanes
 from space_robot_msgs_py.compiled.lanes import WIDTH, lane_of
 from space_robot_msgs_py.compiled.records import Block
 from space_robot_sim.plant.lanes import advance_lanes
-from space_robot_sim.plant.plant import RATE_LIMIT
+from space_robot_sim.plant.tick import RATE_LIMIT
 
 from .lane_loop import measure_lanes
 

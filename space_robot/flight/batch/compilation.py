@@ -19,7 +19,7 @@ from space_robot_msgs_py.ros.lifeline import hold_to_standard_input
 from space_robot_msgs_py.ros.run_module import module_command
 from space_robot_msgs_py.samples import Reference, State
 from space_robot_sim.plant.lanes import advance_lanes
-from space_robot_sim.plant.plant import PlantMemory
+from space_robot_sim.plant.tick import PlantMemory
 
 from ...processes.child_process import child_process
 from ..compilation import compile_kernels, compiling, mark_of

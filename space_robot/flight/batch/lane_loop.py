@@ -18,7 +18,7 @@ from space_robot_msgs_py.compiled.lanes import WIDTH, any_lane, lane_of, negated
 from space_robot_msgs_py.compiled.records import Block
 from space_robot_msgs_py.samples import State
 from space_robot_sim.plant.lanes import advance_lanes
-from space_robot_sim.plant.plant import RATE_LIMIT
+from space_robot_sim.plant.tick import RATE_LIMIT
 from space_robot_sim.sensors.sensors import sense
 
 Array = NDArray[np.float64]

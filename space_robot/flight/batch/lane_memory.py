@@ -15,7 +15,8 @@ from space_robot_control.laws.compiled import CompiledLaw, LawCode, SomeGains
 from space_robot_msgs_py.compiled.lanes import WIDTH
 from space_robot_msgs_py.compiled.records import Block, Record, prefix
 from space_robot_msgs_py.samples import Reference
-from space_robot_sim.plant.plant import Plant, PlantMemory
+from space_robot_sim.plant.plant import Plant
+from space_robot_sim.plant.tick import PlantMemory
 
 from ..plan import Flight
 from .lane_loop import InLanes, LaneMemory, take_out

@@ -10,7 +10,8 @@ from space_robot_control.controller.memory import ControllerMemory
 from space_robot_control.laws.compiled import CompiledLaw
 from space_robot_msgs_py.compiled.lanes import WIDTH
 from space_robot_msgs_py.errors import InputError
-from space_robot_sim.plant.plant import Plant, PlantMemory
+from space_robot_sim.plant.plant import Plant
+from space_robot_sim.plant.tick import PlantMemory
 
 from ..plan import Flight
 

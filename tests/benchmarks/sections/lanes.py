@@ -16,7 +16,7 @@ from space_robot.flight.batch.lane_memory import in_lanes
 from space_robot.flight.plan import Flight
 from space_robot.flight.simulate import simulate
 from space_robot_msgs_py.compiled.lanes import WIDTH
-from space_robot_sim.plant.plant import PlantMemory
+from space_robot_sim.plant.tick import PlantMemory
 
 from ..kernels import lane_steps, plant_steps
 from ..measure import Options, interleave

@@ -39,7 +39,7 @@ from space_robot_model.robot import Robot
 from space_robot_model.robot.find import find_robot
 from space_robot_model.robot.gears import geared_joints
 from space_robot_model.robot.tree import Encoder, Gear
-from space_robot_sim.plant.plant import update_true_state
+from space_robot_sim.plant.tick import update_true_state
 
 Array = NDArray[np.float64]
 

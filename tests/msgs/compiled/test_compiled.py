@@ -96,7 +96,7 @@ def test_the_temporary_folder_is_nobody_elses(
 NAMES = """
 from space_robot_msgs_py.compiled.record_type import RecordType
 from space_robot_model.dynamics.rho_space import RhoSpaceModel
-from space_robot_sim.plant.plant import PlantMemory
+from space_robot_sim.plant.tick import PlantMemory
 for record in {records}:
     print(record.__name__, RecordType(record.layout()).mangling_args)
 """

@@ -23,7 +23,8 @@ from space_robot_msgs_py.samples import Command, RobotState
 from space_robot_sim.environment.disturbance import DisturbanceSettings
 from space_robot_sim.environment.friction import FrictionSettings
 from space_robot_sim.environment.payload import PayloadSettings
-from space_robot_sim.plant.plant import Plant, PlantSettings, fastest_rate
+from space_robot_sim.plant.plant import Plant, PlantSettings
+from space_robot_sim.plant.tick import fastest_rate
 
 Array = NDArray[np.float64]
 
