@@ -22,8 +22,8 @@ from ..analysis.words import flown
 from ..console.notebook import is_in_notebook
 from ..flight.bag_path import check_bag_path
 from ..flight.ending import COMPLETE, Ending
+from ..flight.flight_messages import record
 from ..flight.plan import Flight
-from ..flight.simulate import record
 from .flight_page import HEIGHT_PX, FlightPage, draw_page, show_page
 from .report import flight_report
 

@@ -19,8 +19,8 @@ from space_robot_msgs_py.samples import Command
 
 from .bench_history import BenchHistory
 from .closed_loop import measured_ticks
+from .flown_log import check_memory, empty_log, ended_early, note_assumed_errors
 from .plan import Flight
-from .simulate import check_memory, empty_log, ended_early, note_assumed_errors
 
 STRETCH_TICKS = 10_000
 """Ticks whose states are in memory beside the log."""

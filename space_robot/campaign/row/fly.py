@@ -17,8 +17,9 @@ from ...analysis.own_metric import MetricError, of_mapping
 from ...flight.batch.batch import FlightBatch
 from ...flight.batch.sharing import batches
 from ...flight.ending import FAILED, Ending
+from ...flight.flown_log import row_bytes
 from ...flight.plan import Flight
-from ...flight.simulate import fly_blocks, row_bytes, simulate
+from ...flight.simulate import fly_blocks, simulate
 from ..draws import Draws
 from ..study import Study
 from .measure import Measure

@@ -16,8 +16,8 @@ from space_robot_msgs_py.errors import FlightError
 from space_robot_msgs_py.samples import LawInForce
 
 from ..closed_loop import measured_ticks
+from ..flown_log import ended_early, note_assumed_errors
 from ..plan import Flight
-from ..simulate import ended_early, note_assumed_errors
 from .lane_log import LogsInLanes
 from .lane_loop import fly_lanes, measure_lanes
 from .lane_memory import LawInLanes, begin_tick, copy_back, copy_command, memory_of

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from space_robot_msgs_py.compiled.lanes import WIDTH
 from space_robot_msgs_py.samples import ALL_FIELDS, ReferenceChunk
 
+from ..flown_log import columns_of, empty_log
 from ..plan import Flight
-from ..simulate import columns_of, empty_log
 from .lane_loop import LaneLog, References
 
 Array = NDArray[np.float64]

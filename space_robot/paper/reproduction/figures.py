@@ -10,8 +10,8 @@ from matplotlib.figure import Figure
 from ...analysis.figures import chatter, desired_joints, junctions
 from ...analysis.figures.figure_set import FigureFolder, SavedFigure
 from ...analysis.plot_series import BaseTorque
+from ...flight.flown_log import empty_log
 from ...flight.plan import Flight, FlightPlan, resolve
-from ...flight.simulate import empty_log
 from .flights import ROBOT, Result, TableRow
 
 FIGURE_OF_CASE = {"1": "6", "2": "7", "3": "8", "4-1": "9a", "4-2": "9b"}

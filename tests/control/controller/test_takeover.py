@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 
 from space_robot.analysis.metrics import tracking_error
 from space_robot.flight.closed_loop import close_loop
+from space_robot.flight.flown_log import empty_log
 from space_robot.flight.plan import Flight, FlightPlan, resolve
-from space_robot.flight.simulate import empty_log
 from space_robot_control.controller.controller import Controller
 from space_robot_control.controller.gains import build_law
 from space_robot_control.laws import ControlLaw, laws

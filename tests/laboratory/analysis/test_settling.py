@@ -13,8 +13,8 @@ from hypothesis.extra.numpy import arrays
 from space_robot.analysis import excerpt
 from space_robot.analysis.settling import BAND, Settling
 from space_robot.analysis.waypoints import Waypoints
+from space_robot.flight.flown_log import empty_log
 from space_robot.flight.plan import Flight, FlightPlan, resolve
-from space_robot.flight.simulate import empty_log
 from space_robot_msgs_py.bag.blocks import blocks_of
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.errors import InputError

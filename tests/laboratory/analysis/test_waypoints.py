@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from space_robot.analysis.waypoints import junction_ticks, waypoint_ticks
+from space_robot.flight.flown_log import empty_log
 from space_robot.flight.plan import Flight, FlightPlan, resolve
-from space_robot.flight.simulate import empty_log
 from space_robot_msgs_py.bag.flight_log import FlightLog
 
 

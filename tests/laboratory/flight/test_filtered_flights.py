@@ -14,8 +14,9 @@ from numpy.typing import NDArray
 
 from space_robot import load_bag
 from space_robot.flight.closed_loop import close_loop
+from space_robot.flight.flown_log import empty_log
 from space_robot.flight.plan import Flight, FlightPlan, resolve
-from space_robot.flight.simulate import empty_log, simulate
+from space_robot.flight.simulate import simulate
 from space_robot_control.laws import laws
 from space_robot_msgs_py.errors import InputError
 

@@ -17,9 +17,10 @@ from hypothesis import strategies as st
 
 from space_robot.analysis import analyze
 from space_robot.flight.bag_path import default_bag
+from space_robot.flight.flown_log import empty_log
 from space_robot.flight.graph.orchestrator import flight_parameters
 from space_robot.flight.plan import Flight, FlightPlan, resolve
-from space_robot.flight.simulate import empty_log, simulate
+from space_robot.flight.simulate import simulate
 from space_robot.scenario.node_settings import NODES, NOT_TO_BE_SET, SCHEMAS
 from space_robot_control.allocation.assumed_actuators import assumed_actuators
 from space_robot_control.controller.controller import Controller

@@ -1,0 +1,112 @@
+"""The log of a flight in this process: its columns, before the flight and after an early end."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from space_robot_msgs_py import topics
+from space_robot_msgs_py.bag.flight_log import FlightLog, of_nan
+from space_robot_msgs_py.errors import InputError
+from space_robot_msgs_py.samples import ReferenceChunk
+from space_robot_msgs_py.wire.controller_telemetry import SIGNALS
+
+from .plan import Flight
+
+Array = NDArray[np.float64]
+
+
+def empty_log(
+    flight: Flight,
+    start: int = 0,
+    stop: int | None = None,
+    new: Callable[[tuple[int, ...]], Array] = of_nan,
+    reference: ReferenceChunk | None = None,
+    is_brief: bool = False,
+) -> FlightLog:
+    """Return the log of the ticks ``start`` to ``stop`` (None: the last) before the flight.
+
+    The reference alone is known; it may have been computed. ``new`` makes the columns that the
+    flight fills. ``is_brief``: with what metrics need only, see `Flight.brief`.
+    """
+    log = columns_of(flight, (flight.ticks if stop is None else stop) - start, new, is_brief)
+    log.first_tick = start
+    log.flight = flight.brief if is_brief else flight.description
+    log.lost = {topic.full_name: 0 for topic in topics.ALL}
+    reference = reference or flight.mission.chunk(start, log.ticks)
+    log.reference_joints, log.reference_base = reference.joints, reference.base
+    return log
+
+
+def columns_of(
+    flight: Flight,
+    ticks: int,
+    new: Callable[[tuple[int, ...]], Array] = of_nan,
+    is_brief: bool = False,
+) -> FlightLog:
+    """Return the columns of a log, see `empty_log`; if ``is_brief``, of true states only."""
+    names = flight.plant.names
+    counts = len(names.wheels), len(names.thrusters)
+    log = FlightLog.allocate(
+        ticks,
+        names.joints,
+        flight.timebase,
+        *counts,
+        names.passive,
+        names.geared,
+        names.in_orbit,
+        new,
+        len(names.torquers),
+    )
+    if is_brief:
+        return log
+    log.commanded_torque = new(log.applied_torque.shape)
+    log.telemetry = new((ticks, 4, log.axes))
+    if not flight.plant.measures_truth:
+        log.record_measured(new)
+    return log
+
+
+def note_assumed_errors(flight: Flight, block: FlightLog, start: int, stop: int) -> None:
+    """Copy the errors in the law's telemetry of the ticks ``start`` to ``stop``."""
+    if block.assumed_error is None:
+        return
+    assert block.telemetry is not None
+    every = flight.controller_settings.telemetry_decimation
+    rows = slice(-(-start // every) * every - block.first_tick, stop - block.first_tick, every)
+    block.assumed_error[rows] = block.telemetry[rows, SIGNALS.index("e")]
+
+
+def ended_early(block: FlightLog, measured: int, answered: int) -> FlightLog:
+    """The first ``measured`` rows; those from ``answered`` on have no command."""
+    for column in (block.commanded_torque, block.actuator_commands, block.telemetry):
+        if column is not None:
+            column[answered:] = np.nan
+    block.unanswered = measured - answered
+    block.laws = tuple(law for law in block.laws if law.tick < block.first_tick + answered)
+    return block.rows(0, measured)
+
+
+def check_memory(flight: Flight, ticks: int) -> None:
+    """Check that a log of the first ``ticks`` of a flight fits into memory.
+
+    Raises:
+        InputError: the log does not fit.
+    """
+    from ..processes.memory import available_bytes
+
+    needed, free = ticks * row_bytes(flight), available_bytes()
+    if needed > free:
+        raise InputError(
+            f"duration {ticks * flight.period:g} s: the whole flight in memory needs "
+            f"{needed / 1e9:.1f} GB, {free / 1e9:.1f} GB are free: fly a shorter one"
+        )
+
+
+def row_bytes(flight: Flight) -> int:
+    """Return the size of a tick in a log."""
+    row = empty_log(flight, 0, 1)
+    columns = [*row.columns.values(), *(row.measured.columns.values() if row.measured else ())]
+    return sum(column.nbytes for column in columns)
