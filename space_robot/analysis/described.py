@@ -1,4 +1,4 @@
-"""The robot, the actuators' limits and h_bar, from a flight's description.
+"""The robot, its hardware and its environment, from a flight's description.
 
 A bag carries the numbers. One that does not (an older one, or of another recorder) is taken at its
 names' word: the robot, case and gains of that name here and now. Files and modules that it names
@@ -13,15 +13,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from space_robot_control.controller.gains import build_law, split_gains
 from space_robot_control.controller.settings import ControllerNodeSettings
-from space_robot_control.laws.trust import check_file, check_law, is_plain
-from space_robot_control.navigation.low_pass import low_pass_weight
+from space_robot_control.laws.trust import check_file, is_plain
 from space_robot_model.hardware.base_actuators import BaseActuatorSettings
 from space_robot_model.robot import Robot
 from space_robot_model.robot.find import find_robot
 from space_robot_msgs_py.bag.flight_log import FlightLog
-from space_robot_msgs_py.bag.law_history import laws_of
 from space_robot_msgs_py.config.settings import leaves
 from space_robot_msgs_py.config.text import shortened
 from space_robot_msgs_py.config.trees import nest
@@ -39,7 +36,6 @@ from space_robot_sim.plant.settings import PlantNodeSettings
 
 from ..flight.start_step import StartStep
 from .actuation import TorqueLimits
-from .estimate_error import HBar
 from .momentum import MomentumSeries
 
 Array = NDArray[np.float64]
@@ -81,7 +77,7 @@ def robot_of(log: FlightLog) -> Robot:
     if isinstance(content := flight.get("robot_file"), dict):
         robot = Robot.from_dict(content, where="robot_file of the bag")
     elif name := flight.get("robot"):
-        _check_files(log, {"robot": name})
+        check_files(log, {"robot": name})
         robot = find_robot(str(name))
     else:
         raise NotDescribedError("the bag does not say which robot was flown")
@@ -218,7 +214,7 @@ def _plant_settings(log: FlightLog, keys: Sequence[str] = ()) -> PlantNodeSettin
 
     The bag has every number. An older one has those that were set, and names of files.
     """
-    parameters = _parameters(log, PlantNodeSettings.node)
+    parameters = parameters_of(log, PlantNodeSettings.node)
     if parameters.keys() >= _NUMBERS:
         return validate(PlantNodeSettings, nest(parameters), "plant parameters of the bag")
     if not parameters:
@@ -232,7 +228,7 @@ def _plant_settings(log: FlightLog, keys: Sequence[str] = ()) -> PlantNodeSettin
     if keys and all(key in parameters for key in keys):
         parameters = {key: parameters[key] for key in keys}
     parameters = _without_told_robot(log, parameters)
-    _check_files(log, parameters)
+    check_files(log, parameters)
     # their numbers are in the bag, while their files may be elsewhere
     has_orbit = "orbital_elements.height" in parameters
     in_bag = ("actuators", "sensors", *(("orbit",) if has_orbit else ()))
@@ -243,7 +239,7 @@ def _without_told_robot(log: FlightLog, parameters: Mapping[str, Any]) -> dict[s
     """Leave out the files of a robot and a mission all of which the bag tells."""
     files = {
         "robot": isinstance(log.flight.get("robot_file"), dict),
-        "mission": "waypoints_deg" in _parameters(log, "mission"),
+        "mission": "waypoints_deg" in parameters_of(log, "mission"),
     }
     return {
         key: value
@@ -252,31 +248,9 @@ def _without_told_robot(log: FlightLog, parameters: Mapping[str, Any]) -> dict[s
     }
 
 
-def estimator(log: FlightLog) -> tuple[HBar, float]:
-    """Find h_bar of the laws' time-delay estimate, and the weight of its low-pass (0: none).
-
-    Raises:
-        InputError: the law is not recorded, and has no estimate or is not described; or its
-            estimate is not of the states measured.
-    """
-    if navigation_of(log) != DIRECT:
-        raise InputError("the filtered states that N_hat is formed of are not recorded")
-    if log.laws:
-        h_bar = recorded_h_bar
-    else:
-        described = _described_h_bar(log)
-
-        def h_bar(log: FlightLog) -> Array:
-            return described
-
-    parameters, key = _parameters(log, ControllerNodeSettings.node), "acceleration_filter_hz"
-    settings = ControllerNodeSettings.resolve({key: parameters[key]} if key in parameters else {})
-    return h_bar, low_pass_weight(settings.acceleration_filter_hz, log.timebase.period)
-
-
 def sensors_of(log: FlightLog) -> str:
     """Return the name of the sensors, as far as the bag records it."""
-    return str(_parameters(log, PlantNodeSettings.node).get("sensors", "")) or IDEAL
+    return str(parameters_of(log, PlantNodeSettings.node).get("sensors", "")) or IDEAL
 
 
 def actuators_of(log: FlightLog) -> str:
@@ -314,49 +288,10 @@ def flown_actuators(log: FlightLog) -> BaseActuatorSettings:
 
 def navigation_of(log: FlightLog) -> str:
     """Return the name of the navigation, as far as the bag records it."""
-    return str(_parameters(log, ControllerNodeSettings.node).get("navigation", "")) or DIRECT
+    return str(parameters_of(log, ControllerNodeSettings.node).get("navigation", "")) or DIRECT
 
 
-def recorded_h_bar(log: FlightLog) -> Array:
-    """Return h_bar of the laws in force in the rows of ``log``, see `HBar`."""
-    laws, none = laws_of(log), np.full(log.axes, np.nan)
-    rows: list[Array] = [none]
-    for law in laws:
-        values = law.gains.get("h_bar", ())
-        fits = len(values) in (1, log.axes) and any(values)  # zeros: the nominal inertia
-        rows.append(np.broadcast_to(values, log.axes) if fits else none)
-    if len(laws) == 1 and laws[0].tick <= log.first_tick:
-        return np.asarray(rows[1])
-    ticks = np.arange(log.first_tick, log.first_tick + log.ticks)
-    which = np.searchsorted([law.tick for law in laws], ticks, side="right")
-    return np.array(rows)[which]
-
-
-def _described_h_bar(log: FlightLog) -> Array:
-    """Return h_bar of a bag without the laws in force, at its description's word."""
-    flight = log.flight
-    if flight.get("swaps"):
-        raise NotDescribedError("laws were swapped in flight, so no one h_bar holds")
-    if not (name := flight.get("controller")):
-        raise NotDescribedError("the bag does not say which law was flown")
-    if isinstance(gains := flight.get("gains_used"), dict):
-        h_bar = np.array(gains.get("h_bar", ()), dtype=np.float64)
-    else:
-        chosen: dict[str, Any] = {key: flight[key] for key in ("robot", "gains") if key in flight}
-        recorded, _ = split_gains(_parameters(log, ControllerNodeSettings.node))
-        chosen |= {**recorded, "controller": name}
-        _check_files(log, chosen)
-        if not log.trusted:
-            check_law(str(name))
-        h_bar = build_law(str(name), ControllerNodeSettings.resolve(chosen), log.axes).h_bar
-    if not h_bar.any():
-        raise NotDescribedError(f"{name} has no time-delay estimate with a constant h_bar")
-    if h_bar.shape not in ((log.axes,), (1,)):
-        raise NotDescribedError(f"gains_used of the bag: h_bar: {log.axes} values were expected")
-    return np.broadcast_to(h_bar, log.axes)
-
-
-def _check_files(log: FlightLog, parameters: Mapping[str, Any]) -> None:
+def check_files(log: FlightLog, parameters: Mapping[str, Any]) -> None:
     """Check that nothing but what is shipped is read, unless the bag is trusted."""
     if not log.trusted:
         for what in ("robot", "case", "mission", "gains", "sensors", "actuators", "orbit"):
@@ -365,7 +300,8 @@ def _check_files(log: FlightLog, parameters: Mapping[str, Any]) -> None:
             check_file("disturbance", table)
 
 
-def _parameters(log: FlightLog, node: str) -> dict[str, Any]:
+def parameters_of(log: FlightLog, node: str) -> dict[str, Any]:
+    """Return the parameters of a node, as far as the bag records them."""
     parameters = log.flight.get("parameters")
     own = parameters.get(node) if isinstance(parameters, dict) else None
     return dict(own) if isinstance(own, dict) else {}

@@ -23,7 +23,6 @@ from .described import (
     assumed_robot_of,
     captures_of,
     environment_of,
-    estimator,
     event_labels,
     events_of,
     flown_actuators,
@@ -34,6 +33,7 @@ from .described import (
     start_step_of,
     torque_limits,
 )
+from .described_estimator import estimator
 from .estimate_error import EstimateError
 from .external_torques import DisturbanceBySource
 from .metrics import Chatter, Maxima, Rms, tracking_error

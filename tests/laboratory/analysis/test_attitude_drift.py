@@ -17,7 +17,8 @@ from space_robot.analysis.attitude_drift import AttitudeDrift, attitude_drift, c
 from space_robot.analysis.columns import column_names
 from space_robot.analysis.figures.figure_set import FigureSet
 from space_robot.analysis.metrics import of_log
-from space_robot.analysis.report_tables import comparison_table, lines, rms_table
+from space_robot.analysis.report_lines import lines
+from space_robot.analysis.report_tables import comparison_table, rms_table
 from space_robot.analysis.words import notes, remarks
 from space_robot_msgs_py.bag.flight_log import FlightLog
 

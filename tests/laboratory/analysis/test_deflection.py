@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 
 from space_robot.analysis import analyze
 from space_robot.analysis.deflection import Deflection, deflection
-from space_robot.analysis.report_tables import DEFINITIONS, Line, comparison_table, lines
+from space_robot.analysis.report_lines import Line, lines
+from space_robot.analysis.report_tables import DEFINITIONS, comparison_table
 from space_robot.console.tables import NONE
 from space_robot.flight.plan import Flight, FlightPlan, resolve
 from space_robot.flight.simulate import simulate

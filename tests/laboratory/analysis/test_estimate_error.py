@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from random_logs import random_log
 
 from space_robot.analysis import analyze, excerpt
-from space_robot.analysis.described import estimator
+from space_robot.analysis.described_estimator import estimator
 from space_robot.analysis.estimate_error import DelayedEstimate, EstimateErrors
 from space_robot.analysis.generalised_motion import neglected_force
 from space_robot.flight.plan import Flight, FlightPlan, resolve

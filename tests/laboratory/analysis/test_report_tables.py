@@ -12,7 +12,8 @@ from random_logs import random_log
 
 from space_robot.analysis import analyze
 from space_robot.analysis.metrics import unit_of
-from space_robot.analysis.report_tables import DEFINITIONS, Line, lines
+from space_robot.analysis.report_lines import Line, lines
+from space_robot.analysis.report_tables import DEFINITIONS
 from space_robot.console.tables import NONE
 from space_robot.flight.plan import Flight, FlightPlan, resolve
 from space_robot.flight.simulate import simulate

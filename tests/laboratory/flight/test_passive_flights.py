@@ -15,7 +15,8 @@ from space_robot.analysis.columns import column_names
 from space_robot.analysis.described import robot_of
 from space_robot.analysis.figures.single_flight import control_results, desired_joints
 from space_robot.analysis.pointing import pointing_error
-from space_robot.analysis.report_tables import lines, rms_table
+from space_robot.analysis.report_lines import lines
+from space_robot.analysis.report_tables import rms_table
 from space_robot.flight.plan import Flight, FlightPlan, resolve
 from space_robot.flight.simulate import simulate
 from space_robot_control.laws import laws

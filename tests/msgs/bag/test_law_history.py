@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from space_robot.analysis import analyze
-from space_robot.analysis.described import estimator
+from space_robot.analysis.described_estimator import estimator
 from space_robot.analysis.estimate_error import EstimateErrors, HBar
 from space_robot.analysis.excerpt import excerpt
 from space_robot.flight.plan import Flight, FlightPlan, resolve
