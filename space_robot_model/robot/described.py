@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .file import drive_of
+from .link_file import drive_of
 from .plates import plates_of
 from .robot import Robot
 from .tree import Gear

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 from space_robot_msgs_py.topics import BASE_FRAME, INERTIAL_FRAME
 
-from .file import BASE
+from .link_file import BASE
 from .robot import Robot
 
 

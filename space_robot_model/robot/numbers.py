@@ -17,7 +17,7 @@ from pydantic import Field
 from space_robot_msgs_py.config.validation import StrictModel
 
 from ..dynamics.model import MOST_JOINTS
-from .file import DriveFile, drive_of
+from .link_file import DriveFile, drive_of
 from .tree import Body, Joint, JointFriction, JointLimits, Plate, Spring, Tool
 
 Array = NDArray[np.float64]

@@ -18,8 +18,8 @@ from space_robot_msgs_py.errors import InputError
 
 from ..elementary.matrices import product
 from ..elementary.rotations import rpy_of_rotation
-from .file import BASE, drive_of
 from .inertia import inertia_elements
+from .link_file import BASE, drive_of
 from .robot import Robot
 from .tree import Visual
 from .urdf_file import is_urdf

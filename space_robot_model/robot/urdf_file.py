@@ -12,7 +12,8 @@ from typing_extensions import Self
 
 from space_robot_msgs_py.config.validation import StrictModel, validate
 
-from .file import BASE, DriveFile, PassiveFile, Plates
+from .link_file import BASE, DriveFile, PassiveFile
+from .plate_file import Plates
 from .tree import Spring
 from .urdf.read import UrdfRobot, parse_urdf, read_urdf, with_gears, with_plates, with_springs
 

@@ -13,8 +13,8 @@ from typing_extensions import Self
 
 from space_robot_model.dynamics.attitude import rotation_matrix
 from space_robot_model.elementary.matrices import norm
-from space_robot_model.robot.file import Vector
 from space_robot_model.robot.inertia import Inertia, Mass
+from space_robot_model.robot.link_file import Vector
 from space_robot_msgs_py.config.files import named_file
 from space_robot_msgs_py.config.validation import StrictModel, read_yaml, validate
 

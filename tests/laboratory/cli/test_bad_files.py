@@ -13,7 +13,7 @@ import yaml
 from command import Run
 from paths import CONFIG, DATA
 
-from space_robot_model.robot.file import MOST_PLATES
+from space_robot_model.robot.plate_file import MOST_PLATES
 from space_robot_sim.environment import surfaces
 from space_robot_sim.plant.gear_mounting import MOST_SUBSTEPS
 from space_robot_sim.plant.plant import PlantSettings
