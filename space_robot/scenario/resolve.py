@@ -15,9 +15,10 @@ from space_robot_model.robot import Robot
 from space_robot_model.robot.find import TRAJECTORIES, robot_files
 from space_robot_model.robot.source import YAML
 from space_robot_msgs_py.config.files import GIVEN
+from space_robot_msgs_py.config.trees import flatten, nest
 from space_robot_msgs_py.config.validation import one_of, validate
 from space_robot_msgs_py.errors import InputError, explained_by
-from space_robot_sim.environment.disturbance_table import DisturbanceTable
+from space_robot_sim.environment.disturbance_table import JSON, DisturbanceTable
 from space_robot_sim.faults.grammar import Fault, parse_faults
 
 from .disturbances import sampled
@@ -57,7 +58,7 @@ def resolve(plan: FlightPlan) -> ResolvedScenario:
         _process_faults(plan),
     )
     _check_composed(plan)
-    _check_disturbance(scenario)
+    _check_disturbance(plan, scenario)
     _check_actuators(scenario)
     return _with_sampled_disturbance(scenario) if callable(plan.disturbance) else scenario
 
@@ -137,10 +138,13 @@ def _check_composed(plan: FlightPlan) -> None:
 
 
 @explained_by("disturbances")
-def _check_disturbance(scenario: ResolvedScenario) -> None:
-    """Check the columns of a file, which the plant does not know, against the robot."""
-    file, text = scenario.options.disturbance, scenario.plant.disturbance.table
-    if isinstance(file, str) and text:
+def _check_disturbance(plan: FlightPlan, scenario: ResolvedScenario) -> None:
+    """Check the columns of a file that was given, which the plant does not know, for the robot."""
+    if not (text := scenario.plant.disturbance.table):
+        return
+    given = {**plan.options().get("plant", {}), **plan.parameters.get("plant", {})}
+    file = dict(flatten(nest(given))).get("disturbance.table", "")
+    if file and not file.startswith(JSON):
         joints = scenario.plant.robot_names(scenario.robots.plant).joints
         DisturbanceTable.parse(text).loads(joints, file)
 

@@ -203,6 +203,24 @@ def test_a_wrong_column_is_named_with_its_file(tmp_path: Path) -> None:
     file.write_text("time,joint9\n0,1\n1,1\n")
     with pytest.raises(InputError, match=f"^{file}: unknown column 'joint9': choose one of "):
         sr.Scenario(disturbance=str(file), duration=0.1).check()
+    for parameters in ({"disturbance.table": str(file)}, {"disturbance": {"table": str(file)}}):
+        with pytest.raises(InputError, match=f"^{file}: unknown column 'joint9'"):
+            sr.Scenario(
+                disturbance={"time": [0, 1], "joint1": [1, 1]},
+                duration=0.1,
+                parameters={"plant": parameters},
+            ).check()
+
+
+def test_a_wrong_column_of_numbers_is_named_with_the_option() -> None:
+    text = '{"time":[0,1],"joint9":[1,1]}'
+    for words in (
+        {"disturbance": text},
+        {"parameters": {"plant": {"disturbance.table": text}}},
+        {"disturbance": "wind.csv", "parameters": {"plant": {"disturbance.table": text}}},
+    ):
+        with pytest.raises(InputError, match=r"^disturbance: unknown column 'joint9'"):
+            sr.Scenario(duration=0.1, **words).check()
 
 
 def test_a_function_is_sampled() -> None:
