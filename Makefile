@@ -7,7 +7,7 @@ CONSTRAINTS := constraints.txt
 # Extras with versions in it. Not apt, which has ROS's own NumPy, and not bench: Basilisk holds others back.
 CONSTRAINED := campaign dask dist docs gym mpc mutation notebooks parquet ros test view xacro
 PACKAGES := space_robot space_robot_control space_robot_model space_robot_msgs_py space_robot_sim
-# A file's tests run in one process; tests/conftest.py has the files in an order that fills both.
+# A file's tests run in one process; tests/conftest.py has the files in an order that fills all.
 PYTEST := $(VENV)/bin/python -m pytest --numprocesses logical --maxprocesses 4 --dist loadfile --no-loadscope-reorder
 # Tests of kernels that are short enough without a compiler.
 INTERPRETED := $(addprefix tests/,model/dynamics sim/environment model/robot sim/sensors sim/faults \

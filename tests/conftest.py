@@ -128,7 +128,7 @@ def pytest_configure(config: pytest.Config) -> None:
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Mark by fixture and by folder; limit every test's time; bring the files into an order.
 
-    Those with marks lie spread among the others, and short ones are left for the end: so the two
+    Those with marks lie spread among the others, and short ones are left for the end: so the
     processes of `make test` seldom fly graphs at once, and end together.
     """
     for item in items:

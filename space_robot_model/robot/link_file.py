@@ -6,7 +6,7 @@ from typing import Annotated, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field, ValidationInfo, field_validator, model_validator
+from pydantic import AfterValidator, Field, ValidationInfo, field_validator, model_validator
 from typing_extensions import Self
 
 from space_robot_msgs_py.config.validation import StrictModel
@@ -22,6 +22,15 @@ BASE = "base"
 """Name of the base in a robot's file."""
 
 Vector = Annotated[list[float], Field(min_length=3, max_length=3)]
+
+
+def _is_direction(vector: list[float], info: ValidationInfo) -> list[float]:
+    if not norm(vector) > 1e-9:
+        raise ValueError(f"the {info.field_name} must not be zero")
+    return vector
+
+
+Direction = Annotated[Vector, AfterValidator(_is_direction)]
 Coefficient = Annotated[float, Field(ge=0.0)]
 
 
@@ -131,7 +140,7 @@ class LinkFile(FrameFile):
     name: Annotated[str, Field(min_length=1)]
     parent: str = ""
     joint: Literal["revolute", "continuous", "prismatic", "fixed"] = "revolute"
-    axis: Vector = Field([0.0, 0.0, 1.0])
+    axis: Direction = Field([0.0, 0.0, 1.0])
     mass: Annotated[float, Field(ge=0.0)]
     inertia: Annotated[list[float], Field(min_length=6, max_length=6)]
     com: Vector
@@ -139,13 +148,6 @@ class LinkFile(FrameFile):
     friction: FrictionFile | None = None
     passive: PassiveFile | None = None
     drive: DriveFile | None = None
-
-    @field_validator("axis", mode="after")
-    @classmethod
-    def _is_direction(cls, axis: list[float]) -> list[float]:
-        if not norm(axis) > 1e-9:
-            raise ValueError("the axis must not be zero")
-        return axis
 
     @field_validator("mass", mode="after")
     @classmethod

@@ -5,13 +5,13 @@ from __future__ import annotations
 from typing import Annotated
 
 import numpy as np
-from pydantic import Field, field_validator, model_validator
+from pydantic import Field, model_validator
 from typing_extensions import Self
 
 from space_robot_msgs_py.config.validation import StrictModel
 
 from ..elementary.matrices import norm
-from .link_file import BASE, Vector
+from .link_file import BASE, Direction, Vector
 from .tree import Plate
 
 MOST_PLATES = 128
@@ -26,18 +26,11 @@ class PlateFile(StrictModel):
 
     link: Annotated[str, Field(min_length=1)] = BASE
     area: Annotated[float, Field(gt=0.0, le=1e6)]
-    normal: Vector
+    normal: Direction
     centre: Vector = Field([0.0, 0.0, 0.0])
     drag_coefficient: Annotated[float, Field(ge=0.0, le=10.0)] = 2.2
     specular: Annotated[float, Field(ge=0.0, le=1.0)] = 0.2
     diffuse: Annotated[float, Field(ge=0.0, le=1.0)] = 0.3
-
-    @field_validator("normal", mode="after")
-    @classmethod
-    def _is_direction(cls, normal: list[float]) -> list[float]:
-        if not norm(normal) > 1e-9:
-            raise ValueError("the normal must not be zero")
-        return normal
 
     @model_validator(mode="after")
     def _reflects_what_comes(self) -> Self:
