@@ -142,8 +142,8 @@ def _check_disturbance(plan: FlightPlan, scenario: ResolvedScenario) -> None:
     """Check the columns of a file that was given, which the plant does not know, for the robot."""
     if not (text := scenario.plant.disturbance.table):
         return
-    given = {**plan.options().get("plant", {}), **plan.parameters.get("plant", {})}
-    file = dict(flatten(nest(given))).get("disturbance.table", "")
+    parameters = {**plan.options().get("plant", {}), **plan.parameters.get("plant", {})}
+    file = dict(flatten(nest(parameters))).get("disturbance.table", "")
     if file and not file.startswith(JSON):
         joints = scenario.plant.robot_names(scenario.robots.plant).joints
         DisturbanceTable.parse(text).loads(joints, file)
