@@ -46,7 +46,7 @@ def test_a_bag_is_as_large_as_the_page_says(bags: Path) -> None:
 
 
 def test_the_errata_have_the_torques_and_variations_of_their_commands(tmp_path: Path) -> None:
-    """Both readings of the misprint in Table III; the smoothness of the laws, without CTC's gains."""
+    """Both readings of the misprint in Table III, and the smoothness of the laws."""
     groups = ("base_torque", "torque_1_3", "torque_4_6")
     robot = (ROOT / "config/robots/paper.yaml").read_text("utf-8").replace("-1.08,", "-0.108,")
     (tmp_path / "misprint.yaml").write_text(robot, "utf-8")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from flown_tables import Number, Options, Page, Table
 
+
 def _row(sigma: str, corner_hz: int) -> list[str | Number]:
     options: Options = {
         "faults": [f"noise_joint_velocity@0:{sigma}"] if sigma != "0" else [],

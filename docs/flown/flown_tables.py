@@ -6,7 +6,8 @@ What the flights gave is kept in `NAME.json`, so a page can be compared with it 
 
 A kept flight is stale if its settings (all parameters, gains and files behind its options) are not
 those of today, or if its first `BEGINNING_S` are not flown with the same torques: that shows most
-changes of laws, noise, dynamics and allocation, too.
+changes of laws, noise, dynamics and allocation, too. What changes later in a flight is seen by
+``python docs/flown --all`` only, which is part of a release.
 """
 
 from __future__ import annotations
@@ -170,8 +171,7 @@ class Page(NamedTuple):
         kept = {name: kept[name] for name in flights if name in kept}
         for name in names:
             options, quantities = flights[name]
-            flown = Scenario(**options).fly()
-            numbers = {quantity_name(q): _value(flown, q) for q in quantities}
+            numbers = fly(options, quantities)
             beginning = [float(f"{value:.6g}") for value in torques(options)]
             kept[name] = {"settings": settings(options), "beginning": beginning, "numbers": numbers}
             ordered = {key: kept[key] for key in sorted(kept)}
@@ -204,6 +204,12 @@ def key(options: Options) -> str:
 def quantity_name(quantity: Quantity) -> str:
     """Return the name under which a number is kept."""
     return quantity if isinstance(quantity, str) else quantity.__name__
+
+
+def fly(options: Options, quantities: Iterable[Quantity]) -> dict[str, float | None]:
+    """Fly to the end and return the numbers that are kept, by `quantity_name`."""
+    flown = Scenario(**options).fly()
+    return {quantity_name(quantity): _value(flown, quantity) for quantity in quantities}
 
 
 def settings(options: Options) -> str:
