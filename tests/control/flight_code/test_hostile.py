@@ -14,7 +14,7 @@ from space_robot.flight.plan import Flight, FlightPlan, resolve
 from space_robot_control.controller.supervision import NEW
 from space_robot_control.controller.supervisor import Supervisor
 from space_robot_control.flight_code.folder import Exported
-from space_robot_control.flight_code.hostile import hostile_ticks, shake, spoil
+from space_robot_control.flight_code.hostile import hostile_ticks, shake, spoil, spoiled_reference
 from space_robot_control.flight_code.library import CONDITION, FlightLibrary
 from space_robot_control.flight_code.supervisors import bits
 
@@ -50,6 +50,8 @@ def test_c_answers_like_python(seed: int, law: str, share: float) -> None:
             state.tick = tick
             shake(state, 10.0 ** random.uniform(-8, 0), random)
             spoil(state, wheels, random, is_hostile=random.random() < share)
+            if random.random() < share:
+                reference = spoiled_reference(reference, random)
             command, status = supervisor.answer(state, reference), code.answer(state, reference)
             np.testing.assert_array_equal(bits(code.command), bits(command.torque))
             assert bool(status) == bool(supervisor.reason)
