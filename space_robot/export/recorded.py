@@ -63,7 +63,7 @@ def recorded_flights(
     """Fly and record what exported flight software has to answer.
 
     The scenario as it is; its first second under each law in case 3 with faults of messages and
-    hardware; and hostile states.
+    hardware; and hostile states and references.
 
     Args:
         plan: of the scenario.
