@@ -12,7 +12,14 @@ from space_robot_control.controller.law_choice import LawChoice
 from space_robot_control.controller.supervision import NEW
 from space_robot_control.flight_code.acceptance import CHOOSE, AnswerRecording, RecordingSupervisor
 from space_robot_control.flight_code.folder import Exported
-from space_robot_control.flight_code.hostile import SHARE, hostile_ticks, shake, spoil
+from space_robot_control.flight_code.hostile import (
+    REFERENCE_SHARE,
+    SHARE,
+    hostile_ticks,
+    shake,
+    spoil,
+    spoiled_reference,
+)
 from space_robot_msgs_py.errors import FlightError
 from space_robot_msgs_py.samples import RobotState
 
@@ -56,7 +63,7 @@ def recorded_flights(
     """Fly and record what exported flight software has to answer.
 
     The scenario as it is; its first second under each law in case 3 with faults of messages and
-    hardware; and hostile states.
+    hardware; and hostile states and references.
 
     Args:
         plan: of the scenario.
@@ -74,7 +81,9 @@ def recorded_flights(
         faulty = Flight(resolve(plan.model_copy(update=update)))
         about = f"{law}, case 3, lost, late and wrong states, safe mode"
         yield RecordedFlight(f"faults_{law}", about, _flown(faulty, exported, place, law))
-    yield RecordedFlight("hostile", "hostile states and stamps", _hostile(plan, exported, laws))
+    yield RecordedFlight(
+        "hostile", "hostile states, references and stamps", _hostile(plan, exported, laws)
+    )
 
 
 def _of_hardware(flight: Flight) -> list[str]:
@@ -108,7 +117,10 @@ def _flown(flight: Flight, exported: Exported, place: int = 0, law: str = "") ->
 
 
 def _hostile(plan: FlightPlan, exported: Exported, laws: Sequence[str]) -> AnswerRecording:
-    """Record the answers to hostile states, between noisy ones of a base that does not move."""
+    """Record the answers to hostile states and references, between noisy ones of a still base.
+
+    The first reference is none, so that there is nothing to hold.
+    """
     flight = Flight(resolve(plan))
     recording, random = AnswerRecording(exported), np.random.default_rng(20)
     supervisor, wheels = _supervisor(flight, recording), _Wheels(flight)
@@ -134,7 +146,12 @@ def _hostile(plan: FlightPlan, exported: Exported, laws: Sequence[str]) -> Answe
         wheels.measure(state, commanded, k)
         is_hostile = random.random() < SHARE and k % PHASE > QUIET_TICKS
         spoil(state, wheels.count, random, is_hostile)
-        commanded = supervisor.answer(state, references[k : k + 1]).torque
+        reference = references[k : k + 1]
+        if supervisor.answered < 0:
+            reference = np.full_like(reference.view(np.float64), np.nan).view(reference.dtype)
+        elif random.random() < REFERENCE_SHARE:
+            reference = spoiled_reference(reference, random)
+        commanded = supervisor.answer(state, reference).torque
     supervisor.finish()
     return recording
 

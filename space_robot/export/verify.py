@@ -19,14 +19,14 @@ class ReplayVerdict(NamedTuple):
     """Result of the recorded flights on one compiler."""
 
     target: str
-    """Compiler, or processor."""
+    """Compiler, alone or with other flags than the folder's, or processor."""
     is_accepted: bool
     states: int
     """Answered, every bit equal."""
     tick_ns: float | None
     """Time of a tick in the first flight, ns; None where it was not taken."""
     code_bytes: int | None
-    """Code and constants as this compiler makes them with -O2; None where it was not taken."""
+    """Code and constants as this compiler makes them; None where it was not taken."""
     largest_frame: int | None
     """Bytes on the stack of the function that needs most."""
     reason: str
@@ -35,8 +35,10 @@ class ReplayVerdict(NamedTuple):
 
 def targets() -> dict[str, list[str]]:
     """Return what can be verified here: the arguments of make by compiler or processor."""
-    native = {name: [f"COMPILERS={name}", "figures"] for name in ("gcc", "clang")}
-    here = {name: made for name, made in native.items() if shutil.which(name)}
+    here = {}
+    for name in filter(shutil.which, ("gcc", "clang")):
+        here[name] = [f"COMPILERS={name}", "figures"]
+        here[f"{name}, other flags"] = [f"COMPILERS={name}", "matrix"]
     for name, compiler in CROSS.items():
         if shutil.which(compiler) and shutil.which(EMULATORS[name]):
             here[name] = [name]

@@ -11,7 +11,7 @@ from space_robot_model.dynamics.rho_space import semi_floating_into, to_rho_spac
 from space_robot_msgs_py.compiled.kernels import kernel
 from space_robot_msgs_py.compiled.lanes import all_lanes, uniform, where
 from space_robot_msgs_py.compiled.records import Block
-from space_robot_msgs_py.samples import MOST_WHEELS, State
+from space_robot_msgs_py.samples import MOST_WHEELS, Reference, State
 
 from ..laws.base import CONSTANT_INERTIA, NOMINAL_INERTIA
 from ..navigation.navigation import navigate
@@ -52,6 +52,24 @@ def compute_signals(
         `USABLE`, or why the state is not: then nothing was done, but that navigation may have taken
         a measured state that was usable.
     """
+    status: int = compute_signals_for(
+        block, tick, state, reference[0], h_bar, estimate, uses_model, period
+    )
+    return status
+
+
+@kernel
+def compute_signals_for(
+    block: Block,
+    tick: int,
+    state: Block,
+    reference: Reference,
+    h_bar: Array,
+    estimate: int,
+    uses_model: bool,
+    period: float,
+) -> int:
+    """Compute the signals as `compute_signals`, for a record; that of the signals may be it."""
     memory, measured = block[0], state[0]
     signals, controls_base = memory.signals, uniform(memory.controls_base) == 1.0
     rate, is_filtered = signals.rho_rate, uniform(memory.navigation.is_filtered) == 1.0
@@ -85,8 +103,8 @@ def compute_signals(
         signals.applied_force[:] = measured.applied_torque
     signals.tick = tick
     signals.time = tick * period
-    show_state(measured, near, reference[0], signals)
-    tracking_errors(measured, near, rate, reference[0], memory.desired_jacobian, signals)
+    show_state(measured, near, reference, signals)
+    tracking_errors(measured, near, rate, reference, memory.desired_jacobian, signals)
     if not controls_base:
         leave_base_out(signals)
     observe_pair(memory, tick, state[0], estimate, period)

@@ -13,12 +13,12 @@ from numpy.typing import NDArray
 
 from space_robot_msgs_py.compiled.kernels import RecordFunction, kernel
 from space_robot_msgs_py.compiled.records import Block, Record, nested, shaped
-from space_robot_msgs_py.samples import MOST_THRUSTERS, MOST_TORQUERS, MOST_WHEELS
+from space_robot_msgs_py.samples import MOST_THRUSTERS, MOST_TORQUERS, MOST_WHEELS, Reference
 from space_robot_msgs_py.wire.stamp_guard import accept
 
 from ..laws.compiled import LawCode
 from .kernels import compute_command
-from .signal_kernels import NORM_TOLERANCE, SINGULAR, USABLE, compute_signals
+from .signal_kernels import LARGEST, NORM_TOLERANCE, SINGULAR, USABLE, compute_signals_for
 from .time_delay_estimation import LONGEST_GAP
 
 Array = NDArray[np.float64]
@@ -29,7 +29,11 @@ ANSWERED, NEW, REFUSED = range(3)
 """A received state by its stamp: answered last; to be answered; not plausible."""
 LAST_TICK = 1 << 52
 """Largest tick that is answered: up to here a float has every integer."""
-STATUSES = 5
+REFERENCE_HELD = SINGULAR + 1
+"""Status of a usable state whose reference is not: the law holds the last usable one, at rest."""
+NO_REFERENCE = SINGULAR + 2
+"""The same where none has been usable: there is no command of the law."""
+STATUSES = NO_REFERENCE + 1
 """Number of different statuses of a state."""
 SAFE_BELOW_ETA = 0.02
 """|eta| below which the mode is safe, since the torques grow without bound: 177.7 degrees."""
@@ -65,13 +69,13 @@ class Supervision(Record):
     mode: float = shaped(lambda n: ())
     """`NOMINAL`, `HOLDING` or `SAFE`."""
     reason: float = shaped(lambda n: ())
-    """Status of the last state that was not usable; `USABLE` in nominal mode."""
+    """Status of the last state; in nominal mode `USABLE` or `REFERENCE_HELD`."""
     last_tick: float = shaped(lambda n: ())
     """Last tick answered by the law; -1: none."""
     held_since: float = shaped(lambda n: ())
     """Tick at which holding began."""
     rejected: Array = shaped(lambda n: (STATUSES,))
-    """Number of states not used, by status."""
+    """Number of states not used, or whose reference was not, by status."""
     command: Array = shaped(lambda n: (n + 3 + MOST_WHEELS + MOST_THRUSTERS + MOST_TORQUERS,))
     """Answer to the last state: torque of every axis, N m, then what is asked of each of the
     base's actuators, N m and N."""
@@ -146,7 +150,7 @@ def answer_state(
     status = admit_state(
         block, controller, law.h_bar, law.estimate, law.uses_model, tick, state, reference, period
     )
-    if status == USABLE:
+    if is_for_law(status):
         compute_command(controller, law, allocate, tick, block[0].command, period)
     conclude(block, tick, status)
     return status
@@ -171,14 +175,57 @@ def admit_state(
     Returns:
         The status of the state.
     """
+    desired = controller[0].signals.reference
+    status_with_reference: int = take_reference(reference[0], desired)
     quaternion = state[0].quaternion
     least = NOMINAL_FROM_ETA if block[0].mode == SAFE else SAFE_BELOW_ETA
     if abs(quaternion[0]) < least and is_unit(quaternion):
         return SINGULAR
-    status: int = compute_signals(
-        controller, tick, state, reference, h_bar, estimate, uses_model, period
+    status: int = compute_signals_for(
+        controller, tick, state, desired, h_bar, estimate, uses_model, period
     )
-    return status
+    return status_with_reference if status == USABLE else status
+
+
+@kernel
+def take_reference(reference: Reference, desired: Reference) -> int:
+    """Copy a usable reference into ``desired``; of another one, make that rest where it was.
+
+    The conditions are those of a `ReferenceBuffer`, and it holds the same.
+
+    Returns:
+        `USABLE`, `REFERENCE_HELD` or `NO_REFERENCE`.
+    """
+    is_usable = True
+    for k in range(4):
+        is_usable = is_usable and abs(reference.quaternion[k]) <= LARGEST
+    for k in range(3):
+        is_usable = is_usable and abs(reference.omega_base[k]) <= LARGEST
+        is_usable = is_usable and abs(reference.alpha_base[k]) <= LARGEST
+    for i in range(reference.joint_positions.size):
+        is_usable = is_usable and abs(reference.joint_positions[i]) <= LARGEST
+        is_usable = is_usable and abs(reference.joint_velocities[i]) <= LARGEST
+        is_usable = is_usable and abs(reference.joint_accelerations[i]) <= LARGEST
+    if is_usable:
+        desired.joint_positions[:] = reference.joint_positions
+        desired.joint_velocities[:] = reference.joint_velocities
+        desired.joint_accelerations[:] = reference.joint_accelerations
+        desired.quaternion[:] = reference.quaternion
+        desired.omega_base[:] = reference.omega_base
+        desired.alpha_base[:] = reference.alpha_base
+        return USABLE
+    desired.joint_velocities[:] = desired.joint_accelerations[:] = 0.0
+    desired.omega_base[:] = desired.alpha_base[:] = 0.0
+    is_first = True
+    for k in range(4):
+        is_first = is_first and desired.quaternion[k] == 0.0
+    return NO_REFERENCE if is_first else REFERENCE_HELD
+
+
+@kernel
+def is_for_law(status: int) -> bool:
+    """Return whether the law answers a state of a ``status``."""
+    return status == USABLE or status == REFERENCE_HELD  # kernels have no `in`
 
 
 @kernel
@@ -197,12 +244,13 @@ def conclude(block: Block, tick: int, status: int) -> None:
     supervision = block[0]
     supervision.answered = tick
     supervision.reason = status
-    if status == USABLE:
+    if status != USABLE:
+        supervision.rejected[status] += 1.0
+    if is_for_law(status):
         supervision.last_tick = tick
         supervision.mode = NOMINAL
         return
     command = supervision.command
-    supervision.rejected[status] += 1.0
     if supervision.mode == NOMINAL:
         supervision.mode = HOLDING
         supervision.held_since = tick

@@ -3,6 +3,7 @@
     nominal --bad state--> holding --hold_ticks of them--> safe --good state--> nominal
     nominal --attitude near 180 degrees--> safe
 
+A reference that is not finite or too large is held at the last good one, in nominal mode.
 Holding repeats the last good torque, but closes the valves of thrusters: how long a pulse is to be
 is not known there. Safe commands none. Coming back, the law takes over from the
 applied force (`Controller.engage`). All of it happens in the kernels of `.supervision`.
@@ -24,13 +25,13 @@ from ..laws import ControlLaw
 from ..laws.checked import force_of
 from ..laws.compiled import CompiledLaw, LawCode
 from .controller import Controller, unusable
-from .signal_kernels import USABLE
+from .signal_kernels import SINGULAR, USABLE
 from .supervision import (
-    STATUSES,
     Supervision,
     admit_state,
     answer_state,
     conclude,
+    is_for_law,
     judge,
     takes_over,
 )
@@ -47,8 +48,12 @@ class Mode(Enum):
 
 
 MODES = tuple(Mode)
-KINDS = tuple(unusable(status, 0, np.zeros(4)).kind for status in range(STATUSES))
-"""What is wrong with a state, in a word or two, by its status."""
+KINDS = (
+    *(unusable(status, 0, np.zeros(4)).kind for status in range(SINGULAR + 1)),
+    "reference held",
+    "no reference",
+)
+"""What is wrong with a state or its reference, in a word or two, by its status."""
 
 
 class Supervisor:
@@ -88,12 +93,12 @@ class Supervisor:
 
     @property
     def reason(self) -> str:
-        """Reason why the mode is not nominal."""
+        """Reason why the mode is not nominal, or the reference held."""
         return "" if self._record.reason == USABLE else KINDS[int(self._record.reason)]
 
     @property
     def rejected(self) -> Counter[str]:
-        """States not used, by reason."""
+        """States not used, or whose reference was not, by reason."""
         counts = zip(KINDS, self._record.rejected, strict=True)
         return Counter({kind: int(count) for kind, count in counts if count})
 
@@ -134,7 +139,7 @@ class Supervisor:
         else:
             block, estimate, has_model = controller.block, law.estimate, law.needs_model
             status = admit_state(self.block, block, law.h_bar, estimate, has_model, *inputs)
-            if status == USABLE:
+            if is_for_law(status):
                 force = force_of(law, controller.signals, tick)
                 command.torque[:] = controller.command_for(tick, force).torque
             conclude(self.block, tick, status)

@@ -1,4 +1,7 @@
-"""Hostile states: what no sensor should ever send, for the flight code to answer all the same."""
+"""Hostile states and references: what no sensor and no mission should ever send.
+
+The flight code has to answer all the same.
+"""
 
 from __future__ import annotations
 
@@ -7,7 +10,8 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from space_robot_msgs_py.samples import RobotState
+from space_robot_msgs_py.compiled.records import Block
+from space_robot_msgs_py.samples import Reference, RobotState
 
 Array = NDArray[np.float64]
 
@@ -17,8 +21,8 @@ VALUES = (
 )
 JUMPS = (0, -1, -2, 2, 7, 20, 21, 500, 1999, 2001, -5000, 10**6, 10**12, 2**52, -(2**62), 2**62)
 LEAST, MOST = -(2**63), 2**63 - 1
-SHARE = 0.3
-"""Share of the states that are hostile."""
+SHARE, REFERENCE_SHARE = 0.3, 0.1
+"""Shares of the states, and of their references, that are hostile."""
 
 
 def shake(state: RobotState, size: float, random: np.random.Generator) -> None:
@@ -52,6 +56,16 @@ def spoil(
         numbers[:] *= 10.0 ** random.integers(0, 20)
         state.quaternion[:] = [1.0, 0.0, 0.0, 0.0]
     state.wheel_velocities[wheels:] = state.wheel_torques[wheels:] = 0.0
+
+
+def spoiled_reference(reference: Block, random: np.random.Generator) -> Block:
+    """Return a reference with some, or all, of its numbers changed."""
+    spoiled = reference.copy()
+    for part in Reference.parts(spoiled):
+        numbers = part.reshape(-1)
+        places = random.integers(numbers.size, size=random.choice([0, 1, 3, numbers.size]))
+        numbers[places] = random.choice(VALUES, size=places.size)
+    return spoiled
 
 
 def hostile_ticks(count: int, random: np.random.Generator) -> Iterator[int]:

@@ -12,12 +12,13 @@ from numpy.typing import NDArray
 from space_robot_msgs_py.compiled.records import Block
 from space_robot_msgs_py.samples import Reference, RobotState, State
 
+from ..controller.supervision import STATUSES
 from ..laws import ControlLaw
 from .compiler import build_library
 from .folder import Exported
 
 Array = NDArray[np.float64]
-CONDITION = ("reason", "mode", "answered", "last_stamp", "is_new_time", *["rejected"] * 5)
+CONDITION = ("reason", "mode", "answered", "last_stamp", "is_new_time", *["rejected"] * STATUSES)
 """Numbers of ``space_robot_condition``."""
 
 

@@ -5,6 +5,11 @@ observer estimates position z_1, rate z_2 and total disturbance z_3 of ``rhodd =
 from the position alone; the discrete observer is the current estimator of Miklosovic, Radke & Gao,
 Discrete implementation and generalization of the extended state observer, ACC 2006, with all three
 poles at ``beta = 1 / (1 + omega_o period)``.
+
+That is where a backward difference takes the pole ``-omega_o``, as in `dob`. The lag of z_3, on
+which `space-robot gains tune` rests, is then ``3 / omega_o`` as in continuous time, and half a
+tick. Errors of the observer fade with ``ln(1 + omega_o period) / period``, the omega_o of the
+paper's ``beta = exp(-omega_o period)``: 1595 rad/s for 2440 at 2 kHz.
 """
 
 from __future__ import annotations
@@ -24,7 +29,7 @@ class Gains(LawGains):
 
     inertia: Array = per_axis("inertia J of each axis, 1/b_0", "kg m2")
     omega_c: Array = per_axis("bandwidth of the controller: K_P = omega_c^2", "rad/s")
-    omega_o: Array = per_axis("bandwidth of the observer", "rad/s")
+    omega_o: Array = per_axis("observer: its poles are at 1/(1 + omega_o T), T: tick", "rad/s")
 
 
 class Memory(LawMemory):

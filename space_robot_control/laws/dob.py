@@ -7,7 +7,8 @@ observed through a low-pass without differentiating the rate:
 
     d_hat = g / (s + g) (F_S + g J rhodot) - g J rhodot.
 
-With backward differences this is the time-delay estimate behind a low-pass of the same corner.
+With backward differences this is the time-delay estimate behind a low-pass whose pole is
+``1 / (1 + g period)``: its lag is 1 / g, and it fades with ``ln(1 + g period) / period``.
 """
 
 from __future__ import annotations
@@ -23,10 +24,10 @@ from .signals import Array, Signals, per_axis
 
 
 class Gains(LawGains):
-    """Gains of (31), inertia and bandwidth of the observer."""
+    """Gains of (31), inertia and g of the observer."""
 
     inertia: Array = per_axis("nominal inertia J of each axis", "kg m2")
-    bandwidth: Array = per_axis("bandwidth g of the observer", "rad/s")
+    bandwidth: Array = per_axis("g of the observer: its pole is at 1/(1 + g T), T: tick", "rad/s")
     k_p: Array = per_axis("K_P of (31)", "1/s2")
     k_d: Array = per_axis("K_D of (31)", "1/s")
 

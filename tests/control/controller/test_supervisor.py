@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
 
 import numpy as np
 import pytest
@@ -12,10 +13,14 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from space_robot_control.controller.controller import Controller
+from space_robot_control.controller.reference_buffer import ReferenceBuffer
 from space_robot_control.controller.supervision import NOMINAL_FROM_ETA, SAFE_BELOW_ETA
 from space_robot_control.controller.supervisor import Mode, Supervisor
 from space_robot_control.controller.time_delay_estimation import LONGEST_GAP
+from space_robot_control.laws import ControlLaw, LawGains, Signals
 from space_robot_model.robot import Robot
+from space_robot_msgs_py.compiled.records import Block
+from space_robot_msgs_py.errors import MessageError
 from space_robot_msgs_py.samples import STATE_FIELDS, Reference, RobotState
 
 Array = NDArray[np.float64]
@@ -23,6 +28,17 @@ Array = NDArray[np.float64]
 AXES, HOLD = 9, 5
 REST = Reference.at_rest(6)
 """The reference that asks for rest at zero."""
+
+
+class Held(ControlLaw):
+    """A law in Python: one force on every axis."""
+
+    name = "held"
+    gains_type = LawGains
+
+    def force(self, signals: Signals) -> Array:
+        force: Array = np.ones(signals.error.size)
+        return force
 
 
 def supervisor_of(robot: Robot, name: str = "tde_stc", hold_ticks: int = HOLD) -> Supervisor:
@@ -41,6 +57,58 @@ def state_at(tick: int, eta: float = 1.0, scale: float = 1.0) -> RobotState:
 def with_nan(state: RobotState) -> RobotState:
     state.joint_velocities[3] = np.nan
     return state
+
+
+# References
+
+
+def moving(tick: int) -> Block:
+    """All axes move, and speed up."""
+    reference = Reference.at_rest(6)
+    joints, base = Reference.parts(reference)
+    joints[:], base[:, 4:] = 0.01 + 1e-4 * tick, 1e-3
+    return reference
+
+
+@pytest.mark.parametrize("name", sorted(GAINS))
+def test_a_bad_reference_is_held_as_a_buffer_holds_it(paper_robot: Robot, name: str) -> None:
+    """And no law keeps anything of it."""
+    bad = {4: (0, np.nan), 5: (17, -np.inf), 6: (22, 1.1e30), 11: (26, np.inf), 12: (18, np.nan)}
+    supervisor, other = supervisor_of(paper_robot, name), supervisor_of(paper_robot, name)
+    buffer = ReferenceBuffer(6)
+    for tick in range(20):
+        reference = moving(tick)
+        if tick in bad:
+            place, number = bad[tick]
+            reference.view(np.float64)[place] = number
+        joints, base = Reference.parts(reference)
+        with suppress(MessageError):
+            buffer.add_joints(tick, joints)
+            buffer.add_base(tick, base)
+        held = buffer.at(tick) if buffer.covers(tick) else buffer.hold(tick)
+        assert held is not None
+        answer = other.answer(state_at(tick), held).torque
+        np.testing.assert_array_equal(supervisor.answer(state_at(tick), reference).torque, answer)
+        for mine, expected in zip(supervisor.telemetry(), other.telemetry(), strict=True):
+            np.testing.assert_array_equal(mine, expected)
+        assert supervisor.mode is Mode.NOMINAL
+        assert supervisor.reason == ("reference held" if tick in bad else "")
+    assert supervisor.rejected == {"reference held": 5}
+
+
+@pytest.mark.parametrize("law", [law_of("tde_stc"), Held({}, PERIOD, AXES)])
+def test_before_the_first_reference_no_law_answers(paper_robot: Robot, law: ControlLaw) -> None:
+    supervisor = Supervisor(Controller(paper_robot, law, PERIOD), HOLD)
+    nothing = moving(0)
+    nothing.view(np.float64)[3] = np.nan
+    for tick in range(HOLD + 2):
+        assert not supervisor.answer(state_at(tick), nothing).torque.any()
+        assert supervisor.mode is (Mode.HOLDING if tick < HOLD else Mode.SAFE)
+        assert supervisor.reason == "no reference"
+    supervisor.answer(state_at(HOLD + 2), moving(0))  # it takes over from no torque
+    assert supervisor.mode is Mode.NOMINAL
+    assert supervisor.answer(state_at(HOLD + 3), nothing).torque.any()
+    assert supervisor.rejected == {"no reference": HOLD + 2, "reference held": 1}
 
 
 # Any stream of states

@@ -1,4 +1,4 @@
-"""Whatever is measured, C answers as the supervisor in Python does, to the bit."""
+"""Whatever is measured and wanted, C answers as the supervisor in Python does, to the bit."""
 
 from __future__ import annotations
 
@@ -11,12 +11,14 @@ from hypothesis import strategies as st
 
 from space_robot.export.software import export
 from space_robot.flight.plan import Flight, FlightPlan, resolve
-from space_robot_control.controller.supervision import NEW
+from space_robot_control.controller.signal_kernels import USABLE
+from space_robot_control.controller.supervision import NEW, NO_REFERENCE, REFERENCE_HELD, STATUSES
 from space_robot_control.controller.supervisor import Supervisor
 from space_robot_control.flight_code.folder import Exported
-from space_robot_control.flight_code.hostile import hostile_ticks, shake, spoil
+from space_robot_control.flight_code.hostile import hostile_ticks, shake, spoil, spoiled_reference
 from space_robot_control.flight_code.library import CONDITION, FlightLibrary
 from space_robot_control.flight_code.supervisors import bits
+from space_robot_msgs_py.samples import Reference
 
 pytestmark = needs_compiler
 TICKS = 150
@@ -50,6 +52,8 @@ def test_c_answers_like_python(seed: int, law: str, share: float) -> None:
             state.tick = tick
             shake(state, 10.0 ** random.uniform(-8, 0), random)
             spoil(state, wheels, random, is_hostile=random.random() < share)
+            if random.random() < share:
+                reference = spoiled_reference(reference, random)
             command, status = supervisor.answer(state, reference), code.answer(state, reference)
             np.testing.assert_array_equal(bits(code.command), bits(command.torque))
             assert bool(status) == bool(supervisor.reason)
@@ -57,3 +61,21 @@ def test_c_answers_like_python(seed: int, law: str, share: float) -> None:
         assert condition["answered"] == supervisor.answered
         assert condition["last_stamp"] == supervisor.last_stamp
         assert code.condition[5:].sum() == supervisor.rejected.total()
+
+
+def test_a_bad_reference_is_held_and_told() -> None:
+    """The law goes on, and keeps nothing of it; before the first good one there is none to hold."""
+    flight, code = flight_of("tde_stc"), FlightLibrary(exported("tde_stc"))
+    references, state = flight.mission.chunk(0, 8).references(), flight.plant.state.copy()
+    statuses = []
+    for tick in range(8):
+        reference = references[tick : tick + 1].copy()
+        if tick in (0, 3, 4):
+            Reference.parts(reference)[tick % 2].reshape(-1)[2] = np.nan if tick < 4 else np.inf
+        state.tick = tick
+        statuses.append(code.step(state, reference))
+        assert np.isfinite(np.concatenate([code.command, *code.telemetry])).all()
+    held = REFERENCE_HELD
+    assert statuses == [NO_REFERENCE, USABLE, USABLE, held, held, USABLE, USABLE, USABLE]
+    rejected = dict(zip(range(STATUSES), code.condition[5:], strict=True))
+    assert (rejected[NO_REFERENCE], rejected[held], sum(rejected.values())) == (1, 2, 3)

@@ -274,6 +274,26 @@ def test_the_law_of_ones_own_in_the_manual_flies(
     assert np.abs(errors).max() < 1e-6
 
 
+def test_the_integral_in_the_manual_is_kept_and_begins_at_zero(tmp_path: Path) -> None:
+    """At the start, and when the law takes over again."""
+    manual = (ROOT / "docs/manual/control_laws.md").read_text("utf-8")
+    module = re.search(r"```python\n(# my_pid.py.*?)```", manual, re.DOTALL)
+    assert module
+    (tmp_path / "my_pid.py").write_text(module[1])
+    plan = FlightPlan(
+        controller=f"{tmp_path}/my_pid.py:Pid",
+        gains={"pid": {"k_p": [100.0], "k_i": [100.0], "k_d": [20.0]}},
+        case="3",
+        duration=0.05,
+    )
+    for swaps, start in (([], 0), (["0.02:ctc", "0.03:pid"], 60)):
+        flight = Flight(resolve(plan.model_copy(update={"swaps": swaps})))
+        errors = simulate(flight).telemetry[start:, 3]  # type: ignore[index]
+        integral = flight.laws["pid"].memory.integral
+        np.testing.assert_allclose(integral, PERIOD * errors.sum(axis=0), rtol=1e-9)
+        assert integral.any()
+
+
 def test_numba_finds_one_type_for_all_laws_and_keeps_it() -> None:
     """Else a kernel that is called with a law looks for the type anew, at every tick."""
     flown = Flight(resolve(FlightPlan())).laws.values()

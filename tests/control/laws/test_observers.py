@@ -81,9 +81,11 @@ def error_matrices(axes: Axes) -> Array:
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_all_three_poles_of_the_observer_are_where_its_bandwidth_says(seed: int) -> None:
+def test_all_three_poles_of_the_observer_are_where_its_gain_says(seed: int) -> None:
     """``beta = 1 / (1 + omega_o T)``: the characteristic polynomial is ``(z - beta)^3``, and by
     Cayley and Hamilton ``(M - beta E)^3 = 0``; a motion of the axis and a force make no error."""
+    assert "poles are at 1/(1 + omega_o T)" in find_law("adrc").gain_descriptions()["omega_o"]
+    assert "pole is at 1/(1 + g T)" in find_law("dob").gain_descriptions()["bandwidth"]
     axes = Axes(np.random.default_rng(seed), push=0.1)
     for matrix, beta in zip(error_matrices(axes), 1.0 / (1.0 + POLES * PERIOD), strict=True):
         polynomial = np.poly(matrix)

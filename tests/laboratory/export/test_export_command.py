@@ -231,10 +231,10 @@ def test_a_law_without_translation_is_refused(
 
 @needs_make
 def test_what_is_verified_is_told_in_json(tmp_path: Path, space_robot: Run) -> None:
+    """Also with processors for which gcc would fuse products and sums of the navigation."""
     folder = tmp_path / "code"
-    ran = space_robot(
-        "export", "-o", str(folder), "--acceptance-seconds", "0.05", "--verify", "--json"
-    )
+    options = "--sensors fine --navigation filtered --acceptance-seconds 0.05 --verify --json"
+    ran = space_robot("export", "-o", str(folder), *options.split())
     assert ran.code == 0, ran.err
     report = json.loads(ran.out)
     assert report["laws"] == ["tde_stc"]
@@ -247,8 +247,17 @@ def test_what_is_verified_is_told_in_json(tmp_path: Path, space_robot: Run) -> N
     assert targets["gcc"]["is_accepted"]
     assert targets["gcc"]["states"] > 6000
     assert 10.0 < targets["gcc"]["tick_ns"] < 1e6
+    assert targets["gcc, other flags"]["is_accepted"]
+    assert targets["gcc, other flags"]["states"] % targets["gcc"]["states"] == 0
     readme = (folder / "README.md").read_text("utf-8")
     assert f"{report['state_bytes']} bytes" in readme
+    one_law = (folder / "src" / "flight.c").read_text("utf-8")
+    for switch in one_law.split("    switch (")[1:]:  # MISRA's rule 16.6
+        assert len(re.findall(r"^    (case|default)\b", switch.split("\n    }")[0], re.M)) > 1
+    fast = ["gcc", "-ffast-math", "-Iinclude", "-I.", "-fsyntax-only", "src/laws.c"]
+    refused = subprocess.run(fast, cwd=folder, capture_output=True, text=True, check=False)
+    assert refused.returncode != 0
+    assert "compile the flight software without -ffast-math" in refused.stderr
 
 
 @needs_make

@@ -215,7 +215,7 @@ def test_one_that_falls_silent_ends_the_flight(monkeypatch: pytest.MonkeyPatch) 
             assert int(np.frombuffer(data[:8], np.int64)[0]) == BEGIN
             server.sendto(bytes(computer_bytes), peer)
 
-        computer_bytes = 8 * (3 + 1 + 9 + 10 + 36)
+        computer_bytes = 8 * (3 + 1 + 9 + 12 + 36)
         thread = threading.Thread(target=greet)
         thread.start()
         computer = FlightComputer(exported, "127.0.0.1", server.getsockname()[1])
