@@ -81,7 +81,8 @@ class Robot(TreeArrays):
             return cls._of_urdf(read_urdf_content(content, folder or Path(), where), where)
         if are_numbers(content):
             numbers = validate(Document, content, where).robot
-            robot = cls.of_tree(numbers.name, [b.body for b in numbers.bodies], where)
+            bodies = [b.body for b in numbers.bodies]
+            robot = cls.of_tree(numbers.name, bodies, where, base_is_at_com=False)  # bit for bit
         else:
             file = validate(_RobotDocument, content, where).robot
             robot = cls.of_tree(file.name, file.bodies(), where)
