@@ -16,6 +16,7 @@ from tree_oracle import TreeOracle, assert_same_dynamics, pinocchio_tree
 
 from space_robot_model.robot import Robot
 from space_robot_model.robot.mission_document import QUATERNION
+from space_robot_model.robot.tool import tool_pose
 from space_robot_model.robot.tree import Body, Joint, Spring, Tool, flatten, other_meaning
 from space_robot_model.robot.tree.flatten import axes_with_z
 from space_robot_msgs_py.errors import InputError
@@ -56,6 +57,19 @@ def test_nominal_robot_is_locked_at_rest(seed: int, kinds: list[str]) -> None:
     assert robot.nominal.joint_names == robot.joint_names
     assert not robot.nominal.passive_names
     assert_same_dynamics(robot.nominal, oracle, seed)
+
+
+@settings(max_examples=30)
+@given(seed=SEEDS, kinds=TREES)
+def test_nominal_tool_is_where_the_true_one_is_at_rest(seed: int, kinds: list[str]) -> None:
+    robot, rng = Robot.of_tree("tree", tree_of(seed, kinds)), np.random.default_rng(seed)
+    quaternion = Rotation.random(3, random_state=seed).as_quat()[:, [3, 0, 1, 2]]
+    joints = rng.uniform(-3.0, 3.0, (3, robot.n))
+    rest = np.broadcast_to([spring.rest for spring in robot.springs], (3, len(robot.springs)))
+    rotation, position = tool_pose(robot, quaternion, np.hstack([joints, rest]))
+    nominal_rotation, nominal_position = tool_pose(robot.nominal, quaternion, joints)
+    np.testing.assert_allclose(nominal_rotation, rotation, atol=1e-12)
+    np.testing.assert_allclose(nominal_position, position, atol=1e-11)
 
 
 def _locked(body: Body) -> Body:
