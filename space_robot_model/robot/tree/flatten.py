@@ -24,7 +24,7 @@ from .bodies import Body
 Array = NDArray[np.float64]
 
 OTHER_MEANINGS = {
-    "*": "all of them in campaigns",
+    "*": "the pattern of all joints in campaigns",
     **dict.fromkeys(BASE_AXES, "the name of a base axis"),
     **dict.fromkeys(("base", "joints", "all"), "a group of axes in faults"),
     **dict.fromkeys(("time", "q_w", "q_x", "q_y", "q_z"), "a column of trajectories"),

@@ -168,7 +168,7 @@ FAULTS: dict[str, tuple[Edit, list[str]]] = {
             ["robot.links", f"joint {name!r} needs another name: it is {meaning}"],
         )
         for name, meaning in {
-            "*": "all of them",
+            "*": "the pattern of all joints",
             "2": "the number of a joint",
             "all": "a group of axes",
             "base": "the name of the base",
