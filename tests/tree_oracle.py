@@ -50,9 +50,19 @@ def pinocchio_tree(bodies: Sequence[Body]) -> pin.Model:
 
 
 class TreeOracle:
-    """A Pinocchio model that moves about, seen from the CoM of one of its bodies."""
+    """A Pinocchio model that moves about, seen from the CoM of one of its bodies.
 
-    def __init__(self, model: pin.Model, base: str, joint_names: Sequence[str], seed: int) -> None:
+    Or from another place ``seen_from`` (3,) of the body, m.
+    """
+
+    def __init__(
+        self,
+        model: pin.Model,
+        base: str,
+        joint_names: Sequence[str],
+        seed: int,
+        seen_from: Array | None = None,
+    ) -> None:
         rng = np.random.default_rng(seed)
         self.model = model
         self.model.gravity = pin.Motion.Zero()
@@ -65,9 +75,9 @@ class TreeOracle:
         self.positions, self.rates = angles[self.columns], self.v[self.columns]
         link = self.model.frames[self.model.getFrameId(base, pin.FrameType.BODY)]
         body = self.model.inertias[link.parentJoint]  # with all that is fixed to it
-        at_com = pin.SE3(link.placement.rotation, body.lever)
+        place = pin.SE3(link.placement.rotation, body.lever if seen_from is None else seen_from)
         self.frame = self.model.addFrame(
-            pin.Frame("seen from", link.parentJoint, at_com, pin.FrameType.OP_FRAME)
+            pin.Frame("seen from", link.parentJoint, place, pin.FrameType.OP_FRAME)
         )
         self.data = self.model.createData()
 

@@ -56,6 +56,13 @@ DEFECTS = {
     "name of a base axis": Defect(
         'joint name="slide"', 'joint name="base_x"', "joint 'base_x'", 45, "name of a base axis"
     ),
+    "name of a column": Defect(
+        'joint name="slide"', 'joint name="time"', "joint 'time'", 45, "a column of trajectories"
+    ),
+    "name of all": Defect(
+        'joint name="slide"', 'joint name="*"', "joint '*'", 45, "pattern of all joints"
+    ),
+    "number of a joint": Defect('joint name="slide"', 'joint name="2"', "joint '2'", 45, "number"),
     "no parent": Defect('<parent link="upper"/>', "", "joint 'slide'", 45, "<parent link="),
     "no child": Defect('<child link="fore"/>', "<child/>", "joint 'slide'", 45, "<child link="),
     "unknown parent": Defect(

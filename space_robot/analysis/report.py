@@ -224,7 +224,7 @@ _METRICS: dict[str, Callable[[FlightLog], Metric]] = {
     "missed_deadlines": _missed_deadlines,
     "estimate_error": lambda log: EstimateError(log, *estimator(log)),
     "pointing": lambda log: Pointing(log, robot_of(log)),
-    "tool": lambda log: ToolError(log, robot_of(log), assumed_robot_of(log)),
+    "tool": lambda log: ToolError(log, captures_of(log), assumed_robot_of(log)),
     "sizing": lambda log: _sizing(log, None),
     "momentum": lambda log: MomentumBudget(momentum_of(log)),
     "disturbance_by_source": _disturbance_by_source,

@@ -56,7 +56,13 @@ def lines(reports: Sequence[Report], brief: bool = False) -> list[Line]:
         rows += each(group, ("pointing", key), text=_angle, label=_upper)
     for group, key in (("tool position", "tool_position_m"), ("base's drift", "base_drift_m")):
         rows += each(group, ("pointing", key), "m", label=_upper)
-    rows += each("tool on its path", ("tool",), lambda key: key.split("_")[-1], label=_kind)
+    rows += each(
+        "tool on its path",
+        ("tool",),
+        lambda key: key.split("_")[-1],
+        label=_kind,
+        text_of=lambda key: _moved if key == "drift_m" else _number,
+    )
     rows += each("momentum", ("momentum", "peak_n_m_s"), "N m s", label="{} at most".format)
     rows += each(
         "momentum",
@@ -216,7 +222,14 @@ def _axes(key: str, kind: str) -> str:
     return f"{key if key == 'base' else f'joints_{key}'} {_upper(kind)}"
 
 
+def _moved(value: float) -> str:
+    """Write a distance, m, that is zero but for rounding where nothing pushes the robot."""
+    return _number(value) if value > 1e-9 else "0"
+
+
 def _kind(key: str) -> str:
+    if key == "drift_m":
+        return "the path's drift"
     size = "RMS" if key.startswith("rms") else "max"
     return f"rotation, {size}" if key.endswith("deg") else size
 

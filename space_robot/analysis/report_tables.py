@@ -43,7 +43,8 @@ DEFINITIONS = {
     "tool position": "distance from the desired position, the base at its measured position",
     "base's drift": "of the base's centre of mass from where it began; nothing holds it",
     "tool on its path": "distance and rotation of the end effector from the path that the mission "
-    "leads along, on inertial axes",
+    "leads along, on inertial axes; the path moves with the common centre of mass, where drag, "
+    "thrusters or a captured target move that, which is its drift",
     "momentum": "largest angular momentum about the common centre of mass: of the robot with "
     "its wheels locked, of its base in that, of the wheels' spin, and what came from outside; and "
     "how far robot and wheels together drifted from what is conserved",

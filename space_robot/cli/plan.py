@@ -45,8 +45,9 @@ def plan(
 
     MISSION is a name of config/missions or a path; without it, the robot's own. Demands are those
     of the nominal robot without friction, with zero momentum at the start. σ is the smallest
-    singular value of the tool's Jacobian, with the base's attitude held and with a free base: near
-    zero the posture is singular.
+    singular value of the tool's Jacobian, with the base's attitude held and with a free base, its
+    rows of translation divided by the tool's distance from the base: near zero the posture is
+    singular.
 
     \b
     Examples:

@@ -20,6 +20,10 @@ SEGMENTS = (
     Column("σ held", "", ".2g"),
     Column("σ free", "", ".2g"),
 )
+SIGMA = (
+    "σ: smallest singular value of the tool's Jacobian, with the base's attitude held and with a "
+    "free base; its rows of translation are divided by the tool's distance from the base"
+)
 ACTUATORS = (
     Column("actuators", is_label=True),
     Column("torque", "%", ".0f"),
@@ -43,6 +47,7 @@ def print_plan(report: Mapping[str, Any], console: Console) -> None:
         for s in report["segments"]
     ]
     print_table(Table.of("", SEGMENTS, rows), console)
+    say(console, SIGMA)
     judged = [
         (
             a["actuators"],

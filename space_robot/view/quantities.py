@@ -14,7 +14,7 @@ from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.samples import SOURCES
 
 from ..analysis.attitude_drift import attitude_drift, controls_base
-from ..analysis.described import assumed_robot_of, flown_actuators
+from ..analysis.described import assumed_robot_of, captures_of, flown_actuators
 from ..analysis.figures.overlay import words
 from ..analysis.metrics import error_columns, torque_columns, tracking_error, unit_of
 from ..analysis.tool_error import ToolError, leads_tool
@@ -33,7 +33,7 @@ def quantities_of(log: FlightLog, robot: Robot) -> list[PlottedQuantity]:
     """
     return [
         *_errors(log),
-        *_tool(log, robot),
+        *_tool(log),
         *_drift(log),
         *motion(log),
         *_passive_joints(log, robot),
@@ -57,12 +57,12 @@ def _errors(log: FlightLog) -> Iterator[PlottedQuantity]:
         )
 
 
-def _tool(log: FlightLog, robot: Robot) -> Iterator[PlottedQuantity]:
+def _tool(log: FlightLog) -> Iterator[PlottedQuantity]:
     """Yield the distance of the tool from its path, of a mission that leads it."""
     if not leads_tool(log):
         return
     with suppress(InputError):  # the bag does not tell what the flight software assumed
-        errors = ToolError(log, robot, assumed_robot_of(log)).errors(log)
+        errors = ToolError(log, captures_of(log), assumed_robot_of(log)).errors(log)
         yield PlottedQuantity("tool", "tool error", "m", ["distance"], errors[:, :1], True)
 
 

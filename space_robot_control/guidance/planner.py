@@ -54,7 +54,7 @@ class Planner:
         self._time, self._joints, self._quaternion = 0.0, joints, quaternion
         pose = ToolFollower(self._robot, None).pose(quaternion, joints)
         self._origin = pose.position - pose.from_base
-        """Origin of the inertial frame, the base's CoM at t = 0, from the robot's CoM."""
+        """Origin of the inertial frame, that of the base's frame at t = 0, from the robot's CoM."""
 
     def plan(
         self, begin: float, joints: Array, quaternion: Array, segments: Sequence[Segment]

@@ -33,8 +33,8 @@ class ToolGoal(Orientation):
     xyz: Vector | None = Field(None, description="position, m (none: it stays)")
     frame: Frame = Field(
         "start",
-        description="axes of the goal: inertial (origin: the base's CoM at t = 0), base (at the end"
-        " of the segment), or start (a displacement and a turn on inertial axes)",
+        description="axes of the goal: inertial (origin: the base at t = 0), base (at the end of "
+        "the segment), or start (a displacement and a turn on inertial axes)",
     )
     link: str | None = Field(None, description="name of the tool, of a robot with several")
     least: Literal["motion", "momentum"] = Field(

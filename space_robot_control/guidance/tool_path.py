@@ -22,7 +22,7 @@ class ToolPose(NamedTuple):
     position: Array
     """(3,) m, from the robot's centre of mass."""
     from_base: Array
-    """(3,) m, from the base's centre of mass."""
+    """(3,) m, from the base's frame."""
     rotation: Array
     """(3, 3) from the tool's frame."""
     jacobian: Array

@@ -12,13 +12,12 @@ from pydantic import AfterValidator, Field, ValidationInfo, field_validator
 
 from space_robot_msgs_py.config.choices import choices
 from space_robot_msgs_py.config.validation import StrictModel, short
-from space_robot_msgs_py.topics import BASE_AXES
 
 from ..elementary.matrices import product
 from .inertia import Inertia, Mass, inertia_tensor
 from .link_file import BASE, FrameFile, LinkFile, body_of
 from .plate_file import PlateFile, Plates
-from .tree import Body, Plate, Tool, first_repeated
+from .tree import Body, Plate, Tool, first_repeated, other_meaning
 
 Array = NDArray[np.float64]
 
@@ -46,12 +45,25 @@ def _distinct_names(links: list[LinkFile]) -> list[LinkFile]:
     names = [link.name for link in links]
     if (repeated := first_repeated(names)) is not None:
         raise ValueError(f"joint names must differ, {short(repeated)} occurs twice")
+    moving = [link.name for link in links if link.joint != "fixed"]
     for name in names:
-        if name in BASE_AXES:
-            raise ValueError(f"{name!r} is the name of a base axis, not of a joint")
+        meaning = other_meaning(name, moving) if name in moving else ""
         if name == BASE:
-            raise ValueError(f"{name!r} is the name of the base, not of a joint")
+            meaning = "the name of the base"
+        if meaning:
+            raise ValueError(f"joint {short(name)} needs another name: it is {meaning}")
     return links
+
+
+def _check_links(what: str, on: list[str], info: ValidationInfo) -> None:
+    if (links := info.data.get("links")) is None:  # they are wrong themselves
+        return
+    names = [BASE, *(link.name for link in links)]
+    for number, name in enumerate(on):
+        if name not in names:
+            raise ValueError(
+                f"unknown link {short(name)} of {what} {number}: {choices(name, names)}"
+            )
 
 
 class RobotFile(StrictModel):
@@ -66,16 +78,27 @@ class RobotFile(StrictModel):
     tools: list[ToolFile] = Field([])
     plates: Plates = Field([])
 
+    @field_validator("tool", mode="after")
+    @classmethod
+    def _tool_is_on_a_link(cls, tool: ToolFile | None, info: ValidationInfo) -> ToolFile | None:
+        if tool and tool.link:
+            _check_links("tool", [tool.link], info)
+        return tool
+
+    @field_validator("tools", mode="after")
+    @classmethod
+    def _tools_differ(cls, tools: list[ToolFile], info: ValidationInfo) -> list[ToolFile]:
+        if tools and info.data.get("tool"):
+            raise ValueError("a robot has either tool or tools: list all of them in tools")
+        if (repeated := first_repeated(tool.name for tool in tools)) is not None:
+            raise ValueError(f"tool names must differ, {short(repeated)} occurs twice")
+        _check_links("tool", [tool.link or BASE for tool in tools], info)
+        return tools
+
     @field_validator("plates", mode="after")
     @classmethod
-    def _are_on_links(cls, plates: list[PlateFile], info: ValidationInfo) -> list[PlateFile]:
-        if (links := info.data.get("links")) is None:  # they are wrong themselves
-            return plates
-        names = [BASE, *(link.name for link in links)]
-        for number, plate in enumerate(plates):
-            if plate.link not in names:
-                advice = choices(plate.link, names)
-                raise ValueError(f"unknown link {short(plate.link)} of plate {number}: {advice}")
+    def _plates_are_on_links(cls, plates: list[PlateFile], info: ValidationInfo) -> list[PlateFile]:
+        _check_links("plate", [plate.link for plate in plates], info)
         return plates
 
     def bodies(self) -> list[Body]:

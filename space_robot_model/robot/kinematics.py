@@ -60,7 +60,7 @@ class ToolState(NamedTuple):
     position: Array
     """(3,) m, origin of the tool from the robot's centre of mass, inertial axes."""
     centre_of_mass: Array
-    """(3,) m, the robot's centre of mass from the base's, inertial axes."""
+    """(3,) m, the robot's centre of mass from the base's frame, inertial axes."""
     rotation: Array
     """(3, 3) from the tool's frame to the inertial frame."""
     base: Array

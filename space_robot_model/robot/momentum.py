@@ -37,7 +37,7 @@ class RobotMomentum(NamedTuple):
     """Total momentum of a robot's bodies, at each tick."""
 
     centre_of_mass: Array
-    """(N, 3) common centre of mass relative to the base's CoM, m, inertial axes."""
+    """(N, 3) common centre of mass relative to the base's frame, m, inertial axes."""
     angular: Array
     """(N, 3) angular momentum about the common centre of mass, N m s, inertial axes."""
     base: Array

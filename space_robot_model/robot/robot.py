@@ -81,7 +81,8 @@ class Robot(TreeArrays):
             return cls._of_urdf(read_urdf_content(content, folder or Path(), where), where)
         if are_numbers(content):
             numbers = validate(Document, content, where).robot
-            robot = cls.of_tree(numbers.name, [b.body for b in numbers.bodies], where)
+            bodies = [b.body for b in numbers.bodies]
+            robot = cls.of_tree(numbers.name, bodies, where, base_is_at_com=False)  # bit for bit
         else:
             file = validate(_RobotDocument, content, where).robot
             robot = cls.of_tree(file.name, file.bodies(), where)
@@ -122,14 +123,19 @@ class Robot(TreeArrays):
 
     @cached_property
     def nominal(self) -> Robot:
-        """The robot assumed by the flight software: passive joints locked at rest."""
+        """The robot assumed by the flight software: passive joints locked at rest.
+
+        Its base has the frame of this robot's base, which measurements and goals refer to, and so
+        its centre of mass elsewhere if a locked panel is part of it.
+        """
         if not self.springs:
             return self
         bodies = self.bodies()
         for number, body in enumerate(bodies):
             if body.joint and body.joint.spring:
                 bodies[number] = replace(body, joint=_locked(body.joint, body.joint.spring.rest))
-        return Robot.of_tree(self.name, bodies)  # the same order of the actuated joints
+        # the same order of the actuated joints
+        return Robot.of_tree(self.name, bodies, base_is_at_com=False)
 
     def from_degrees(self, values: ArrayLike) -> Array:
         """Convert positions of the n actuated joints to rad; m of prismatic joints are kept.

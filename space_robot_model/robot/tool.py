@@ -16,7 +16,7 @@ _BATCH = 8192
 
 
 def tool_pose(robot: Robot, quaternion: Array, joint_positions: Array) -> tuple[Array, Array]:
-    """Return rotation and position of the end effector's frame, relative to the base's CoM.
+    """Return rotation and position of the end effector's frame, relative to the base's.
 
     Args:
         robot: its masses are not used.

@@ -12,6 +12,8 @@ from space_robot_model.elementary.matrices import norms
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.config.validation import one_of
 from space_robot_msgs_py.errors import InputError
+from space_robot_sim.environment.captures import Captures
+from space_robot_sim.environment.payload import with_payload
 
 from ...analysis.attitude_drift import attitude_drift
 from ...analysis.metrics import tracking_error
@@ -44,7 +46,7 @@ class Measure:
         names = {metric.name for metric in own}
         self._robot, columns = flight.robot, Columns.of_flight(flight)
         self._columns = columns
-        self._assumed = flight.scenario.robots.controller
+        self._flight = flight
         self._start: NDArray[np.float64] | None = None
         """(4,) attitude at the first tick."""
         self._tool: ToolError | None = None
@@ -65,7 +67,7 @@ class Measure:
             self._start = block.quaternion[0].copy() if self._start is None else self._start
             sizes[DRIFT] = np.radians(norms(attitude_drift(block, self._start)))
         if self._columns.tool:
-            self._tool = self._tool or ToolError(block, self._robot, self._assumed)
+            self._tool = self._tool or _tool_error(block, self._flight)
             sizes |= zip(self._columns.tool, self._tool.errors(block).T, strict=True)
         self._bands.add(block.first_tick, sizes)
         for metrics in (self._whole, *self._require.values()):
@@ -104,6 +106,13 @@ class Measure:
     def bands(self) -> dict[str, NDArray[np.float32]]:
         """Return the bands of each column over time."""
         return self._bands.result()
+
+
+def _tool_error(log: FlightLog, flight: Flight) -> ToolError:
+    settings = flight.plant_settings
+    robot = with_payload(flight.robot, settings.payload)
+    captures = Captures(settings.parsed_events, robot, flight.period, settings)  # not the plant's
+    return ToolError(log, captures, flight.scenario.robots.controller)
 
 
 def check_requirements(

@@ -14,7 +14,7 @@ from .bodies import (
     Tool,
     Visual,
 )
-from .flatten import axes_with_z, first_repeated, flatten, parallel_axes
+from .flatten import axes_with_z, first_repeated, flatten, other_meaning, parallel_axes
 
 __all__ = [
     "Body",
@@ -32,5 +32,6 @@ __all__ = [
     "axes_with_z",
     "first_repeated",
     "flatten",
+    "other_meaning",
     "parallel_axes",
 ]

@@ -25,7 +25,7 @@ class TreeArrays:
 
     Arrays over joints have the n actuated ones first, then the passive ones with springs; each
     group branch by branch from the base. Body 0 is the base, body j + 1 is moved by joint j; the z
-    axis of its frame is the joint's axis. The base's frame is at its CoM.
+    axis of its frame is the joint's axis. The base's frame is at its CoM, but for `Robot.nominal`.
     """
 
     name: str
@@ -100,13 +100,15 @@ class TreeArrays:
         return self.tools[0]
 
     @classmethod
-    def of_tree(cls, name: str, bodies: Sequence[Body], where: str = "robot") -> Self:
+    def of_tree(
+        cls, name: str, bodies: Sequence[Body], where: str = "robot", base_is_at_com: bool = True
+    ) -> Self:
         """Build the arrays from bodies in any order, see `space_robot_model.robot.tree.flatten`.
 
         Raises:
             InputError: not a tree, or one that cannot be flown; ``where`` names the file.
         """
-        walked = flatten(bodies, where)
+        walked = flatten(bodies, where, base_is_at_com)
         moved = sorted(walked[1:], key=lambda m: _joint(m).spring is not None)
         joints = [_joint(m) for m in moved]
         actuated = tuple(joint for joint in joints if not joint.spring)

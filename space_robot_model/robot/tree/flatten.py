@@ -6,7 +6,8 @@ frame, and the base's frame is at its centre of mass.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+import re
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -15,11 +16,41 @@ from numpy.typing import NDArray
 from space_robot_msgs_py.config.choices import choices
 from space_robot_msgs_py.config.validation import short
 from space_robot_msgs_py.errors import InputError
+from space_robot_msgs_py.topics import BASE_AXES
 
 from ...elementary.matrices import norm, product, rotate_tensor
 from .bodies import Body
 
 Array = NDArray[np.float64]
+
+OTHER_MEANINGS = {
+    "*": "the pattern of all joints in campaigns",
+    **dict.fromkeys(BASE_AXES, "the name of a base axis"),
+    **dict.fromkeys(("base", "joints", "all"), "a group of axes in faults"),
+    **dict.fromkeys(("time", "q_w", "q_x", "q_y", "q_z"), "a column of trajectories"),
+    **{
+        f"base_{kind}_{axis}": "a column of disturbances"
+        for kind in ("force", "torque")
+        for axis in "xyz"
+    },
+}
+"""What names of joints would mean elsewhere."""
+
+
+def other_meaning(name: str, joints: Collection[str] = ()) -> str:
+    """Return what the name of a joint would mean elsewhere; empty: nothing.
+
+    Args:
+        name: of the joint.
+        joints: names of all moving joints.
+    """
+    if name.isdecimal():
+        return "the number of a joint in faults and campaigns"
+    if re.fullmatch(r"(wheel|thruster|torquer)_\d+", name):
+        return "the name of an actuator of the base"
+    if name.endswith("_rate") and (joint := name.removesuffix("_rate")) in joints:
+        return f"the column of the rate of {short(joint)} in trajectories"
+    return OTHER_MEANINGS.get(name, "")
 
 
 @dataclass
@@ -34,8 +65,15 @@ class Moved:
     """Number of the parent `Moved`; the base is 0."""
 
 
-def flatten(bodies: Sequence[Body], where: str = "robot") -> list[Moved]:
+def flatten(
+    bodies: Sequence[Body], where: str = "robot", base_is_at_com: bool = True
+) -> list[Moved]:
     """Merge fixed bodies, rotate every joint axis to z, put the base's frame at its CoM.
+
+    Args:
+        bodies: in any order.
+        where: name of the file, for errors.
+        base_is_at_com: False: the base's frame stays where it is in ``bodies``.
 
     Returns:
         The base, then the bodies with a moving joint, branch by branch in the order of ``bodies``,
@@ -72,7 +110,8 @@ def flatten(bodies: Sequence[Body], where: str = "robot") -> list[Moved]:
         parts[number].append(_moved_to(body, rotation, at))
     for moved, members in zip(flat, parts, strict=True):
         moved.body = _merged(moved.body, members, where)
-    _put_base_at_com(flat)
+    if base_is_at_com:
+        _put_base_at_com(flat)
     return flat
 
 
@@ -111,6 +150,15 @@ def _check_names(bodies: Sequence[Body], where: str) -> dict[str, Body]:
     bases = [body.name for body in bodies if body.joint is None]
     if len(bases) != 1:
         raise InputError(f"{where}: a robot has one base, got {len(bases)}: {bases}")
+    moving = {b.joint.name: b.name for b in bodies if b.joint and b.joint.kind != "fixed"}
+    for joint, link in moving.items():
+        if meaning := other_meaning(joint, moving):
+            raise InputError(f"{where}: joint {short(joint)} needs another name: it is {meaning}")
+        if link == "*" or link.isdecimal():
+            raise InputError(
+                f"{where}: link {short(link)} needs another name: in campaigns it is all links, or "
+                "one by its number"
+            )
     for body in bodies:
         if body.joint and body.parent not in by_name:
             raise InputError(

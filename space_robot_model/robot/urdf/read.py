@@ -14,11 +14,10 @@ from space_robot_msgs_py.config.extras import install_command
 from space_robot_msgs_py.config.validation import one_of, short
 from space_robot_msgs_py.config.yaml_text import check_file, read_file
 from space_robot_msgs_py.errors import InputError
-from space_robot_msgs_py.topics import BASE_AXES
 
 from ...dynamics.model import MOST_JOINTS
 from ...elementary.matrices import product
-from ..tree import Body, Gear, JointFriction, Plate, Spring
+from ..tree import Body, Gear, JointFriction, Plate, Spring, first_repeated, other_meaning
 from .bodies import check_kinds, end_frames, make_bodies, mend_inertias, mend_massless, moved_frames
 from .elements import Element, parse_xml
 from .fields import HERE, UrdfFrame
@@ -95,6 +94,8 @@ def parse_urdf(
     _check_moving(tree, report)
     for tool in tools or ():
         one_of(tool, links, "link", f" for a tool of {report.where}")
+    if (repeated := first_repeated(tools or ())) is not None:
+        raise InputError(f"{report.where}: tools: link {short(repeated)} occurs twice")
     if not repair:
         report.refuse_defects()
     frames = end_frames(links, tree) if tools is None else tools
@@ -221,9 +222,10 @@ def _check_moving(tree: Tree, report: Report) -> None:
     moving = [edge.joint for edge in tree.edges.values() if edge.moves]
     if not moving:
         raise InputError(f"{report.where}: no moving joint: a robot needs at least one")
+    names = [joint.name for joint in moving]
     for joint in moving:
-        if joint.name in BASE_AXES:
-            raise report.error(joint.line, joint.part, "this is the name of a base axis")
+        if meaning := other_meaning(joint.name, names):
+            raise report.error(joint.line, joint.part, f"it needs another name: this is {meaning}")
 
 
 def expand_xacro(path: Path) -> str:

@@ -95,6 +95,7 @@ def test_every_line_is_its_figure(reports: list[dict[str, Any]]) -> None:
         for kind, label in (("rms", "RMS"), ("largest", "max")):
             texts["tool on its path", label] = f"{r['tool'][f'{kind}_m']:.4g}"
             texts["tool on its path", f"rotation, {label}"] = f"{r['tool'][f'{kind}_deg']:.4g}"
+        texts["tool on its path", "the path's drift"] = f"{r['tool']['drift_m']:.4g}"
         for axis, asked in r["sizing"]["axes"].items():
             texts["asked of the base", f"{axis} torque"] = f"{asked['peak_torque_n_m']:.4g}"
             texts["asked of the base", f"{axis} momentum"] = f"{asked['peak_momentum_n_m_s']:.4g}"

@@ -2,23 +2,37 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
+import yaml
 from conservation import momentum
 from hypothesis import given
 from hypothesis import strategies as st
+from paths import CONFIG
 from random_robots import random_quaternion, random_robot
 from scipy.spatial.transform import Rotation
 
 import space_robot as sr
-from space_robot.analysis.tool_error import ToolError
+from space_robot.analysis.described import assumed_robot_of, captures_of
+from space_robot.analysis.tool_error import ToolError, ToolPath
+from space_robot.campaign.draws.changes import RobotArrays
 from space_robot_model.robot import Robot
 from space_robot_model.robot.momentum import Motion, robot_momentum
+from space_robot_model.robot.tool import tool_pose
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.samples import Timebase
+from space_robot_sim.environment.captures import Captures
+from space_robot_sim.environment.orbit_settings import OrbitSettings
 
 TICKS = 5
 SEEDS = st.integers(0, 2**31 - 1)
+
+
+def of(robot: Robot) -> Captures:
+    """No captures."""
+    return Captures([], robot, 5e-4, OrbitSettings())
 
 
 def on_its_path(robot: Robot, seed: int) -> FlightLog:
@@ -40,7 +54,7 @@ def on_its_path(robot: Robot, seed: int) -> FlightLog:
 def test_a_flight_on_its_path_has_no_error(seed: int, n: int) -> None:
     robot = random_robot(np.random.default_rng(seed), n)
     log = on_its_path(robot, seed)
-    errors = ToolError(log, robot, robot).errors(log)
+    errors = ToolError(log, of(robot), robot).errors(log)
     np.testing.assert_allclose(errors, 0.0, atol=1e-12)
 
 
@@ -49,16 +63,95 @@ def test_a_displaced_and_turned_base_displaces_and_turns_the_tool(seed: int, n: 
     rng = np.random.default_rng(seed)
     robot = random_robot(rng, n)
     log = on_its_path(robot, seed)
-    metric = ToolError(log, robot, robot)
+    metric = ToolError(log, of(robot), robot)
     shift, angle = rng.normal(size=3), 0.3
     turn = Rotation.from_rotvec([0.0, 0.0, angle])
-    log.base_position[1:] += shift
-    errors = metric.errors(log)
-    np.testing.assert_allclose(errors[1:, 0], np.linalg.norm(shift), rtol=1e-12)
-    np.testing.assert_allclose(errors[:, 1], 0.0, atol=1e-12)
+    log.base_position[1:] += shift  # with the whole robot, and so with the path
+    np.testing.assert_allclose(metric.errors(log), 0.0, atol=1e-12)
+    metric.add(log, np.empty(0))
+    assert metric.result()["drift_m"] == pytest.approx(np.linalg.norm(shift))
     attitude = turn * Rotation.from_quat(np.roll(log.quaternion, -1, axis=1))
     log.quaternion[:] = np.roll(attitude.as_quat(), 1, axis=1)
     np.testing.assert_allclose(metric.errors(log)[:, 1], angle, rtol=1e-9)
+
+
+def test_a_base_with_its_centre_of_mass_elsewhere_is_on_its_path_at_rest() -> None:
+    """The base's frame, to which it is measured, is elsewhere; its parts are where they were."""
+    robot = random_robot(np.random.default_rng(1), 4)
+    log = on_its_path(robot, 1).rows(0, 1)
+    arrays = RobotArrays(robot, has_surfaces=False)
+    arrays.com[0] = [0.02, -0.03, 0.05]
+    errors = ToolError(log, of(arrays.robot()), robot).errors(log)
+    np.testing.assert_allclose(errors, 0.0, atol=1e-12)
+
+
+def one_sided_panel() -> dict[str, Any]:
+    """The shipped robot with flexible panels, without the right one."""
+    content: dict[str, Any] = yaml.safe_load((CONFIG / "robots/flexible_panels.yaml").read_text())
+    robot = content["robot"]
+    robot["links"] = [link for link in robot["links"] if not link["name"].startswith("right")]
+    return content
+
+
+@pytest.mark.parametrize("frame", ["inertial", "base"])
+def test_a_panel_on_one_side_does_not_displace_the_tool(frame: str) -> None:
+    """A locked panel moves the base's centre of mass, not the frame that goals are given in."""
+    goal = [1.8, 0.2, 0.3]
+    segments = [{"tool": {"xyz": goal, "frame": frame}, "duration": 3}]
+    flown = sr.Scenario(
+        robot=one_sided_panel(),
+        mission={"start": {"joints_deg": [10, -60, 120]}, "segments": segments},
+        controller="ctc",
+        gains=str(CONFIG / "gains/flexible_panels/tuned/ctc.yaml"),
+        friction=False,
+        case="1",
+        duration=4,
+    ).fly()
+    log = flown.log
+    _, place = tool_pose(flown.flight.robot, log.quaternion[-1:], log.all_positions[-1:])
+    if frame == "inertial":
+        place += log.base_position[-1]
+    np.testing.assert_allclose(place[0], goal, atol=2e-5)
+    assert flown.report()["tool"]["largest_m"] < 2e-5
+
+
+def test_in_orbit_the_path_is_that_of_the_free_centre_of_mass() -> None:
+    """Drag moves the robot from the origin in free fall, and the tool not from its path."""
+    segments = [{"joints_deg": [5, 120, 220, 0, -10, 0], "duration": 5}, {"hold": 15}]
+    flown = sr.Scenario(
+        mission={"start": {"joints_deg": [0, 120, 220, 0, -10, 0]}, "segments": segments},
+        controller="ctc",
+        friction=False,
+        case="1",
+        orbit="iss",
+        parameters={"plant": {"atmosphere.density": 1e-8}},
+    ).fly()
+    tool = flown.report()["tool"]
+    assert tool["drift_m"] > 1e-2
+    assert tool["largest_m"] < 1e-5
+
+
+def test_a_capture_moves_the_path_only_from_then_on() -> None:
+    segments = [{"joints_deg": [5, 120, 220, 0, -10, 0], "duration": 1}]
+    log = (
+        sr.Scenario(
+            mission={"start": {"joints_deg": [0, 120, 220, 0, -10, 0]}, "segments": segments},
+            controller="ctc",
+            friction=False,
+            case="1",
+            duration=2,
+            events=["capture@1:tumbling_satellite"],
+        )
+        .fly()
+        .log
+    )
+    path = ToolPath(log, captures_of(log), assumed_robot_of(log))
+    parts = [path.poses(log.rows(*part))[2] for part in [(0, 1200), (1200, 2000), (2000, 4000)]]
+    drift = np.concatenate(parts)
+    np.testing.assert_allclose(drift[:2001], 0.0, atol=1e-9)
+    per_tick = np.diff(drift[2000:], axis=0)
+    assert np.linalg.norm(per_tick[0]) > 1e-7
+    np.testing.assert_allclose(per_tick, np.broadcast_to(per_tick[0], per_tick.shape), atol=1e-10)
 
 
 def test_a_line_is_flown_within_a_micrometre_and_a_payload_moves_it() -> None:

@@ -15,6 +15,7 @@ from space_robot.cli.main import cli
 from space_robot_control.guidance.mission import Mission
 from space_robot_control.guidance.settings import MissionNodeSettings
 from space_robot_model.robot.find import find_robot
+from space_robot_model.robot.kinematics import tool_state
 from space_robot_msgs_py.errors import InputError
 
 MISSION: dict[str, Any] = {
@@ -82,6 +83,18 @@ def test_segments_of_a_document(mission: Path) -> None:
     shown = run(mission).stdout
     assert "37.00 s; largest base torque" in shown
     assert "small_wheels" in shown
+
+
+def test_sigma_is_of_translations_divided_by_the_tools_distance(mission: Path) -> None:
+    hold, robot = report(mission)["segments"][2], find_robot("paper")
+    posture = np.radians(hold["goal_deg"]), np.array(hold["attitude"])
+    state = tool_state(robot, posture[1], posture[0])
+    jacobian = robot.tool_jacobian(*posture)
+    jacobian[:3] /= np.linalg.norm(state.position + state.centre_of_mass)
+    smallest = np.linalg.svd(jacobian, compute_uv=False)[-1]
+    assert hold["singular_value"] == pytest.approx(smallest, rel=1e-9)
+    shown = " ".join(run(mission).stdout.split())
+    assert "translation are divided by the tool's distance from the base" in shown
 
 
 @pytest.mark.parametrize(

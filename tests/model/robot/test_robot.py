@@ -162,6 +162,38 @@ FAULTS: dict[str, tuple[Edit, list[str]]] = {
         ["robot.links", "must differ", "'joint1' occurs twice"],
     ),
     "name of a base axis": (in_link(0, "name", "base_y"), ["robot.links", "'base_y'"]),
+    **{
+        f"{name!r} means something else": (
+            in_link(0, "name", name),
+            ["robot.links", f"joint {name!r} needs another name: it is {meaning}"],
+        )
+        for name, meaning in {
+            "*": "the pattern of all joints",
+            "2": "the number of a joint",
+            "all": "a group of axes",
+            "base": "the name of the base",
+            "time": "a column of trajectories",
+            "base_torque_z": "a column of disturbances",
+            "wheel_1": "the name of an actuator",
+            "joint2_rate": "the column of the rate of 'joint2'",
+        }.items()
+    },
+    "tool on no link": (
+        lambda content: content["robot"].__setitem__("tool", {"link": "join6"}),
+        ["robot.tool", "unknown link 'join6' of tool 0: choose one of base, joint1"],
+    ),
+    "one of several tools on no link": (
+        lambda content: content["robot"].update(tool=None, tools=[{}, {"name": "b", "link": "c"}]),
+        ["robot.tools", "unknown link 'c' of tool 1"],
+    ),
+    "tool and tools": (
+        lambda content: content["robot"].update(tool={}, tools=[{"name": "camera"}]),
+        ["robot.tools", "either tool or tools"],
+    ),
+    "two tools of a name": (
+        lambda content: content["robot"].update(tool=None, tools=[{}, {"link": "joint2"}]),
+        ["robot.tools", "tool names must differ, 'tool' occurs twice"],
+    ),
     "empty name": (in_link(0, "name", ""), ["robot.links.0.name", "''", "at least 1"]),
 }
 

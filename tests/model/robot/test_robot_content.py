@@ -38,7 +38,8 @@ def test_trees_come_back_to_the_bit(seed: int) -> None:
         replace(body, tools=tuple(replace(tool, rank=-number) for tool in body.tools))
         for number, body in enumerate(random_bodies(np.random.default_rng(seed), KINDS))
     ]
-    for robot in (Robot.of_tree("tree", bodies), random_robot(np.random.default_rng(seed), 3)):
+    tree = Robot.of_tree("tree", bodies)
+    for robot in (tree, tree.nominal, random_robot(np.random.default_rng(seed), 3)):
         content = json.loads(json.dumps(robot.content))
         again = Robot.from_dict(content)
         same(robot, again)

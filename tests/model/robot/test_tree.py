@@ -15,9 +15,14 @@ from scipy.spatial.transform import Rotation
 from tree_oracle import TreeOracle, assert_same_dynamics, pinocchio_tree
 
 from space_robot_model.robot import Robot
-from space_robot_model.robot.tree import Body, Joint, Spring, Tool, flatten
+from space_robot_model.robot.mission_document import QUATERNION
+from space_robot_model.robot.tool import tool_pose
+from space_robot_model.robot.tree import Body, Joint, Spring, Tool, flatten, other_meaning
 from space_robot_model.robot.tree.flatten import axes_with_z
 from space_robot_msgs_py.errors import InputError
+from space_robot_msgs_py.topics import BASE_AXES
+from space_robot_sim.environment.disturbance_table import BASE as BASE_LOADS
+from space_robot_sim.environment.disturbance_table import TIME
 
 Array = NDArray[np.float64]
 SEEDS = st.integers(0, 2**32 - 2)
@@ -42,15 +47,29 @@ def test_dynamics_are_pinocchios(seed: int, kinds: list[str]) -> None:
 @settings(max_examples=30)
 @given(seed=SEEDS, kinds=TREES)
 def test_nominal_robot_is_locked_at_rest(seed: int, kinds: list[str]) -> None:
-    """Pinocchio's tree with fixed joints where the springs are at rest."""
+    """Pinocchio's tree with fixed joints where the springs are at rest, in the base's own frame."""
     bodies = tree_of(seed, kinds)
     robot = Robot.of_tree("tree", bodies)
-    oracle = TreeOracle(
-        pinocchio_tree([_locked(body) for body in bodies]), BASE, robot.joint_names, seed
-    )
+    own = pinocchio_tree(bodies)
+    locked = pinocchio_tree([_locked(body) for body in bodies])
+    base_com = own.inertias[own.getJointId("root")].lever
+    oracle = TreeOracle(locked, BASE, robot.joint_names, seed, base_com)
     assert robot.nominal.joint_names == robot.joint_names
     assert not robot.nominal.passive_names
     assert_same_dynamics(robot.nominal, oracle, seed)
+
+
+@settings(max_examples=30)
+@given(seed=SEEDS, kinds=TREES)
+def test_nominal_tool_is_where_the_true_one_is_at_rest(seed: int, kinds: list[str]) -> None:
+    robot, rng = Robot.of_tree("tree", tree_of(seed, kinds)), np.random.default_rng(seed)
+    quaternion = Rotation.random(3, random_state=seed).as_quat()[:, [3, 0, 1, 2]]
+    joints = rng.uniform(-3.0, 3.0, (3, robot.n))
+    rest = np.broadcast_to([spring.rest for spring in robot.springs], (3, len(robot.springs)))
+    rotation, position = tool_pose(robot, quaternion, np.hstack([joints, rest]))
+    nominal_rotation, nominal_position = tool_pose(robot.nominal, quaternion, joints)
+    np.testing.assert_allclose(nominal_rotation, rotation, atol=1e-12)
+    np.testing.assert_allclose(nominal_position, position, atol=1e-11)
 
 
 def _locked(body: Body) -> Body:
@@ -63,6 +82,24 @@ def _locked(body: Body) -> Body:
     else:
         turn = Rotation.from_rotvec(rest * joint.axis).as_matrix()
     return replace(body, joint=Joint(joint.name, "fixed", joint.rotation @ turn, turn.T @ offset))
+
+
+def test_no_joint_has_the_name_of_something_else() -> None:
+    """Those are names of axes and columns in packages that this one does not import."""
+    columns = {TIME, *BASE_LOADS, *QUATERNION}
+    names = {*BASE_AXES, *columns, "base", "joints", "all", "*", "12", "wheel_1", "thruster_10"}
+    assert all(map(other_meaning, names))
+    assert other_meaning("elbow_rate", ["elbow"])
+    assert not any(map(other_meaning, ["elbow_rate", "joint_1", "base_yaw", "wheel", "time_1"]))
+
+
+@pytest.mark.parametrize(("joint", "link"), [("time", "a"), ("a", "*"), ("a", "2")])
+def test_names_of_a_program_are_checked(joint: str, link: str) -> None:
+    base, moved = tree_of(1, [])
+    assert moved.joint
+    renamed = replace(moved, name=link, joint=replace(moved.joint, name=joint))
+    with pytest.raises(InputError, match="needs another name"):
+        Robot.of_tree("tree", [base, renamed])
 
 
 @given(seed=SEEDS, kinds=TREES)

@@ -89,6 +89,8 @@ def test_tools_are_ordered_by_the_joints_before_them(tmp_path: Path) -> None:
     assert [(tool.name, tool.body) for tool in robot.tools] == [("upper", 1), ("camera", 0)]
     with pytest.raises(InputError, match="unknown link 'x' for a tool"):
         read_urdf(path, tools=["x"])
+    with pytest.raises(InputError, match="tools: link 'camera' occurs twice"):
+        read_urdf(path, tools=["camera", "upper", "camera"])
 
 
 def test_a_branch_without_tool_frame_has_one_on_its_last_link(tmp_path: Path) -> None:
