@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 import time
 from contextlib import suppress
@@ -14,6 +13,7 @@ from . import topics
 from .bag.recorder import BagRecorder
 from .bag.recorder_settings import RecorderNodeSettings
 from .bag.set_aside import set_aside
+from .config.text import parse_json
 from .errors import InputError, MessageError
 from .ros.endpoints import PolledCallbackGroup, RawPublisher, RawSubscription
 from .ros.exclusive import GraphPublishers
@@ -71,8 +71,8 @@ class RecorderLoop:
         """
         self._node, self._settings, self._gives_way = node, settings, gives_way
         try:
-            flight = json.loads(settings.flight)
-        except json.JSONDecodeError as error:
+            flight = parse_json(settings.flight)
+        except ValueError as error:
             raise InputError(f"recorder parameters: flight: not JSON ({error})") from None
         path = Path(settings.bag or time.strftime("bag_%Y%m%d-%H%M%S"))
         if node.times_configured and settings.bag:  # reset: a bag is one flight from its start
@@ -227,7 +227,7 @@ class RecorderLoop:
         """Note what the plant says that it flies."""
         if (taken := self._description.take_with_source()) is not None:
             with suppress(MessageError, ValueError):
-                flown = json.loads(decode(taken.data, topics.PLANT_DESCRIPTION.type).data)
+                flown = parse_json(decode(taken.data, topics.PLANT_DESCRIPTION.type).data)
                 self._recorder.describe(flown, taken.publisher, taken.sequence)
 
     def _take_counts(self) -> None:

@@ -9,9 +9,11 @@ Files and commands name it as ``path/file.py:overshoot`` or ``module:overshoot``
 from __future__ import annotations
 
 import math
+import os
 import sys
 import traceback
 from collections.abc import Callable, Iterable, Mapping
+from contextlib import suppress
 from inspect import isclass
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -66,20 +68,21 @@ def call(function: MetricFunction, log: FlightLog, what: str) -> float:
     Raises:
         MetricError: it raised an error, or returned no number.
     """
+    folder = os.getcwd()
     try:
         value: Any = function(log)
+        shape = getattr(value, "shape", ())
+        if shape == () and not isinstance(value, (str, bytes, complex)):
+            with suppress(TypeError, ValueError, OverflowError):
+                return float(value)
     except (Exception, SystemExit) as error:
         place = traceback.extract_tb(error.__traceback__)[-1]
         raise MetricError(
             f"{what} failed: {one_line_of(error)} ({Path(place.filename).name}, "
             f"line {place.lineno})"
         ) from error
-    shape = getattr(value, "shape", ())
-    if shape == () and not isinstance(value, (str, bytes, complex)):
-        try:
-            return float(value)
-        except (TypeError, ValueError, OverflowError):
-            pass
+    finally:
+        os.chdir(folder)  # a function may have changed it; paths of a campaign are relative
     got = f"an array of shape {shape}" if shape else short(value)
     raise MetricError(f"{what}: the function must return one number, got {got}")
 

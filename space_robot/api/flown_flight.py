@@ -12,7 +12,7 @@ from typing_extensions import Self
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.config.arguments import as_path
 from space_robot_msgs_py.config.html import html_table
-from space_robot_msgs_py.config.validation import one_of
+from space_robot_msgs_py.config.validation import one_of, short
 from space_robot_msgs_py.errors import InputError
 
 from ..analysis import analyze
@@ -219,13 +219,16 @@ class FlownFlight:
             height: of the page in a notebook, px.
 
         Raises:
-            InputError: viser is not installed, no log was kept, a plot is unknown, or the file
-                cannot be written.
+            InputError: viser is not installed, no log was kept, a plot is unknown, another one is
+                no flight, or the file cannot be written.
         """
         from ..view.flights import ViewOptions  # slow to import
         from ..view.plot_kinds import parse_kinds
 
         flights = (self, *others)
+        for other in others:
+            if not isinstance(other, FlownFlight):
+                raise InputError(f"others: flights were expected, got {short(other)}")
         kinds = parse_kinds(",".join(plots)) if plots else ()
         options = ViewOptions(side_by_side, rate, title, not light, kinds)
         logs, robots = zip(*((flight.log, flight.flight.robot) for flight in flights), strict=True)

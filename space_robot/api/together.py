@@ -51,7 +51,7 @@ def fly_many(
     """
     check_progress(progress)
     if progress is True:
-        several = list(scenarios)
+        several = list(_several(scenarios))
         with flights_progress(len(several)) as show:
             return _fly_groups(several, keep_log, show, is_shown_at_start=True)
     return _fly_groups(scenarios, keep_log, progress or None)
@@ -78,9 +78,15 @@ def bench_many(scenarios: Iterable[Scenario]) -> Benches:
     return Benches(flights)
 
 
+def _several(scenarios: Iterable[Scenario]) -> Iterable[Scenario]:
+    if isinstance(scenarios, Scenario) or not isinstance(scenarios, Iterable):
+        raise InputError(f"scenarios: a list of them was expected, got {short(scenarios)}")
+    return scenarios
+
+
 def _checked(scenarios: Iterable[Scenario], is_flown: bool = True) -> Iterator[tuple[int, Flight]]:
     """Yield number and checked flight of each scenario; ``is_flown``: under its law."""
-    for number, scenario in enumerate(scenarios):
+    for number, scenario in enumerate(_several(scenarios)):
         where = f"scenario {number}"
         if not isinstance(scenario, Scenario):
             raise InputError(f"{where}: a Scenario was expected, got {short(scenario)}")

@@ -1,11 +1,14 @@
-"""Atomic writing of files, without overwriting existing ones unless requested."""
+"""Atomic writing of files and folders, without overwriting existing ones unless requested."""
 
 from __future__ import annotations
 
 import csv
 import os
+import shutil
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
+from glob import escape
 from io import TextIOWrapper
 from pathlib import Path
 from secrets import token_hex
@@ -16,6 +19,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from space_robot_msgs_py.errors import InputError
+
+ABANDONED_S = 3600.0
+"""Age since the last change above which an unfinished file is that of a killed process, s."""
 
 
 def check_free(path: Path) -> None:
@@ -103,7 +109,7 @@ def whole_file(path: Path, replace: bool = False) -> Iterator[IO[Any]]:
     if not replace:
         check_free(path)
     with _told(path):
-        unnamed = path.with_name(f".{path.name}.{token_hex(4)}")
+        unnamed = _unfinished(path)
         try:
             with unnamed.open("xb") as file:
                 yield file
@@ -114,6 +120,40 @@ def whole_file(path: Path, replace: bool = False) -> Iterator[IO[Any]]:
         finally:
             with suppress(OSError):
                 unnamed.unlink()
+
+
+@contextmanager
+def whole_folder(folder: Path) -> Iterator[Path]:
+    """Yield a temporary folder that replaces ``folder`` if the block ends without error.
+
+    Raises:
+        InputError: the folder cannot be written.
+    """
+    make_folder(folder.parent)
+    place = _unfinished(folder)
+    old = place.with_suffix(".old")
+    try:
+        place.mkdir()
+        yield place
+        if folder.exists():
+            folder.rename(old)
+        place.rename(folder)
+    except OSError as error:
+        raise InputError(f"{folder}: cannot be written ({error.strerror})") from None
+    finally:
+        if old.exists() and not folder.exists():
+            old.rename(folder)
+        for left in (place, old):
+            shutil.rmtree(left, ignore_errors=True)
+
+
+def _unfinished(path: Path) -> Path:
+    """Return a new hidden name beside ``path``; remove what killed processes have left of it."""
+    for left in path.parent.glob(f".{escape(path.name)}.{'[0-9a-f]' * 8}"):
+        with suppress(OSError):  # of somebody else, or gone by now
+            if time.time() > left.lstat().st_mtime + ABANDONED_S:
+                shutil.rmtree(left) if left.is_dir() else left.unlink()
+    return path.with_name(f".{path.name}.{token_hex(4)}")
 
 
 @contextmanager

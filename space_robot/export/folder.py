@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
-import tempfile
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 
@@ -11,6 +9,7 @@ from space_robot_control.flight_code.compiler import write_sources
 from space_robot_control.flight_code.folder import Exported
 from space_robot_msgs_py.errors import InputError
 
+from ..console.files import whole_folder
 from .recorded import RecordedFlight
 from .verify import ReplayVerdict
 
@@ -50,8 +49,7 @@ def write_folder(
     Returns:
         Name, description and number of records of each flight.
     """
-    with tempfile.TemporaryDirectory(dir=folder.resolve().parent, prefix=".export_") as name:
-        new = Path(name) / "folder"
+    with whole_folder(folder.resolve()) as new:
         write_sources(new, exported.sources)
         acceptance = new / "acceptance"
         acceptance.mkdir()
@@ -64,9 +62,6 @@ def write_folder(
         for file in BUILD_FILES:
             (new / file).write_text(exported.render(file), encoding="utf-8")
         write_readme(new, exported, written)
-        if folder.exists():
-            shutil.rmtree(folder)
-        new.rename(folder)
     return written
 
 

@@ -19,11 +19,13 @@ from space_robot_control.controller.controller import Controller, ControllerSnap
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.compiled.records import Block, RecordOwner
 from space_robot_msgs_py.config.arguments import as_numbers, as_whole_number
+from space_robot_msgs_py.config.trees import Tree
 from space_robot_msgs_py.config.validation import short
 from space_robot_msgs_py.errors import FlightError, InputError
 from space_robot_msgs_py.samples import Command, Reference, RobotState
 from space_robot_sim.plant.plant import Plant, PlantSettings, PlantSnapshot
 
+from ..scenario.comparison import differences
 from .bench_history import BenchHistory
 from .bench_log import BenchLog, law_at
 from .ending import Ending
@@ -39,6 +41,8 @@ REFERENCE_TICKS = 1000
 class Snapshot(NamedTuple):
     """State of a bench at a tick: plant, random numbers, faults, controller, law. Picklable."""
 
+    scenario: Tree
+    """Every number of the scenario."""
     plant: PlantSnapshot
     controller: ControllerSnapshot
     answered: int
@@ -191,29 +195,28 @@ class FlightBench(RecordOwner):
         """Save the complete state of the flight."""
         history = None if self._history is None else self._history.copy()
         return Snapshot(
-            self._plant.save(), self.controller.save(), self._answered, self._ending, history
+            self.flight.scenario.tree,
+            self._plant.save(),
+            self.controller.save(),
+            self._answered,
+            self._ending,
+            history,
         )
 
     def restore(self, snapshot: Snapshot) -> RobotState:
         """Restore a snapshot of this scenario; the flight continues bit-identically.
 
         Raises:
-            InputError: no snapshot, or a snapshot of another robot or scenario.
+            InputError: no snapshot, or a snapshot of another scenario.
         """
         if not isinstance(snapshot, Snapshot):
             raise InputError(f"snapshot: what `save` returned was expected, got {short(snapshot)}")
-        if snapshot.plant.block.dtype != self._plant.block.dtype:
-            raise InputError("the snapshot is of another robot")
-        delayed, law = snapshot.plant.command_delay_buffer, snapshot.controller.law
-        if delayed.shape != self._plant.command_delay_buffer.shape:
+        here, there = self.flight.scenario.tree, snapshot.scenario
+        if there is not here and (changes := differences(there, here)):
+            path, old, new = changes[0]
             raise InputError(
-                "the snapshot is of another scenario: its delay of commands, or its "
-                "actuators, are not those of this bench"
-            )
-        if law not in self._laws:
-            raise InputError(
-                f"the snapshot is of another scenario: under {law!r}, the laws of this bench are "
-                f"{', '.join(self._laws)}"
+                f"the snapshot is of another scenario: {path} is {short(old)} there, "
+                f"{short(new)} here"
             )
         self._plant.restore(snapshot.plant)
         self.controller.restore(snapshot.controller, self._laws)
@@ -232,7 +235,7 @@ class FlightBench(RecordOwner):
 
         Raises:
             InputError: nothing was flown or recorded; the log does not fit into memory; or the
-                state reached is not the bench's, whose scenario is another one then.
+                state reached is not the bench's, whose plant was changed.
         """
         return self._flown().log
 
@@ -247,8 +250,8 @@ class FlightBench(RecordOwner):
             flown = BenchLog(self.flight, history, self._ending.error if self._ending else None)
             if flown.flight.plant.block.tobytes() != self._plant.block.tobytes():
                 raise InputError(
-                    "log: the recorded commands lead to another state: a snapshot of another "
-                    "scenario was restored, or the plant was changed in flight"
+                    "log: the recorded commands lead to another state: the plant was changed in "
+                    "flight"
                 )
             self._log = flown
         return self._log

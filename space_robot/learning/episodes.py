@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from collections.abc import Mapping
+from inspect import signature
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from space_robot_msgs_py.compiled.records import Block
 from space_robot_msgs_py.config.arguments import as_numbers, as_whole_number
-from space_robot_msgs_py.config.validation import short
+from space_robot_msgs_py.config.validation import one_of, short
 from space_robot_msgs_py.errors import InputError
 from space_robot_sim.plant.plant import Plant
 from space_robot_sim.plant.tick import update_true_state
@@ -97,6 +99,17 @@ class ReachTask:
         reach["target"], reach["scale"] = episode.target, self.scale
         reach["attitude"] = self.begin.truth.quaternion
         reach["tick"], reach["ticks"], reach["has_failed"] = 0.0, self.ticks, 0.0
+
+
+def reach_task(settings: Mapping[str, Any]) -> ReachTask:
+    """Return the task with some settings by name.
+
+    Raises:
+        InputError: a name is unknown; see `ReachTask`.
+    """
+    for name in settings:
+        one_of(name, signature(ReachTask).parameters, "setting", " of the task reach")
+    return ReachTask(**settings)
 
 
 def _positive(value: float, name: str, or_zero: bool = False) -> float:

@@ -6,6 +6,8 @@ envs = space_robot.make_vec("reach", num_envs=64)
 
 from __future__ import annotations
 
+import os
+from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
@@ -30,12 +32,14 @@ except ImportError:
 
 from ..flight.batch.lane_loop import InLanes
 from ..flight.batch.lane_memory import in_lanes, numbers_of
-from .episodes import ReachTask
+from .episodes import ReachTask, reach_task
 from .reach import LARGEST, Reach, observe_start, step_alone, step_in_lanes
 
 Array = NDArray[np.float64]
 Info = dict[str, Any]
 
+MOST_ENVS, MOST_THREADS = 1 << 18, 1024
+"""Largest numbers of environments, which take 4 KB each, and of threads."""
 NAME = "space_robot/Reach-v0"
 """Name for `gymnasium.make` and `gymnasium.make_vec`, registered with this module."""
 
@@ -59,7 +63,7 @@ class ReachEnv(gymnasium.Env[Array, Array]):
         Raises:
             InputError: see `ReachTask`.
         """
-        self.task = ReachTask(**settings)
+        self.task = reach_task(settings)
         self.observation_space, self.action_space = _spaces(self.task)
         self._plant, self._reach = self.task.begin.block.copy(), Reach.block(self.task.n)
 
@@ -107,8 +111,8 @@ class ReachVectorEnv(VectorEnv[Array, Array, Array]):
         Raises:
             InputError: a number is out of its range; see `ReachTask`.
         """
-        self.num_envs = as_whole_number(num_envs, "num_envs", 1)
-        self.task = task = ReachTask(**settings)
+        self.num_envs = as_whole_number(num_envs, "num_envs", 1, MOST_ENVS)
+        self.task = task = reach_task(settings)
         self.single_observation_space, self.single_action_space = _spaces(task)
         self.observation_space = batch_space(self.single_observation_space, self.num_envs)
         self.action_space = batch_space(self.single_action_space, self.num_envs)
@@ -124,27 +128,45 @@ class ReachVectorEnv(VectorEnv[Array, Array, Array]):
         self._over = np.zeros(self.num_envs, np.bool_)
         """Environments that begin a new episode at the next step."""
         self._generators: list[np.random.Generator] = []
-        parts = np.array_split(np.arange(groups), as_whole_number(threads, "threads", 1))
+        parts = np.array_split(
+            np.arange(groups), as_whole_number(threads, "threads", 1, MOST_THREADS)
+        )
         self._parts = [slice(int(part[0]), int(part[-1]) + 1) for part in parts if len(part)]
         self._work = [_work_of(task.begin) for _ in self._parts]
-        self._pool = ThreadPoolExecutor(len(self._parts)) if len(self._parts) > 1 else None
+        self._pool: ThreadPoolExecutor | None = None
+        self._pool_process = 0
+        """Of the pool's threads: a forked process has none of them."""
 
     def reset(
-        self, *, seed: int | list[int | None] | None = None, options: dict[str, Any] | None = None
+        self,
+        *,
+        seed: int | Sequence[int | None] | None = None,
+        options: dict[str, Any] | None = None,
     ) -> tuple[Array, Info]:
         """Start an episode of each environment.
 
         Args:
             seed: of the first; the next ones have the numbers after it. Or one for each.
             options: not used.
+
+        Raises:
+            InputError: a seed is not a whole number of 0 or more, or their number is wrong.
         """
+        count = self.num_envs
         if seed is not None or not self._generators:
-            first = seed if isinstance(seed, int) else None
-            seeds = (
-                seed
-                if isinstance(seed, list)
-                else [None if first is None else first + k for k in range(self.num_envs)]
-            )
+            if isinstance(seed, Sequence) and not isinstance(seed, str):
+                if len(seed) != count:
+                    raise InputError(f"seed: {count} numbers were expected, got {len(seed)}")
+                names = [f"seed[{k}]" for k in range(count)]
+                seeds = [
+                    None if own is None else as_whole_number(own, name, 0)
+                    for own, name in zip(seed, names, strict=True)
+                ]
+            elif seed is None:
+                seeds = [None] * count
+            else:
+                first = as_whole_number(seed, "seed", 0)
+                seeds = [first + k for k in range(count)]
             self._generators = [gymnasium.utils.seeding.np_random(own)[0] for own in seeds]
         self._start(range(self.num_envs))
         return self._observations[: self.num_envs].copy(), {}
@@ -162,8 +184,8 @@ class ReachVectorEnv(VectorEnv[Array, Array, Array]):
         over = np.flatnonzero(self._over)
         results = self._results.reshape(3, -1)
         results[2, :count] = self._over
-        if self._pool:
-            list(self._pool.map(self._step_part, range(len(self._parts))))
+        if len(self._parts) > 1:
+            list(self._threads().map(self._step_part, range(len(self._parts))))
         else:
             self._step_part(0)
         if len(over):
@@ -173,9 +195,15 @@ class ReachVectorEnv(VectorEnv[Array, Array, Array]):
         self._over = (failed + truncated) > 0.0
         return self._observations[:count].copy(), rewards, failed > 0.0, truncated > 0.0, {}
 
+    def _threads(self) -> ThreadPoolExecutor:
+        """Return the threads of this process."""
+        if self._pool is None or self._pool_process != os.getpid():
+            self._pool, self._pool_process = ThreadPoolExecutor(len(self._parts)), os.getpid()
+        return self._pool
+
     def close_extras(self, **kwargs: Any) -> None:
         """End the threads."""
-        if self._pool:
+        if self._pool and self._pool_process == os.getpid():
             self._pool.shutdown()
 
     def _step_part(self, number: int) -> None:

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from space_robot_msgs_py.config.arguments import as_numbers
+from space_robot_msgs_py.config.arguments import as_positive
 from space_robot_msgs_py.config.validation import short
 from space_robot_msgs_py.errors import InputError
 from space_robot_sim.environment.disturbance_table import BASE, TIME, DisturbanceTable
@@ -35,10 +35,7 @@ def sampled(function: Load, duration: float, period: float = PERIOD_S) -> Column
     Raises:
         InputError: a number is not above 0, or the function returns something else.
     """
-    for name, value in (("duration", duration), ("period", period)):
-        number = as_numbers(value, name)
-        if number.shape or not (0.0 < number < math.inf):
-            raise InputError(f"{name}: a number above 0 was expected, got {short(value)}")
+    duration, period = as_positive(duration, "duration"), as_positive(period, "period")
     count = math.ceil(duration / period - 1e-6) + 1
     times = [k * period for k in range(count)]
     rows = [_row(function(time), time) for time in times]
@@ -91,8 +88,8 @@ def _row(value: Any, time: float) -> dict[str, float]:
         )
     row = {}
     for name, number in numbers.items():
-        is_number = isinstance(number, (int, float, np.number)) or getattr(number, "shape", 0) == ()
-        row[name] = float(number) if is_number else math.nan
+        is_number = isinstance(number, (int, float)) or getattr(number, "shape", 0) == ()
+        row[name] = float(number) if is_number and np.isrealobj(number) else math.nan
         if not math.isfinite(row[name]):
             raise InputError(
                 f"disturbance: the function returned {short(number)} for {name} at {time:g} s; a "

@@ -43,5 +43,9 @@ def check_inertia(values: list[float]) -> list[float]:
     return values
 
 
-Mass = Annotated[float, Field(gt=0.0)]
-Inertia = Annotated[list[float], Field(min_length=6, max_length=6), AfterValidator(check_inertia)]
+LARGEST_MASS, LARGEST_INERTIA = 1e9, 1e15
+"""Of a body, kg and kg m2: products of larger numbers overflow."""
+Mass = Annotated[float, Field(gt=0.0, le=LARGEST_MASS)]
+InertiaElement = Annotated[float, Field(ge=-LARGEST_INERTIA, le=LARGEST_INERTIA)]
+InertiaElements = Annotated[list[InertiaElement], Field(min_length=6, max_length=6)]
+Inertia = Annotated[InertiaElements, AfterValidator(check_inertia)]

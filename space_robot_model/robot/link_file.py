@@ -13,7 +13,7 @@ from space_robot_msgs_py.config.validation import StrictModel
 
 from ..elementary.matrices import norm, product
 from ..elementary.rotations import exact_sines_cosines, rotation_of_rpy
-from .inertia import check_inertia, inertia_tensor
+from .inertia import LARGEST_MASS, InertiaElements, check_inertia, inertia_tensor
 from .tree import Body, Encoder, Gear, Joint, JointFriction, JointLimits, Spring
 
 Array = NDArray[np.float64]
@@ -21,7 +21,9 @@ Array = NDArray[np.float64]
 BASE = "base"
 """Name of the base in a robot's file."""
 
-Vector = Annotated[list[float], Field(min_length=3, max_length=3)]
+Number = Annotated[float, Field(ge=-1e6, le=1e6)]
+"""Length, m, or angle, degrees."""
+Vector = Annotated[list[Number], Field(min_length=3, max_length=3)]
 
 
 def _is_direction(vector: list[float], info: ValidationInfo) -> list[float]:
@@ -44,9 +46,9 @@ class OriginFile(StrictModel):
 class FrameFile(StrictModel):
     """A frame by modified Denavit-Hartenberg parameters, lengths in m, or by its ``origin``."""
 
-    alpha_deg: float = 0.0
-    a: float = 0.0
-    d: float = 0.0
+    alpha_deg: Number = 0.0
+    a: Number = 0.0
+    d: Number = 0.0
     origin: OriginFile | None = None
 
     @model_validator(mode="after")
@@ -141,8 +143,8 @@ class LinkFile(FrameFile):
     parent: str = ""
     joint: Literal["revolute", "continuous", "prismatic", "fixed"] = "revolute"
     axis: Direction = Field([0.0, 0.0, 1.0])
-    mass: Annotated[float, Field(ge=0.0)]
-    inertia: Annotated[list[float], Field(min_length=6, max_length=6)]
+    mass: Annotated[float, Field(ge=0.0, le=LARGEST_MASS)]
+    inertia: InertiaElements
     com: Vector
     limits: LimitsFile = LimitsFile()
     friction: FrictionFile | None = None

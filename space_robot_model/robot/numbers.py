@@ -17,12 +17,13 @@ from pydantic import Field
 from space_robot_msgs_py.config.validation import StrictModel
 
 from ..dynamics.model import MOST_JOINTS
-from .link_file import DriveFile, drive_of
+from .inertia import LARGEST_MASS, InertiaElement
+from .link_file import DriveFile, Vector, drive_of
 from .tree import Body, Joint, JointFriction, JointLimits, Plate, Spring, Tool
 
 Array = NDArray[np.float64]
-Vector = Annotated[list[float], Field(min_length=3, max_length=3)]
 Matrix = Annotated[list[Vector], Field(min_length=3, max_length=3)]
+InertiaRow = Annotated[list[InertiaElement], Field(min_length=3, max_length=3)]
 
 
 class ToolNumbers(StrictModel):
@@ -74,8 +75,8 @@ class BodyNumbers(StrictModel):
     """A rigid body with its joint and tools, as a `Body`."""
 
     name: str
-    mass: float
-    inertia: Matrix
+    mass: Annotated[float, Field(ge=0.0, le=LARGEST_MASS)]
+    inertia: Annotated[list[InertiaRow], Field(min_length=3, max_length=3)]
     com: Vector
     parent: str
     joint: JointNumbers | None

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from typing import Annotated
 
 from pydantic import BaseModel, Field, TypeAdapter, ValidationError
+
+from ..config.text import parse_json
 
 ACCOUNTS_KEY = "space_robot.accounting"
 
@@ -37,8 +38,8 @@ _ACCOUNTS = TypeAdapter(dict[str, Account])
 def noted_accounts(noted: Mapping[str, str]) -> dict[str, Account]:
     """Read the accounts in a bag's custom data, by topic; empty if none is valid."""
     try:
-        return _ACCOUNTS.validate_python(json.loads(noted.get(ACCOUNTS_KEY, "{}")))
-    except (ValueError, RecursionError, ValidationError):
+        return _ACCOUNTS.validate_python(parse_json(noted.get(ACCOUNTS_KEY, "{}")))
+    except (ValueError, ValidationError):
         return {}
 
 

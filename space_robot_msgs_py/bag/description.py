@@ -6,14 +6,13 @@ may have written more.
 
 from __future__ import annotations
 
-import json
 import sys
 from collections.abc import Iterator, Mapping
 from typing import Annotated, Any
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, JsonValue
 
-from ..config.text import printable
+from ..config.text import parse_json, printable
 from ..config.validation import validate
 from ..errors import InputError
 from .recorder import FLIGHT_KEY
@@ -83,8 +82,8 @@ def read_description(noted: Mapping[str, str]) -> dict[str, Any]:
     if (text := noted.get(FLIGHT_KEY)) is None:
         return {}
     try:
-        content = json.loads(text)
-    except (ValueError, RecursionError):
+        content = parse_json(text)
+    except ValueError:
         raise InputError(f"{WHERE} cannot be read") from None
     if not isinstance(content, dict):
         raise InputError(f"{WHERE} cannot be read: a mapping was expected")

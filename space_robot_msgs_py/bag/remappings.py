@@ -6,6 +6,7 @@ import json
 from collections.abc import Mapping
 
 from .. import topics
+from ..config.text import parse_json
 
 TOPICS_KEY = "space_robot.topics"
 
@@ -28,8 +29,8 @@ def remappings_note(names: Mapping[str, str], namespace: str) -> dict[str, str]:
 def noted_remappings(noted: Mapping[str, str]) -> dict[str, str]:
     """Our topic by the one that it was recorded as; empty if nothing that makes sense is noted."""
     try:
-        remappings = json.loads(noted.get(TOPICS_KEY, "{}"))
-    except (ValueError, RecursionError):
+        remappings = parse_json(noted.get(TOPICS_KEY, "{}"))
+    except ValueError:
         return {}
     if not isinstance(remappings, dict) or not all(
         isinstance(ours, str) for ours in remappings.values()

@@ -52,6 +52,18 @@ def as_numbers(value: Any, name: str) -> Array:
     return numbers.astype(np.float64)
 
 
+def as_positive(value: Any, name: str) -> float:
+    """Return a finite number above 0.
+
+    Raises:
+        InputError: ``value`` is something else.
+    """
+    number = as_numbers(value, name)
+    if number.shape or not 0.0 < number < np.inf:
+        raise InputError(f"{name}: a number above 0 was expected, got {short(value)}")
+    return float(number)
+
+
 def as_whole_number(value: Any, name: str, least: int, most: int | None = None) -> int:
     """Return an integer in a range.
 

@@ -1,6 +1,9 @@
-"""Display of external texts."""
+"""Display and parsing of external texts."""
 
 from __future__ import annotations
+
+import json
+from typing import Any
 
 
 def printable(text: str) -> str:
@@ -20,3 +23,15 @@ def shortened(text: str, most: int) -> str:
         return text
     end = (most - 3) // 2
     return f"{text[: most - 3 - end]}...{text[len(text) - end :]}"
+
+
+def parse_json(text: str) -> Any:
+    """Parse a JSON text of unknown origin.
+
+    Raises:
+        ValueError: it is not JSON, or nested deeper than Python's parser follows.
+    """
+    try:
+        return json.loads(text)
+    except RecursionError:
+        raise ValueError("nested too deeply") from None

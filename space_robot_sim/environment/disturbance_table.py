@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 
 from space_robot_msgs_py.config.choices import choices
 from space_robot_msgs_py.config.columns import read_columns
+from space_robot_msgs_py.config.text import parse_json
 from space_robot_msgs_py.config.validation import short
 from space_robot_msgs_py.errors import InputError
 
@@ -33,6 +34,8 @@ BASE = tuple(f"base_{kind}_{axis}" for kind in ("force", "torque") for axis in "
 """Columns of the wrench on the base."""
 MOST_VALUES = 50_000
 """Largest number of values, those of ``time`` included: a bag holds all of them."""
+LARGEST = 1e12
+"""Largest size of a value, N, N m or s."""
 JSON = "{"
 """Begin of a text that holds the numbers; any other text is a path."""
 
@@ -158,7 +161,7 @@ def check_table_text(text: str) -> str:
 @lru_cache(maxsize=16)
 def _parsed(text: str) -> DisturbanceTable:
     try:
-        columns = json.loads(text)
+        columns = parse_json(text)
     except ValueError as error:
         raise InputError(f"disturbance: not a table as JSON ({error})") from None
     return DisturbanceTable.of(columns, "disturbance")
@@ -169,8 +172,9 @@ def _numbers(name: str, values: Any, where: str) -> list[float]:
         raise InputError(f"{where}: {name}: a list of numbers was expected, got {short(values)}")
     for row, value in enumerate(values, 1):
         is_number = isinstance(value, (int, float)) and not isinstance(value, bool)
-        if not is_number or not math.isfinite(value):
+        if not is_number or not abs(value) <= LARGEST:
             raise InputError(
-                f"{where}: {name}: row {row}: a number was expected, got {short(value)}"
+                f"{where}: {name}: row {row}: a number of at most {LARGEST:g} was expected, "
+                f"got {short(value)}"
             )
     return [float(value) for value in values]

@@ -17,6 +17,7 @@ from typing import Any
 
 import yaml
 
+from space_robot_msgs_py.config.arguments import as_path, as_positive, as_whole_number
 from space_robot_msgs_py.config.validation import short, validate
 from space_robot_msgs_py.config.yaml_text import read_file
 from space_robot_msgs_py.errors import FlightError, InputError
@@ -212,11 +213,17 @@ class Campaign:
             workers = 0
             warn(f"metrics {', '.join(local)}: {OF_SESSION}: this process flies alone")
         asked = Preparation.of(self.study, seed, runs)
+        processes = cores() if workers is None else as_whole_number(workers, "workers", 0)
+        if timeout_s is not None:
+            as_positive(timeout_s, "timeout_s")
         manifest = asked.manifest
         temporary = None if out is not None else ScratchFolder()
-        folder = Path(temporary.name if temporary else str(out))
+        folder = Path(temporary.name) if temporary else as_path(out, "out")
         if scheduler is not None and not (folder / MANIFEST).exists():
             check_scheduler(scheduler)  # before the folder is created
+        if self.study.metrics and not (folder / MANIFEST).exists():
+            asked.compile(is_in_lanes=timeout_s is None)
+            asked.try_metrics(processes, timeout_s if processes else None)
         with held_folder(folder):
             damage = begin_or_resume(folder, manifest, self._text or as_yaml(self.study))
             journal, damage_of_rows = open_journal(folder, manifest)
@@ -224,15 +231,12 @@ class Campaign:
                 for line in (*damage, *damage_of_rows):
                     warn(line)
                 flights = Flights(asked.flyer, asked.runs, journal)
-                processes = cores() if workers is None else workers
                 options = {"workers": processes, "scheduler": scheduler, "timeout_s": timeout_s}
                 try:
                     if not flights.are_complete:
                         for line in asked.notes:
                             warn(line)
                         asked.compile(is_in_lanes=timeout_s is None)
-                        if self.study.metrics and not flights.kept:
-                            asked.try_metrics()
                         journal.make_note(WRITTEN, "")  # the table is outdated
                         with _shown(progress) as show:
                             flights.fly(show, options)

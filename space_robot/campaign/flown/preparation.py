@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from contextlib import closing
 from dataclasses import dataclass
 from functools import cached_property
 
+from space_robot_msgs_py.config.arguments import as_whole_number
 from space_robot_msgs_py.errors import FlightError, InputError
 
 from ...analysis.own_metric import check_names, function_of, of_mapping
@@ -13,6 +15,7 @@ from ...flight.batch.sharing import reason_to_fly_alone
 from ...flight.compilation import compile_kernels
 from ...flight.plan import Flight
 from ...flight.simulate import simulate
+from ...processes.pool import OutOfTimeError, WorkerDiedError, run_many
 from ...processes.software import commit
 from ..row.bands import BINS
 from ..row.columns import Columns
@@ -40,10 +43,12 @@ class Preparation:
         """Check seed and number of runs; ``runs`` None: from the file.
 
         Raises:
-            InputError: the number of runs is missing, or the seed is negative.
+            InputError: the number of runs is missing, or one of them is no whole number, or too
+                small.
         """
-        if seed < 0:
-            raise InputError(f"seed: 0 or more is allowed, got {seed}")
+        as_whole_number(seed, "seed", 0)
+        if runs is not None:
+            as_whole_number(runs, "runs", 1)
         asked = study.runs_asked(runs)
         return cls(study, seed, min(asked, study.until.runs) if study.until else asked)
 
@@ -94,15 +99,33 @@ class Preparation:
         reasons = {law: reason_to_fly_alone(flight) for law, flight in self.flights.items()}
         return [f"{law}: flown one by one: {why}" for law, why in reasons.items() if why]
 
-    def try_metrics(self) -> None:
+    def try_metrics(self, workers: int, timeout_s: float | None) -> None:
         """Fly the nominal flight of the first law, and evaluate the user's own metrics of it.
 
         A flight that ends early has no metrics, and is left to its rows.
 
+        Args:
+            workers: 0: in this process, which a function may hold or end; else in a worker.
+            timeout_s: longest time of a worker, s; None: any.
+
         Raises:
-            InputError: a function raised an error, or returned no finite number.
+            InputError: a function raised an error, returned no finite number or did not return.
         """
         law, where = self.study.laws[0], self.study.where
+        tried = run_many(
+            self._measure_nominal, [law], workers=min(workers, 1), timeout_s=timeout_s, attempts=1
+        )
+        with closing(tried):
+            for done in tried:
+                if isinstance(done.error, (OutOfTimeError, WorkerDiedError)):
+                    names = ", ".join(self.study.metrics)
+                    raise InputError(
+                        f"{where}: metrics {names}: {done.error}, with the nominal flight of {law}"
+                    )
+                done.value()
+
+    def _measure_nominal(self, law: str) -> None:
+        where = self.study.where
         try:
             log = simulate(self.flyer.draws.nominal(law).check())
         except FlightError:

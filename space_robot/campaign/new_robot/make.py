@@ -22,6 +22,7 @@ from space_robot_msgs_py.errors import FlightError, InputError
 from space_robot_sim.environment.environment import EnvironmentSettings
 
 from ...analysis import Analysis
+from ...console.files import whole_folder
 from ...flight.plan import Flight, FlightPlan, resolve
 from ...flight.simulate import fly_blocks
 from ...processes.pool import cores, run_all
@@ -29,7 +30,6 @@ from ...tuning.demand import demand
 from ...tuning.task import AUTO, TuningOptions
 from ...tuning.warning import estimate_remark
 from ..gain_set import tuned_set, write_set
-from .folder import whole_folder
 from .texts import CAMPAIGN_FILE, campaign_text
 
 SET, CASE = "tuned", "1"

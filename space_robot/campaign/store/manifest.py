@@ -10,6 +10,7 @@ from typing import Annotated, Any, Final, Literal
 
 from pydantic import Field
 
+from space_robot_msgs_py.config.text import parse_json
 from space_robot_msgs_py.config.validation import StrictModel, short, validate
 from space_robot_msgs_py.config.yaml_text import read_file
 from space_robot_msgs_py.errors import InputError
@@ -120,8 +121,8 @@ def read_manifest(path: Path) -> Manifest:
         InputError: the file is missing, damaged, or of another version.
     """
     try:
-        content = json.loads(read_file(path))
-    except (ValueError, RecursionError) as error:
+        content = parse_json(read_file(path))
+    except ValueError as error:
         if isinstance(error, InputError):
             raise
         raise InputError(f"{path}: damaged: not JSON ({error})") from None

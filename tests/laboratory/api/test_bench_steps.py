@@ -116,8 +116,11 @@ def test_a_snapshot_outlives_its_bench() -> None:
     fly_on(bench, 30)
     other.restore(bench.save())
     assert fly_on(other, 50) == fly_on(bench, 50)
-    with pytest.raises(InputError, match="of another robot"):
-        Scenario(controller=None, robot="seven_joint").bench().restore(bench.save())
+    with pytest.raises(InputError, match=r"of another scenario: seed is \d+ there, 77 here"):
+        RICH.replace(seed=77).bench().restore(bench.save())
+    for option in ({"robot": "seven_joint"}, {"case": "1"}, {"duration": 1.0}):
+        with pytest.raises(InputError, match="of another scenario: "):
+            RICH.replace(**option).bench().restore(bench.save())
 
 
 @settings(max_examples=20)

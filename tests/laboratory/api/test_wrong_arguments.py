@@ -16,10 +16,13 @@ from space_robot import (
     FlownCampaign,
     Robot,
     Scenario,
+    bench_many,
+    fly_many,
     forward_dynamics,
     load_bag,
     mass_matrix,
     replay,
+    sampled,
 )
 from space_robot.analysis import analyze
 from space_robot.api.gymnasium_env import SpaceRobotEnv
@@ -178,3 +181,27 @@ def test_what_is_no_option(option: str) -> None:
     """Each field refuses an object that it cannot read; none takes it silently."""
     for junk in (object(), b"x", np.array([None]), 1j):
         refused(Scenario, **{option: junk})
+
+
+class NoFloat:
+    def __float__(self) -> float:
+        raise RuntimeError("no")
+
+
+def test_what_is_no_scenario_flight_or_number_is_named() -> None:
+    flight = Scenario(duration=0.01).fly()
+    for several in (5, Scenario()):
+        for function in (fly_many, bench_many):
+            assert "scenarios: a list of them was expected" in refused(function, several)
+        assert "scenarios: a list" in refused(fly_many, several, progress=True)
+    assert refused(flight.view, 5) == "others: flights were expected, got 5"
+    assert "failed: RuntimeError: no" in refused(flight.metric, lambda log: NoFloat())
+    for value in (np.zeros(6) + 1j, {"base_torque_z": 1j}):
+        assert "a number was expected" in refused(sampled, lambda time, value=value: value, 1.0)
+
+
+@pytest.mark.parametrize("name", ["runs", "seed", "workers", "timeout_s", "out"])
+def test_options_of_a_campaign_are_checked_before_it_begins(name: str, tmp_path: Path) -> None:
+    options: dict[str, Any] = {"out": tmp_path / "one", name: 2.5j}
+    assert refused(Campaign.load("first").run, **options).startswith(f"{name}: ")
+    assert not (tmp_path / "one").exists()

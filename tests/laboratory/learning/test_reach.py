@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import os
+import signal
+import time
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -52,6 +56,43 @@ def test_many_have_the_bits_of_single_ones(threads: int, robot: str) -> None:
     assert ended > 10
     envs.close()
     singles.close()
+
+
+def test_threads_of_a_forked_process_are_its_own() -> None:
+    envs = sr.make_vec("reach", num_envs=16, threads=2, **SHORT)
+    envs.reset(seed=1)
+    actions = np.zeros(envs.action_space.shape)
+    envs.step(actions)
+    child = os.fork()
+    if not child:  # pragma: no cover
+        envs.step(actions)
+        os._exit(5)
+    deadline = time.monotonic() + 60.0
+    while not (ended := os.waitpid(child, os.WNOHANG))[0] and time.monotonic() < deadline:
+        time.sleep(0.01)
+    if not ended[0]:
+        os.kill(child, signal.SIGKILL)
+        os.waitpid(child, 0)
+    assert os.waitstatus_to_exitcode(ended[1]) == 5
+    envs.close()
+
+
+@pytest.mark.parametrize(
+    ("call", "why"),
+    [
+        (lambda: sr.make("reach", foo=1), "unknown setting 'foo' of the task reach: choose one of"),
+        (lambda: sr.make_vec("reach", foo=1), "unknown setting 'foo' of the task reach"),
+        (lambda: sr.make_vec("reach", num_envs=1e9), "num_envs: a whole number was expected"),
+        (lambda: sr.make_vec("reach", num_envs=10**9), "num_envs: 1 to 262144 is allowed"),
+        (lambda: sr.make_vec("reach", threads=10**6), "threads: 1 to 1024 is allowed"),
+        (lambda: sr.make_vec("reach", 4).reset(seed=[1, 2]), "seed: 4 numbers were expected"),
+        (lambda: sr.make_vec("reach", 2).reset(seed=[1, "x"]), r"seed\[1\]: a whole number was"),
+        (lambda: sr.make_vec("reach", 2).reset(seed=-1), "seed: 0 or more is allowed, got -1"),
+    ],
+)
+def test_wrong_settings_and_seeds_are_named(call: Callable[[], Any], why: str) -> None:
+    with pytest.raises(InputError, match=why):
+        call()
 
 
 def test_an_episode_is_a_second_of_steps_with_rewards_below_zero() -> None:

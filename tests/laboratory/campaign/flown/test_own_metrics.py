@@ -40,6 +40,24 @@ def heavy_is_nan(log):
 
 def nan(log):
     return float("nan")
+
+
+def never(log):
+    while True:
+        pass
+
+
+def deadly(log):
+    import os
+
+    os._exit(0)
+
+
+def elsewhere(log):
+    import os
+
+    os.chdir("/")
+    return 1.0
 """
 CONTENT: dict[str, Any] = {
     "scenario": {"case": "3", "sensors": "fine", "duration": 0.2},
@@ -159,6 +177,28 @@ def test_a_mistake_is_told_before_the_first_flight(metrics: dict[str, Any], why:
         campaign(metrics=metrics, require={}).run(3, 7, "one", workers=0)
     assert why in str(told.value)
     assert "\n" not in str(told.value)
+
+
+@pytest.mark.parametrize(
+    ("name", "why"),
+    [
+        ("never", "metrics m: .*3 s.*, with the nominal flight of tde_stc"),
+        (
+            "deadly",
+            "metrics m: its process died in each of 1 attempts.*, with the nominal flight of tde_stc",
+        ),
+        ("nan", "metric m: the function must return a finite number"),
+    ],
+)
+def test_a_mended_function_is_flown_in_the_folder_of_the_wrong_one(name: str, why: str) -> None:
+    """Nothing was flown with the wrong one, so there is nothing of it."""
+    with pytest.raises(InputError, match=why):
+        campaign(metrics={"m": f"mine.py:{name}"}, require={}).run(
+            1, 7, "one", workers=1, timeout_s=3.0
+        )
+    assert not Path("one").exists()
+    campaign(metrics={"m": "mine.py:elsewhere"}, require={}).run(1, 7, "one", workers=0)
+    assert list(FlownCampaign.open("one").table["metric.m"]) == [1.0, 1.0]
 
 
 def test_a_name_twice_and_an_unknown_one_are_told() -> None:
