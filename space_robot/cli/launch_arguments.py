@@ -54,7 +54,7 @@ class LaunchedFlight(NamedTuple):
 @flight_options(*(o.name for o in OPTIONS if o.is_launched), "bag", "set", "scenario")
 @click.pass_context
 def _plan(
-    context: click.Context, bag: Path | None, namespace: str, **options: Any
+    context: click.Context, /, bag: Path | None, namespace: str, **options: Any
 ) -> LaunchedFlight:
     from ..flight.bag_path import default_bag
 
