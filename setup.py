@@ -6,23 +6,30 @@ from pathlib import Path
 from setuptools import find_packages, setup
 
 NAME = "space_robot"
+ROOT = Path(__file__).resolve().parent
+"""Where the files are: `colcon build --symlink-install` links this one into a folder of its own."""
 
 
 def version() -> str:
     """Return the version of the first heading of the changelog, as in ``## 0.9.0 (unreleased)``."""
-    heading = re.search(r"^## (\S+) \(", Path("CHANGELOG.md").read_text("utf-8"), re.MULTILINE)
+    heading = re.search(r"^## (\S+) \(", (ROOT / "CHANGELOG.md").read_text("utf-8"), re.M)
     if heading is None:
         raise SystemExit("setup.py: CHANGELOG.md has no heading such as '## 0.9.0 (unreleased)'")
     return heading[1]
 
 
+def files(folder: str, pattern: str = "*") -> list[Path]:
+    """Return the files of a folder, relative to this one's, as setuptools takes data files."""
+    return sorted(path.relative_to(ROOT) for path in (ROOT / folder).glob(pattern))
+
+
 # What `ros2 run` starts, all alike: each hands its name to bin/space-robot. As data files they land
 # in lib/space_robot, where it looks, whether pip or colcon installs them.
-EXECUTABLES = [str(path) for path in sorted(Path("resource/executables").iterdir())]
+EXECUTABLES = [str(path) for path in files("resource/executables")]
 
 CONFIG = [
     (f"share/{NAME}/{path.parent}", [str(path)])
-    for path in sorted(Path("config").rglob("*.*"))
+    for path in files("config", "**/*.*")
     if path.suffix == ".yaml" or path.parent.name == "views"
 ]
 
@@ -30,11 +37,11 @@ CONFIG = [
 EXAMPLES = [
     (f"share/{NAME}/{path.parent}", [str(path)])
     for folder in ("examples", "examples/flight_computer")
-    for path in sorted(Path(folder).iterdir())
+    for path in files(folder)
     if path.suffix in (".c", ".md", ".py", ".urdf") or path.name == "Makefile"
 ]
 
-LAUNCH = [str(path) for path in sorted(Path("launch").glob("*.launch.py"))]
+LAUNCH = [str(path) for path in files("launch", "*.launch.py")]
 
 setup(
     name=NAME,
@@ -43,7 +50,7 @@ setup(
     license="Apache-2.0",
     maintainer="space_robot maintainers",
     maintainer_email="maintainers@space-robot.example.org",
-    packages=find_packages(include=[f"{NAME}*"]),
+    packages=find_packages(str(ROOT), include=[f"{NAME}*"]),
     package_data={
         "space_robot.analysis": ["templates/*.j2"],
         "space_robot.analysis.figures": ["*.mplstyle"],

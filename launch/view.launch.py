@@ -3,7 +3,8 @@
     ros2 launch space_robot view.launch.py controller:=tde_tsmc realtime:=true
     ros2 launch space_robot view.launch.py play:=flights/BAG
 
-It takes all arguments of fly.launch.py, and ends with the flight.
+It takes all arguments of fly.launch.py, and ends with the flight. A viewer that fails does not end
+it; the exit code is 1 then.
 """
 
 import sys
@@ -20,12 +21,17 @@ from launch.actions import (
     ExecuteProcess,
     IncludeLaunchDescription,
     OpaqueFunction,
+    RegisterEventHandler,
 )
+from launch.conditions import IfCondition
+from launch.event_handlers import OnProcessExit
+from launch.events.process import ProcessExited
 from launch.launch_description_sources import PythonLaunchDescriptionSource
-from launch.substitutions import LaunchConfiguration
+from launch.substitutions import EqualsSubstitution, LaunchConfiguration
 from launch_ros.actions import Node
 
 from space_robot.cli.launch_arguments import launch_arguments, refuse_unknown
+from space_robot.flight.graph.launched import report_failure
 
 RVIZ, PAGE = "rviz", "page"
 VIEW = [sys.executable, "-m", "space_robot.cli.main", "view"]
@@ -33,6 +39,8 @@ VIEW = [sys.executable, "-m", "space_robot.cli.main", "view"]
 
 def generate_launch_description() -> LaunchDescription:
     """Declare the arguments; what is started follows from their values."""
+    source = PythonLaunchDescriptionSource(str(Path(__file__).with_name("fly.launch.py")))
+    flies = IfCondition(EqualsSubstitution(LaunchConfiguration("play"), ""))
     return LaunchDescription(
         [
             DeclareLaunchArgument(
@@ -46,34 +54,38 @@ def generate_launch_description() -> LaunchDescription:
                 "there].",
             ),
             OpaqueFunction(function=view),
+            IncludeLaunchDescription(source, condition=flies),
         ]
     )
 
 
 def view(context: LaunchContext) -> list:
-    """Start what shows, and what is shown."""
-    refuse_unknown(
-        sys.argv,
-        __file__,
-        [*(name for name, *_ in launch_arguments()), "autostart", "play", "viewer"],
-    )
+    """Start the viewer, and what plays the bag if it is no flight that is shown."""
+    names = [name for name, *_ in launch_arguments()]
+    refuse_unknown(sys.argv, __file__, [*names, "autostart", "shutdown", "play", "viewer"])
     bag = LaunchConfiguration("play").perform(context)
     viewer = LaunchConfiguration("viewer").perform(context) or (RVIZ if has_rviz() else PAGE)
     share = Path(get_package_share_directory("space_robot"))
-    if viewer == PAGE and bag:
-        return [ExecuteProcess(cmd=[*VIEW, bag], output="screen")]
-    rviz = Node(
-        package="rviz2",
-        executable="rviz2",
-        arguments=["-d", str(share / "config/views/fly.rviz")],
-        parameters=[{"use_sim_time": True}],
-    )
-    if bag:  # its own /clock is played: no --clock, which would send a second one
-        play = ExecuteProcess(cmd=["ros2", "bag", "play", bag], output="screen")
-        return [rviz, play]
-    page = ExecuteProcess(cmd=[*VIEW, "--live"], output="screen")
-    source = PythonLaunchDescriptionSource(str(share / "launch/fly.launch.py"))
-    return [rviz if viewer == RVIZ else page, IncludeLaunchDescription(source)]
+    if viewer == PAGE:
+        started = [ExecuteProcess(cmd=[*VIEW, bag or "--live"], output="screen")]
+    else:
+        rviz = Node(
+            package="rviz2",
+            executable="rviz2",
+            arguments=["-d", str(share / "config/views/fly.rviz")],
+            parameters=[{"use_sim_time": True}],
+        )
+        # a bag's own /clock is played: no --clock, which would send a second one
+        play = [ExecuteProcess(cmd=["ros2", "bag", "play", bag], output="screen")] if bag else []
+        started = [rviz, *play]
+    handlers = [OnProcessExit(target_action=action, on_exit=check_end) for action in started]
+    return [*map(RegisterEventHandler, handlers), *started]
+
+
+def check_end(event: ProcessExited, context: LaunchContext) -> None:
+    """Report a viewer, or player, that has failed."""
+    if event.returncode and not context.is_shutdown:
+        report_failure(context, f"{event.process_name} ended with exit code {event.returncode}")
 
 
 def has_rviz() -> bool:

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import gc
 import json
+import os
 import signal
 import sys
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, MutableMapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -65,6 +66,22 @@ class _MissingTool:
 
 
 sys.meta_path.append(_MissingTool())
+
+
+def forget_workspace(environment: MutableMapping[str, str]) -> None:
+    """Let flights start the nodes of this checkout, in domains of their own.
+
+    In the shell of a sourced workspace, and under `colcon test`, a node would be `ros2 run` with a
+    child, in the user's domain, where others may be.
+    """
+    environment.pop("ROS_DOMAIN_ID", None)
+    if prefixes := environment.get(PREFIXES):
+        others = [p for p in prefixes.split(os.pathsep) if not (Path(p) / MARKER).exists()]
+        environment[PREFIXES] = os.pathsep.join(others)
+
+
+PREFIXES, MARKER = "AMENT_PREFIX_PATH", "share/ament_index/resource_index/packages/space_robot"
+forget_workspace(os.environ)
 
 OF_ROS = {"domain", "free_domain", "fly", "start", "ground"}
 """Fixtures of tests that start ROS processes, or are a node of their own."""

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import importlib
 import re
+import shlex
 from collections.abc import Iterator
 from pathlib import Path
 from xml.etree import ElementTree
 
 import click
 import pytest
+import yaml
 
 from space_robot.cli.main import cli
 from space_robot.flight.graph.listeners import LISTENERS
@@ -148,3 +150,16 @@ def test_security_policy_has_one_publisher_a_topic_and_all_listeners() -> None:
     for topic in (*topics.RECORDED, topics.PLANT_DESCRIPTION):
         assert len(nodes("publish", topic.full_name)) == 1, topic.full_name
         assert nodes("subscribe", topic.full_name) == list(LISTENERS[topic]), topic.full_name
+
+
+def test_ros2_param_set_can_send_the_values_of_the_pages() -> None:
+    """It reads them as YAML, and has no parameter for a mapping: that is a text in quotes."""
+    commands = [
+        shlex.split(line.partition(" && ")[0].partition("  #")[0])
+        for page in DOCUMENTS
+        for line in page.read_text("utf-8").splitlines()
+        if line.startswith("    ros2 param set ")
+    ]
+    sent = {name: yaml.safe_load(value) for *_, name, value in commands}
+    assert not any(isinstance(value, dict) for value in sent.values()), sent
+    assert yaml.safe_load(sent["goto"])["duration"] == 8

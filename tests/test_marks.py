@@ -1,9 +1,15 @@
-"""Which tests `make quick` leaves out: the marks are given by fixture, folder and file."""
+"""What conftest.py gives all tests: marks by fixture, folder and file, and a shell of no workspace.
+
+`make quick` leaves out what is marked.
+"""
 
 from __future__ import annotations
 
+import os
+from pathlib import Path
+
 import pytest
-from conftest import SLOW, WITH_ROS, marks
+from conftest import SLOW, WITH_ROS, forget_workspace, marks
 from paths import TESTS
 
 
@@ -34,3 +40,17 @@ def test_every_test_has_its_marks_and_a_timeout(request: pytest.FixtureRequest) 
         for mark in marks(where, getattr(item, "fixturenames", ())):
             assert item.get_closest_marker(mark), item.nodeid
         assert item.get_closest_marker("timeout"), item.nodeid
+
+
+def test_a_sourced_workspace_and_its_domain_are_forgotten(tmp_path: Path) -> None:
+    mine, theirs = tmp_path / "install", tmp_path / "jazzy"
+    for prefix, package in ((mine, "space_robot"), (theirs, "launch_ros")):
+        marker = prefix / "share/ament_index/resource_index/packages" / package
+        marker.parent.mkdir(parents=True)
+        marker.touch()
+    prefixes = os.pathsep.join([str(mine), str(theirs)])
+    sourced = {"ROS_DOMAIN_ID": "50", "AMENT_PREFIX_PATH": prefixes, "PATH": "/bin"}
+    forget_workspace(sourced)
+    assert sourced == {"AMENT_PREFIX_PATH": str(theirs), "PATH": "/bin"}
+    forget_workspace(none := {"PATH": "/bin"})
+    assert none == {"PATH": "/bin"}

@@ -262,6 +262,27 @@ def test_there_is_one_executable_for_each_command_and_node() -> None:
     assert all(os.access(path, os.X_OK) for path in EXECUTABLES)
 
 
+DESCRIBE = """
+from distutils.core import run_setup
+it = run_setup("setup.py", stop_after="config")
+print(it.get_version(), sorted(it.packages), it.data_files)
+"""
+
+
+def test_setup_py_describes_the_package_from_any_folder(tmp_path: Path) -> None:
+    """`colcon build --symlink-install` runs a link to it in a folder of its own."""
+    pytest.importorskip("setuptools")
+    (tmp_path / "setup.py").symlink_to(ROOT / "setup.py")
+    command = [sys.executable, "-c", f"import setuptools\n{DESCRIBE}"]
+    here, there = (
+        subprocess.run(command, cwd=folder, capture_output=True, text=True)
+        for folder in (ROOT, tmp_path)
+    )
+    assert there.stdout == here.stdout, there.stderr[-500:]
+    assert "space_robot_sim.plant" in here.stdout
+    assert "'config/cases/1.yaml'" in here.stdout
+
+
 @pytest.fixture(scope="module")
 def prefix(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The package installed as colcon does it."""

@@ -6,6 +6,7 @@ described in its bag, and the same to the last bit as one of the command.
 
 from __future__ import annotations
 
+import json
 import shlex
 from collections.abc import Iterable, Mapping, Sequence
 from difflib import get_close_matches
@@ -13,6 +14,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import click
+from click.core import ParameterSource
 
 from space_robot_msgs_py.config.validation import short
 from space_robot_msgs_py.errors import InputError
@@ -23,6 +25,8 @@ from .options import flight_options, plan_flight
 
 PARAMS_FILE = "params_file"
 """Argument for a ROS parameter file, as launch files name it; not an option of `fly`."""
+PACKAGE = "space_robot"
+"""Package that `ros2 launch` is given before the name of a launch file."""
 _TRUTH = {"true": True, "false": False}
 
 
@@ -33,6 +37,8 @@ class LaunchArgument(NamedTuple):
     description: str
     choices: tuple[str, ...] = ()
     """Allowed values; empty: any text."""
+    default: str = ""
+    """Default of the option, for the reader; empty: none."""
 
 
 class LaunchedFlight(NamedTuple):
@@ -40,15 +46,24 @@ class LaunchedFlight(NamedTuple):
 
     flight: Flight
     bag: Path
+    of_ros: dict[str, dict[str, Any]]
+    """Parameters by node that every ROS node has, from the parameter file."""
 
 
 @click.command()
 @flight_options(*(o.name for o in OPTIONS if o.is_launched), "bag", "set", "scenario")
-def _plan(bag: Path | None, **options: Any) -> LaunchedFlight:
+@click.pass_context
+def _plan(
+    context: click.Context, /, bag: Path | None, namespace: str, **options: Any
+) -> LaunchedFlight:
     from ..flight.bag_path import default_bag
 
-    flight = plan_flight(**options)
-    return LaunchedFlight(flight, bag or default_bag(flight))
+    if context.get_parameter_source("namespace") is ParameterSource.DEFAULT:
+        namespace = ""
+    if not namespace.startswith("/"):  # as a node's in a launch file
+        namespace = f"{context.obj}/{namespace}"
+    flight = plan_flight(namespace=namespace, **options)
+    return LaunchedFlight(flight, bag or default_bag(flight), {})
 
 
 def launch_arguments() -> list[LaunchArgument]:
@@ -60,14 +75,19 @@ def launch_arguments() -> list[LaunchArgument]:
 
 def _argument(option: click.Option) -> LaunchArgument:
     help_ = " ".join((option.help or "").split())
+    description, told, default = help_.removesuffix("].").partition(" [default: ")
+    if told:
+        description += "."
+    elif option.is_flag:
+        default = "true" if option.default is True else "false"
+    elif option.show_default:
+        default = str(option.default)
     if option.multiple:
-        help_ += " Separate several with spaces."
-    if option.show_default:
-        help_ += f" [default: {str(option.default).lower() if option.is_flag else option.default}]"
+        description += " Separate several with spaces."
     choices = tuple(option.type.choices) if isinstance(option.type, click.Choice) else ()
     if option.is_flag:
         choices = tuple(_TRUTH)
-    return LaunchArgument(_name(option), help_, ("", *choices) if choices else ())
+    return LaunchArgument(_name(option), description, ("", *choices) if choices else (), default)
 
 
 def _name(option: click.Option) -> str:
@@ -78,7 +98,7 @@ def refuse_unknown(command_line: Sequence[str], file: str, names: Iterable[str])
     """Check that a launch file is not started with an unknown argument.
 
     launch itself takes any. Arguments of another launch file that includes this one are that one's
-    own.
+    own, whatever its name.
 
     Args:
         command_line: of the process, as ``ros2 launch space_robot fly.launch.py case:=1``.
@@ -88,9 +108,13 @@ def refuse_unknown(command_line: Sequence[str], file: str, names: Iterable[str])
     Raises:
         InputError: an argument is unknown.
     """
-    started, *words = [*command_line, ""]
-    while started and Path(started).name != Path(file).name:
-        started, *words = words
+    own, words = Path(file), list(command_line)
+    before = ""
+    while words:
+        is_named = (before, words[0]) == (PACKAGE, own.name)
+        before = words.pop(0)
+        if is_named or (before.endswith(own.name) and Path(before).resolve() == own.resolve()):
+            break
     known = list(names)
     for word in words:
         name, is_argument, _ = word.partition(":=")
@@ -103,11 +127,12 @@ def refuse_unknown(command_line: Sequence[str], file: str, names: Iterable[str])
             )
 
 
-def launched_flight(values: Mapping[str, str]) -> LaunchedFlight:
+def launched_flight(values: Mapping[str, str], group: str = "") -> LaunchedFlight:
     """Return the flight that a launch file's arguments ask for, checked as `fly` does.
 
     Args:
         values: of each argument, by name; empty for its default.
+        group: namespace of the group that includes the launch file; a relative one is in it.
 
     Raises:
         InputError: values conflict, a name is unknown, or one needs `space-robot fly`.
@@ -116,15 +141,21 @@ def launched_flight(values: Mapping[str, str]) -> LaunchedFlight:
     for option in _plan.params:
         if isinstance(option, click.Option) and (text := values.get(_name(option), "")):
             words += _words(option, text)
-    if file := values.get(PARAMS_FILE, ""):
-        words += _words_of_file(Path(file))
+    given, of_ros = _of_file(values.get(PARAMS_FILE, ""))
+    words += [
+        f"--set={node}.{name}={json.dumps(value)}"
+        for node, parameters in given.items()
+        for name, value in parameters.items()
+    ]
     try:
-        launched: LaunchedFlight = _plan.main(words, "fly.launch.py", standalone_mode=False)
+        launched: LaunchedFlight = _plan.main(
+            words, "fly.launch.py", standalone_mode=False, obj=group
+        )
     except click.ClickException as error:
         raise InputError(error.format_message()) from None
     if faults := launched.flight.scenario.process_faults:
         raise InputError(f"fault {faults[0]}: that needs `space-robot fly`")
-    return launched
+    return launched._replace(of_ros=of_ros)
 
 
 def _words(option: click.Option, argument: str) -> list[str]:
@@ -136,17 +167,21 @@ def _words(option: click.Option, argument: str) -> list[str]:
     return [f"{max(option.opts, key=len)}={text}" for text in texts]
 
 
-def _words_of_file(file: Path) -> list[str]:
-    """Return a ROS parameter file as options ``--set``."""
-    import json
-
-    from space_robot_msgs_py.config.files import node_parameters
+def _of_file(file: str) -> tuple[dict[str, dict[str, Any]], dict[str, dict[str, Any]]]:
+    """Return the parameters of a ROS parameter file by node: those of the flight, and ROS's own."""
+    from space_robot_msgs_py.config.files import is_of_ros, node_parameters
     from space_robot_msgs_py.config.trees import flatten
 
     from .scenario_option import NODES
 
-    return [
-        f"--set={node}.{name}={json.dumps(value)}"
-        for node in NODES
-        for name, value in flatten(node_parameters(file, node))
-    ]
+    parameters = {
+        node: dict(flatten(node_parameters(Path(file), node))) if file else {} for node in NODES
+    }
+
+    def only(of_ros: bool) -> dict[str, dict[str, Any]]:
+        return {
+            node: {name: value for name, value in values.items() if is_of_ros(name) == of_ros}
+            for node, values in parameters.items()
+        }
+
+    return only(False), only(True)

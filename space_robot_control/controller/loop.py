@@ -13,6 +13,7 @@ from space_robot_msgs_py.ros.health import Health, Level
 from space_robot_msgs_py.ros.loop import Wait
 from space_robot_msgs_py.ros.managed_node import ManagedNode
 from space_robot_msgs_py.ros.paused import PausedInput
+from space_robot_msgs_py.wire.stamp_guard import describe_new_time
 
 from ..allocation.assumed_actuators import assumed_actuators
 from ..laws import ControlLaw
@@ -87,6 +88,8 @@ class ControllerLoop:
         self._made_at = time.monotonic()
         self._unanswered = -1
         """A state's tick whose reference has not come yet; -1: none."""
+        self._is_resumed = True
+        """True until the first state since the activation."""
         self._state_at = time.monotonic()
         self._paused = PausedInput(node)
         self._look_ahead_at = 0.0
@@ -99,7 +102,7 @@ class ControllerLoop:
 
     def begin(self) -> None:
         """Begin with the next state."""
-        self._unanswered = -1
+        self._unanswered, self._is_resumed = -1, True
 
     def step(self) -> Wait | None:
         """Answer a state if it and its reference have arrived."""
@@ -200,5 +203,6 @@ class ControllerLoop:
     def _believe(self, tick: int, last: int) -> None:
         """Accept a state with a plausible stamp, which may begin a new time."""
         if self._answering.supervisor.is_new_time and last >= 0:
-            self._node.log(f"a new time begins at tick {tick}, after {last}")
+            self._node.log(describe_new_time(tick, last, self._is_resumed))
+        self._is_resumed = False
         self._state_at = time.monotonic()

@@ -14,7 +14,7 @@ from space_robot_msgs_py.ros.managed_node import ManagedNode
 from space_robot_msgs_py.ros.trusted_subscription import TrustedSubscription
 from space_robot_msgs_py.wire.cdr import header_stamp_ns
 from space_robot_msgs_py.wire.reference_codec import ReferenceCodec
-from space_robot_msgs_py.wire.stamp_guard import StampGuard
+from space_robot_msgs_py.wire.stamp_guard import StampGuard, describe_new_time
 
 from .mission import Mission
 from .mission_changes import MissionChanges
@@ -51,6 +51,8 @@ class MissionLoop:
         )
         self._for_clock = Wait(CLOCK_WAIT_S, (self._clock,))
         self._stamps = StampGuard(round(MOST_OWED_S / settings.period))
+        self._is_resumed = True
+        """True until the first tick since the activation."""
         self._next = 0
         """The first tick that the stream has not reached."""
         self._invalid_stamps, self._listeners = 0, 0
@@ -64,6 +66,7 @@ class MissionLoop:
 
     def begin(self) -> None:
         """Begin at the end of the stream."""
+        self._is_resumed = True
 
     def step(self) -> Wait | None:
         """Send due chunks and read the clock."""
@@ -132,6 +135,8 @@ class MissionLoop:
         if last < 0:  # in the middle of a flight there is nothing to say of its past
             self._next = max(self._next, start)
         elif stamps.is_new_time:
-            self._node.log(f"a new time begins at tick {tick}, after {last}: the stream too")
+            new_time = describe_new_time(tick, last, self._is_resumed)
+            self._node.log(f"{new_time}: the stream too")
             self._next = start
+        self._is_resumed = False
         return True

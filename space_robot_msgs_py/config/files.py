@@ -15,6 +15,15 @@ from .yaml_text import check_file
 GIVEN = "given"
 """In place of a file's name: there is no file, all values are set directly."""
 
+QOS_OVERRIDES = "qos_overrides."
+"""Beginning of the names of ROS parameters for QoS policies."""
+
+
+def is_of_ros(parameter: str) -> bool:
+    """Return True for a parameter that rclpy declares for every node, by its dotted name."""
+    names = ("use_sim_time", "start_type_description_service")
+    return parameter in names or parameter.startswith(QOS_OVERRIDES)
+
 
 def named_file(kind: str, name: str) -> Path:
     """Return ``config/<kind>/<name>.yaml``, or ``name`` itself if it is a path to a YAML file.

@@ -10,7 +10,7 @@ import time
 from collections.abc import Callable
 from typing import Any, Generic, TypeVar
 
-from rcl_interfaces.msg import ParameterDescriptor
+from rcl_interfaces.msg import ParameterDescriptor, ParameterType
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
 
 from ..config.settings import NodeSettings
@@ -68,6 +68,12 @@ class ManagedNode(LifecycleNode, Generic[Schema]):
             read_only=True,
         )
         self.autostart = bool(self.declare_parameter(AUTOSTART, True, description).value)
+        no_effect = ParameterDescriptor(
+            type=ParameterType.PARAMETER_BOOL,
+            description="without effect: the time of the nodes is that of the plant's states",
+            read_only=True,
+        )
+        self.set_descriptor("use_sim_time", no_effect)
         self._diagnostics = Diagnostics(self)
         offer_services(self)
         self._own = self._entities()

@@ -8,13 +8,11 @@ from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescri
 from rclpy.node import Node
 
 from ..config.choices import choices
+from ..config.files import QOS_OVERRIDES
 from ..config.settings import NodeSettings, leaves
 from ..config.trees import flatten
 from ..errors import InputError
 from .rclpy_internals import declared_parameters, parameter_overrides
-
-QOS_OVERRIDES = "qos_overrides."
-"""Beginning of the names of parameters for QoS policies."""
 
 Schema = TypeVar("Schema", bound=NodeSettings)
 

@@ -32,6 +32,18 @@ class StampGuard:
         return accept(self, tick)
 
 
+def describe_new_time(tick: int, last: int, is_resumed: bool) -> str:
+    """Return the log text for the first tick of a new time, or of a node that was inactive before.
+
+    Args:
+        tick: the accepted tick.
+        last: the one accepted before.
+        is_resumed: whether the node has been activated since.
+    """
+    what = "active again" if is_resumed and tick > last else "a new time begins"
+    return f"{what} at tick {tick}, after {last}"
+
+
 def accept(guard: Any, tick: int) -> bool:
     """Return whether ``tick`` is accepted by a `StampGuard`, or by a record of its attributes.
 

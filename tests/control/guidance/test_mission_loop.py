@@ -158,6 +158,20 @@ def test_a_new_time_has_a_new_stream(bench: Bench) -> None:
     assert values == {"tick": 24, "rejected: stamp": 6, "rejected: another's": 3, **NO_TRAJECTORIES}
 
 
+def test_after_an_activation_it_says_that_it_is_active_again(bench: Bench) -> None:
+    bench.hear([0])
+    bench.run()
+    bench.loop.begin()
+    later = round(61.0 / bench.settings.period)
+    bench.hear(range(later, later + 6))
+    bench.run()
+    assert bench.node.said == [f"active again at tick {later + 4}, after 0: the stream too"]
+    bench.loop.begin()
+    bench.hear(range(20, 26))
+    bench.run()
+    assert bench.node.said[1] == f"a new time begins at tick 24, after {later + 5}: the stream too"
+
+
 def test_a_stop_of_a_minute_is_believed_and_a_longer_one_is_not(bench: Bench) -> None:
     longest = round(60.0 / bench.settings.period)
     bench.hear([0, longest])

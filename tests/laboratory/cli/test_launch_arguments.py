@@ -12,6 +12,7 @@ from paths import ROOT
 
 from space_robot.cli.fly import fly
 from space_robot.cli.launch_arguments import launch_arguments, launched_flight, refuse_unknown
+from space_robot.cli.scenario_option import NODES
 from space_robot.flight.plan import Flight, FlightPlan
 from space_robot_msgs_py.errors import InputError
 
@@ -32,13 +33,30 @@ def test_each_option_of_fly_is_an_argument() -> None:
     for option in options:
         if (name := next(iter(names(option)))) in arguments:
             said = arguments[name].description
-            assert said.startswith((option.help or "")[:20])
+            assert said.startswith((option.help or "").partition(" [default")[0][:20])
             if isinstance(option.type, click.Choice):
                 assert arguments[name].choices == ("", *option.type.choices)
 
 
+def test_arguments_show_the_defaults_of_their_options() -> None:
+    shown = {argument.name: argument.default for argument in launch_arguments()}
+    without = {name for name, default in shown.items() if not default}
+    assert without == {"swap", "fault", "bag", "set", "scenario", "params_file"}
+    of_options = {
+        "controller": "tde_stc",
+        "friction": "true",
+        "realtime": "false",
+        "repair": "false",
+        "seed": "0",
+        "period": "0.0005",
+        "duration": "the mission's",
+    }
+    assert shown.items() >= of_options.items()
+    assert not any("[default" in argument.description for argument in launch_arguments())
+
+
 def test_the_flight_is_the_one_of_the_command(tmp_path: Path) -> None:
-    flight, bag = launched_flight(
+    flight, bag, _ = launched_flight(
         {
             "controller": "tde_tsmc",
             "case": "4-2",
@@ -85,6 +103,47 @@ def test_a_parameter_file_goes_over_the_arguments_and_into_the_bag(tmp_path: Pat
 
 
 @pytest.mark.parametrize(
+    ("group", "namespace", "scenario", "flown"),
+    [
+        ("", "", "", "/"),
+        ("", "sat1", "", "/sat1"),
+        ("/fleet", "", "", "/fleet"),
+        ("/fleet", "sat1", "", "/fleet/sat1"),
+        ("/fleet", "/sat1", "", "/sat1"),
+        ("/fleet", "/", "", "/"),
+        ("/fleet", "", "sat2", "/fleet/sat2"),
+        ("/fleet", "sat1", "sat2", "/fleet/sat1"),
+    ],
+)
+def test_a_relative_namespace_is_in_that_of_the_group(
+    group: str, namespace: str, scenario: str, flown: str, tmp_path: Path
+) -> None:
+    """As a node's in a launch file with PushRosNamespace."""
+    values = {"namespace": namespace}
+    if scenario:
+        (tmp_path / "mine.yaml").write_text(f"namespace: {scenario}\n")
+        values["scenario"] = str(tmp_path / "mine.yaml")
+    assert launched_flight(values, group).flight.scenario.options.namespace == flown
+
+
+def test_parameters_of_every_ros_node_go_to_the_nodes_unchanged(tmp_path: Path) -> None:
+    """Of them `use_sim_time` stands in most files; they are no settings of a flight."""
+    file = tmp_path / "mine.yaml"
+    file.write_text(
+        "/**: {ros__parameters: {use_sim_time: true}}\n"
+        "plant_node:\n"
+        "  ros__parameters:\n"
+        "    hold_ticks: 40\n"
+        "    qos_overrides: {/clock: {publisher: {depth: 7}}}\n"
+    )
+    flight, _, of_ros = launched_flight({"params_file": str(file)})
+    assert flight.scenario.options.parameters == {"plant": {"hold_ticks": 40}}
+    everywhere = {"use_sim_time": True}
+    depth = {"qos_overrides./clock.publisher.depth": 7}
+    assert of_ros == {node: everywhere for node in NODES} | {"plant": {**everywhere, **depth}}
+
+
+@pytest.mark.parametrize(
     ("values", "said"),
     [
         ({"controller": "pid"}, "unknown controller 'pid'"),
@@ -123,18 +182,24 @@ def test_a_launched_flight_is_checked_like_any_other() -> None:
     ],
 )
 @pytest.mark.parametrize(
-    "command", [["ros2", "launch", "space_robot", "fly.launch.py"], ["-c", "/x/fly.launch.py"]]
+    "command",
+    [["ros2", "launch", "space_robot", "fly.launch.py"], ["-c", "launch/../launch/fly.launch.py"]],
 )
 def test_an_argument_that_launch_would_let_pass_is_refused(
     command: list[str], words: list[str], said: str
 ) -> None:
     names = [argument.name for argument in launch_arguments()]
+    file = str(Path("launch/fly.launch.py").absolute())
     if not said:
-        refuse_unknown([*command, *words], "/y/fly.launch.py", names)
+        refuse_unknown([*command, *words], file, names)
         return
     with pytest.raises(InputError, match=re.escape(said)):
-        refuse_unknown([*command, *words], "/y/fly.launch.py", names)
+        refuse_unknown([*command, *words], file, names)
 
 
-def test_arguments_of_a_launch_file_that_includes_ours_are_its_own() -> None:
-    refuse_unknown(["ros2", "launch", "mine.launch.py", "kase:=1"], "/y/fly.launch.py", ["case"])
+@pytest.mark.parametrize(
+    "words", [["mine.launch.py"], ["fly.launch.py"], ["mine", "fly.launch.py"]]
+)
+def test_arguments_of_a_launch_file_that_includes_ours_are_its_own(words: list[str]) -> None:
+    """Also of one that has the same name."""
+    refuse_unknown(["ros2", "launch", *words, "kase:=1"], "/y/fly.launch.py", ["case"])

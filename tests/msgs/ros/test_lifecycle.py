@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import signal
 import time
 from typing import Any
@@ -64,7 +65,8 @@ def test_configure_fails_with_the_reason(start: Start, ground: Ground) -> None:
 def test_deactivated_controller_leaves_no_torque_and_comes_back(
     start: Start, ground: Ground
 ) -> None:
-    nodes = [start("mission"), start("controller"), start("plant", silence_timeout=0.3)]
+    controller = start("controller", longest_jump=20)
+    nodes = [start("mission"), controller, start("plant", silence_timeout=0.3)]
     robot = Robot.from_yaml("config/robots/paper.yaml")
     codec = StateCodec(RobotNames(robot.joint_names), TIMEBASE)
     state = RobotState.allocate(robot.n)
@@ -83,6 +85,10 @@ def test_deactivated_controller_leaves_no_torque_and_comes_back(
     assert ground.change("controller", "activate")
     ground.until(lambda: torque() > 1e-3, "a torque again")
     assert all(node.poll() is None for node in nodes)
+    controller.send_signal(signal.SIGINT)
+    output, _ = controller.communicate(timeout=30)
+    assert re.search(r"active again at tick \d+, after \d+", output), output
+    assert "new time" not in output
 
 
 @pytest.mark.parametrize(

@@ -106,7 +106,8 @@ def test_law_and_gains_change_in_flight(start: Start, domain: int) -> None:
         refused, reason = change("tde_tsmc.k_1", [0.5, 0.5])
         assert not refused
         assert "9 values" in reason
-        assert change("robot", "seven_joint")[0] is False  # read-only
+        for name, value in (("robot", "seven_joint"), ("use_sim_time", True)):
+            assert change(name, value)[0] is False  # read-only
     finally:
         node.destroy_node()
         context.try_shutdown()

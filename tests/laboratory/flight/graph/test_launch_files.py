@@ -28,15 +28,27 @@ import sys
 from launch import LaunchDescription, LaunchService
 from launch.actions import IncludeLaunchDescription
 from launch.launch_description_sources import PythonLaunchDescriptionSource
-arguments = [tuple(word.split(":=", 1)) for word in sys.argv[2:]]
-source = PythonLaunchDescriptionSource(sys.argv[1])
+from launch.actions import GroupAction
+from launch_ros.actions import PushRosNamespace
+flights, arguments = [], []
+for word in [*sys.argv[2:], "--"]:
+    if word == "--":
+        source = PythonLaunchDescriptionSource(sys.argv[1])
+        include = IncludeLaunchDescription(source, launch_arguments=arguments)
+        flights.append(GroupAction([PushRosNamespace("fleet"), include]))
+        arguments = []
+    else:
+        arguments.append(tuple(word.split(":=", 1)))
 service = LaunchService(argv=sys.argv[2:])
 service.include_launch_description(
-    LaunchDescription([IncludeLaunchDescription(source, launch_arguments=arguments)])
+    LaunchDescription(flights if len(flights) > 1 else [include])
 )
 sys.exit(service.run())
 """
-"""`ros2 launch FILE NAME:=VALUE...`, which no wheel carries either."""
+"""`ros2 launch FILE NAME:=VALUE...`, which no wheel carries either.
+
+With `--` between the arguments of several flights: a launch file that includes one after another.
+"""
 SHORT = ("duration:=0.2",)
 
 
@@ -125,6 +137,7 @@ def test_a_signal_ends_it_with_a_whole_bag(
         time.sleep(0.05)
     process.send_signal(number)
     output, _ = process.communicate(timeout=60)
+    assert process.returncode in (1, -signal.SIGTERM), output
     log = read_flight(bag)
     assert log.ticks > 100, output
     assert not any(log.lost.values()), output
@@ -148,6 +161,23 @@ def test_a_node_that_dies_ends_it_with_an_error(
     assert "mission_node ended with exit code -9" in output
 
 
+def test_of_two_flights_each_goes_to_its_end(
+    launch: Callable[..., subprocess.Popen[str]], tmp_path: Path
+) -> None:
+    """In the namespace of their group; the launch ends with the last one."""
+    flights = {"sat1": 0.2, "/sat2": 0.6}
+    words = [
+        [f"namespace:={name}", f"duration:={duration}", f"bag:={tmp_path / name.strip('/')}"]
+        for name, duration in flights.items()
+    ]
+    process = launch(*words[0], "--", *words[1])
+    output, _ = process.communicate(timeout=240)
+    assert process.returncode == 0, output
+    assert {read_flight(tmp_path / name.strip("/")).ticks for name in flights} == {400, 1200}
+    assert "/fleet/sat1/joint_states" in open_bag(tmp_path / "sat1").topics()
+    assert "/sat2/joint_states" in open_bag(tmp_path / "sat2").topics()
+
+
 @pytest.mark.parametrize("words", [("play:=mine",), ()])
 def test_rviz_has_simulated_time_and_there_is_one_clock(
     monkeypatch: pytest.MonkeyPatch, prefix: Path, words: tuple[str, ...]
@@ -162,14 +192,14 @@ def test_rviz_has_simulated_time_and_there_is_one_clock(
     monkeypatch.setattr(sys, "argv", ["ros2", "launch", "space_robot", "view.launch.py", *words])
     view = runpy.run_path(str(ROOT / "launch/view.launch.py"))["view"]
     context = LaunchContext()
-    context.launch_configurations |= {"viewer": "rviz", "play": words[0][6:] if words else ""}
-    rviz, shown = view(context)
+    play = words[0][6:] if words else ""
+    context.launch_configurations.update({"viewer": "rviz", "play": play})
+    rviz, *played = (action for action in view(context) if isinstance(action, ExecuteProcess))
     assert isinstance(rviz, Node)
     parameters = evaluate_parameters(context, rviz._Node__parameters)  # no public way
     assert parameters == ({"use_sim_time": True},)
-    if words:
-        assert isinstance(shown, ExecuteProcess)
-        assert [part[0].text for part in shown.cmd] == ["ros2", "bag", "play", "mine"]
+    commands = [[part[0].text for part in action.cmd] for action in played]
+    assert commands == ([["ros2", "bag", "play", "mine"]] if words else [])
 
 
 @pytest.mark.parametrize(
@@ -185,5 +215,9 @@ def test_launch_reads_the_files(file: Path) -> None:
     for name, argument in declared.items():
         assert argument.default_value is not None, name
         assert len(argument.description) > 10, name
-    if file.name == "fly.launch.py":
-        assert {a.name for a in launch_arguments()} == set(declared) - {"autostart"}
+    assert {a.name for a in launch_arguments()} <= set(declared)
+    own = {"fly.launch.py": set[str](), "view.launch.py": {"play", "viewer"}}[file.name]
+    own |= {"autostart", "shutdown"}
+    assert {a.name for a in launch_arguments()} == set(declared) - own
+    shown = declared["controller"].default_value
+    assert [part.describe() for part in shown] == ["'tde_stc'"]
