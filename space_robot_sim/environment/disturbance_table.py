@@ -11,7 +11,6 @@ As text it is JSON, a list of numbers by column: so the text holds all its numbe
 from __future__ import annotations
 
 import json
-import math
 from collections.abc import Mapping, Sequence
 from functools import lru_cache
 from itertools import pairwise
