@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from space_robot_model.elementary.matrices import norm
+from space_robot_model.elementary.matrices import direction_norm
 from space_robot_model.robot import Robot
 from space_robot_msgs_py.config.settings import Texts
 from space_robot_msgs_py.config.validation import StrictModel
@@ -88,9 +88,7 @@ class Mission:
             )
         if times[0] != 0.0 or np.any(np.diff(times) <= 0.0):
             raise InputError(f"waypoint_times must rise from 0, got {settings.waypoint_times}")
-        length = norm(settings.base_quaternion)
-        if not 1e-3 <= length <= 1e3:
-            raise InputError(f"base_quaternion must have a norm near 1, got {length:g}")
+        length = direction_norm(settings.base_quaternion, "base_quaternion")
         waypoints = robot.from_degrees(np.reshape(settings.waypoints_deg, (len(times), n)))
         check_positions(robot, waypoints)
         quaternion = np.array(settings.base_quaternion) / length

@@ -297,7 +297,7 @@ BAD: list[tuple[dict[str, Any] | str, str]] = [
     ({"tool": {"xyz": [1, 2, "z"]}, "duration": 2}, "xyz"),
     ({"tool": {**TOOL, "frame": "world"}, "duration": 2}, "frame"),
     ({"tool": {**TOOL, "link": "hand"}, "duration": 2}, "'hand': choose one of"),
-    ({"tool": {**TOOL, "quaternion": [0, 0, 0, 0]}, "duration": 2}, "norm near 1"),
+    ({"tool": {**TOOL, "quaternion": [0, 0, 0, 0]}, "duration": 2}, "norm of 0.001 to 1000"),
     ({"tool": {**TOOL, "quaternion": [1, 0, 0]}, "duration": 2}, "quaternion"),
     (
         {"tool": {"rpy_deg": [0, 0, 1], "quaternion": [1, 0, 0, 0]}, "duration": 2},
