@@ -82,8 +82,8 @@ def _check_motion(robot: Robot, time: Array, joints: Array, base: Array) -> None
     ):
         values = np.abs(joints[:, order])
         if not np.all(values <= most):  # true of NaN
-            k, joint = np.unravel_index(int(np.argmin(values <= most)), values.shape)
-            scale, unit = shown_unit(robot, int(joint))
+            k, joint = divmod(int(np.argmin(values <= most)), values.shape[1])
+            scale, unit = shown_unit(robot, joint)
             raise InputError(
                 f"joint {robot.joint_names[joint]!r} {word} {joints[k, order, joint] * scale:.4g} "
                 f"{unit}{per} at t = {time[k]:.6g} s, at most {most * scale:.4g} can be flown"

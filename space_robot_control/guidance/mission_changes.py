@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -105,7 +106,7 @@ class MissionChanges:
         ]
         names = list(trajectory.joint_names)
         try:
-            self._change(lambda: self._mission.follow(self._ticks()[1], names, points))
+            self._change(partial(self._mission.follow, self._ticks()[1], names, points))
         except InputError as error:
             self._refuse(str(error))
             raise
@@ -113,7 +114,7 @@ class MissionChanges:
 
     def stop(self) -> None:
         """Bring the reference to rest."""
-        self._change(lambda: self._mission.go_to(self._ticks()[1], "{hold: 1}"))
+        self._change(partial(self._mission.go_to, self._ticks()[1], "{hold: 1}"))
 
     def close(self) -> None:
         """End the subscription and the action, and accept no parameter."""
@@ -127,9 +128,7 @@ class MissionChanges:
             if parameter.name != NAME or parameter.value in ("", self._last_text):
                 continue  # a call may be repeated if its answer was lost
             try:
-                self._change(
-                    lambda text=parameter.value: self._mission.go_to(self._ticks()[1], text)
-                )
+                self._change(partial(self._mission.go_to, self._ticks()[1], parameter.value))
                 self._last_text = parameter.value
             except InputError as error:
                 return SetParametersResult(successful=False, reason=str(error))

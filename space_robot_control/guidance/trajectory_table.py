@@ -61,7 +61,7 @@ class TrajectoryTable:
         """s."""
         positions = np.column_stack([np.array(columns[name], float) for name in joint_names])
         if not np.all(within := np.abs(positions) <= FARTHEST):
-            row, joint = np.unravel_index(int(np.argmin(within)), within.shape)
+            row, joint = divmod(int(np.argmin(within)), len(joint_names))
             raise InputError(
                 f"trajectory: {joint_names[joint]} is {positions[row, joint]:g} at "
                 f"{time[row]:.12g} s, at most {FARTHEST:g} (rad or m) can be flown"

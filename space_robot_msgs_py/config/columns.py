@@ -15,7 +15,7 @@ from .text import printable
 from .validation import short
 from .yaml_text import check_file
 
-MOST_ROWS, MOST_COLUMNS, MOST_VALUES = 100_000, 1_000, 5_000_000
+MOST_ROWS, MOST_COLUMNS, MOST_VALUES = 100_000, 1_000, 190_000
 LARGEST_CSV = 128 * 2**20
 """Largest size of a CSV file, bytes."""
 MOST_LISTED = 20
