@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from space_robot_model.robot import Robot
+from space_robot_model.robot.described import MANY_TURNS
 from space_robot_msgs_py.config.validation import StrictModel
 from space_robot_msgs_py.errors import InputError
 
@@ -23,8 +24,6 @@ Array = NDArray[np.float64]
 
 ROUNDING = 1e-9
 """rad or m, by which a waypoint may be beyond a limit: both were written in degrees, maybe."""
-MANY_TURNS = 4.0 * np.pi
-"""Angle of a joint that asks for a remark, rad."""
 HALFWAY = 15.0 / 8.0
 """Largest velocity of a quintic leg from rest to rest, as a share of its mean velocity."""
 

@@ -168,7 +168,7 @@ NEAR = np.radians(START).tolist()
         (
             ROBOT.joint_names,
             [TrajectoryPoint(1e-9, [3.0] * 6, [], []), TrajectoryPoint(1.0, NEAR, [], [])],
-            "'joint1' moves at ",
+            "can be flown",
         ),
     ],
 )

@@ -273,8 +273,9 @@ def test_trajectories_of_files(tmp_path: Path) -> None:
 def test_a_long_segment_is_the_same_path_with_no_more_knots(base: Any) -> None:
     segments = [{"tool": {"xyz": [0.1, 0.0, -0.1]}, "base": base, "duration": d} for d in (9, 9e5)]
     (short,), (long,) = (planned(segment).pieces for segment in segments)
-    np.testing.assert_allclose(long.goal, short.goal, atol=1e-8)
-    np.testing.assert_allclose(long.attitude, short.attitude, atol=1e-8)
+    # where joints are left over, their share depends on the knots a little
+    np.testing.assert_allclose(long.goal, short.goal, atol=1e-5)
+    np.testing.assert_allclose(long.attitude, short.attitude, atol=1e-6)
     assert len(knots(long.end)) == len(sample_times(long.begin, long.end)) == MOST_KNOTS
 
 
@@ -357,7 +358,7 @@ BAD: list[tuple[dict[str, Any] | str, str]] = [
     ({"hold": 1e7}, "less than or equal to 1000000"),
     ({"joints_deg": [1e300] * 6, "duration": 10}, "'joint1': at most 572958 degrees can be flown"),
     ({"joints_deg": [1.0] * 6, "duration": 1e-300}, "a duration of 1e-06 to 1e.06 s"),
-    ({"joints_deg": [1.0] * 6, "duration": 1e-5}, "joint 'joint1' moves at .* can be flown"),
+    ({"joints_deg": [1.0] * 6, "duration": 1e-5}, "moves at .* degrees/s at t = .* can be flown"),
     ({"base": {"rpy_deg": [0, 0, 10]}, "duration": 1e-3}, r"the base turns at .* rad/s at t ="),
     ({"tool": {"xyz": [1e300, 0, 0]}, "duration": 5}, "cannot follow its path"),
     ({"reactionless": {"joints_deg": [1e300] * 6}, "duration": 5}, "at most 572958 degrees"),
