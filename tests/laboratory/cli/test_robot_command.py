@@ -61,7 +61,7 @@ def test_tables() -> None:
     ("metres", "millimetres", "said"),
     [
         ('xyz="0 0 0.8"', 'xyz="0 0 800"', "joint 'slide' is 800 m from the joint before it"),
-        ('upper="2"', 'upper="115"', "'shoulder' has a limit at 6589.01 degrees (115 rad)"),
+        ('upper="2"', 'upper="115"', "joint 'shoulder' has a limit at 6589.01 degrees (115 rad)"),
     ],
 )
 def test_millimetres_and_degrees_are_remarked(
