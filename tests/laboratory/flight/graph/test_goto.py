@@ -10,7 +10,7 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from threading import Timer
+from typing import Any
 
 import numpy as np
 import pytest
@@ -29,6 +29,8 @@ set_defaults()
 pytest.importorskip("rclpy")
 
 from space_robot.analysis.tool_error import leads_tool  # noqa: E402
+from space_robot.flight.graph import simulation_calls  # noqa: E402
+from space_robot.flight.graph.node_services import set_parameters  # noqa: E402
 from space_robot.flight.graph.simulation_calls import go_to  # noqa: E402
 from space_robot.flight.graph.temporary_node import TemporaryNode  # noqa: E402
 from space_robot_msgs_py.ros.endpoints import message_type, qos  # noqa: E402
@@ -129,18 +131,20 @@ def test_what_cannot_be_flown_is_refused_and_the_flight_goes_on(
     assert np.isfinite(log.reference_joints).all()
 
 
-def test_a_mission_that_is_killed_is_not_waited_for(free_domain: int, tmp_path: Path) -> None:
+def test_a_mission_that_is_killed_is_not_waited_for(
+    free_domain: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     with paused(free_domain, tmp_path / "bag"):
         (name,) = (node.name for node in nodes_in(free_domain) if "mission" in node.name)
         pid = int(re.findall(r"pid (\d+)", name)[0])
-        os.kill(pid, signal.SIGSTOP)
-        killed = Timer(2.0, os.kill, (pid, signal.SIGKILL))
-        killed.start()
-        try:
-            with pytest.raises(FlightError, match="mission_node has gone"):
-                go_to("{hold: 1}", free_domain, "")
-        finally:
-            killed.join()
+
+        def killed_before(*arguments: Any) -> None:
+            os.kill(pid, signal.SIGKILL)
+            set_parameters(*arguments)
+
+        monkeypatch.setattr(simulation_calls, "set_parameters", killed_before)
+        with pytest.raises(FlightError, match="mission_node has gone"):
+            go_to("{hold: 1}", free_domain, "")
 
 
 def test_a_joint_trajectory_of_a_publisher_is_followed(free_domain: int, tmp_path: Path) -> None:
