@@ -13,14 +13,12 @@ from ..elementary.matrices import norms
 from .link_file import drive_of
 from .plates import plates_of
 from .robot import Robot
-from .tree import Gear
+from .tree import MANY_TURNS, Gear
 
 Array = NDArray[np.float64]
 
 FAR = 100.0
 """Distance between two joints that asks for a remark, m."""
-MANY_TURNS = 4.0 * math.pi
-"""Angle of a joint that asks for a remark, rad."""
 
 
 def describe(robot: Robot) -> dict[str, Any]:
