@@ -202,6 +202,8 @@ def remarks_on(flight: Flight) -> list[str]:
     little margin (of default gains only where hardware or a fault tries the margin), of joints
     that are asked too much.
     """
+    from space_robot_model.robot.described import unit_remarks
+
     from ..flight.start_step import sentence
     from ..tuning.gain_check import pair_corner
     from ..tuning.warning import limit_remarks, margin_remarks
@@ -227,4 +229,5 @@ def remarks_on(flight: Flight) -> list[str]:
     step = flight.start_step
     on_start = [f"warning: {sentence(step)}"] if step else []
     repaired = [f"repaired: {text}" for text in flight.robot.repairs]
-    return [*repaired, *on_start, *on_gains, *on_limits]
+    units = [f"warning: {text}" for text in unit_remarks(flight.robot)]
+    return [*repaired, *units, *on_start, *on_gains, *on_limits]

@@ -56,7 +56,9 @@ def plan(
       space-robot plan line.yaml --base-torque 0.5 --out slow.yaml
       space-robot plan --robot seven_joint --json
     """
+    from space_robot_control.guidance.limits import turn_remarks
     from space_robot_control.guidance.mission import Mission, MissionSettings
+    from space_robot_model.robot.described import unit_remarks
 
     from ..analysis.lighter_mission import lightened_mission, mission_text, stretched_mission
     from ..analysis.mission_plan import plan_report, planned_segments
@@ -67,6 +69,8 @@ def plan(
     flight = plan_flight(mission=mission, **options)
     robot = flight.scenario.robots.controller
     settings: MissionSettings = flight.mission_settings
+    for remark in (*unit_remarks(robot), *turn_remarks(robot, flight.mission.pieces)):
+        click.echo(f"warning: {remark}", err=True)
     segments = planned_segments(robot, flight.mission)
     report = plan_report(robot, segments)
     if base_torque is not None or momentum is not None:

@@ -31,6 +31,9 @@ ACTUATORS = (
     Column("feasible", is_label=True),
 )
 
+MANY = 1e3
+"""Share from which a percentage is printed as a power of ten."""
+
 
 def print_plan(report: Mapping[str, Any], console: Console) -> None:
     """Print the report of `space_robot.analysis.mission_plan.plan_report`."""
@@ -51,8 +54,8 @@ def print_plan(report: Mapping[str, Any], console: Console) -> None:
     judged = [
         (
             a["actuators"],
-            100.0 * a["torque"],
-            100.0 * a["momentum"],
+            _percent(a["torque"]),
+            _percent(a["momentum"]),
             JudgedCell("", "yes" if a["is_feasible"] else "no", _tone(a["is_feasible"])),
         )
         for a in report["actuators"]
@@ -72,6 +75,10 @@ def print_plan(report: Mapping[str, Any], console: Console) -> None:
                 f"{words}: {other['duration_s']:.2f} s, {other['base_torque']:.3g} N m, "
                 f"{other['momentum']:.3g} N m s",
             )
+
+
+def _percent(share: float) -> float | str:
+    return 100.0 * share if not share >= MANY else f"{100.0 * share:.1e}"
 
 
 def _margins(margins: Mapping[str, Mapping[str, Any]]) -> Iterator[str]:

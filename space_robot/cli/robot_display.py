@@ -26,6 +26,8 @@ def print_robot(description: dict[str, Any], findings: Sequence[Finding], consol
     )
     if findings:
         print_defects(findings, console, are_repaired=True)
+    for remark in description["remarks"]:
+        say(console, f"warning: {remark}")
     print_table(_bodies(description), console)
     print_table(_joints(description), console)
     if any("drive" in joint for joint in description["joints"]):

@@ -22,6 +22,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from space_robot_control.guidance.courses import FEWEST_KNOTS
 from space_robot_control.guidance.mission import Mission, MissionSettings
 from space_robot_model.robot import Robot
 from space_robot_model.robot.frames import BodyFrame, body_frames
@@ -31,6 +32,8 @@ Array = NDArray[np.float64]
 
 SAMPLING = 0.05
 """Time between two evaluated configurations, s; a leg of a mission takes seconds."""
+MOST_SAMPLES = 20_000
+"""Largest number of configurations at equal distances."""
 
 
 def sampled_reference(
@@ -38,11 +41,21 @@ def sampled_reference(
 ) -> ReferenceChunk:
     """Return the reference of a mission every ``step`` s, including the last waypoint.
 
+    Of a long mission every part is sampled as often as the others.
+
     Raises:
         InputError: the waypoints do not fit the times or the joints.
     """
     mission = Mission(robot, settings, step)
-    return mission.chunk(0, int(np.ceil(mission.duration / step - 1e-9)) + 1)
+    if (count := int(np.ceil(mission.duration / step - 1e-9)) + 1) <= MOST_SAMPLES:
+        return mission.chunk(0, count)
+    times = [np.linspace(part.begin, part.end, FEWEST_KNOTS) for part in mission.pieces]
+    pairs = list(zip(mission.pieces, times, strict=True))
+    return ReferenceChunk(
+        0,
+        np.concatenate([part.joints.at(time) for part, time in pairs]),
+        np.concatenate([part.base.at(time) for part, time in pairs]),
+    )
 
 
 def inertia_along(

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from space_robot_control.guidance.limits import too_fast, too_strong
+from space_robot_control.guidance.limits import too_fast, too_strong, turn_remarks
 from space_robot_control.guidance.mission import Mission, MissionSettings
 from space_robot_control.laws import CompiledLaw, ControlLaw
 from space_robot_control.laws.base import CONSTANT_INERTIA, NO_ESTIMATE
@@ -154,7 +154,8 @@ def limit_remarks(robot: Robot, mission: MissionSettings) -> list[str]:
         planned = Mission(robot, mission, COARSE)
     except InputError:  # the flight itself reports it
         return []
-    remarks = [
+    remarks = [f"warning: {text}" for text in turn_remarks(robot, planned.pieces)]
+    remarks += [
         f"warning: mission: {b.joint} would move at {b.asked:.3g} {b.unit}, its limit is "
         f"{b.limit:.3g} {b.unit}"
         for b in too_fast(robot, planned.times, planned.waypoints)

@@ -19,7 +19,8 @@ Array = NDArray[np.float64]
 
 KNOT_S = 0.01
 """Spacing of the knots of a spline along a path, and of the samples of a segment, s."""
-FEWEST_KNOTS = 101
+FEWEST_KNOTS, MOST_KNOTS = 101, 20_001
+"""Number of these: a segment is the same motion in any duration, so a long one needs no more."""
 
 
 class Course(Protocol):
@@ -58,12 +59,17 @@ def quintic(u: Array) -> tuple[Array, Array, Array]:
 
 def knots(span: float) -> Array:
     """Return the times (K,) from 0 to ``span``, s, of the knots of a spline along a path."""
-    return np.linspace(0.0, span, max(FEWEST_KNOTS, math.ceil(span / KNOT_S) + 1))
+    return np.linspace(0.0, span, _within(math.ceil(min(span / KNOT_S, MOST_KNOTS)) + 1))
 
 
 def sample_times(begin: float, end: float) -> Array:
     """Return the times (K,), s, at which a planned segment is checked."""
-    return np.linspace(begin, end, max(FEWEST_KNOTS, round((end - begin) / KNOT_S) + 1))
+    span = end - begin
+    return np.linspace(begin, end, _within(round(min(span / KNOT_S, MOST_KNOTS)) + 1))
+
+
+def _within(count: int) -> int:
+    return min(max(FEWEST_KNOTS, count), MOST_KNOTS)
 
 
 class QuinticLeg(NamedTuple):

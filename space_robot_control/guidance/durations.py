@@ -16,6 +16,7 @@ from space_robot_model.elementary.matrices import norms
 from space_robot_model.robot import Robot
 from space_robot_msgs_py.errors import InputError
 
+from .checks import LONGEST_S
 from .courses import Course
 from .demand import demand
 from .limits import MissionLimits
@@ -38,7 +39,7 @@ def shortest_duration(
         span: s, any duration that the segment was sampled with.
 
     Raises:
-        InputError: none of what moves has a limit.
+        InputError: none of what moves has a limit, or one is so low that it takes too long.
     """
     shares = list(_shares(robot, limits, joints, base, begin, span))
     if not shares:
@@ -47,29 +48,40 @@ def shortest_duration(
             "duration, or limits (base_torque, base_momentum, base_rate_deg, "
             "joint_acceleration_deg)"
         )
-    return max(SHORTEST_S, span * max(shares))
+    longer, limit = max(shares)
+    if not span * longer <= LONGEST_S:  # true of NaN
+        raise InputError(
+            f"fast: it takes {span * longer:.3g} s to keep to {limit}, at most {LONGEST_S:g} s "
+            "(11 days) are flown"
+        )
+    return max(SHORTEST_S, span * longer)
 
 
 def _shares(
     robot: Robot, limits: MissionLimits, joints: Course, base: Course, begin: float, span: float
-) -> Iterator[float]:
-    """Yield the factor on ``span`` that each limit asks for."""
+) -> Iterator[tuple[float, str]]:
+    """Yield the factor on ``span`` that each limit asks for, and the name of the limit."""
     asked = demand(robot, joints, base, begin, begin + span)
     rates = np.max(np.abs(asked.joints[:, 1]), axis=0)
     accelerations = np.max(np.abs(asked.joints[:, 2]), axis=0)
     efforts = np.max(np.abs(asked.torque[:, 3:]), axis=0)
+    names = robot.joint_names
     per_unit = np.where(robot.is_prismatic[: robot.n], 1.0, np.pi / 180.0)
     for joint, limit in enumerate(robot.limits):
         if math.isfinite(limit.velocity):
-            yield float(rates[joint]) / limit.velocity
+            yield float(rates[joint] / limit.velocity), f"the velocity of joint {names[joint]!r}"
         if math.isfinite(limit.effort):
-            yield math.sqrt(float(efforts[joint]) / limit.effort)
+            yield (
+                math.sqrt(float(efforts[joint] / limit.effort)),
+                f"the effort of joint {names[joint]!r}",
+            )
         if limits.joint_acceleration_deg:
             bound = limits.joint_acceleration_deg * float(per_unit[joint])
-            yield math.sqrt(float(accelerations[joint]) / bound)
+            yield math.sqrt(float(accelerations[joint] / bound)), "joint_acceleration_deg"
     if limits.base_torque:
-        yield math.sqrt(float(np.max(asked.base_torque)) / limits.base_torque)
+        yield math.sqrt(float(np.max(asked.base_torque) / limits.base_torque)), "base_torque"
     if limits.base_momentum:
-        yield float(np.max(asked.stored_momentum)) / limits.base_momentum
+        yield float(np.max(asked.stored_momentum) / limits.base_momentum), "base_momentum"
     if limits.base_rate_deg:
-        yield float(np.max(norms(asked.base[:, 4:7]))) / math.radians(limits.base_rate_deg)
+        bound = math.radians(limits.base_rate_deg)
+        yield float(np.max(norms(asked.base[:, 4:7])) / bound), "base_rate_deg"

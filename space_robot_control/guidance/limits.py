@@ -6,6 +6,7 @@ the waypoints are. The desired velocity is largest halfway, ``15/8`` of the mean
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import Annotated, NamedTuple
 
 import numpy as np
@@ -13,8 +14,11 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from space_robot_model.robot import Robot
+from space_robot_model.robot.tree import MANY_TURNS
 from space_robot_msgs_py.config.validation import StrictModel
 from space_robot_msgs_py.errors import InputError
+
+from .courses import Piece, sample_times
 
 Array = NDArray[np.float64]
 
@@ -95,6 +99,21 @@ def too_fast(robot: Robot, times: Array, waypoints: Array) -> list[Beyond]:
             strict=True,
         )
         if fastest > limits.velocity * (1.0 + ROUNDING)
+    ]
+
+
+def turn_remarks(robot: Robot, pieces: Iterable[Piece]) -> list[str]:
+    """Return a remark on each joint that a trajectory from a file turns so far as if in degrees."""
+    far = np.zeros(robot.n)
+    for piece in pieces:
+        if piece.motion in ("file", "trajectory"):
+            rows = piece.joints.at(sample_times(piece.begin, piece.end))
+            far = np.maximum(far, np.abs(rows[:, 0]).max(axis=0))
+    return [
+        f"the trajectory leads joint {name!r} to {np.degrees(angle):.6g} degrees "
+        f"({angle:.6g} rad): its numbers are in rad"
+        for name, angle, slides in zip(robot.joint_names, far, robot.is_prismatic, strict=False)
+        if angle > MANY_TURNS and not slides
     ]
 
 

@@ -64,6 +64,7 @@ def is_moving(joints: Array, base: Array) -> bool:
     return bool(max(np.abs(joints[1:]).max(), np.abs(base[4:]).max()) > AT_REST)
 
 
+@np.errstate(all="ignore")  # numbers that overflow are refused, in one line
 def joined(
     robot: Robot,
     names: Sequence[str],

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from space_robot_model.elementary.matrices import norm
+from space_robot_model.elementary.matrices import direction_norm
 from space_robot_model.robot import Robot
 from space_robot_msgs_py.config.settings import Texts
 from space_robot_msgs_py.config.validation import StrictModel
@@ -88,9 +88,7 @@ class Mission:
             )
         if times[0] != 0.0 or np.any(np.diff(times) <= 0.0):
             raise InputError(f"waypoint_times must rise from 0, got {settings.waypoint_times}")
-        length = norm(settings.base_quaternion)
-        if not 1e-3 <= length <= 1e3:
-            raise InputError(f"base_quaternion must have a norm near 1, got {length:g}")
+        length = direction_norm(settings.base_quaternion, "base_quaternion")
         waypoints = robot.from_degrees(np.reshape(settings.waypoints_deg, (len(times), n)))
         check_positions(robot, waypoints)
         quaternion = np.array(settings.base_quaternion) / length
@@ -103,6 +101,9 @@ class Mission:
             )
         ]
         """Legs between the waypoints, then the segments; at least one."""
+        still = [] if self.pieces else [_leg(0.0, 1.0, waypoints[0], waypoints[0], quaternion)]
+        for leg in (*self.pieces, *still):
+            check_piece(robot, leg, has_limits=False)  # flights warn of those of waypoints
         self._robot = robot.nominal
         self._start, self._limits = (waypoints[0].copy(), quaternion), settings.limits
         if segments := read_segments(settings.segments):
@@ -110,8 +111,7 @@ class Mission:
             self.pieces += planner.plan(float(times[-1]), waypoints[-1], quaternion, segments)
         self.duration = self.pieces[-1].end if self.pieces else 0.0
         """s, until the end of the last segment."""
-        if not self.pieces:
-            self.pieces = [_leg(0.0, 1.0, waypoints[0], waypoints[0], quaternion)]
+        self.pieces = self.pieces or still
         self._first, self._begins = (
             waypoints[0].copy(),
             np.array([piece.begin for piece in self.pieces]),
@@ -156,6 +156,8 @@ class Mission:
         segments = read_segments([segment])
         if not segments:
             raise InputError("a segment was expected, got an empty text")
+        if segments[0].file is not None:  # whoever reaches the node could have it read any file
+            raise InputError("file: no file is read in flight, give the columns as trajectory")
         pieces = self._new_planner().plan(begin, joints[0], base[:4], segments)
         self._replace([*before, *pieces])
         return pieces[-1]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -10,6 +11,7 @@ from numpy.typing import NDArray
 from rcl_interfaces.msg import SetParametersResult
 
 from space_robot_msgs_py import topics
+from space_robot_msgs_py.config.text import one_line_of
 from space_robot_msgs_py.errors import InputError, MessageError
 from space_robot_msgs_py.ros.endpoints import PolledCallbackGroup, RawSubscription
 from space_robot_msgs_py.ros.managed_node import ManagedNode
@@ -24,6 +26,8 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 NAME = "goto"
+UNFORESEEN = (ArithmeticError, AttributeError, LookupError, MemoryError, TypeError, ValueError)
+"""What planning raises for numbers that no check has foreseen; the flight must go on."""
 
 
 class MissionChanges:
@@ -100,9 +104,9 @@ class MissionChanges:
             )
             for p in trajectory.points
         ]
+        names = list(trajectory.joint_names)
         try:
-            names = list(trajectory.joint_names)
-            self._change(self._mission.follow(self._ticks()[1], names, points))
+            self._change(partial(self._mission.follow, self._ticks()[1], names, points))
         except InputError as error:
             self._refuse(str(error))
             raise
@@ -110,7 +114,7 @@ class MissionChanges:
 
     def stop(self) -> None:
         """Bring the reference to rest."""
-        self._change(self._mission.go_to(self._ticks()[1], "{hold: 1}"))
+        self._change(partial(self._mission.go_to, self._ticks()[1], "{hold: 1}"))
 
     def close(self) -> None:
         """End the subscription and the action, and accept no parameter."""
@@ -124,14 +128,24 @@ class MissionChanges:
             if parameter.name != NAME or parameter.value in ("", self._last_text):
                 continue  # a call may be repeated if its answer was lost
             try:
-                self._change(self._mission.go_to(self._ticks()[1], parameter.value))
+                self._change(partial(self._mission.go_to, self._ticks()[1], parameter.value))
                 self._last_text = parameter.value
             except InputError as error:
                 return SetParametersResult(successful=False, reason=str(error))
         return SetParametersResult(successful=True)
 
-    def _change(self, piece: Piece) -> None:
-        self.latest = piece
+    def _change(self, plan: Callable[[], Piece]) -> None:
+        """Fly what is planned.
+
+        Raises:
+            InputError: it cannot be planned; the mission is as it was.
+        """
+        try:
+            self.latest = piece = plan()
+        except InputError:
+            raise
+        except UNFORESEEN as error:
+            raise InputError(f"it cannot be planned ({one_line_of(error)})") from error
         self._node.log(f"{piece.motion} from t = {piece.begin:.4f} s to {piece.end:.4f} s")
 
     def _refuse(self, reason: str) -> None:

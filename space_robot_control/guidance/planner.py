@@ -14,11 +14,11 @@ from space_robot_model.robot import Robot
 from space_robot_msgs_py.config.columns import read_columns
 from space_robot_msgs_py.errors import InputError
 
-from .checks import check_piece
+from .checks import FARTHEST, LONGEST_S, check_piece
 from .courses import BentLeg, Course, Piece, QuinticLeg, Slew, knots, quintic, turn_between
 from .durations import shortest_duration
 from .free_base import free_attitude
-from .limits import MissionLimits
+from .limits import MissionLimits, shown_unit
 from .reactionless import reactionless_path
 from .segments import Segment, ToolGoal
 from .spline_courses import SplineCourse
@@ -30,6 +30,9 @@ Array = NDArray[np.float64]
 
 TRIAL_S = 10.0
 """Duration that a fast segment is tried with."""
+
+MOST_AWAY = 4.0 * np.pi
+"""Largest way of a joint in a reactionless motion, rad or m; its steps would be too long."""
 
 Maker = Callable[[float], tuple[Course, Course]]
 """Makes the courses of joints and base of a segment of a duration in s."""
@@ -56,6 +59,7 @@ class Planner:
         self._origin = pose.position - pose.from_base
         """Origin of the inertial frame, that of the base's frame at t = 0, from the robot's CoM."""
 
+    @np.errstate(all="ignore")  # numbers that overflow are refused, in one line
     def plan(
         self, begin: float, joints: Array, quaternion: Array, segments: Sequence[Segment]
     ) -> list[Piece]:
@@ -69,6 +73,8 @@ class Planner:
             try:
                 piece = self._piece(segment)
                 check_piece(self._robot, piece)
+                if piece.end - begin > LONGEST_S:
+                    raise InputError(f"all together last more than {LONGEST_S:g} s (11 days)")
             except InputError as error:
                 raise InputError(f"segment {number}: {error}") from None
             pieces.append(piece)
@@ -136,7 +142,15 @@ class Planner:
     def _of_degrees(self, values: Sequence[float], key: str) -> Array:
         if len(values) != self._robot.n:
             raise InputError(f"{key}: {self._robot.n} values were expected, got {len(values)}")
-        return self._robot.from_degrees(values)
+        positions = self._robot.from_degrees(values)
+        if (far := np.abs(positions)).max() > FARTHEST:
+            joint = int(np.argmax(far))
+            scale, unit = shown_unit(self._robot, joint)
+            raise InputError(
+                f"{key}: joint {self._robot.joint_names[joint]!r}: at most {FARTHEST * scale:.6g} "
+                f"{unit} can be flown, got {values[joint]:g}"
+            )
+        return positions
 
     def _turn(self, segment: Segment) -> Callable[[float], Slew]:
         begin, start, axis, angle = self._time, self._quaternion, np.array([1.0, 0.0, 0.0]), 0.0
@@ -146,6 +160,12 @@ class Planner:
 
     def _reactionless(self, values: Sequence[float]) -> CubicSpline:
         goal = self._of_degrees(values, "reactionless")
+        if (away := np.abs(goal - self._joints)).max() > MOST_AWAY:
+            name = self._robot.joint_names[int(np.argmax(away))]
+            raise InputError(
+                f"reactionless: joint {name!r} is {away.max():.4g} rad or m away, at most "
+                f"{MOST_AWAY:.4g} are planned"
+            )
         return reactionless_path(self._robot, self._quaternion, self._joints, goal)
 
     def _along(self, path: CubicSpline, span: float) -> SplineCourse:

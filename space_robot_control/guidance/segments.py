@@ -15,6 +15,7 @@ from space_robot_msgs_py.config.yaml_text import YamlTextError, parse_yaml
 from space_robot_msgs_py.errors import InputError
 
 Seconds = Annotated[float, Field(gt=0.0, le=1e6)]
+MOST_BENDS = 100
 Frame = Literal["inertial", "base", "start"]
 MOTIONS = ("joints_deg", "tool", "hold", "reactionless_deg", "file", "trajectory")
 """Keys of which a segment has one; a segment of the base alone has none."""
@@ -56,6 +57,7 @@ class Segment(StrictModel):
     joints_deg: list[float] | None = Field(None, description="joints, degrees or m")
     bends_deg: list[list[float]] | None = Field(
         None,
+        max_length=MOST_BENDS,
         description="amplitudes of bends on the way to joints_deg, by sin(pi s), sin(2 pi s), ...:"
         " a list of joints each, degrees or m",
     )

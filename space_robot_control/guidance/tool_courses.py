@@ -15,7 +15,17 @@ from space_robot_model.elementary.spline import CubicSpline
 from space_robot_model.robot import Robot
 from space_robot_msgs_py.errors import InputError
 
-from .courses import Course, Slew, knots, multiplied, quintic, turn_between, turned_by
+from .courses import (
+    KNOT_S,
+    MOST_KNOTS,
+    Course,
+    Slew,
+    knots,
+    multiplied,
+    quintic,
+    turn_between,
+    turned_by,
+)
 from .demand import demand
 from .free_base import twists_along, with_middles
 from .segments import ToolGoal
@@ -122,9 +132,11 @@ class ToolCourses:
         times = knots(span)
         share = with_middles(times) / span
         positions, rotations = self._path(np.empty((0, 4)), quintic(share)[0])
-        twists = twists_along(positions, rotations, share, span)
+        # in a long one knots are far apart: the same path is followed in less time
+        slower = float(times[1]) / KNOT_S if len(times) == MOST_KNOTS else 1.0
+        twists = twists_along(positions, rotations, share, span / slower)
         postures, attitudes, error = self._follower.follow_free(
-            positions, rotations, twists, float(times[1]), joints, quaternion
+            positions, rotations, twists, float(times[1]) / slower, joints, quaternion
         )
         if not error <= FREE_TOLERANCE:
             raise InputError(

@@ -10,10 +10,11 @@ from numpy.typing import NDArray
 from space_robot_model.elementary.matrices import dot_rows, norms, unit_rows
 from space_robot_model.elementary.spline import CubicSpline
 from space_robot_model.robot.mission_document import QUATERNION
-from space_robot_msgs_py.config.choices import nearest
+from space_robot_msgs_py.config.columns import MOST_ROWS, missing_column
 from space_robot_msgs_py.config.validation import short
 from space_robot_msgs_py.errors import InputError
 
+from .checks import FARTHEST, SHORTEST_S
 from .courses import Course, Slew
 from .spline_courses import AttitudeCourse, SplineCourse
 
@@ -21,7 +22,6 @@ Array = NDArray[np.float64]
 Columns = Mapping[str, Sequence[float]]
 
 TIME, RATE = "time", "_rate"
-MOST_ROWS = 100_000
 SAME_PLACE = 1e-6
 """rad or m, that the first row may be away from where the segment begins."""
 SAME_RATE = 0.02
@@ -39,23 +39,33 @@ class TrajectoryTable:
         """
         missing = [name for name in (TIME, *joint_names) if name not in columns]
         if missing:
-            near = " or ".join(nearest(missing[0], list(columns)))
-            raise InputError(
-                f"trajectory: column {short(missing[0])} is missing; there are {', '.join(columns)}"
-                + (f" (did you mean {near}?)" if near else "")
-            )
+            raise InputError(f"trajectory: {missing_column(short(missing[0]), columns)}")
         time = np.array(columns[TIME], dtype=np.float64)
-        if not 2 <= len(time) <= MOST_ROWS:
-            raise InputError(f"trajectory: 2 to {MOST_ROWS} rows were expected, got {len(time)}")
-        if np.any(np.diff(time) <= 0.0):
-            row = int(np.argmax(np.diff(time) <= 0.0)) + 1
+        if not 2 <= (count := len(time)) <= MOST_ROWS:
+            raise InputError(f"trajectory: 2 to {MOST_ROWS} rows were expected, got {count}")
+        used = (*joint_names, *(f"{name}{RATE}" for name in joint_names), *QUATERNION)
+        for name in used:
+            if (rows := len(columns.get(name, columns[TIME]))) != count:
+                raise InputError(
+                    f"trajectory: {name} has {rows} values, {count} were expected, as many as times"
+                )
+        too_soon = ~(np.diff(time) > 0.999 * SHORTEST_S)  # they are rounded
+        if np.any(too_soon):
+            row = int(np.argmax(too_soon)) + 1
             raise InputError(
-                f"trajectory: time must rise, got {time[row]:g} s after {time[row - 1]:g} s"
+                f"trajectory: time must rise, got {time[row]:.12g} s after "
+                f"{time[row - 1]:.12g} s; {SHORTEST_S:g} s between rows are needed"
             )
         self._time = time - time[0]
         self.duration = float(self._time[-1])
         """s."""
         positions = np.column_stack([np.array(columns[name], float) for name in joint_names])
+        if not np.all(within := np.abs(positions) <= FARTHEST):
+            row, joint = divmod(int(np.argmin(within)), len(joint_names))
+            raise InputError(
+                f"trajectory: {joint_names[joint]} is {positions[row, joint]:g} at "
+                f"{time[row]:.12g} s, at most {FARTHEST:g} (rad or m) can be flown"
+            )
         rates = [columns.get(f"{name}{RATE}") for name in joint_names]
         ends = np.array([[r[0], r[-1]] if r is not None else [0.0, 0.0] for r in rates]).T
         self._joints = CubicSpline(self._time, positions, ends[0], ends[1])
@@ -96,7 +106,7 @@ class TrajectoryTable:
 def _quaternions(columns: Columns) -> Array:
     """Return unit quaternions (K, 4), each in the hemisphere of the one before."""
     rows = np.column_stack([np.array(columns[name], float) for name in QUATERNION])
-    if np.any(np.abs(norms(rows) - 1.0) > 1e-3):
+    if not np.all(np.abs(norms(rows) - 1.0) <= 1e-3):
         raise InputError("trajectory: quaternions must have norm 1")
     rows = unit_rows(rows)
     products = dot_rows(rows[1:], rows[:-1])
@@ -107,7 +117,7 @@ def _quaternions(columns: Columns) -> Array:
 def _check_rates(name: str, rates: Array, of_positions: Array, time: Array) -> None:
     allowed = SAME_RATE * float(np.max(np.abs(of_positions))) + 1e-9
     difference = np.abs(rates - of_positions)
-    if difference.max() > allowed:
+    if not difference.max() <= allowed:
         row = int(np.argmax(difference))
         raise InputError(
             f"trajectory: {name}{RATE} is {rates[row]:.6g} at {time[row]:g} s, the positions of "

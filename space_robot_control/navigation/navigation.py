@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from space_robot_model.elementary.matrices import norm
+from space_robot_model.elementary.matrices import direction_norm
 from space_robot_msgs_py.compiled.kernels import kernel
 from space_robot_msgs_py.compiled.lanes import uniform, whole
 from space_robot_msgs_py.compiled.records import Record, assign, nested, shaped
@@ -66,11 +66,7 @@ class Navigation(Record):
                 f"{LONGEST_DELAY * period:g} s, got {settings.tracker_delay:g} s"
             )
         boresight = np.array(settings.tracker_boresight)
-        length = norm(boresight)
-        if not 1e-3 <= length <= 1e3:
-            raise InputError(
-                f"navigation_filter.tracker_boresight must have a norm near 1, got {length:g}"
-            )
+        length = direction_norm(boresight, "navigation_filter.tracker_boresight")
         along = np.outer(boresight, boresight) / (length * length)
         across = settings.tracker_across * settings.tracker_across
         about = settings.tracker_about * settings.tracker_about

@@ -10,7 +10,12 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from space_robot_msgs_py.errors import InputError
+
 Array = NDArray[np.float64]
+
+LEAST_NORM, MOST_NORM = 1e-3, 1e3
+"""Norms of what is written as a direction or quaternion, and scaled to 1."""
 
 
 def product(a: ArrayLike, b: ArrayLike) -> Array:
@@ -31,6 +36,22 @@ def rotate_tensor(rotation: Array, tensor: Array) -> Array:
 def norm(vector: ArrayLike) -> float:
     """Return the Euclidean norm of a vector; the squares must not overflow."""
     return math.sqrt(product(np.ravel(vector), np.ravel(vector)))
+
+
+@np.errstate(over="ignore")
+def direction_norm(vector: ArrayLike, what: str) -> float:
+    """Return the norm of a vector that is going to be divided by it.
+
+    Raises:
+        InputError: it is too short or too long for that; names ``what``.
+    """
+    length = norm(vector)
+    if not LEAST_NORM <= length <= MOST_NORM:
+        raise InputError(
+            f"{what} must have a norm of {LEAST_NORM:g} to {MOST_NORM:g} (it is scaled to 1), "
+            f"not {length:g}"
+        )
+    return length
 
 
 def dot_rows(a: Array, b: Array) -> Array:

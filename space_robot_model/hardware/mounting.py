@@ -10,7 +10,7 @@ from pydantic import Field
 
 from space_robot_msgs_py.errors import InputError
 
-from ..elementary.matrices import unit_rows
+from ..elementary.matrices import direction_norm, unit_rows
 
 Array = NDArray[np.float64]
 
@@ -37,14 +37,13 @@ def are_vectors(flat: list[float], most: int) -> list[float]:
 
 
 def are_directions(flat: list[float], most: int) -> list[float]:
-    """Return ``flat`` if all its vectors have norms near 1, see `are_vectors`.
+    """Return ``flat`` if all its vectors can be scaled to norm 1, see `are_vectors`.
 
     Raises:
         ValueError: a vector is too short or too long.
     """
-    for i, norm in enumerate(np.linalg.norm(vectors(are_vectors(flat, most)), axis=1)):
-        if not 1e-3 <= norm <= 1e3:
-            raise ValueError(f"the norm of each must be near 1, that of number {i + 1} is {norm:g}")
+    for i, vector in enumerate(vectors(are_vectors(flat, most)), 1):
+        direction_norm(vector, f"vector {i}")
     return flat
 
 

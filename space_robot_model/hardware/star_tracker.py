@@ -8,7 +8,7 @@ from pydantic import AfterValidator, Field
 
 from space_robot_msgs_py.config.validation import StrictModel
 
-from ..elementary.matrices import norm
+from ..elementary.matrices import direction_norm
 
 Angle = Annotated[float, Field(ge=0.0, le=1.0)]
 
@@ -19,14 +19,12 @@ MOST_UNDER_WAY = 64
 
 
 def has_direction(vector: list[float]) -> list[float]:
-    """Return ``vector`` if its norm is near 1.
+    """Return ``vector`` if it can be scaled to norm 1.
 
     Raises:
         ValueError: the vector is too short or too long.
     """
-    length = norm(vector)
-    if not 1e-3 <= length <= 1e3:
-        raise ValueError(f"the norm must be near 1, not {length:g}")
+    direction_norm(vector, "a direction")
     return vector
 
 

@@ -9,12 +9,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..elementary.matrices import norms
 from .link_file import drive_of
 from .plates import plates_of
 from .robot import Robot
-from .tree import Gear
+from .tree import MANY_TURNS, Gear
 
 Array = NDArray[np.float64]
+
+FAR = 100.0
+"""Distance between two joints that asks for a remark, m."""
 
 
 def describe(robot: Robot) -> dict[str, Any]:
@@ -44,7 +48,26 @@ def describe(robot: Robot) -> dict[str, Any]:
         ],
         "plates": _plates(robot),
         "repairs": list(robot.repairs),
+        "remarks": unit_remarks(robot),
     }
+
+
+def unit_remarks(robot: Robot) -> list[str]:
+    """Return remarks on numbers that look like millimetres or degrees, where m and rad are read."""
+    remarks = []
+    for joint, name in enumerate(robot.all_joint_names):
+        if (distance := float(norms(robot.offset[joint]))) > FAR:
+            remarks.append(
+                f"joint {name!r} is {distance:.6g} m from the joint before it: lengths are in m"
+            )
+    for joint, (name, limits) in enumerate(zip(robot.joint_names, robot.limits, strict=True)):
+        ends = [abs(end) for end in (limits.lower, limits.upper) if math.isfinite(end)]
+        if not robot.is_prismatic[joint] and max(ends, default=0.0) > MANY_TURNS:
+            remarks.append(
+                f"joint {name!r} has a limit at {math.degrees(max(ends)):.6g} degrees "
+                f"({max(ends):.6g} rad): angles of a URDF are in rad"
+            )
+    return remarks
 
 
 def _body(robot: Robot, number: int) -> dict[str, Any]:

@@ -22,7 +22,7 @@ from typing import Any
 import numpy as np
 from pydantic import Field
 
-from space_robot_msgs_py.config.columns import read_columns
+from space_robot_msgs_py.config.columns import missing_column, read_columns
 from space_robot_msgs_py.config.files import GIVEN, node_parameters
 from space_robot_msgs_py.config.trees import Tree
 from space_robot_msgs_py.config.validation import StrictModel, read_yaml, validate
@@ -118,7 +118,7 @@ def trajectory_document(path: Path, robot: str) -> MissionDocument:
     columns, model = read_columns(path), find_robot(robot)
     joints = model.joint_names[: model.n]
     if missing := [name for name in ("time", *joints) if name not in columns]:
-        raise InputError(f"{path}: column {missing[0]} is missing; there are {', '.join(columns)}")
+        raise InputError(f"{path}: {missing_column(missing[0], columns)}")
     if not columns["time"]:
         raise InputError(f"{path}: there are no rows below the names of the columns")
     first = {name: column[0] for name, column in columns.items()}

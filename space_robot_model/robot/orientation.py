@@ -10,7 +10,7 @@ from pydantic import Field, model_validator
 
 from space_robot_msgs_py.config.validation import StrictModel
 
-from ..elementary.matrices import norm
+from ..elementary.matrices import direction_norm, norm
 from ..elementary.rotations import quaternion_of_rotation, rotation_of_rpy
 
 Vector = Annotated[list[float], Field(min_length=3, max_length=3)]
@@ -27,8 +27,8 @@ class Orientation(StrictModel):
     def _is_unit(self) -> Orientation:
         if self.rpy_deg is not None and self.quaternion is not None:
             raise ValueError("rpy_deg and quaternion were given: give one of them")
-        if self.quaternion is not None and not 1e-3 <= norm(self.quaternion) <= 1e3:
-            raise ValueError("quaternion must have a norm near 1")
+        if self.quaternion is not None:
+            direction_norm(self.quaternion, "quaternion")
         return self
 
     @property

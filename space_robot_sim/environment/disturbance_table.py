@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from space_robot_msgs_py.config.choices import choices
-from space_robot_msgs_py.config.columns import read_columns
+from space_robot_msgs_py.config.columns import missing_column, read_columns
 from space_robot_msgs_py.config.text import parse_json
 from space_robot_msgs_py.config.validation import short
 from space_robot_msgs_py.errors import InputError
@@ -53,8 +53,7 @@ class DisturbanceTable(NamedTuple):
             InputError: a column is missing or has no numbers, or the times do not rise.
         """
         if TIME not in columns:
-            names = ", ".join(map(str, columns)) or "none"
-            raise InputError(f"{where}: column {TIME!r} is missing; there are {names}")
+            raise InputError(f"{where}: {missing_column(repr(TIME), [*map(str, columns)])}")
         if len(columns) < 2:
             allowed = ", ".join(BASE)
             raise InputError(f"{where}: {TIME!r} alone: columns are {allowed}, and joints by name")

@@ -12,7 +12,7 @@ from pydantic import AfterValidator, Field, model_validator
 from typing_extensions import Self
 
 from space_robot_model.dynamics.attitude import rotation_matrix
-from space_robot_model.elementary.matrices import norm
+from space_robot_model.elementary.matrices import direction_norm, norm
 from space_robot_model.robot.inertia import Inertia, Mass
 from space_robot_model.robot.link_file import Vector
 from space_robot_msgs_py.config.files import named_file
@@ -22,9 +22,7 @@ Array = NDArray[np.float64]
 
 
 def _unit(quaternion: list[float]) -> list[float]:
-    length = norm(quaternion)
-    if not 1e-3 <= length <= 1e3:
-        raise ValueError("a quaternion must have a norm near 1")
+    direction_norm(quaternion, "a quaternion")
     return quaternion
 
 

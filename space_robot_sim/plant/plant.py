@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from space_robot_model.elementary.matrices import norm
+from space_robot_model.elementary.matrices import direction_norm
 from space_robot_model.hardware.sensors import SensorSettings
 from space_robot_model.robot import Robot
 from space_robot_msgs_py import topics
@@ -107,9 +107,7 @@ class Plant(RecordOwner):
                 f"initial_joints_deg has {len(settings.initial_joints_deg)} values, "
                 f"robot {robot.name!r} has {n} joints"
             )
-        length = norm(settings.initial_quaternion)
-        if not 1e-3 <= length <= 1e3:
-            raise InputError(f"initial_quaternion must have a norm near 1, got {length:g}")
+        length = direction_norm(settings.initial_quaternion, "initial_quaternion")
         settings.check(robot, getattr(settings, "actuators", "given"))
         self.names = settings.robot_names(robot)._replace(in_orbit=settings.has_orbit)
         """Names of all measured and commanded quantities."""

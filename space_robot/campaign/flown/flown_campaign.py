@@ -19,7 +19,7 @@ from ...api import FlownFlight, Scenario
 from ...api.in_process import fly_in_process
 from ..row.fly import RowFlyer
 from ..row.row import Task
-from ..store.folder import MANIFEST, STUDY, TABLE, study_changes
+from ..store.folder import MANIFEST, STUDY, TABLE, check_regular, study_changes
 from ..store.manifest import Manifest, read_manifest
 from ..store.software import software, texts_of
 from ..store.table import check_table, read_table
@@ -54,6 +54,7 @@ class FlownCampaign:
         """
         if not (folder / MANIFEST).is_file():
             raise InputError(f"{folder}: not a campaign folder (it has no {MANIFEST})")
+        check_regular(folder)
         self.folder, self.kept, self._trust, self._temporary = folder, kept, trust, temporary
         self.manifest: Manifest = read_manifest(folder / MANIFEST)
 

@@ -17,6 +17,7 @@ from space_robot_control.controller.settings import DEFAULT_SETS
 from space_robot_control.guidance.mission import MissionSettings
 from space_robot_control.laws import laws
 from space_robot_model.robot import Robot
+from space_robot_model.robot.described import unit_remarks
 from space_robot_model.robot.find import OWN_GAINS, OWN_MISSION
 from space_robot_msgs_py.errors import FlightError, InputError
 from space_robot_sim.environment.environment import EnvironmentSettings
@@ -190,7 +191,8 @@ def make_robot(
         names = sorted(laws())
         step(f"flying {', '.join(names)}")
         outcomes = run_all(partial(_fly, place), names, cores())
-    remarks = tuple(filter(None, (estimate_remark(tuned), hinge_remark(robot))))
+    on_gains = filter(None, (estimate_remark(tuned), hinge_remark(robot)))
+    remarks = (*unit_remarks(robot), *on_gains)
     return NewRobot(folder, robot, mission, dict(zip(names, outcomes, strict=True)), remarks)
 
 

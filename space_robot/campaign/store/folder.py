@@ -43,6 +43,7 @@ def held_folder(folder: Path) -> Iterator[None]:
         InputError: another process has locked it, or it contains other files.
     """
     make_folder(folder)
+    check_regular(folder)
     _check_own(folder)
     try:
         descriptor = os.open(folder / LOCK, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o644)
@@ -60,6 +61,18 @@ def held_folder(folder: Path) -> Iterator[None]:
         yield
     finally:
         os.close(descriptor)
+
+
+def check_regular(folder: Path) -> None:
+    """Check that a campaign's files are files; a pipe with such a name would be read for ever.
+
+    Raises:
+        InputError: one is neither a file nor a folder.
+    """
+    for path in folder.iterdir():
+        is_own = path.name == LOCK or path.name.startswith(_OWN)
+        if is_own and not (path.is_file() or path.is_dir()):
+            raise InputError(f"{path}: not a file")
 
 
 def begin_or_resume(folder: Path, manifest: Manifest, study_text: str) -> list[str]:

@@ -8,12 +8,12 @@ from typing import Any
 
 from space_robot_msgs_py.config.namespace import full_namespace
 from space_robot_msgs_py.errors import FlightError, InputError
-from space_robot_msgs_py.ros.locks import living_nodes
+from space_robot_msgs_py.ros.locks import living_nodes, look, node_lock
 from space_robot_sim.plant.settings import MOST_TICKS
 
 from .domain import domain_asked_for
 from .node_names import MISSION, PLANT
-from .node_services import call_trigger, set_parameters
+from .node_services import Check, call_trigger, set_parameters
 from .temporary_node import TemporaryNode
 
 FIND_S = 5.0
@@ -42,12 +42,7 @@ def call_simulation(action: str, domain: int | None, namespace: str, ticks: int 
     visitor = TemporaryNode("simulation_call", domain, namespace)
     try:
         service = f"{PLANT}/{action}"
-        _wait_for(visitor.node, service, domain)
-
-        def check() -> None:
-            if not visitor.node.count_services(service):
-                raise FlightError(f"{PLANT} has gone")
-
+        check = _wait_for(visitor.node, service, domain)
         if action == "step":
             set_parameters(visitor.node, PLANT, {"step_ticks": ticks}, check)
         success, text = call_trigger(visitor.node, service, check)
@@ -75,10 +70,10 @@ def go_to(segment: str, domain: int | None, namespace: str) -> None:
     domain = domain_of_plant(namespace) if domain is None else domain
     visitor = TemporaryNode("goto", domain, namespace)
     try:
-        _wait_for(visitor.node, f"{MISSION}/set_parameters_atomically", domain)
+        check = _wait_for(visitor.node, f"{MISSION}/set_parameters_atomically", domain)
         # a text of its own: the mission ignores one that it has had
         text = f"{segment} # {uuid.uuid4()}"
-        set_parameters(visitor.node, MISSION, {"goto": text}, lambda: None)
+        set_parameters(visitor.node, MISSION, {"goto": text}, check)
     finally:
         visitor.leave()
 
@@ -98,10 +93,20 @@ def domain_of_plant(namespace: str) -> int:
     return domains[0]
 
 
-def _wait_for(node: Any, service: str, domain: int) -> None:
+def _wait_for(node: Any, service: str, domain: int) -> Check:
+    """Wait for a service; return a check that its node is still there."""
     until = time.monotonic() + FIND_S
     while not node.count_services(service):
         if time.monotonic() > until:
             name = node.resolve_service_name(service)
             raise InputError(f"no service {name} in ROS domain {domain}: is a graph flying there?")
         time.sleep(LOOK_S)
+    name = service.rpartition("/")[0]
+    lock = node_lock(domain, node.resolve_service_name(name))
+    is_here = look(lock)[0]  # on this machine: discovery lists a killed node for another 20 s
+
+    def check() -> None:
+        if not node.count_services(service) or (is_here and not look(lock)[0]):
+            raise FlightError(f"{name} has gone")
+
+    return check

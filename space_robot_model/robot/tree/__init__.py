@@ -2,6 +2,7 @@
 
 from .arrays import TreeArrays
 from .bodies import (
+    MANY_TURNS,
     Body,
     Encoder,
     Gear,
@@ -17,6 +18,7 @@ from .bodies import (
 from .flatten import axes_with_z, first_repeated, flatten, other_meaning, parallel_axes
 
 __all__ = [
+    "MANY_TURNS",
     "Body",
     "Encoder",
     "Gear",

@@ -13,6 +13,10 @@ JointKind = Literal["revolute", "prismatic", "fixed"]
 Encoder = Literal["motor", "link", "both"]
 
 
+MANY_TURNS = 4.0 * np.pi
+"""Angle of a joint that asks for a remark, rad."""
+
+
 class JointLimits(NamedTuple):
     """Limits of an actuated joint; infinite if unknown."""
 

@@ -91,6 +91,12 @@ def test_a_refused_segment_leaves_the_mission_alone() -> None:
         np.testing.assert_array_equal(part, other)
 
 
+def test_no_file_is_read_in_flight() -> None:
+    with pytest.raises(InputError, match=r"^file: no file is read in flight") as caught:
+        mission().go_to(5_000, "{file: /etc/passwd}")
+    assert "root" not in str(caught.value)
+
+
 @pytest.mark.parametrize("tick", [0, 8_000, 30_000])
 def test_a_trajectory_is_joined_and_passes_its_points(tick: int) -> None:
     flown = mission()
@@ -154,8 +160,19 @@ NEAR = np.radians(START).tolist()
         (ROBOT.joint_names, [TrajectoryPoint(1.0, NEAR[:5], [], [])], "5 positions of 6 joints"),
         (ROBOT.joint_names, [TrajectoryPoint(1.0, NEAR, [0.0], [])], "1 velocities of 6 joints"),
         (ROBOT.joint_names, [TrajectoryPoint(1.0, [np.nan] * 6, [], [])], "not finite"),
+        (ROBOT.joint_names, [TrajectoryPoint(2147483647.0, NEAR, [], [])], r"got 2.14748e.09 s"),
+        (ROBOT.joint_names, [TrajectoryPoint(1.0, [1e308] * 6, [], [])], "'joint1' comes to "),
+        (ROBOT.joint_names, [TrajectoryPoint(1.0, NEAR, [1e308] * 6, [])], "'joint1' comes to "),
+        (ROBOT.joint_names, [TrajectoryPoint(1.0, NEAR, [], [1e300] * 6)], "'joint1' comes to "),
+        (ROBOT.joint_names, [TrajectoryPoint(1e-9, [3.0] * 6, [], [])], "1e-06 to 1e.06 s"),
+        (
+            ROBOT.joint_names,
+            [TrajectoryPoint(1e-9, [3.0] * 6, [], []), TrajectoryPoint(1.0, NEAR, [], [])],
+            "can be flown",
+        ),
     ],
 )
+@pytest.mark.filterwarnings("error")
 def test_bad_trajectories_are_refused_in_one_line(
     names: tuple[str, ...], given_points: list[TrajectoryPoint], said: str
 ) -> None:

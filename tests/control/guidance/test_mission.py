@@ -157,7 +157,7 @@ def test_base_attitude_is_held_and_normalised() -> None:
         ([1.0, 5.0], [[1.0], [2.0]], {}, r"must rise from 0, got \[1.0, 5.0\]"),
         ([0.0, 5.0, 5.0], [[1.0], [2.0], [3.0]], {}, r"must rise from 0, got \[0.0, 5.0, 5.0\]"),
         ([0.0, 5.0, 2.0], [[1.0], [2.0], [3.0]], {}, "must rise from 0"),
-        ([0.0], [[1.0]], {"base_quaternion": [0.0] * 4}, "base_quaternion must have a norm near 1"),
+        ([0.0], [[1.0]], {"base_quaternion": [0.0] * 4}, "base_quaternion must have a norm of"),
         ([], [[]], {}, "waypoint_times"),
         ([0.0, float("inf")], [[1.0], [2.0]], {}, "waypoint_times"),
         ([0.0], [[float("nan")]], {}, "waypoints_deg"),

@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections import deque
 from collections.abc import Iterable
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -199,6 +200,21 @@ def test_the_stream_goes_on_while_the_clock_is_flooded(bench: Bench) -> None:
     assert len(bench.clock.waiting) == MOST_AT_ONCE + 1
     assert len(bench.joints.sent) == 4 + 1
     assert bench.run() == [*range(50, 2 * MOST_AT_ONCE + LEAD, CHUNK)]
+
+
+@pytest.mark.parametrize("error", [IndexError, MemoryError, ValueError, ZeroDivisionError])
+def test_what_nobody_foresaw_in_a_plan_is_a_refusal(
+    bench: Bench, error: type[Exception], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def plan(*_: object) -> None:
+        raise error("unforeseen,\nin two lines")
+
+    monkeypatch.setattr(Mission, "go_to", plan)
+    (on_set,) = bench.node.on_set
+    result = on_set([SimpleNamespace(name="goto", value="{hold: 1}")])
+    assert not result.successful
+    assert result.reason == f"it cannot be planned ({error.__name__}: unforeseen, in two lines)"
+    assert bench.run() == [0, 10, 20, 30], "the stream goes on"
 
 
 def test_junk_on_the_topic_of_trajectories_is_refused_in_one_line(bench: Bench) -> None:

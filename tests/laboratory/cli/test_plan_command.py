@@ -146,6 +146,17 @@ def test_the_figure_is_drawn(mission: Path, tmp_path: Path) -> None:
     assert "momentum (N m s)" in (tmp_path / "plan.svg").read_text("utf-8")
 
 
+def test_degrees_in_a_file_of_radians_are_remarked(tmp_path: Path) -> None:
+    path = tmp_path / "track.csv"
+    names = ",".join(("time", *find_robot("paper").joint_names))
+    path.write_text(f"{names}\n0,0,120,220,0,-10,0\n10,0,119,219,0,-10,0\n")
+    result = run(path)
+    assert result.exit_code == 0
+    said = "the trajectory leads joint 'joint3' to 12605.1 degrees (220 rad): its numbers are in"
+    assert f"warning: {said} rad" in result.stderr
+    assert "joint1" not in result.stderr
+
+
 @pytest.mark.parametrize(
     ("change", "said"),
     [

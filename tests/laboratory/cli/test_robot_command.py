@@ -57,6 +57,23 @@ def test_tables() -> None:
         assert words in result.stdout
 
 
+@pytest.mark.parametrize(
+    ("metres", "millimetres", "said"),
+    [
+        ('xyz="0 0 0.8"', 'xyz="0 0 800"', "joint 'slide' is 800 m from the joint before it"),
+        ('upper="2"', 'upper="115"', "joint 'shoulder' has a limit at 6589.01 degrees (115 rad)"),
+    ],
+)
+def test_millimetres_and_degrees_are_remarked(
+    tmp_path: Path, metres: str, millimetres: str, said: str
+) -> None:
+    path = tmp_path / "arm.urdf"
+    path.write_text(GOOD.replace(metres, millimetres))
+    result = run(path)
+    assert f"warning: {said}" in " ".join(result.stdout.split())
+    assert report(ARM)["remarks"] == []
+
+
 def test_json_has_all_numbers() -> None:
     found, robot = report(ARM), Robot.from_urdf(ARM)
     assert [body["name"] for body in found["bodies"]] == list(robot.body_names)

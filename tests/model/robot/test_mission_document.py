@@ -63,7 +63,7 @@ def test_it_is_flown(tmp_path: Path) -> None:
     [
         ((HEADER.replace("joint4", "elbow"), *ROWS), "column joint4 is missing; there are time, "),
         ((HEADER,), "there are no rows below the names of the columns"),
-        ((f"{HEADER},q_w,q_x,q_y,q_z", f"{ROWS[0]},0,0,0,0"), "norm near 1"),
+        ((f"{HEADER},q_w,q_x,q_y,q_z", f"{ROWS[0]},0,0,0,0"), "must have a norm of 0.001"),
     ],
 )
 def test_wrong_files_are_named(tmp_path: Path, lines: tuple[str, ...], said: str) -> None:

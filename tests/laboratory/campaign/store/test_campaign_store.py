@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import multiprocessing
+import os
 import subprocess
 import sys
 from collections.abc import Iterable
@@ -64,6 +65,13 @@ CODEC = JournalCodec("campaign", LAWS)
 def journal_of(path: Path, rows: Iterable[Row] = ()) -> Journal:
     write_journal(path, CODEC, rows)
     return Journal(path, CODEC)
+
+
+@pytest.mark.parametrize("name", ["journal.db", "campaign.json", "table.parquet.sha256", ".lock"])
+def test_a_pipe_in_the_place_of_a_file_is_refused(tmp_path: Path, name: str) -> None:
+    os.mkfifo(tmp_path / name)
+    with pytest.raises(InputError, match=f"{name}: not a file"), held_folder(tmp_path):
+        pass
 
 
 @settings(max_examples=12)

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import json
+import os
+import re
 import signal
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -18,12 +21,17 @@ from space_robot_model.robot.find import find_robot
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.bag.reader import read_flight
+from space_robot_msgs_py.errors import FlightError
+from space_robot_msgs_py.ros.locks import nodes_in
 from space_robot_msgs_py.ros.process_environment import set_defaults
 
 set_defaults()
 pytest.importorskip("rclpy")
 
 from space_robot.analysis.tool_error import leads_tool  # noqa: E402
+from space_robot.flight.graph import simulation_calls  # noqa: E402
+from space_robot.flight.graph.node_services import set_parameters  # noqa: E402
+from space_robot.flight.graph.simulation_calls import go_to  # noqa: E402
 from space_robot.flight.graph.temporary_node import TemporaryNode  # noqa: E402
 from space_robot_msgs_py.ros.endpoints import message_type, qos  # noqa: E402
 
@@ -94,6 +102,51 @@ def test_goto_moves_joints_and_base(free_domain: int, tmp_path: Path) -> None:
     assert replay.returncode == 0, replay.stderr
 
 
+REFUSED = (
+    ("{hold: 1e9}", "less than or equal to 1000000"),
+    ("{reactionless: {joints_deg: [1e300, 0, 0, 0, 0, 0]}, duration: 5}", "can be flown, got 1e"),
+    ("{trajectory: {time: [0, 1], joint1: [0]}}", "column 'joint2' is missing"),
+    ("{file: /etc/passwd}", "file: no file is read in flight"),
+)
+
+
+def test_what_cannot_be_flown_is_refused_and_the_flight_goes_on(
+    free_domain: int, tmp_path: Path
+) -> None:
+    bag = tmp_path / "bag"
+    with paused(free_domain, bag) as process:
+        for segment, said in REFUSED:
+            with pytest.raises(FlightError, match=re.escape(said)) as caught:
+                go_to(segment, free_domain, "")
+            assert "\n" not in str(caught.value)
+        node = TemporaryNode("planner", free_domain)
+        try:
+            joints = find_robot("paper").joint_names
+            for goal, seconds in ((1.0, 2**31 - 1), (1e308, 1), (np.nan, 1), (3.0, 0)):
+                publish_trajectory(node, joints, np.full(6, goal), seconds, nanosec=1)
+            go_to("{hold: 86400}", free_domain, "")
+            log = flown(process, free_domain, bag)
+        finally:
+            node.leave()
+    assert np.isfinite(log.reference_joints).all()
+
+
+def test_a_mission_that_is_killed_is_not_waited_for(
+    free_domain: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with paused(free_domain, tmp_path / "bag"):
+        (name,) = (node.name for node in nodes_in(free_domain) if "mission" in node.name)
+        pid = int(re.findall(r"pid (\d+)", name)[0])
+
+        def killed_before(*arguments: Any) -> None:
+            os.kill(pid, signal.SIGKILL)
+            set_parameters(*arguments)
+
+        monkeypatch.setattr(simulation_calls, "set_parameters", killed_before)
+        with pytest.raises(FlightError, match="mission_node has gone"):
+            go_to("{hold: 1}", free_domain, "")
+
+
 def test_a_joint_trajectory_of_a_publisher_is_followed(free_domain: int, tmp_path: Path) -> None:
     bag = tmp_path / "bag"
     robot = find_robot("paper")
@@ -111,14 +164,20 @@ def test_a_joint_trajectory_of_a_publisher_is_followed(free_domain: int, tmp_pat
     assert replay.returncode == 0, replay.stderr
 
 
-def publish_trajectory(node: TemporaryNode, names: tuple[str, ...], goal: np.ndarray) -> None:
+def publish_trajectory(
+    node: TemporaryNode,
+    names: tuple[str, ...],
+    goal: np.ndarray,
+    seconds: int = 1,
+    nanosec: int = 0,
+) -> None:
     topic = topics.JOINT_TRAJECTORY
     kind = message_type(topic.type)
     point_type = message_type("trajectory_msgs/msg/JointTrajectoryPoint")
     publisher = node.node.create_publisher(kind, topic.name, qos(topic))
     until(lambda: publisher.get_subscription_count() > 0)
     point = point_type(positions=goal.tolist())
-    point.time_from_start.sec = 1
+    point.time_from_start.sec, point.time_from_start.nanosec = seconds, nanosec
     publisher.publish(kind(joint_names=list(names), points=[point]))
     from rclpy.duration import Duration
 

@@ -1,0 +1,123 @@
+"""Columns of CSV and Parquet files: what is read, and what is said of what is not."""
+
+from __future__ import annotations
+
+from datetime import datetime, timezone
+from decimal import Decimal
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from space_robot_msgs_py.config.columns import MOST_ROWS, read_columns
+from space_robot_msgs_py.errors import InputError
+
+
+def refusal(path: Path) -> str:
+    with pytest.raises(InputError) as caught:
+        read_columns(path)
+    (line,) = str(caught.value).splitlines()
+    assert line.startswith(f"{path}: ")
+    return line.removeprefix(f"{path}: ")
+
+
+@pytest.mark.parametrize(
+    "text", ["time,x\n0,0.5\n1,1e3\n", "time;x\n0;0,5\n1;1e3\n", "\ufefftime ;x\n0;.5\n\n1;1000\n"]
+)
+def test_commas_or_semicolons_separate_numbers(tmp_path: Path, text: str) -> None:
+    path = tmp_path / "a.csv"
+    path.write_text(text, "utf-8")
+    assert read_columns(path) == {"time": [0.0, 1.0], "x": [0.5, 1000.0]}
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("", "the file is empty"),
+        ("\n\n\n", "the file is empty"),
+        ("  \n", "column 1 has no name"),
+        ("time,x,\n0,1,\n", "column 3 after x has no name (a separator too many in each line?)"),
+        ("time,x\n0,1,\n", "line 2: 2 cells expected, got 3 (time, x; the last one is empty: a "),
+        ("time,x\n\n0,1\n\n1,z\n", "line 5: x: a number was expected, got 'z'"),
+        ('time,x\n0,"0,5"\n', "line 2: x: a number was expected, got '0,5' (columns with decimal "),
+        ("time,x,x\n", "two columns are called 'x'"),
+        ("time,x\n" + "0,1\n" * (MOST_ROWS + 1), "more than 100000 rows"),
+        (",".join(f"c{k}" for k in range(20_000)), "20000 columns, at most 1000 are read"),
+        (",".join(f"c{k}" for k in range(20)) + ("\n" + ",".join("0" * 20)) * 10_000, "10000 rows"),
+    ],
+    ids=range(11),
+)
+def test_wrong_csv_files(tmp_path: Path, text: str, said: str) -> None:
+    path = tmp_path / "a.csv"
+    path.write_text(text)
+    assert refusal(path).startswith(said)
+
+
+def parquet(path: Path, values: Any) -> Path:
+    pyarrow = pytest.importorskip("pyarrow")
+    from pyarrow.parquet import write_table
+
+    write_table(pyarrow.table({"time": pyarrow.array(range(len(values))), "x": values}), path)
+    return path
+
+
+KINDS: dict[str, list[Any]] = {
+    "string": ["1", "2"],
+    "list<element: double>": [[1.0], [2.0]],
+    "struct<a: int64>": [{"a": 1}, {"a": 2}],
+    "timestamp[us, tz=UTC]": [datetime(2026, 1, 1, tzinfo=timezone.utc)] * 2,
+    "bool": [True, False],
+    "null": [None, None],
+}
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_columns_that_are_no_numbers_are_named_with_their_kind(tmp_path: Path, kind: str) -> None:
+    path = parquet(tmp_path / "a.parquet", KINDS[kind])
+    assert refusal(path) == f"x: numbers were expected, got a column of {kind}"
+
+
+def test_all_kinds_of_numbers_are_read(tmp_path: Path) -> None:
+    pyarrow = pytest.importorskip("pyarrow")
+    for values in (
+        [1, 2],
+        [1.0, 2.0],
+        [Decimal(1), Decimal(2)],
+        pyarrow.array([1, 2]).dictionary_encode(),
+        pyarrow.array([1.0, 2.0], pyarrow.float32()),
+    ):
+        path = parquet(tmp_path / "a.parquet", values)
+        assert read_columns(path) == {"time": [0.0, 1.0], "x": [1.0, 2.0]}
+
+
+@pytest.mark.parametrize("missing", [None, float("nan")])
+def test_a_value_that_is_missing_is_named_with_its_row(tmp_path: Path, missing: Any) -> None:
+    path = parquet(tmp_path / "a.parquet", [1.0, missing, 2.0])
+    assert refusal(path).startswith("row 2: x: a number was expected, got n")
+
+
+def test_too_many_rows_are_refused_before_they_are_unpacked(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = parquet(tmp_path / "a.parquet", np.zeros(MOST_ROWS + 1))
+    from pyarrow.parquet import ParquetFile
+
+    monkeypatch.delattr(ParquetFile, "read")
+    assert refusal(path) == "more than 100000 rows"
+
+
+def test_a_damaged_parquet_file_is_read_or_refused_in_one_line(tmp_path: Path) -> None:
+    whole = parquet(tmp_path / "a.parquet", np.linspace(0.0, 1.0, 50)).read_bytes()
+    rng, said = np.random.default_rng(1), set()
+    for number in range(200):
+        damaged = bytearray(whole)
+        damaged[rng.integers(len(whole))] ^= 1 << rng.integers(8)
+        path = tmp_path / "b.parquet"
+        path.write_bytes(damaged[: rng.integers(len(whole))] if number % 10 == 0 else damaged)
+        try:
+            read_columns(path)
+        except InputError as error:
+            said.add(str(error).removeprefix(f"{path}: "))
+    assert "damaged, or not a Parquet file" in said
+    assert all("\n" not in line and "thrift" not in line for line in said)
