@@ -20,7 +20,7 @@ NONE = (0.0, -1.0)
 MEASURED = ("position", "velocity")
 
 
-class Verdict(NamedTuple):
+class GoalVerdict(NamedTuple):
     """How a goal ends."""
 
     code: str
@@ -64,7 +64,7 @@ class GoalTolerances(NamedTuple):
 
     def judge(
         self, piece: Piece, names: Sequence[str], time: Array, measured: Array
-    ) -> Verdict | None:
+    ) -> GoalVerdict | None:
         """Compare measured joints with a trajectory; None: the goal goes on.
 
         Args:
@@ -79,15 +79,15 @@ class GoalTolerances(NamedTuple):
         if beyond.any():
             k = int(np.argmax(beyond))
             text = _excess("path_tolerance", names, time[k], error[k], self.path)
-            return Verdict("PATH_TOLERANCE_VIOLATED", text)
+            return GoalVerdict("PATH_TOLERANCE_VIOLATED", text)
         reached = (error <= self.goal).all(axis=(1, 2)) & is_after
         late = time > piece.end + self.time
         if reached.any() and np.argmax(reached) <= np.argmax([*late, True]):
-            return Verdict("SUCCESSFUL")
+            return GoalVerdict("SUCCESSFUL")
         if late.any():
             k = int(np.argmax(late))
             text = _excess("goal_tolerance", names, time[k], error[k], self.goal)
-            return Verdict("GOAL_TOLERANCE_VIOLATED", text)
+            return GoalVerdict("GOAL_TOLERANCE_VIOLATED", text)
         return None
 
 

@@ -28,7 +28,7 @@ from space_robot_msgs_py.wire.compiled_codec import CompiledCodec
 from space_robot_msgs_py.wire.joint_states import JointStates
 
 from .courses import Piece
-from .goal_tolerances import GoalTolerances, Verdict
+from .goal_tolerances import GoalTolerances, GoalVerdict
 
 Array = NDArray[np.float64]
 
@@ -116,23 +116,23 @@ class Pursuit:
         self.piece, self.tolerances, self._names = piece, tolerances, names
         self.measured: MeasuredJoints | None = None
         """None: without tolerances nothing is measured."""
-        self._verdict: Verdict | None = None
+        self._verdict: GoalVerdict | None = None
 
-    def verdict(self, time: float) -> Verdict | None:
+    def verdict(self, time: float) -> GoalVerdict | None:
         """Return how the goal ends at simulated time ``time``, s; None: it goes on."""
         if self.measured is None:
-            return Verdict("SUCCESSFUL") if time >= self.piece.end else None
+            return GoalVerdict("SUCCESSFUL") if time >= self.piece.end else None
         if self._verdict is None:
             times, states = self.measured.take()
             self._verdict = self.tolerances.judge(self.piece, self._names.joints, times, states)
         return self._verdict
 
 
-class Outcome(NamedTuple):
+class GoalEnding(NamedTuple):
     """End of a goal."""
 
     end: Callable[[], None]
-    verdict: Verdict
+    verdict: GoalVerdict
 
 
 class TrajectoryAction:
@@ -229,19 +229,21 @@ class TrajectoryAction:
         wake_at = time.monotonic() + FEEDBACK_S
         await until(lambda: time.monotonic() >= wake_at or self._outcome(goal, pursuit) is not None)
 
-    def _outcome(self, goal: ServerGoalHandle, pursuit: Pursuit) -> Outcome | None:
+    def _outcome(self, goal: ServerGoalHandle, pursuit: Pursuit) -> GoalEnding | None:
         """Return how a goal ends; None: it goes on."""
         if self._is_closed:
-            return Outcome(goal.abort, Verdict("INVALID_GOAL", "the mission has ended"))
+            return GoalEnding(goal.abort, GoalVerdict("INVALID_GOAL", "the mission has ended"))
         if goal.is_cancel_requested:
             text = "the reference is brought to rest"
-            return Outcome(goal.canceled, Verdict("SUCCESSFUL", text))
+            return GoalEnding(goal.canceled, GoalVerdict("SUCCESSFUL", text))
         if self._motions.latest is not pursuit.piece:
-            return Outcome(goal.abort, Verdict("INVALID_GOAL", "another motion took its place"))
+            return GoalEnding(
+                goal.abort, GoalVerdict("INVALID_GOAL", "another motion took its place")
+            )
         verdict = pursuit.verdict(self._motions.time)
         if verdict is None:
             return None
-        return Outcome(goal.succeed if verdict.code == "SUCCESSFUL" else goal.abort, verdict)
+        return GoalEnding(goal.succeed if verdict.code == "SUCCESSFUL" else goal.abort, verdict)
 
     def _feedback(self) -> Any:
         """Return the reference of the joints at this time."""
