@@ -75,6 +75,7 @@ NOT_RUN = {
     r"\. .venv/bin/activate": "the tests have an environment",
     r"(ROS_DOMAIN_ID=7 )?(ros2|rviz2|plotjuggler)\b": "ROS 2 from apt",
     r"(source|python -m colcon|export ROS_|for node in)\b": "ROS 2 from apt",
+    r"overrides=|sed -E ": "ROS 2 from apt: test_topics.py runs the sed",
     r"rerun\b": "a viewer of 100 MB",
     r"(git|mkdir -p ws|cp TraceableRobotModels|pip|python3 -m venv|sudo apt)\b": "from elsewhere",
     r"for gains in": "3,000 flights",

@@ -44,7 +44,9 @@ def _recorded(reports: Mapping[str, Report]) -> Table:
             law_of(report) or "not said",
             *(report[key] or "not said" for key in ("case", "gains", "robot")),
             f"{report['from_s']:g} to {report['to_s']:g} s",
-            report["ticks"],
+            report["ticks"]
+            if report["ticks"] == report["flight_ticks"]
+            else f"{report['ticks']} of {report['flight_ticks']}",
             JudgedCell("", *(("whole", "good") if _whole(report) else ("not whole", "bad"))),
         ]
         for name, report in reports.items()

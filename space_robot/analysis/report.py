@@ -80,7 +80,7 @@ def analyze(log: FlightLog, actuators: ActuatorSet | None = None) -> dict[str, A
     """
     if not isinstance(log, FlightLog):
         raise InputError(f"log: a FlightLog was expected (load_bag reads one), got {short(log)}")
-    analysis = Analysis(actuators)
+    analysis = Analysis(actuators, log.ticks)
     for block in blocks_of(_without_gaps(log)):
         analysis.add(block)
     return analysis.report()
@@ -89,10 +89,16 @@ def analyze(log: FlightLog, actuators: ActuatorSet | None = None) -> dict[str, A
 class Analysis:
     """Does what `analyze` does, of a flight without gaps in blocks, as `blocks_of` cuts it."""
 
-    def __init__(self, actuators: ActuatorSet | None = None) -> None:
-        """``actuators``: of the base, for the sizing; None: those that flew."""
+    def __init__(self, actuators: ActuatorSet | None = None, flight_ticks: int = 0) -> None:
+        """Begin.
+
+        Args:
+            actuators: of the base, for the sizing; None: those that flew.
+            flight_ticks: of the whole flight, if only a part of it follows.
+        """
         self.ticks = 0
         """Rows so far."""
+        self._flight_ticks = flight_ticks
         self._kinds = _METRICS | {"sizing": lambda log: _sizing(log, actuators)}
         self._metrics: dict[str, Metric] = {}
         self._unavailable: dict[str, str] = {}
@@ -125,6 +131,7 @@ class Analysis:
             **({"controller": laws[0].name} if laws else {}),
             "laws": as_data(laws, self._timebase),
             "ticks": self.ticks,
+            "flight_ticks": max(self._flight_ticks, self.ticks),
             "duration_s": self.ticks * period_ns / 1e9,
             "from_s": self._first_tick * period_ns / 1e9,
             "to_s": stop * period_ns / 1e9,

@@ -11,7 +11,7 @@ from .described import IDEAL
 from .metrics import unit_of
 from .report_lines import Line, lines
 from .settling import BAND
-from .words import Report, flown, law_of, notes, remarks, seen_through
+from .words import Report, analyzed, flown, law_of, notes, remarks, seen_through
 
 DEFINITIONS = {
     "RMS, mean of axes": "mean over a column's axes of each axis' root mean square: what Table V "
@@ -69,7 +69,7 @@ def rms_table(report: Report) -> Table:
 
     Where the truth was recorded, the navigation error stands in the place of (64).
     """
-    title = f"{flown(report)}: {report['ticks']} ticks, {report['duration_s']:g} s"
+    title = f"{flown(report)}: {analyzed(report)}"
     if report["truth_recorded"]:
         title += f"\n{seen_through(report)}"
     navigation = report["navigation_error"]
@@ -115,6 +115,8 @@ def comparison_table(reports: Mapping[str, Report]) -> Table:
     for key in described:
         flights.append([key, *(report[key] and str(report[key]) for report in each)])
     flights.append(["time (s)", *(f"{r['from_s']:g} to {r['to_s']:g}" for r in each)])
+    if any(report["ticks"] < report["flight_ticks"] for report in each):
+        flights.append(["share analyzed", *(f"{r['ticks'] / r['flight_ticks']:.1%}" for r in each)])
     columns = Column(is_label=True), *(Column(name) for name in reports)
     return Table("", columns, [Group(flights, "flight"), *_groups(lines(each))])
 

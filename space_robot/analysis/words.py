@@ -24,6 +24,14 @@ def flown(described: Mapping[str, Any]) -> str:
     return ", ".join([str(law or "unknown law"), *known])
 
 
+def analyzed(report: Report) -> str:
+    """Say how much was analyzed, and what share of the flight that is if it is not all of it."""
+    ticks, of_all, seconds = report["ticks"], report["flight_ticks"], f"{report['duration_s']:g} s"
+    if ticks == of_all:
+        return f"{ticks} ticks, {seconds}"
+    return f"{ticks / of_all:.1%} of the flight, {ticks} of {of_all} ticks, {seconds}"
+
+
 def seen_through(report: Report) -> str:
     """Say through which sensors and navigation the law saw, and that errors are of the truth."""
     faults = ", faults" if report["faults"] else ""

@@ -20,6 +20,7 @@ from space_robot_msgs_py.errors import InputError
 
 from .checks import check_piece
 from .courses import Piece
+from .limits import HALFWAY
 from .spline_courses import BrakedTurn, SplineCourse
 
 Array = NDArray[np.float64]
@@ -29,6 +30,8 @@ BRAKE_S = 2.0
 AT_REST = 1e-9
 """rad/s or m/s."""
 MOST_POINTS = 100_000
+START_WITHIN_S = 86_400.0
+"""Longest wait for the start of a trajectory, s: a day. A stamp of the wall clock is later."""
 
 
 class TrajectoryPoint(NamedTuple):
@@ -72,22 +75,27 @@ def joined(
     begin: float,
     joints: Array,
     base: Array,
+    late: float = 0.0,
 ) -> Piece:
     """Return a trajectory of the joints that begins with the present reference.
+
+    Its points until ``begin`` are left out, as the first one of a plan that begins with the present
+    state; of one that is joined late also those that the joints cannot reach in time any more.
 
     Args:
         robot: as the flight software knows it.
         names: of the joints, in the order of the points' numbers.
-        points: with rising times above 0; velocities and accelerations that are missing are those
-            of a cubic spline through the positions. It ends at rest unless the last point says
-            otherwise.
+        points: with rising times from 0 on; velocities and accelerations that are missing are
+            those of a cubic spline through the positions. It ends at rest unless the last point
+            says otherwise.
         begin: s.
         joints: (3, n) reference of the joints at ``begin``.
         base: (10,) reference of the base, which comes to rest.
+        late: s, from the trajectory's start to ``begin``.
 
     Raises:
-        InputError: a joint is missing or unknown, times do not rise, numbers are missing, or the
-            trajectory is beyond the joints' limits.
+        InputError: a joint is missing or unknown, times do not rise, numbers are missing, no point
+            is left, or the trajectory is beyond the joints' limits.
     """
     for name in names:
         one_of(name, robot.joint_names, "joint", " of the trajectory")
@@ -97,18 +105,30 @@ def joined(
         raise InputError("the trajectory has a joint twice")
     if not 1 <= len(points) <= MOST_POINTS:
         raise InputError(f"1 to {MOST_POINTS} points were expected, got {len(points)}")
-    times = np.array([0.0, *(point.time for point in points)])
-    if not np.all(np.diff(times) > 0.0):
+    times = np.array([point.time for point in points])
+    if times[0] < 0.0 or not np.all(np.diff(times) > 0.0):
+        raise InputError(f"the times of points must rise from 0 on, got {times.tolist()[:8]} s")
+    if times[-1] <= late:
         raise InputError(
-            f"the times of points must rise from above 0, got {times[1:].tolist()[:8]} s"
+            f"the last point is for t = {begin - late + times[-1]:.4f} s, and the reference has "
+            f"been sent until t = {begin:.4f} s"
         )
     order = [list(names).index(name) for name in robot.joint_names]
+    first = int(np.argmax(times > late))
+    if late > 0.0:
+        rise = np.array([_row(p.positions, order, "positions") for p in points[first:]]) - joints[0]
+        fastest = np.array([limits.velocity for limits in robot.limits])
+        span = times[first:, np.newaxis] - late
+        first += int(np.argmax(np.all(HALFWAY * np.abs(rise) <= fastest * span, axis=1)))
+    times, points = np.array([0.0, *(times[first:] - late)]), points[first:]
     states = _states(times, points, order, joints)
     course = SplineCourse(begin, QuinticSpline(times, states))
     end = begin + float(times[-1])
     turn = BrakedTurn(begin, BRAKE_S, base[:4], base[4:7], base[7:])
     attitude = turn.at(np.array([begin + BRAKE_S]))[0, :4]
-    piece = Piece(begin, end, course, turn, states[-1, 0], attitude, "trajectory")
+    left_out = f" without its first {'point' if first == 1 else f'{first} points'}" if first else ""
+    motion = f"trajectory{left_out}"
+    piece = Piece(begin, end, course, turn, states[-1, 0], attitude, motion)
     check_piece(robot, piece)
     return piece
 

@@ -8,10 +8,11 @@ from space_robot_model.robot.find import find_robot
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.errors import MessageError
 from space_robot_msgs_py.ros.endpoints import PolledCallbackGroup, RawPublisher
-from space_robot_msgs_py.ros.health import Health
+from space_robot_msgs_py.ros.health import Health, Level
 from space_robot_msgs_py.ros.loop import Wait
 from space_robot_msgs_py.ros.managed_node import ManagedNode
 from space_robot_msgs_py.ros.trusted_subscription import TrustedSubscription
+from space_robot_msgs_py.samples import RobotNames
 from space_robot_msgs_py.wire.cdr import header_stamp_ns
 from space_robot_msgs_py.wire.reference_codec import ReferenceCodec
 from space_robot_msgs_py.wire.stamp_guard import StampGuard, describe_new_time
@@ -61,7 +62,7 @@ class MissionLoop:
             node,
             self._mission,
             lambda: (max(self._stamps.last, 0), self._next),
-            list(robot.joint_names),
+            RobotNames.of(robot.joint_names, passive=robot.passive_names),
         )
 
     def begin(self) -> None:
@@ -92,7 +93,10 @@ class MissionLoop:
         """Report the progress of the stream."""
         values = {"tick": max(self._stamps.last, 0), "rejected: stamp": self._invalid_stamps}
         values |= self._changes.counts
-        return Health("nominal", values={**values, **self._clock.counts("rejected")})
+        values |= self._clock.counts("rejected")
+        if warning := self._changes.next_warning():
+            return Health(warning, Level.WARN, values)
+        return Health("nominal", values=values)
 
     def _resend_pending(self) -> None:
         """Send the current reference again to new subscribers."""

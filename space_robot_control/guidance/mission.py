@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from itertools import pairwise
 from typing import TYPE_CHECKING, Annotated
@@ -27,6 +28,10 @@ if TYPE_CHECKING:
     from .planner import Planner
 
 Array = NDArray[np.float64]
+
+
+ROUNDING = 1e-6
+"""Ticks by which a time may miss the tick it means."""
 
 
 class MissionSettings(StrictModel):
@@ -162,17 +167,37 @@ class Mission:
         self._replace([*before, *pieces])
         return pieces[-1]
 
-    def follow(self, tick: int, names: Sequence[str], points: Sequence[TrajectoryPoint]) -> Piece:
-        """Fly a trajectory of the joints from a tick on, in place of what was planned.
+    def follow(
+        self,
+        tick: int,
+        names: Sequence[str],
+        points: Sequence[TrajectoryPoint],
+        start: float | None = None,
+    ) -> Piece:
+        """Fly a trajectory of the joints in place of what was planned.
 
-        Args: see `joined`.
+        Args:
+            tick: the first one whose reference may change.
+            names: see `joined`.
+            points: see `joined`.
+            start: s, simulated time of the trajectory's start; None: at ``tick``. What was planned
+                is flown until then; a trajectory that has started already is joined.
 
         Raises:
             InputError: the trajectory is wrong; the mission is as it was.
         """
-        from .live import braking, is_moving, joined
+        from .live import START_WITHIN_S, braking, is_moving, joined
 
-        piece = joined(self._robot, names, points, *self._state_at(tick))
+        late = 0.0
+        if start is not None:
+            if start > tick * self.period + START_WITHIN_S:
+                raise InputError(
+                    f"the start at t = {start:.9g} s is more than {START_WITHIN_S:g} s after now, "
+                    f"t = {tick * self.period:.4f} s: stamps are of simulated time, or 0 for now"
+                )
+            tick = max(tick, math.ceil(start / self.period - ROUNDING))
+            late = max(0.0, tick * self.period - start)
+        piece = joined(self._robot, names, points, *self._state_at(tick), late)
         end = np.array([piece.end])
         joints, base = piece.joints.at(end)[0], piece.base.at(end)[0]
         after = [braking(piece.end, joints, base)] if is_moving(joints, base) else []

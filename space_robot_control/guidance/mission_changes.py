@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import time
+from collections import deque
 from collections.abc import Callable
 from functools import partial
 from typing import TYPE_CHECKING, Any
@@ -11,10 +13,11 @@ from numpy.typing import NDArray
 from rcl_interfaces.msg import SetParametersResult
 
 from space_robot_msgs_py import topics
-from space_robot_msgs_py.config.text import one_line_of
+from space_robot_msgs_py.config.text import one_line_of, printable
 from space_robot_msgs_py.errors import InputError, MessageError
 from space_robot_msgs_py.ros.endpoints import PolledCallbackGroup, RawSubscription
 from space_robot_msgs_py.ros.managed_node import ManagedNode
+from space_robot_msgs_py.samples import RobotNames
 from space_robot_msgs_py.wire.definitions import decode
 
 from .courses import Piece
@@ -28,6 +31,10 @@ Array = NDArray[np.float64]
 NAME = "goto"
 UNFORESEEN = (ArithmeticError, AttributeError, LookupError, MemoryError, TypeError, ValueError)
 """What planning raises for numbers that no check has foreseen; the flight must go on."""
+TOLD_S = 1.0
+"""Time for which a refusal is the node's mode in /diagnostics, from where `fly` prints it, s."""
+MOST_TOLD = 20
+"""Refusals that wait to be told, if somebody floods the topic."""
 
 
 class MissionChanges:
@@ -38,7 +45,7 @@ class MissionChanges:
         node: ManagedNode[Any],
         mission: Mission,
         ticks: Callable[[], tuple[int, int]],
-        joint_names: list[str],
+        names: RobotNames,
     ) -> None:
         """Subscribe, accept the parameter, and offer the action if its package is there.
 
@@ -46,16 +53,18 @@ class MissionChanges:
             node: of the mission.
             mission: to be changed.
             ticks: returns the present tick, and the first one whose reference has not been sent.
-            joint_names: of the joints with motors.
+            names: of the joints.
         """
         self._node, self._mission, self._ticks = node, mission, ticks
-        self.joint_names = joint_names
+        self.names = names
         self._subscription = RawSubscription(node, topics.JOINT_TRAJECTORY, PolledCallbackGroup())
         node.add_on_set_parameters_callback(self._on_set)
         self._last_text = ""
         self.latest: Piece | None = None
         """The last motion that was asked for in flight."""
         self.counts = {"trajectories accepted": 0, "trajectories refused": 0}
+        self._warnings, self._warning = deque[str](maxlen=MOST_TOLD), ""
+        self._told_until = 0.0
         self._action = self._offer_action()
 
     def _offer_action(self) -> TrajectoryAction | None:
@@ -83,9 +92,9 @@ class MissionChanges:
             try:
                 self.follow(decode(data, topics.JOINT_TRAJECTORY.type))
             except MessageError as error:
-                self._refuse(str(error))
+                self.refuse(str(error))
             except InputError:
-                pass  # is in the log
+                pass  # has been told
 
     def follow(self, trajectory: Any) -> None:
         """Follow a trajectory_msgs/JointTrajectory.
@@ -95,6 +104,8 @@ class MissionChanges:
         """
         from .live import TrajectoryPoint  # slow to import, and most flights need none
 
+        stamp = trajectory.header.stamp
+        start = stamp.sec + 1e-9 * stamp.nanosec
         points = [
             TrajectoryPoint(
                 p.time_from_start.sec + 1e-9 * p.time_from_start.nanosec,
@@ -106,9 +117,10 @@ class MissionChanges:
         ]
         names = list(trajectory.joint_names)
         try:
-            self._change(partial(self._mission.follow, self._ticks()[1], names, points))
+            first = self._ticks()[1]
+            self._change(partial(self._mission.follow, first, names, points, start or None))
         except InputError as error:
-            self._refuse(str(error))
+            self.refuse(str(error))
             raise
         self.counts["trajectories accepted"] += 1
 
@@ -148,6 +160,19 @@ class MissionChanges:
             raise InputError(f"it cannot be planned ({one_line_of(error)})") from error
         self._node.log(f"{piece.motion} from t = {piece.begin:.4f} s to {piece.end:.4f} s")
 
-    def _refuse(self, reason: str) -> None:
+    def refuse(self, reason: str) -> None:
+        """Count and tell a refused trajectory."""
         self.counts["trajectories refused"] += 1
-        self._node.log(f"refused a trajectory: {reason}")
+        self.warn(f"refused a trajectory: {reason}")
+
+    def warn(self, text: str) -> None:
+        """Write to the log, and report it as the node's mode."""
+        self._warnings.append(printable(text))
+        self._node.log(self._warnings[-1])
+
+    def next_warning(self) -> str:
+        """Return what was refused or failed, each at one call at least, the last for a second."""
+        now = time.monotonic()
+        if self._warnings:
+            self._warning, self._told_until = self._warnings.popleft(), now + TOLD_S
+        return self._warning if now < self._told_until else ""

@@ -7,8 +7,9 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from contextlib import closing, nullcontext
 from functools import partial
-from typing import Any, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,20 +17,26 @@ from rclpy.action.server import ActionServer, CancelResponse, GoalResponse, Serv
 from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.time import Time
 
-from space_robot_msgs_py.errors import InputError
+from space_robot_msgs_py import topics
+from space_robot_msgs_py.errors import InputError, MessageError
+from space_robot_msgs_py.ros.endpoints import PolledCallbackGroup
 from space_robot_msgs_py.ros.managed_node import ManagedNode
 from space_robot_msgs_py.ros.restart import until
+from space_robot_msgs_py.ros.trusted_subscription import TrustedSubscription
+from space_robot_msgs_py.samples import RobotNames
+from space_robot_msgs_py.wire.compiled_codec import CompiledCodec
+from space_robot_msgs_py.wire.joint_states import JointStates
 
 from .courses import Piece
+from .goal_tolerances import GoalTolerances, GoalVerdict
+
+Array = NDArray[np.float64]
 
 NAME = "~/follow_joint_trajectory"
 FEEDBACK_S = 0.1
-TOLERANCES = (
-    "path_tolerance",
-    "component_path_tolerance",
-    "goal_tolerance",
-    "component_goal_tolerance",
-)
+MOST_AT_ONCE = 1_000
+"""States taken before the node goes on."""
+OF_OTHER_JOINTS = ("component_path_tolerance", "component_goal_tolerance")
 
 
 class Motions(Protocol):
@@ -44,20 +51,28 @@ class Motions(Protocol):
         ...
 
     @property
-    def joint_names(self) -> list[str]:
-        """Names of the joints with motors."""
+    def names(self) -> RobotNames:
+        """Names of the joints."""
         ...
 
-    def joints(self) -> NDArray[np.float64]:
+    def joints(self) -> Array:
         """Return the reference (3, n) of the joints at this time."""
         ...
 
     def follow(self, trajectory: Any) -> None:
-        """Follow a trajectory_msgs/JointTrajectory from now on.
+        """Follow a trajectory_msgs/JointTrajectory.
 
         Raises:
-            InputError: it is wrong; the reason has been logged.
+            InputError: it is wrong; the reason has been told.
         """
+        ...
+
+    def refuse(self, reason: str) -> None:
+        """Tell why a trajectory is refused."""
+        ...
+
+    def warn(self, text: str) -> None:
+        """Tell what is wrong."""
         ...
 
     def stop(self) -> None:
@@ -65,11 +80,67 @@ class Motions(Protocol):
         ...
 
 
+class MeasuredJoints:
+    """The joints as /joint_states reports them while a goal with tolerances is followed."""
+
+    def __init__(self, node: ManagedNode[Any], names: RobotNames) -> None:
+        """Subscribe."""
+        assert node.settings is not None
+        self._subscription = TrustedSubscription(node, topics.JOINT_STATES, PolledCallbackGroup())
+        self._codec = CompiledCodec(JointStates.of_robot(names, node.settings.timebase))
+        self._motors, self._all = len(names.joints), len(names.all_joints)
+
+    def take(self) -> tuple[Array, Array]:
+        """Return times (T,), s, and positions and velocities (T, 2, n), of what has come."""
+        times: list[float] = []
+        rows: list[tuple[Array, Array]] = []
+        n = self._motors
+        values = np.zeros(2 * self._all + n)
+        while len(times) < MOST_AT_ONCE and (data := self._subscription.take()) is not None:
+            try:
+                times.append(self._codec.decode(data, values) / 1e9)
+            except MessageError:  # of another robot
+                continue
+            rows.append((values[:n].copy(), values[self._all : self._all + n].copy()))
+        return np.array(times), np.array(rows).reshape(-1, 2, n)
+
+    def close(self) -> None:
+        """End the subscription."""
+        self._subscription.close()
+
+
+class Pursuit:
+    """The trajectory of a goal, and how its joints follow it."""
+
+    def __init__(self, piece: Piece, tolerances: GoalTolerances, names: RobotNames) -> None:
+        self.piece, self.tolerances, self._names = piece, tolerances, names
+        self.measured: MeasuredJoints | None = None
+        """None: without tolerances nothing is measured."""
+        self._verdict: GoalVerdict | None = None
+
+    def verdict(self, time: float) -> GoalVerdict | None:
+        """Return how the goal ends at simulated time ``time``, s; None: it goes on."""
+        if self.measured is None:
+            return GoalVerdict("SUCCESSFUL") if time >= self.piece.end else None
+        if self._verdict is None:
+            times, states = self.measured.take()
+            self._verdict = self.tolerances.judge(self.piece, self._names.joints, times, states)
+        return self._verdict
+
+
+class GoalEnding(NamedTuple):
+    """End of a goal."""
+
+    end: Callable[[], None]
+    verdict: GoalVerdict
+
+
 class TrajectoryAction:
     """Server of the action: one goal at a time, the last one counts.
 
-    A goal succeeds when the reference has reached the end of its trajectory. The errors of the
-    controller are not looked at.
+    A goal succeeds when the reference has reached the end of its trajectory, and the measured
+    joints are within its tolerances, if it has any. With a violated one the reference is brought
+    to rest.
     """
 
     def __init__(self, node: ManagedNode[Any], action: Any, motions: Motions) -> None:
@@ -88,7 +159,7 @@ class TrajectoryAction:
             node,
             action,
             NAME,
-            self._lead,
+            self._lead,  # never called so: each goal is started by `_start`
             callback_group=ReentrantCallbackGroup(),
             goal_callback=self._accept,
             handle_accepted_callback=self._start,
@@ -102,63 +173,83 @@ class TrajectoryAction:
 
     def _accept(self, request: Any) -> GoalResponse:
         """Check a goal and follow it; the action has no field for a reason."""
-        if tolerances := [name for name in TOLERANCES if getattr(request, name)]:
-            self._node.log(f"refused a goal: {tolerances[0]} is not checked here, leave it empty")
-            return GoalResponse.REJECT
-        if request.multi_dof_trajectory.joint_names:
-            self._node.log("refused a goal: multi_dof_trajectory is not for this robot")
+        try:
+            if request.multi_dof_trajectory.joint_names or any(
+                getattr(request, name) for name in OF_OTHER_JOINTS
+            ):
+                raise InputError("multi_dof_trajectory and its tolerances are not for this robot")
+            self._tolerances = GoalTolerances.read(request, self._motions.names.joints)
+        except InputError as error:
+            self._motions.refuse(str(error))
             return GoalResponse.REJECT
         try:
             self._motions.follow(request.trajectory)
         except InputError:
             return GoalResponse.REJECT
+        if any(e.acceleration > 0.0 for e in (*request.path_tolerance, *request.goal_tolerance)):
+            self._motions.warn("accelerations are not measured: their tolerances are ignored")
         return GoalResponse.ACCEPT
 
     def _start(self, goal: ServerGoalHandle) -> None:
-        self._goal = goal
-        goal.execute(partial(self._lead, piece=self._motions.latest))
+        self._goal, piece = goal, self._motions.latest
+        assert piece is not None
+        pursuit = Pursuit(piece, self._tolerances, self._motions.names)
+        goal.execute(partial(self._lead, pursuit=pursuit))
 
     def _cancel(self, goal: ServerGoalHandle) -> CancelResponse:
         if goal is not self._goal:
             return CancelResponse.REJECT
+        return CancelResponse.ACCEPT if self._stop("to cancel a goal") else CancelResponse.REJECT
+
+    def _stop(self, what: str) -> bool:
+        """Bring the reference to rest; return whether that is possible."""
         try:
             self._motions.stop()
         except InputError as error:  # a joint would leave its limits meanwhile
-            self._node.log(f"refused to cancel a goal: {error}")
-            return CancelResponse.REJECT
-        return CancelResponse.ACCEPT
+            self._motions.warn(f"refused {what}: {error}")
+            return False
+        return True
 
-    async def _lead(self, goal: ServerGoalHandle, piece: Piece | None = None) -> Any:
+    async def _lead(self, goal: ServerGoalHandle, pursuit: Pursuit) -> Any:
         """Wait for the end of a trajectory, telling the reference meanwhile."""
-        while (outcome := self._outcome(goal, piece)) is None:
-            goal.publish_feedback(self._feedback())
-            await self._pause(goal, piece)
-        end, text = outcome
-        end()
-        return self._action.Result(error_string=text)
+        if pursuit.tolerances.are_given:
+            pursuit.measured = MeasuredJoints(self._node, self._motions.names)
+        with closing(pursuit.measured) if pursuit.measured else nullcontext():
+            while (outcome := self._outcome(goal, pursuit)) is None:
+                goal.publish_feedback(self._feedback())
+                await self._pause(goal, pursuit)
+        code, text = outcome.verdict
+        if code.endswith("VIOLATED"):
+            self._motions.warn(f"a goal is aborted, the reference is brought to rest: {text}")
+            self._stop("to bring the reference to rest")
+        outcome.end()
+        return self._action.Result(error_code=getattr(self._action.Result, code), error_string=text)
 
-    async def _pause(self, goal: ServerGoalHandle, piece: Piece | None) -> None:
+    async def _pause(self, goal: ServerGoalHandle, pursuit: Pursuit) -> None:
         wake_at = time.monotonic() + FEEDBACK_S
-        await until(lambda: time.monotonic() >= wake_at or self._outcome(goal, piece) is not None)
+        await until(lambda: time.monotonic() >= wake_at or self._outcome(goal, pursuit) is not None)
 
-    def _outcome(
-        self, goal: ServerGoalHandle, piece: Piece | None
-    ) -> tuple[Callable[[], None], str] | None:
-        """Return how a goal ends, and what to say of it; None: it goes on."""
-        motions = self._motions
+    def _outcome(self, goal: ServerGoalHandle, pursuit: Pursuit) -> GoalEnding | None:
+        """Return how a goal ends; None: it goes on."""
         if self._is_closed:
-            return goal.abort, "the mission has ended"
+            return GoalEnding(goal.abort, GoalVerdict("INVALID_GOAL", "the mission has ended"))
         if goal.is_cancel_requested:
-            return goal.canceled, "the reference is brought to rest"
-        if motions.latest is not piece or piece is None:
-            return goal.abort, "another motion took its place"
-        return (goal.succeed, "") if motions.time >= piece.end else None
+            text = "the reference is brought to rest"
+            return GoalEnding(goal.canceled, GoalVerdict("SUCCESSFUL", text))
+        if self._motions.latest is not pursuit.piece:
+            return GoalEnding(
+                goal.abort, GoalVerdict("INVALID_GOAL", "another motion took its place")
+            )
+        verdict = pursuit.verdict(self._motions.time)
+        if verdict is None:
+            return None
+        return GoalEnding(goal.succeed if verdict.code == "SUCCESSFUL" else goal.abort, verdict)
 
     def _feedback(self) -> Any:
         """Return the reference of the joints at this time."""
         motions, feedback = self._motions, self._action.Feedback()
         feedback.header.stamp = Time(nanoseconds=round(motions.time * 1e9)).to_msg()
-        feedback.joint_names = motions.joint_names
+        feedback.joint_names = list(motions.names.joints)
         desired = feedback.desired
         desired.positions, desired.velocities, desired.accelerations = motions.joints().tolist()
         return feedback

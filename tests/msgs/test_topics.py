@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import re
 import subprocess
 import sys
 from typing import Any
 
 import pytest
 import yaml
-from paths import CONFIG
+from paths import CONFIG, DOCS
 
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.samples import RobotNames, Timebase
@@ -26,7 +27,7 @@ def test_overrides_for_ros2_bag_record_are_the_topics_own() -> None:
             "reliability": "reliable",
             "durability": "transient_local" if topic.transient_local else "volatile",
         }
-        for topic in topics.RECORDED
+        for topic in (*topics.RECORDED, *topics.FOR_OTHERS)
     }
     assert yaml.safe_load(OVERRIDES.read_text("utf-8")) == expected
 
@@ -44,8 +45,22 @@ def test_ros2_bag_reads_the_overrides_as_the_nodes_quality_of_service() -> None:
     }
     for name, profile in yaml.safe_load(OVERRIDES.read_text("utf-8")).items():
         read = qos.QoSProfile(**{key: policies[key](value) for key, value in profile.items()})
-        (topic,) = (topic for topic in topics.RECORDED if topic.full_name == name)
+        (topic,) = (
+            topic for topic in (*topics.RECORDED, *topics.FOR_OTHERS) if topic.full_name == name
+        )
         assert read == of_the_nodes(topic), name
+
+
+@pytest.mark.parametrize("page", ["bags", "namespaces"])
+def test_overrides_of_a_robot_in_a_namespace_have_its_topics(page: str) -> None:
+    """By the commands of the pages; topics of the whole domain keep their names."""
+    found = re.findall(r"^    sed -E '(.+)' ", (DOCS / f"manual/{page}.md").read_text(), re.M)
+    everywhere = (*topics.RECORDED, *topics.FOR_OTHERS)
+    assert found
+    for number, expression in enumerate(found, 1):
+        command = ["sed", "-E", expression, str(OVERRIDES)]
+        told = subprocess.run(command, capture_output=True, check=True, text=True).stdout
+        assert set(yaml.safe_load(told)) == {t.in_namespace(f"/sat{number}") for t in everywhere}
 
 
 @pytest.mark.parametrize("topic", topics.ALL, ids=lambda topic: topic.full_name)

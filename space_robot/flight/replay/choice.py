@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -48,6 +48,7 @@ class ControllerChoice:
         gains: str = "",
         chosen: Mapping[str, Any] | None = None,
         trust: bool = False,
+        laws: Sequence[LawInForce] = (),
     ) -> None:
         """Put the parameters together and check them.
 
@@ -58,10 +59,15 @@ class ControllerChoice:
             gains: gain set to fly (empty: the recorded one).
             chosen: further parameters of the node, over the recorded ones.
             trust: whether modules and files that the description names may be opened.
+            laws: in force in flight, by rising tick: of a bag without a description the first one
+                is the law that flew, with its gains.
 
         Raises:
             InputError: something recorded or given does not exist here, or does not fit.
         """
+        if laws and "controller" not in flight:
+            gains_used = {name: list(values) for name, values in laws[0].gains.items()}
+            flight = {**flight, "controller": laws[0].name, "gains_used": gains_used}
         chosen = chosen or {}
         controller = str(chosen.get("controller", controller))
         gains = str(chosen.get("gains", gains))
@@ -179,6 +185,12 @@ class ControllerChoice:
         settings = ControllerNodeSettings.resolve(own)
         robot = find_robot(settings.robot)
         axes = robot.n + 3
+        flown_axes = {len(values) for values in self._flight.get("gains_used", {}).values()}
+        if "robot" not in self.parameters and flown_axes - {1, axes}:
+            raise InputError(
+                f"the bag does not say which robot was flown, with {max(flown_axes) - 3} joints: "
+                "name it with --set controller.robot=NAME"
+            )
         laws = build_laws(settings, axes, gains)
         for swap in parse_swaps(settings.swaps, settings.period):
             one_of(swap.name, laws, "controller", " of swaps")

@@ -145,7 +145,8 @@ class Replay:
         if "_mission" in faults:
             yield "the mission was killed or stopped: references may have come late in flight"
         if not flight:
-            yield "the bag does not say what was flown: case, gains and swaps are a guess"
+            law = "" if has_laws else "law, gains, "
+            yield f"the bag does not say what was flown: {law}robot and parameters are a guess"
         elif "parameters" not in flight:
             yield "the bag is an older one: parameters changed with --set are not in it"
         if not self.recording.is_whole:

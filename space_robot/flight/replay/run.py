@@ -5,7 +5,7 @@ from __future__ import annotations
 import gc
 import time
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -80,6 +80,7 @@ def replay(options: ReplayOptions) -> Replay:
         FlightError: the controller did not start.
     """
     recording = Recording(options.bag, options.remap, options.namespace)
+    laws = recording.laws()
     with ScratchFolder() as folder:
         choice = ControllerChoice(
             recording.flight,
@@ -88,14 +89,19 @@ def replay(options: ReplayOptions) -> Replay:
             options.gains,
             options.parameters,
             options.trust,
+            laws,
         )
         require_ros()
-        return _Run(options, recording, choice).run()
+        return _Run(options, recording, choice, laws).run()
 
 
 class _Run:
     def __init__(
-        self, options: ReplayOptions, recording: Recording, choice: ControllerChoice
+        self,
+        options: ReplayOptions,
+        recording: Recording,
+        choice: ControllerChoice,
+        laws: Sequence[LawInForce],
     ) -> None:
         self._options, self._recording, self._choice = options, recording, choice
         period = recording.timebase.period
@@ -107,7 +113,7 @@ class _Run:
         self._parts = self._choose_parts()
         if next(recording.states(self._parts, self._start, self._stop), None) is None:
             raise InputError(f"{options.bag}: no states in the part to be replayed")
-        self._laws = within(recording.laws(), self._start, self._stop)
+        self._laws = within(laws, self._start, self._stop)
         self._skipped = 0
         self._progress: FlightProgress | None = None
         self._shown_at = 0.0

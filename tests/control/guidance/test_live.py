@@ -115,6 +115,81 @@ def test_a_trajectory_is_joined_and_passes_its_points(tick: int) -> None:
     np.testing.assert_array_equal(joints[-1, 1:], 0.0)
 
 
+WAYS = [
+    (0.0, START),
+    (1.0, [2.0, 119.0, 218.0, 1.0, -9.0, 1.0]),
+    (3.0, [20.0, 100.0, 190.0, 40.0, 5.0, -20.0]),
+    (5.0, GOAL),
+]
+"""A plan from the present state on, as MoveIt makes it."""
+
+
+def points_of(ways: list[tuple[float, list[float]]]) -> list[TrajectoryPoint]:
+    return [TrajectoryPoint(time, np.radians(row).tolist(), [], []) for time, row in ways]
+
+
+@pytest.mark.parametrize(
+    ("start", "begin", "left_out"),
+    [
+        (None, 4.0, "without its first point"),  # stamp 0: now
+        (3.9, 4.0, "without its first point"),
+        (2.5, 4.0, "without its first 2 points"),
+        (0.5, 4.0, "without its first 3 points"),
+        (6.0, 6.0, "without its first point"),
+        (6.00012, 6.0005, "without its first point"),  # between two ticks
+    ],
+)
+def test_a_trajectory_starts_at_its_stamp_or_is_joined_on_its_way(
+    start: float | None, begin: float, left_out: str
+) -> None:
+    """Until then the mission goes on; each point that is left is passed at its time."""
+    flown, tick = mission(), 8_000
+    before, _ = rows_of(flown)
+    piece = flown.follow(tick, ROBOT.joint_names, points_of(WAYS), start)
+    assert (piece.begin, piece.motion) == (pytest.approx(begin), f"trajectory {left_out}")
+    joints, _ = rows_of(flown)
+    first = round(begin / PERIOD)
+    np.testing.assert_array_equal(joints[:first], before[:first])
+    assert np.abs(np.diff(joints[:, 1], axis=0)).max() < 0.02  # 40 rad/s2, where 0.5 s are left
+    origin = tick * PERIOD if start is None else start
+    for time, row in WAYS:
+        if origin + time > begin:
+            at = piece.joints.at(np.array([origin + time]))[0]
+            np.testing.assert_allclose(at[0], np.radians(row), atol=1e-12)
+    assert piece.end == pytest.approx(origin + 5.0)
+    np.testing.assert_allclose(joints[-1, 0], np.radians(GOAL), atol=1e-12)
+
+
+def test_a_late_trajectory_is_joined_where_the_joints_can_reach_it() -> None:
+    robot = find_robot("dual_arm")  # 20 degrees/s at most
+    settings = {"waypoint_times": [0.0], "waypoints_deg": [0.0] * robot.n}
+    flown = Mission(robot, MissionSettings.model_validate(settings), PERIOD)
+    times = np.arange(0, 31) / 10.0
+    ramp = [TrajectoryPoint(t, np.full(robot.n, 0.1 * t).tolist(), [], []) for t in times]
+    piece = flown.follow(2_000, robot.joint_names, ramp, start=0.2)
+    assert piece.motion == "trajectory without its first 18 points"
+    row = piece.joints.at(np.array([0.2 + 1.8]))[0, 0]
+    np.testing.assert_allclose(row, 0.18, atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("start", "said"),
+    [
+        (-1.0, "the last point is for t = 4.0000 s, and the reference has been sent until t = 4.0"),
+        (
+            1.7e9,
+            "the start at t = 1.7e\\+09 s is more than 86400 s after now, t = 4.0000 s: stamps",
+        ),
+    ],
+)
+def test_a_trajectory_of_another_time_is_refused(start: float, said: str) -> None:
+    flown = mission()
+    before = rows_of(flown)
+    with pytest.raises(InputError, match=said):
+        flown.follow(8_000, ROBOT.joint_names, points_of(WAYS), start)
+    np.testing.assert_array_equal(rows_of(flown)[0], before[0])
+
+
 def test_given_velocities_are_flown() -> None:
     flown = mission()
     rate = [0.01] * 6
@@ -151,11 +226,12 @@ NEAR = np.radians(START).tolist()
         (("a", *ROBOT.joint_names), [TrajectoryPoint(1.0, NEAR, [], [])], "unknown joint 'a'"),
         ((*ROBOT.joint_names, "joint1"), [TrajectoryPoint(1.0, NEAR, [], [])], "a joint twice"),
         (ROBOT.joint_names, [], "1 to 100000 points"),
-        (ROBOT.joint_names, [TrajectoryPoint(0.0, NEAR, [], [])], "must rise from above 0"),
+        (ROBOT.joint_names, [TrajectoryPoint(0.0, NEAR, [], [])], "last point is for t = 2.0000 s"),
+        (ROBOT.joint_names, [TrajectoryPoint(-1.0, NEAR, [], [])], "must rise from 0 on"),
         (
             ROBOT.joint_names,
             [TrajectoryPoint(2.0, NEAR, [], []), TrajectoryPoint(1.0, NEAR, [], [])],
-            "must rise from above 0",
+            "must rise from 0 on",
         ),
         (ROBOT.joint_names, [TrajectoryPoint(1.0, NEAR[:5], [], [])], "5 positions of 6 joints"),
         (ROBOT.joint_names, [TrajectoryPoint(1.0, NEAR, [0.0], [])], "1 velocities of 6 joints"),

@@ -14,6 +14,7 @@ import pytest
 from space_robot_control.guidance.settings import MissionNodeSettings
 from space_robot_model.robot import Robot
 from space_robot_msgs_py import topics
+from space_robot_msgs_py.ros.health import Level
 from space_robot_msgs_py.wire.clock import ClockCodec
 from space_robot_msgs_py.wire.reference_codec import ReferenceCodec
 
@@ -22,6 +23,7 @@ pytest.importorskip("rclpy")
 from space_robot_control.guidance import loop, mission_changes
 from space_robot_control.guidance.loop import CLOCK_WAIT_S, GREET_S, MOST_AT_ONCE, MissionLoop
 from space_robot_control.guidance.mission import Mission
+from space_robot_control.guidance.mission_changes import TOLD_S
 
 CHUNK, LEAD = 10, 35
 NO_TRAJECTORIES = {"trajectories accepted": 0, "trajectories refused": 0}
@@ -224,4 +226,9 @@ def test_junk_on_the_topic_of_trajectories_is_refused_in_one_line(bench: Bench) 
     refused = [line for line in bench.node.said if line.startswith("refused a trajectory")]
     assert len(refused) == 3
     assert not any("\n" in line for line in refused)
-    assert bench.loop.health().values["trajectories refused"] == 3
+    told = [bench.loop.health() for _ in range(4)]
+    assert told[0].values["trajectories refused"] == 3
+    assert [health.mode for health in told] == [*refused, refused[-1]]
+    assert {health.level for health in told} == {Level.WARN}
+    bench.now += TOLD_S
+    assert (bench.loop.health().mode, bench.loop.health().level) == ("nominal", Level.OK)

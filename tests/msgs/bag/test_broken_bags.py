@@ -27,6 +27,7 @@ from bags import (
 from mcap.writer import Writer as McapWriter
 
 from space_robot.analysis import analyze
+from space_robot.analysis.report_tables import rms_table
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.bag.reader import read_flight
 from space_robot_msgs_py.bag.recorder import BagRecorder
@@ -99,6 +100,8 @@ def test_a_flight_with_a_gap_is_analysed_where_it_has_none(recorded: Recorded, b
     told = "analyzed from t = 0.1000 to 0.1995 s, the longest stretch without a gap"
     assert report["damage"] == [*log.damage, told]
     assert whole["damage"] == []
+    assert "50.0% of the flight, 200 of 400 ticks, 0.1 s" in rms_table(report).title
+    assert rms_table(whole).title.endswith(": 400 ticks, 0.2 s")
     log.quaternion[:] = np.nan
     with pytest.raises(InputError, match="no tick has both a state and a reference"):
         analyze(log)

@@ -65,11 +65,12 @@ def sim(domain: int, *words: str) -> int:
     return space_robot_here("sim", *words, "--domain", str(domain)).returncode
 
 
-def flown(process: Forked, domain: int, bag: Path) -> FlightLog:
-    """Let the flight go on to its end."""
+def flown(process: Forked, domain: int, bag: Path, said: str = "") -> FlightLog:
+    """Let the flight go on to its end; the terminal has shown what is ``said``."""
     assert sim(domain, "resume") == 0
     output, errors = process.communicate(timeout=TIMEOUT_S)
     assert process.returncode == 0, errors
+    assert said in errors
     assert not any(json.loads(output)["lost"].values())
     log = read_flight(bag)
     joints, base = log.reference_joints, log.reference_base
@@ -154,9 +155,10 @@ def test_a_joint_trajectory_of_a_publisher_is_followed(free_domain: int, tmp_pat
     with paused(free_domain, bag) as process:
         node = TemporaryNode("planner", free_domain)
         try:
-            publish_trajectory(node, robot.joint_names[:4], goal[:4])  # refused
+            publish_trajectory(node, robot.joint_names[:4], goal[:4])
             publish_trajectory(node, robot.joint_names[::-1], goal[::-1])
-            log = flown(process, free_domain, bag)
+            refused = "mission_node: refused a trajectory: the trajectory lacks joint 'joint5'"
+            log = flown(process, free_domain, bag, said=refused)
         finally:
             node.leave()
     np.testing.assert_allclose(log.reference_joints[-1, 0], goal, atol=1e-12)

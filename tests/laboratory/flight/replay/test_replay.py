@@ -13,10 +13,12 @@ from pathlib import Path
 import numpy as np
 import psutil
 import pytest
+from bags import entries_of, rosbags_bag
 from command import Run
 from driven_robots import driven_paper
 from flights import Flown, forked_space_robot, space_robot_here
 
+from space_robot.cli.replay_display import title
 from space_robot.flight.plan import Flight, FlightPlan, resolve
 from space_robot.flight.replay.outcome import Replay, ReplayOptions
 from space_robot.flight.replay.run import replay
@@ -27,6 +29,7 @@ from space_robot_model.robot.find import find_robot
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.bag.folder import open_bag
 from space_robot_msgs_py.bag.recorder import BagRecorder
+from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.samples import Command
 from space_robot_msgs_py.wire.codecs import CommandCodec
 
@@ -173,6 +176,35 @@ def test_another_law_is_shown_and_not_judged(recorded: Callable[..., Path], tmp_
     assert 0.0 < np.abs(torque["replayed"] - torque["recorded"]).max() < 1.0
     assert plot.stat().st_size > 10_000
     assert plot.with_suffix(".svg").exists()
+
+
+def test_another_law_answers_a_bag_of_ros2_bag_record(
+    recorded: Callable[..., Path], play: Callable[..., Replay], tmp_path: Path
+) -> None:
+    """It has no description: what flew is what /controller/law says."""
+    bag = rosbags_bag(tmp_path / "bag", entries_of(recorded(case="3")), lambda writer: None)
+    other = play(bag, controller="ctc").report()
+    expected = play(recorded(case="3"), controller="ctc").report()
+    assert (other["replayed"]["controller"], other["judged"]) == ("ctc", False)
+    assert other["recorded"]["laws"][0]["controller"] == "tde_stc"
+    assert other["axes"] == expected["axes"]
+    assert title(other).endswith(": ctc, gains default, in lockstep")
+    same = play(bag).report()
+    assert (same["replayed"]["controller"], same["judged"], same["passed"]) == (
+        "tde_stc",
+        True,
+        True,
+    )
+
+
+def test_a_bag_without_its_robot_is_refused_in_one_line(
+    recorded: Callable[..., Path], play: Callable[..., Replay], tmp_path: Path
+) -> None:
+    flown = recorded(robot="seven_joint")
+    bag = rosbags_bag(tmp_path / "bag", entries_of(flown), lambda writer: None)
+    with pytest.raises(InputError, match="which robot was flown, with 7 joints: name it with"):
+        play(bag)
+    assert play(bag, parameters={"robot": "seven_joint"}).has_passed
 
 
 def test_one_altered_command_is_found_exactly(
