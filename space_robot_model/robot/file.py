@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 from dataclasses import replace
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,8 +17,9 @@ from space_robot_msgs_py.topics import BASE_AXES
 from ..elementary.matrices import product
 from .inertia import Inertia, Mass, inertia_tensor
 from .link_file import BASE, FrameFile, LinkFile, body_of
-from .plate_file import PlateFile, Plates
-from .tree import Body, Plate, Tool, first_repeated
+from .plate_file import Plates
+from .tree import Body, Tool, first_repeated
+from .visual_file import VisualFile
 
 Array = NDArray[np.float64]
 
@@ -65,35 +66,41 @@ class RobotFile(StrictModel):
     tool: ToolFile | None = None
     tools: list[ToolFile] = Field([])
     plates: Plates = Field([])
+    visuals: list[VisualFile] = Field([])
 
-    @field_validator("plates", mode="after")
+    @field_validator("plates", "visuals", mode="after")
     @classmethod
-    def _are_on_links(cls, plates: list[PlateFile], info: ValidationInfo) -> list[PlateFile]:
+    def _are_on_links(cls, entries: list[Any], info: ValidationInfo) -> list[Any]:
         if (links := info.data.get("links")) is None:  # they are wrong themselves
-            return plates
+            return entries
+        what = str(info.field_name).removesuffix("s")
         names = [BASE, *(link.name for link in links)]
-        for number, plate in enumerate(plates):
-            if plate.link not in names:
-                advice = choices(plate.link, names)
-                raise ValueError(f"unknown link {short(plate.link)} of plate {number}: {advice}")
-        return plates
+        for number, entry in enumerate(entries):
+            if entry.link not in names:
+                advice = choices(entry.link, names)
+                raise ValueError(f"unknown link {short(entry.link)} of {what} {number}: {advice}")
+        return entries
 
     def bodies(self) -> list[Body]:
         """Return the bodies of the tree defined by the file."""
         tools = [*([self.tool] if self.tool else []), *self.tools] or [ToolFile()]
         last = self.links[-1].name
         base = Body(BASE, self.base.mass, inertia_tensor(self.base.inertia), np.zeros(3))
-        bodies = [replace(base, tools=_tools_of(BASE, tools, last), plates=self._plates(BASE))]
+        bodies = [replace(base, tools=_tools_of(BASE, tools, last), **self._surfaces(BASE))]
         for above, link in itertools.pairwise((None, *self.links)):
             assert link
             above_name = above.name if above else BASE
             body = body_of(link, link.parent or above_name)
             on_link = _tools_of(link.name, tools, last)
-            bodies.append(replace(body, tools=on_link, plates=self._plates(link.name)))
+            bodies.append(replace(body, tools=on_link, **self._surfaces(link.name)))
         return bodies
 
-    def _plates(self, link: str) -> tuple[Plate, ...]:
-        return tuple(plate.plate for plate in self.plates if plate.link == link)
+    def _surfaces(self, link: str) -> dict[str, Any]:
+        """Return plates and visuals of a link as fields of its `Body`."""
+        return {
+            "plates": tuple(plate.plate for plate in self.plates if plate.link == link),
+            "visuals": tuple(shape.visual for shape in self.visuals if shape.link == link),
+        }
 
 
 def _tools_of(body: str, tools: list[ToolFile], last: str) -> tuple[Tool, ...]:
