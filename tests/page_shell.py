@@ -132,6 +132,7 @@ def _urdf(folder: Path) -> None:
 def _urdf_with_a_defect(folder: Path) -> None:
     """And the law of the page on laws."""
     text = (DATA / "docs.urdf").read_text("utf-8")
+    _urdf(folder)
     (folder / "ETSVII.urdf").write_text(text.replace('izz="2"', 'izz="9"'))
     (folder / "my_laws.py").write_text(files(DOCS / "manual/control_laws.md")["my_laws.py"])
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import shlex
 from collections.abc import Sequence
 from pathlib import Path
@@ -38,6 +39,27 @@ class NewGroup(click.Group):
         return [*super().shell_complete(ctx, incomplete), *robot.shell_complete(ctx, incomplete)]
 
 
+def _springs(
+    context: click.Context, option: click.Parameter, texts: Sequence[str]
+) -> dict[str, dict[str, float]]:
+    """Parse `JOINT:STIFFNESS,DAMPING`, several times."""
+    springs: dict[str, dict[str, float]] = {}
+    for text in texts:
+        joint, _, numbers = text.rpartition(":")
+        try:
+            stiffness, damping = map(float, numbers.split(","))
+        except ValueError:
+            joint = ""
+        if not joint or not (0.0 <= stiffness < math.inf and 0.0 <= damping < math.inf):
+            raise click.BadParameter(
+                f"JOINT:STIFFNESS,DAMPING was expected, with numbers of 0 or more, got {text!r}"
+            )
+        if joint in springs:
+            raise click.BadParameter(f"{joint} occurs twice")
+        springs[joint] = {"stiffness": stiffness, "damping": damping}
+    return springs
+
+
 @click.group(cls=NewGroup)
 def new() -> None:
     """Make a folder for a robot, or a template: a law, sensors, a metric, a mission.
@@ -64,10 +86,24 @@ def new() -> None:
 )
 @BASE
 @REPAIR
+@click.option(
+    "--passive",
+    multiple=True,
+    callback=_springs,
+    metavar="JOINT:STIFFNESS,DAMPING",
+    help="A spring instead of a motor in a joint, such as the hinge of a panel: N m/rad and "
+    "N m s/rad, or N/m and N s/m if it slides; may be repeated.",
+)
 @click.option("--force", is_flag=True, help="Replace an older folder of this command.")
 @flight_options("json")
 def new_robot(
-    robot: str, out: Path | None, base: str | None, repair: bool, force: bool, as_json: bool
+    robot: str,
+    out: Path | None,
+    base: str | None,
+    repair: bool,
+    passive: dict[str, dict[str, float]],
+    force: bool,
+    as_json: bool,
 ) -> None:
     """Make a folder for a robot: model, mission, gains for all laws; fly each law once.
 
@@ -80,6 +116,7 @@ def new_robot(
     Examples:
       space-robot new my.urdf
       space-robot new my.urdf --base satellite --repair --out my_robot
+      space-robot new my.urdf --passive left_hinge:15,0.05 --passive right_hinge:15,0.05
       space-robot fly --robot my_robot --controller ctc
     """
     from space_robot_model.robot.find import robot_as_path, robot_files
@@ -94,8 +131,11 @@ def new_robot(
 
     files = robot_files(robot_as_path(robot))
     words = ["space-robot", "new", robot, *(["--base", base] if base else [])]
-    command = shlex.join([*words, *(["--repair"] if repair else [])])
-    texts, read = robot_texts(files.file, base, repair, command)
+    words += ["--repair"] if repair else []
+    for joint, spring in passive.items():
+        words += ["--passive", f"{joint}:{spring['stiffness']:.12g},{spring['damping']:.12g}"]
+    command = shlex.join(words)
+    texts, read = robot_texts(files.file, base, repair, command, passive)
     for line in read.repairs:
         click.echo(f"repaired: {line}", err=True)
     folder = out or Path(files.name)

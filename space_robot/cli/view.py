@@ -40,7 +40,7 @@ SECTION = "Results"
     "--robot",
     default="",
     metavar="NAME-or-FILE",
-    help="The robot that flew, where the bag does not tell; of a URDF its shapes, too.",
+    help="The robot that flew, where the bag does not tell; a file of it with meshes.",
 )
 @click.option("--title", default="", help="Of the page [default: the bags' names].")
 @click.option(

@@ -12,7 +12,7 @@ from space_robot_control.guidance.mission import Mission
 from space_robot_control.laws import ControlLaw
 from space_robot_model.hardware.base_actuators import BaseActuatorSettings
 from space_robot_model.robot import Robot
-from space_robot_model.robot.find import TRAJECTORIES, robot_files
+from space_robot_model.robot.find import TRAJECTORIES, remake_advice, robot_files
 from space_robot_model.robot.source import YAML
 from space_robot_msgs_py.config.files import GIVEN
 from space_robot_msgs_py.config.trees import flatten, nest
@@ -84,7 +84,11 @@ def _mission(settings: FlightSettings, robot: Robot) -> Mission:
         try:
             return Mission(robot, settings.mission, settings.plant.period)
         except InputError as error:
-            file = settings.mission.mission
+            file, numbers = settings.mission.mission, settings.mission
+            needed = robot.n * len(numbers.waypoint_times)
+            if not file and len(numbers.waypoints_deg) != needed:
+                own = robot_files(settings.mission.robot).mission
+                raise InputError(f"{own}: {error}{remake_advice(own) if own else ''}") from None
             if not file.endswith((*YAML, *TRAJECTORIES)):
                 raise
             raise InputError(f"{file}: {error}") from None

@@ -14,6 +14,7 @@ from space_robot_msgs_py.bag.flight_log import FlightLog
 
 from ..analysis.tool_error import wanted_poses
 from .actuators import actuators
+from .base_surface import clearest_side
 from .frames import Frames
 from .goals import goals
 from .horizon import Horizon
@@ -124,7 +125,12 @@ def add_flights(
         for flight, of, own, points in zip(flights, frames, orbits, seen, strict=True)
     ]
     tips = [a.tips + place for a, place in zip(arrows, places, strict=True) if a]
-    stage = set_stage(server, np.concatenate([points, *tips]), dark, rendering, horizon)
+    drawn = [
+        (flight.robot, of.base_quaternion[rows], of.joint_positions[rows])
+        for flight, of, rows in zip(flights, frames, map(_rows, frames), strict=True)
+    ]
+    side = clearest_side(drawn, horizon)
+    stage = set_stage(server, np.concatenate([points, *tips]), dark, rendering, horizon, side)
     moves = [earth_frames(scene, stage, orbit, dark)] if orbit else []
     for index, (flight, of, place) in enumerate(zip(flights, frames, places, strict=True)):
         root = f"/{flight.name.replace('/', '_')}"
@@ -148,8 +154,12 @@ def _moving(robot: RobotScene, frames: Frames) -> Move:
     return lambda k: robot.move(*frames.move_to(k))
 
 
+def _rows(frames: Frames) -> NDArray[np.intp]:
+    return np.linspace(0, len(frames.time) - 1, POSES).round().astype(int)
+
+
 def _seen(robot: Robot, frames: Frames) -> Array:
-    rows = np.linspace(0, len(frames.time) - 1, POSES).round().astype(int)
+    rows = _rows(frames)
     return extent(
         robot,
         frames.base_position[rows],

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from contextlib import suppress
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from space_robot_model.robot import Robot
-from space_robot_model.robot.choice import split_choice
 from space_robot_model.robot.find import find_robot, robot_as_path
-from space_robot_model.robot.source import URDF
+from space_robot_model.robot.tree import Spring
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.bag.law_history import as_data, in_words, laws_of
 from space_robot_msgs_py.errors import InputError
@@ -131,23 +131,33 @@ def picture_of(
 def shown_robot(log: FlightLog, name: str = "") -> Robot:
     """Return the robot of a flight: by ``name``, or from the bag if it is empty.
 
+    Joints that are passive in the bag are so in a named robot, too, since a URDF has no springs.
+    Of the bag's robot meshes are files that a bag names: only of a trusted one they are kept.
+
     Raises:
         InputError: the robot does not exist, is unknown, or has other joints than the bag.
     """
-    if not name:
-        return robot_of(log)
-    robot = find_robot(robot_as_path(name))
-    check_joints(robot, log)
-    return robot
+    if name:
+        springs = dict.fromkeys(log.passive_names, Spring(0.0, 0.0))
+        with suppress(InputError):  # unknown springs move nothing that is drawn
+            own = robot_of(log)
+            springs |= zip(own.passive_names, own.springs, strict=True)
+        robot = find_robot(robot_as_path(name)).with_springs(springs)
+        check_joints(robot, log)
+        return robot
+    robot = robot_of(log)
+    if log.trusted:
+        return robot
+    return replace(robot, visuals=tuple(replace(shape, mesh="") for shape in robot.visuals))
 
 
 def remarks_on(logs: Mapping[str, FlightLog], robots: Mapping[str, Robot]) -> list[str]:
     """Return problems of the recordings and the robots' shapes, one line each."""
     lines = [f"{name}: {text}" for name, log in logs.items() for text in log.defects]
-    lines += [line for robot in robots.values() for line in shown_shapes(robot).remarks]
-    for name, log in logs.items():
-        if (urdf := _urdf_of(log)) and not robots[name].visuals:
-            lines.append(f"bags do not contain the robot's shapes: --robot {urdf} draws them")
+    for name, robot in robots.items():
+        lines += shown_shapes(robot).remarks
+        if any(shape.shape == "mesh" and not shape.mesh for shape in robot.visuals):
+            lines.append(f"{name}: mesh files that the bag names are drawn with --trust")
     return list(dict.fromkeys(lines))
 
 
@@ -156,14 +166,6 @@ def _legend(logs: Mapping[str, FlightLog], dark: bool) -> list[ArrowKind]:
     in_orbit = [log for log in logs.values() if is_in_orbit(log)]
     has_sun = any(sun_direction(log) is not None for log in in_orbit)
     return arrow_kinds(has_sun, dark) if in_orbit else []
-
-
-def _urdf_of(log: FlightLog) -> str:
-    """Return the URDF that a flight's robot was read from; empty for another format."""
-    parameters = log.flight.get("parameters")
-    plant = parameters.get("plant") if isinstance(parameters, dict) else None
-    name = split_choice(str(plant.get("robot", ""))).name if isinstance(plant, dict) else ""
-    return name if name.endswith(URDF) else ""
 
 
 def _law(log: FlightLog) -> str:

@@ -46,11 +46,12 @@ class Shapes(NamedTuple):
 def shown_shapes(robot: Robot) -> Shapes:
     """Return the shapes of a robot with their meshes.
 
-    An unreadable mesh is omitted; a body without other shapes is drawn from kinematics and mass. A
-    mesh with too many faces is simplified. Plates of the file are added to derived shapes.
+    A mesh that is unreadable or has no file is omitted; a body without other shapes is drawn from
+    kinematics and mass. A mesh with too many faces is simplified. Plates of the file are added to
+    derived shapes.
     """
     shapes = shapes_of(robot)
-    files = tuple(dict.fromkeys(shape.mesh for shape in shapes if shape.shape == "mesh"))
+    files = tuple(dict.fromkeys(shape.mesh for shape in shapes if shape.mesh))
     meshes, remarks = {}, []
     for file, read in zip(files, read_meshes(files, MOST_FACES), strict=True):
         if read.mesh is None:

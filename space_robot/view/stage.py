@@ -30,6 +30,8 @@ Array = NDArray[np.float64]
 FIELD_OF_VIEW = np.radians(35.0)
 DIRECTION = np.array([0.62, -1.0, 0.42])
 """Direction from the robots to the initial camera; robots are side by side along x."""
+SIDES = np.array([[x, y, z] for z in (1.0, -1.0) for y in (1.0, -1.0) for x in (1.0, -1.0)])
+"""(8, 3) signs of the direction: the initial camera's possible places, the usual one first."""
 SKY = 1.4
 LAMPS = (((0.2, -0.7, 1.0), 2.3), ((-0.8, -0.6, 0.3), 0.6))
 """Directions and intensities of the lights."""
@@ -99,6 +101,7 @@ def set_stage(
     dark: bool,
     rendering: Rendering = PAGE,
     horizon: Horizon | None = None,
+    side: Array = SIDES[0],
 ) -> Stage:
     """Add stars, axes, lights and the initial camera for some points.
 
@@ -108,12 +111,11 @@ def set_stage(
         dark: whether the page is light on dark.
         rendering: what is drawn.
         horizon: of a scene in orbit.
+        side: (3,) of `SIDES`, where camera and lights are.
     """
     scene, camera = server.scene, server.initial_camera
-    axes, direction = np.eye(3), DIRECTION
-    if horizon:
-        axes = horizon.axes
-        direction = horizon.camera_direction(DIRECTION, FIELD_OF_VIEW)
+    axes = horizon.axes if horizon else np.eye(3)
+    back = axes.T @ camera_direction(side, horizon)
     scene.set_up_direction(axes[:, 2] if horizon else "+z")
     scene.world_axes.visible = False
     points = points @ axes
@@ -128,14 +130,26 @@ def set_stage(
         points = np.vstack([points, corner])
     _inertial_axes(scene, size, axes @ corner, rendering.labels)
     _stars(scene, axes @ middle, stars_at, dark, "float32" if horizon else "float16")
-    lamp = _light(scene, rendering.shadows, axes, horizon.sun if horizon else None)
+    lamp = _light(scene, rendering.shadows, axes * side, horizon.sun if horizon else None)
     camera.fov, camera.near, camera.far = float(FIELD_OF_VIEW), 0.01 * size, far
-    back = direction / np.linalg.norm(direction)
     if horizon or camera.up is not None:  # that of a flight before
         camera.up = axes[:, 2]
     camera.look_at = axes @ middle
     camera.position = axes @ (middle + _distance(points - middle, back) * back)
     return Stage(axes @ middle, size, earth_at, lamp)
+
+
+def camera_direction(side: Array, horizon: Horizon | None) -> Array:
+    """Return the unit vector (3,) from the robots to the initial camera, inertial axes.
+
+    Args:
+        side: (3,) of `SIDES`.
+        horizon: of a scene in orbit, whose camera is above the horizon on every side.
+    """
+    direction = DIRECTION * side
+    if horizon:
+        return np.asarray(horizon.axes @ horizon.camera_direction(direction, FIELD_OF_VIEW))
+    return np.asarray(direction / np.linalg.norm(direction))
 
 
 def _inertial_axes(scene: SceneApi, size: float, corner: Array, is_labelled: bool) -> None:

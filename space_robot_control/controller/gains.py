@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from space_robot_model.robot.find import new_command, robot_files
+from space_robot_model.robot.find import new_command, remake_advice, robot_files
 from space_robot_msgs_py.config.files import GIVEN, node_parameters
 from space_robot_msgs_py.config.text import one_line_of
 from space_robot_msgs_py.config.trees import Tree, nest
@@ -103,11 +103,20 @@ def read_gains(path: Path, law: type[ControlLaw], axes: int) -> dict[str, Array]
     tree = node_parameters(path, ControllerNodeSettings.node)
     if not isinstance(tree.get(law.name), dict):
         raise InputError(f"{path}: {law.name}: missing (the gains of this law)")
-    return check_gains(tree[law.name], law, axes, str(path))
+    return check_gains(tree[law.name], law, axes, str(path), remake_advice(path))
 
 
-def check_gains(content: Tree, law: type[ControlLaw], axes: int, where: str) -> dict[str, Array]:
+def check_gains(
+    content: Tree, law: type[ControlLaw], axes: int, where: str, advice: str = ""
+) -> dict[str, Array]:
     """Return gains as (axes,) arrays; a list of one value applies to all axes.
+
+    Args:
+        content: numbers by name.
+        law: whose gains they are.
+        axes: m = n+3.
+        where: name of the source, for errors.
+        advice: what to do where they are for another number of axes.
 
     Raises:
         InputError: a gain is missing, unknown, of the wrong length or out of its range.
@@ -125,7 +134,7 @@ def check_gains(content: Tree, law: type[ControlLaw], axes: int, where: str) -> 
             raise InputError(f"{key}: numbers were expected, got {short(content[name])}")
         if values.shape not in ((axes,), (1,)):
             raise InputError(
-                f"{key}: {gain_lengths(axes)} were expected, got {short(content[name])}"
+                f"{key}: {gain_lengths(axes)} were expected, got {_count(values)}{advice}"
             )
         fits = values > 0.0 if name in STRICTLY_POSITIVE else values >= 0.0
         if name in FRACTIONS:
@@ -155,6 +164,12 @@ def _is_nominal(name: str, value: Any) -> bool:
 def gain_lengths(axes: int) -> str:
     """Return the allowed number of values of a gain, in words."""
     return f"{axes} values (base x, y, z and the joints) or 1"
+
+
+def _count(values: Array) -> str:
+    """Return few numbers as they are, and say of more how many they are."""
+    listed = ", ".join(f"{value:g}" for value in np.ravel(values)[:3])
+    return f"[{listed}]" if values.size <= 3 else f"{values.size}: [{listed}, ...]"
 
 
 def _numbers(value: Any) -> Array | None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 from dataclasses import replace
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,8 +16,9 @@ from space_robot_msgs_py.config.validation import StrictModel, short
 from ..elementary.matrices import product
 from .inertia import Inertia, Mass, inertia_tensor
 from .link_file import BASE, FrameFile, LinkFile, body_of
-from .plate_file import PlateFile, Plates
-from .tree import Body, Plate, Tool, first_repeated, other_meaning
+from .plate_file import Plates
+from .tree import Body, Tool, first_repeated, other_meaning
+from .visual_file import VisualFile
 
 Array = NDArray[np.float64]
 
@@ -77,6 +78,7 @@ class RobotFile(StrictModel):
     tool: ToolFile | None = None
     tools: list[ToolFile] = Field([])
     plates: Plates = Field([])
+    visuals: list[VisualFile] = Field([])
 
     @field_validator("tool", mode="after")
     @classmethod
@@ -95,28 +97,33 @@ class RobotFile(StrictModel):
         _check_links("tool", [tool.link or BASE for tool in tools], info)
         return tools
 
-    @field_validator("plates", mode="after")
+    @field_validator("plates", "visuals", mode="after")
     @classmethod
-    def _plates_are_on_links(cls, plates: list[PlateFile], info: ValidationInfo) -> list[PlateFile]:
-        _check_links("plate", [plate.link for plate in plates], info)
-        return plates
+    def _are_on_links(cls, entries: list[Any], info: ValidationInfo) -> list[Any]:
+        what = str(info.field_name).removesuffix("s")
+        _check_links(what, [entry.link for entry in entries], info)
+        return entries
 
     def bodies(self) -> list[Body]:
         """Return the bodies of the tree defined by the file."""
         tools = [*([self.tool] if self.tool else []), *self.tools] or [ToolFile()]
         last = self.links[-1].name
         base = Body(BASE, self.base.mass, inertia_tensor(self.base.inertia), np.zeros(3))
-        bodies = [replace(base, tools=_tools_of(BASE, tools, last), plates=self._plates(BASE))]
+        bodies = [replace(base, tools=_tools_of(BASE, tools, last), **self._surfaces(BASE))]
         for above, link in itertools.pairwise((None, *self.links)):
             assert link
             above_name = above.name if above else BASE
             body = body_of(link, link.parent or above_name)
             on_link = _tools_of(link.name, tools, last)
-            bodies.append(replace(body, tools=on_link, plates=self._plates(link.name)))
+            bodies.append(replace(body, tools=on_link, **self._surfaces(link.name)))
         return bodies
 
-    def _plates(self, link: str) -> tuple[Plate, ...]:
-        return tuple(plate.plate for plate in self.plates if plate.link == link)
+    def _surfaces(self, link: str) -> dict[str, Any]:
+        """Return plates and visuals of a link as fields of its `Body`."""
+        return {
+            "plates": tuple(plate.plate for plate in self.plates if plate.link == link),
+            "visuals": tuple(shape.visual for shape in self.visuals if shape.link == link),
+        }
 
 
 def _tools_of(body: str, tools: list[ToolFile], last: str) -> tuple[Tool, ...]:

@@ -153,6 +153,23 @@ def new_command(robot: str) -> str:
     return shlex.join([*words, *(["--repair"] if chosen.repair else [])])
 
 
+def remake_advice(file: Path) -> str:
+    """Return what to do if a file in a robot's own folder is not for its joints; else nothing.
+
+    Args:
+        file: a mission or gains.
+    """
+    for folder in file.parents[:3]:
+        names = (f"{OWN}{ending}" for ending in (*YAML, *URDF))
+        if folder.name and any((folder / name).is_file() for name in names):
+            words = ["space-robot", "new", f"{folder}/", "--out", str(folder), "--force"]
+            return (
+                f"; if the joints in {folder}/ have changed, `{shlex.join(words)}` makes mission "
+                "and gains anew"
+            )
+    return ""
+
+
 def robot_as_path(robot: str) -> str:
     """Interpret a user's robot name: ``r`` is a path if no shipped robot has this name.
 

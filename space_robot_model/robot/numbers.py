@@ -1,7 +1,7 @@
 """Exact numbers of a robot as a mapping, from which the same robot is built bit for bit.
 
 Bags store robots without file in this form. Robots written by hand have the form of
-`space_robot_model.robot.file`. Infinite numbers and NaN are null; visuals are omitted.
+`space_robot_model.robot.file`. Infinite numbers and NaN are null.
 """
 
 from __future__ import annotations
@@ -19,7 +19,8 @@ from space_robot_msgs_py.config.validation import StrictModel
 from ..dynamics.model import MOST_JOINTS
 from .inertia import LARGEST_MASS, InertiaElement
 from .link_file import DriveFile, Vector, drive_of
-from .tree import Body, Joint, JointFriction, JointLimits, Plate, Spring, Tool
+from .tree import Body, Joint, JointFriction, JointLimits, Plate, Spring, Tool, Visual
+from .visual_file import ShapeFile, shape_of
 
 Array = NDArray[np.float64]
 Matrix = Annotated[list[Vector], Field(min_length=3, max_length=3)]
@@ -71,8 +72,15 @@ class PlateNumbers(StrictModel):
         )
 
 
+class VisualNumbers(ShapeFile):
+    """A `Visual` of a body."""
+
+    rotation: Matrix
+    position: Vector
+
+
 class BodyNumbers(StrictModel):
-    """A rigid body with its joint and tools, as a `Body`."""
+    """A rigid body with its joint, tools and surfaces, as a `Body`."""
 
     name: str
     mass: Annotated[float, Field(ge=0.0, le=LARGEST_MASS)]
@@ -82,6 +90,7 @@ class BodyNumbers(StrictModel):
     joint: JointNumbers | None
     tools: list[ToolNumbers]
     plates: list[PlateNumbers] = Field([])
+    visuals: list[VisualNumbers] = Field([])
 
     @property
     def body(self) -> Body:
@@ -110,6 +119,10 @@ class BodyNumbers(StrictModel):
             self.parent,
             joint,
             tuple(tools),
+            visuals=tuple(
+                shape.at(np.array(shape.rotation), np.array(shape.position))
+                for shape in self.visuals
+            ),
             plates=tuple(plate.plate for plate in self.plates),
         )
 
@@ -168,7 +181,13 @@ def _body_numbers(body: Body) -> dict[str, Any]:
         "joint": joint,
         "tools": tools,
         **({"plates": [_plate_numbers(plate) for plate in body.plates]} if body.plates else {}),
+        **({"visuals": [_visual_numbers(shape) for shape in body.visuals]} if body.visuals else {}),
     }
+
+
+def _visual_numbers(shape: Visual) -> dict[str, Any]:
+    place = {"rotation": shape.rotation.tolist(), "position": shape.position.tolist()}
+    return shape_of(shape) | place
 
 
 def _plate_numbers(plate: Plate) -> dict[str, Any]:

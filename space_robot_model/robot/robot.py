@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -22,7 +23,7 @@ from ..elementary.series import plain_sin_cos
 from .file import _RobotDocument
 from .inertia import inertia_elements, inertia_tensor
 from .numbers import Document, are_numbers, numbers_of
-from .tree import Joint, TreeArrays
+from .tree import Joint, Spring, TreeArrays
 
 if TYPE_CHECKING:
     from .urdf import UrdfRobot
@@ -118,7 +119,7 @@ class Robot(TreeArrays):
 
     @property
     def content(self) -> dict[str, Any]:
-        """All numbers without visuals, as lists and texts; `from_dict` builds the same robot."""
+        """All numbers and shapes, as lists and texts; `from_dict` builds the same robot."""
         return numbers_of(self.name, self.bodies())
 
     @cached_property
@@ -136,6 +137,22 @@ class Robot(TreeArrays):
                 bodies[number] = replace(body, joint=_locked(body.joint, body.joint.spring.rest))
         # the same order of the actuated joints
         return Robot.of_tree(self.name, bodies, base_is_at_com=False)
+
+    def with_springs(self, springs: Mapping[str, Spring]) -> Robot:
+        """Return the robot with springs instead of motors in those of its joints that are named.
+
+        Raises:
+            InputError: no joint with a motor is left.
+        """
+        if not springs:
+            return self
+        bodies = [
+            replace(body, joint=replace(body.joint, spring=springs[body.joint.name], gear=None))
+            if body.joint and body.joint.name in springs
+            else body
+            for body in self.bodies()
+        ]
+        return replace(Robot.of_tree(self.name, bodies, self.where), source=self.source)
 
     def from_degrees(self, values: ArrayLike) -> Array:
         """Convert positions of the n actuated joints to rad; m of prismatic joints are kept.

@@ -21,8 +21,8 @@ from ..elementary.rotations import rpy_of_rotation
 from .inertia import inertia_elements
 from .link_file import BASE, drive_of
 from .robot import Robot
-from .tree import Visual
 from .urdf_file import is_urdf
+from .visual_file import shape_of
 
 YAML, URDF = (".yaml", ".yml"), (".urdf", ".xacro")
 
@@ -31,7 +31,7 @@ Array = NDArray[np.float64]
 
 
 def document_of(robot: Robot) -> dict[str, Any]:
-    """Return the mapping from which `Robot.from_dict` builds the same robot, without visuals.
+    """Return the mapping from which `Robot.from_dict` builds the same robot.
 
     Frames are written in degrees, so numbers may differ from the robot's in their last digits. The
     order of joints is kept.
@@ -52,6 +52,7 @@ def document_of(robot: Robot) -> dict[str, Any]:
                 for tool in robot.tools
             ],
             **({"plates": _plates(robot, carriers)} if robot.plates else {}),
+            **({"visuals": _visuals(robot, carriers)} if robot.visuals else {}),
         }
     }
 
@@ -98,6 +99,17 @@ def _plates(robot: Robot, carriers: Sequence[str]) -> list[dict[str, Any]]:
     ]
 
 
+def _visuals(robot: Robot, carriers: Sequence[str]) -> list[dict[str, Any]]:
+    return [
+        {
+            "link": carriers[visual.body],
+            **shape_of(visual),
+            "origin": _origin(visual.rotation, visual.position),
+        }
+        for visual in robot.visuals
+    ]
+
+
 def _limits(robot: Robot, joint: int) -> dict[str, Any]:
     own, is_prismatic = robot.limits[joint], robot.is_prismatic[joint]
 
@@ -137,16 +149,13 @@ class RobotSource:
     """Self-contained mapping for `Robot.from_dict`."""
     text: str
     """The same as the text of a YAML file; for a YAML file its own text."""
-    visuals: tuple[Visual, ...] = ()
-    """Visuals of a URDF; a YAML file has none."""
     findings: tuple[str, ...] = ()
     """Defects of a URDF that were repaired."""
 
     @cached_property
     def robot(self) -> Robot:
         """The robot, built from `content`, hence equal to that of a bag with this content."""
-        robot = Robot.from_dict(self.content, where=self.where)
-        return replace(robot, visuals=self.visuals, repairs=self.findings)
+        return replace(Robot.from_dict(self.content, where=self.where), repairs=self.findings)
 
 
 def read_robot_file(file: Path, base: str | None = None, repair: bool = False) -> RobotSource:
@@ -188,4 +197,4 @@ def _of_robot(robot: Robot, file: Path, head: str) -> RobotSource:
     text = "".join(f"# {line}\n" for line in comments) + yaml.safe_dump(
         content, sort_keys=False, default_flow_style=None, width=10_000, allow_unicode=True
     )
-    return RobotSource(str(file), content, text, robot.visuals, robot.repairs)
+    return RobotSource(str(file), content, text, robot.repairs)

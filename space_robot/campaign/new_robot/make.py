@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import shlex
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import partial
@@ -10,7 +11,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import yaml
 from numpy.typing import NDArray
 
 from space_robot_control.controller.settings import DEFAULT_SETS
@@ -191,7 +191,7 @@ def make_robot(
         names = sorted(laws())
         step(f"flying {', '.join(names)}")
         outcomes = run_all(partial(_fly, place), names, cores())
-    on_gains = filter(None, (estimate_remark(tuned), hinge_remark(robot)))
+    on_gains = filter(None, (estimate_remark(tuned), hinge_remark(robot, command, folder)))
     remarks = (*unit_remarks(robot), *on_gains)
     return NewRobot(folder, robot, mission, dict(zip(names, outcomes, strict=True)), remarks)
 
@@ -233,16 +233,22 @@ def hinges(robot: Robot) -> dict[str, dict[str, float]]:
     return hinges
 
 
-def hinge_remark(robot: Robot) -> str:
-    """Return a proposal to make possible hinges passive; empty if there are none."""
+def hinge_remark(robot: Robot, command: str, folder: Path) -> str:
+    """Return a proposal to make possible hinges passive; empty if there are none.
+
+    Args:
+        robot: whose joints are looked at.
+        command: the user's command, without the folder.
+        folder: that it made.
+    """
     names = hinges(robot)
     if not names:
         return ""
-    flow = yaml.safe_dump(
-        {"passive": names}, default_flow_style=True, sort_keys=False, width=math.inf
-    )
+    texts = [f"{name}:{own['stiffness']:g},{own['damping']:g}" for name, own in names.items()]
+    options = [word for text in texts for word in ("--passive", text)]
+    words = shlex.join([*options, "--out", str(folder), "--force"])
     return (
         f"{', '.join(names)}: each carries one body on the base. If that is a panel on a hinge "
-        f"without a motor, add to `robot:` in robot.yaml `{flow.strip()[1:-1]}` (springs of "
-        f"{FREQUENCY_HZ:g} Hz: adapt them), and run `space-robot new` with that file."
+        f"without a motor, `{command} {words}` gives it a spring (of {FREQUENCY_HZ:g} Hz: adapt "
+        "it)."
     )

@@ -2,20 +2,28 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import yaml
 
 from space_robot_model.robot import Robot
 from space_robot_model.robot.find import OWN
-from space_robot_model.robot.source import URDF, read_robot_file
-from space_robot_model.robot.urdf import read_urdf
+from space_robot_model.robot.source import URDF
+from space_robot_model.robot.urdf.visuals import with_absolute_meshes
+from space_robot_model.robot.urdf_file import is_urdf, read_urdf_content
+from space_robot_msgs_py.config.validation import one_of, read_yaml
+from space_robot_msgs_py.config.yaml_text import read_file
+from space_robot_msgs_py.errors import InputError
 
 ROBOT_FILE = f"{OWN}.yaml"
-HEAD = """\
-# Made by `{command}`. What URDF cannot say goes here:
-#   passive: {{hinge: {{stiffness: 120.0, damping: 0.3}}}}   springs instead of motors
+HEAD = "# Made by `{command}`.\n"
+OF_URDF = """\
+# What URDF cannot say goes here:
+#   passive: {hinge: {stiffness: 120.0, damping: 0.3}}   springs instead of motors
 #   tools: [left_hand, right_hand]                       links whose frames are end effectors
+# Mission and gains are for these joints: `space-robot new` of this folder makes them anew.
 """
 
 CAMPAIGN_FILE = "campaign.yaml"
@@ -47,32 +55,64 @@ def campaign_text(folder: Path, command: str) -> str:
 
 
 def robot_texts(
-    file: Path, base: str | None, repair: bool, command: str
+    file: Path,
+    base: str | None,
+    repair: bool,
+    command: str,
+    passive: Mapping[str, Mapping[str, float]] | None = None,
 ) -> tuple[dict[str, str], Robot]:
     """Return the texts of a robot's files by name, and the robot.
 
-    A URDF stays a URDF, expanded if it was xacro, with a YAML that refers to it. A YAML becomes
-    one self-contained file.
+    A URDF stays a URDF, expanded if it was xacro, with a YAML that refers to it; also that of a
+    YAML which refers to one. Another YAML stays one file.
 
     Args:
         file: URDF, xacro or YAML.
         base: name of the link that is the satellite, of a URDF (None: its root).
         repair: whether a URDF's defects are repaired.
         command: the user's command, for the header.
+        passive: stiffness and damping of joints that get a spring instead of a motor, by name.
 
     Raises:
-        InputError: the file is invalid, or ``base`` or ``repair`` is set for a YAML.
+        InputError: the file is invalid, it has no such joint, or ``base`` or ``repair`` is set for
+            a YAML.
     """
-    source = read_robot_file(file, base, repair)
-    if file.suffix not in URDF:
-        return {ROBOT_FILE: source.text}, source.robot
-    name = f"{file.stem}.urdf"
-    texts = {
-        "urdf": name,
-        **({"base": base} if base else {}),
-        **({"repair": True} if repair else {}),
-    }
-    text = HEAD.format(urdf=name, command=command) + yaml.safe_dump(
-        {"robot": texts}, sort_keys=False, allow_unicode=True
-    )
-    return {ROBOT_FILE: text, name: read_urdf(file, base, repair).text}, source.robot
+    content: dict[str, Any]
+    if file.suffix in URDF:
+        choice = {"base": base} if base else {}
+        content = {"robot": {"urdf": file.name, **choice, **({"repair": True} if repair else {})}}
+    elif base or repair:
+        raise InputError(f"{file}: not a URDF, so base and repair cannot be chosen")
+    else:
+        content = read_yaml(file)
+    robot, head = content.get("robot"), HEAD.format(command=command)
+    if not is_urdf(content):
+        text = read_file(file)
+        if passive:
+            _make_passive(robot, passive, str(file))
+            text = head + _dumped(content)
+        return {ROBOT_FILE: text}, Robot.from_dict(content, str(file))
+    assert isinstance(robot, dict)
+    if passive:
+        robot["passive"] = {**(robot.get("passive") or {}), **passive}
+    read = Robot.from_dict(content, str(file), file.parent)
+    text = read_urdf_content(content, file.parent, str(file)).text
+    source = file.parent / str(robot.pop("urdf", file.name))
+    robot.pop("urdf_text", None)
+    name = f"{source.stem}.urdf"
+    return {
+        ROBOT_FILE: head + OF_URDF + _dumped({"robot": {"urdf": name, **robot}}),
+        name: with_absolute_meshes(text, source.absolute().parent),
+    }, read
+
+
+def _make_passive(robot: Any, passive: Mapping[str, Mapping[str, float]], where: str) -> None:
+    """Give the links of a YAML's robot springs."""
+    links = robot.get("links") if isinstance(robot, dict) else None
+    by_name = {str(link.get("name")): link for link in links or () if isinstance(link, dict)}
+    for name, spring in passive.items():
+        by_name[one_of(name, by_name, "passive joint", f" of {where}")]["passive"] = dict(spring)
+
+
+def _dumped(content: Mapping[str, Any]) -> str:
+    return yaml.safe_dump(content, sort_keys=False, allow_unicode=True)

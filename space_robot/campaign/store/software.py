@@ -50,8 +50,15 @@ def flight_digest(flight: Flight) -> str:
     flown = {flight.law.name, *(law.name for _, law in flight.swaps)}
     tree = dict(flight.scenario.tree)
     tree["gains"] = {name: gains for name, gains in tree["gains"].items() if name in flown}
-    content = json.dumps(tree, sort_keys=True, default=str)
+    content = json.dumps(_without_meshes(tree), sort_keys=True, default=str)
     return digest(content.encode())
+
+
+def _without_meshes(value: Any) -> Any:
+    """Return a tree without the names of mesh files."""
+    if isinstance(value, dict):
+        return {key: _without_meshes(inner) for key, inner in value.items() if key != "mesh"}
+    return [_without_meshes(inner) for inner in value] if isinstance(value, list) else value
 
 
 def digest(data: bytes) -> str:

@@ -118,11 +118,15 @@ class Listener:
             check()
             name, period = get_parameters(self._monitor.node, PLANT, ["robot", "period"], check)
         try:
-            return find_robot(robot or str(name)), float(period)
+            own = find_robot(str(name))
         except InputError as error:
-            if robot:
-                raise
-            raise InputError(f"the plant's robot: {error}; choose it with --robot") from None
+            if not robot:
+                raise InputError(f"the plant's robot: {error}; choose it with --robot") from None
+            return find_robot(robot), float(period)
+        if robot:
+            springs = dict(zip(own.passive_names, own.springs, strict=True))
+            own = find_robot(robot).with_springs(springs)
+        return own, float(period)
 
     def _ask_orbit(self, check: Callable[[], None]) -> OrbitSettings | None:
         """Return the orbit of the plant; None: it has none, or is of a version without."""

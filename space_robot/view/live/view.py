@@ -18,6 +18,7 @@ from space_robot_model.robot.tool import tool_pose
 from space_robot_model.robot.transforms import joint_transforms
 
 from ...flight.graph.monitor import Event
+from ..base_surface import clearest_side
 from ..palette import palette
 from ..scene import RobotScene, rgb
 from ..stage import extent, set_stage
@@ -130,15 +131,15 @@ class LiveView:
         """
         self._server, self._robot = server, robot
         colours, ink = palette(dark), "#c9d1d9" if dark else "#333333"
-        points = extent(
-            robot, sample.base_position[np.newaxis], _unit(sample), sample.angles[np.newaxis]
-        )
+        pose = _unit(sample), sample.angles[np.newaxis]
+        points = extent(robot, sample.base_position[np.newaxis], *pose)
         middle = points.mean(axis=0)
         self._orbit: LiveOrbit | None = None
         if orbit and sample.orbit is not None:
             self._orbit = LiveOrbit(orbit, sample.orbit, robot, points, dark)
         horizon = self._orbit.horizon if self._orbit else None
-        stage = set_stage(server, middle + ROOM * (points - middle), dark, horizon=horizon)
+        room, side = middle + ROOM * (points - middle), clearest_side([(robot, *pose)], horizon)
+        stage = set_stage(server, room, dark, horizon=horizon, side=side)
         width = TRAIL * float(np.ptp(points, axis=0).max())
         self._root = server.scene.add_frame(ROOT, show_axes=False)
         self._scene = RobotScene(server.scene, ROOT, robot)

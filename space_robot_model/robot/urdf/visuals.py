@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import os
+import re
 from collections.abc import Iterator
 from pathlib import Path
 from urllib.parse import unquote
+from xml.sax.saxutils import quoteattr, unescape
 
 from space_robot_msgs_py.config.validation import short
 from space_robot_msgs_py.errors import InputError
@@ -135,6 +137,21 @@ def mesh_path(name: str, folder: Path) -> str:
     return name if "://" in name else str(folder / name)
 
 
+def with_absolute_meshes(text: str, folder: Path) -> str:
+    """Return a URDF's text with absolute paths of its meshes, so that it may be in any folder.
+
+    Args:
+        text: of the URDF; names of files that do not exist are kept.
+        folder: that the names are relative to.
+    """
+
+    def absolute(match: re.Match[str]) -> str:
+        path = mesh_path(unescape(match[2][1:-1]), folder)
+        return f"{match[1]}{quoteattr(path)}" if _is_file(path) else match[0]
+
+    return re.sub(r"""(<mesh\b[^>]*?\bfilename\s*=\s*)("[^"]*"|'[^']*')""", absolute, text)
+
+
 def _places(package: str, rest: str, folder: Path) -> Iterator[Path]:
     """Yield possible paths of a package's file, the most likely first."""
     for above in (folder, *folder.parents):
@@ -151,8 +168,8 @@ def _paths(variable: str) -> list[Path]:
     return [Path(text) for text in os.environ.get(variable, "").split(os.pathsep) if text]
 
 
-def _is_file(path: Path) -> bool:
+def _is_file(path: str | Path) -> bool:
     try:
-        return path.is_file()
+        return Path(path).is_file()
     except (OSError, ValueError):  # invalid file name
         return False

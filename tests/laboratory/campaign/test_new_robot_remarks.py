@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 import math
+import shlex
 from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 import pytest
-import yaml
 from hypothesis import given
 from hypothesis import strategies as st
 
 from space_robot.analysis.metrics import axis_groups
+from space_robot.campaign.new_robot import robot_texts
 from space_robot.campaign.new_robot.make import DAMPING_RATIO, FREQUENCY_HZ, hinge_remark
+from space_robot.cli.new import new
 from space_robot.tuning.method import Tuned
 from space_robot.tuning.task import TuningOptions
 from space_robot.tuning.warning import estimate_remark
@@ -43,15 +45,16 @@ def satellite(tmp_path: Path, panel: str = "revolute") -> Robot:
 
 
 def test_panels_on_hinges_are_proposed_as_passive_joints(tmp_path: Path) -> None:
-    """The proposal is read as it stands, and its springs swing as they are said to."""
+    """The command is one that `new` takes, and its springs swing as they are said to."""
     robot = satellite(tmp_path)
-    remark = hinge_remark(robot)
-    proposed = yaml.safe_load(remark.split("`")[3])["passive"]
+    remark = hinge_remark(robot, f"space-robot new {tmp_path}/satellite.urdf", Path("my sat"))
+    words = shlex.split(remark.split("`")[1])
+    assert words[:2] == ["space-robot", "new"]
+    parsed = new.commands["robot"].make_context("robot", words[2:]).params
+    assert (parsed["out"], parsed["force"]) == (Path("my sat"), True)
+    proposed = parsed["passive"]
     assert list(proposed) == ["left_hinge", "right_hinge"]
-    (tmp_path / "robot.yaml").write_text(
-        yaml.safe_dump({"robot": {"urdf": "satellite.urdf", "passive": proposed}})
-    )
-    passive = Robot.from_yaml(tmp_path / "robot.yaml")
+    _, passive = robot_texts(Path(parsed["robot"]), None, False, "", proposed)
     assert (passive.joint_names, set(passive.passive_names)) == (("a", "b"), set(proposed))
     inertia = 0.25 + 3.0 * 0.5**2  # about the hinge
     for spring in proposed.values():
@@ -59,12 +62,12 @@ def test_panels_on_hinges_are_proposed_as_passive_joints(tmp_path: Path) -> None
         assert rate / (2.0 * math.pi) == pytest.approx(FREQUENCY_HZ, rel=0.03)
         ratio = spring["damping"] / (2.0 * inertia * rate)
         assert ratio == pytest.approx(DAMPING_RATIO, rel=0.05)
-    assert hinge_remark(passive) == ""
+    assert hinge_remark(passive, "", tmp_path) == ""
 
 
 def test_what_is_no_hinge_is_not_proposed(tmp_path: Path) -> None:
-    assert hinge_remark(satellite(tmp_path, "prismatic")) == ""
-    assert [name for name in robot_names() if hinge_remark(find_robot(name))] == []
+    assert hinge_remark(satellite(tmp_path, "prismatic"), "", tmp_path) == ""
+    assert [name for name in robot_names() if hinge_remark(find_robot(name), "", tmp_path)] == []
 
 
 def test_branches_are_counted_in_the_order_of_the_joints(tmp_path: Path) -> None:

@@ -22,6 +22,7 @@ from space_robot_control.guidance.mission import Mission
 from space_robot_control.laws import laws
 from space_robot_model.robot import Robot
 from space_robot_model.robot.find import find_robot
+from space_robot_model.robot.plates import plates_of
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.errors import DivergedError, InputError, SpaceRobotError
 
@@ -122,9 +123,80 @@ def test_a_urdf_stays_one_and_has_a_mission_within_its_limits() -> None:
     assert mission.waypoint_times[1] > 10.0, "its joints are slow"
 
 
+def test_a_joint_is_made_passive_in_one_step(tmp_path: Path) -> None:
+    """`--passive` of a URDF, with its meshes wherever the folder is; of a YAML, too."""
+    folder = tmp_path / "cad"
+    (folder / "meshes").mkdir(parents=True)
+    (folder / "meshes" / "fore.stl").touch()
+    named = ARM.read_text("utf-8").replace("package://arm/fore.stl", "meshes/fore.stl")
+    (folder / "arm.urdf").write_text(named)
+    springs = {"slide": {"stiffness": 15.0, "damping": 0.05}}
+    texts, robot = robot_texts(folder / "arm.urdf", None, False, "a command", springs)
+    assert (robot.joint_names, robot.passive_names) == (("shoulder",), ("slide",))
+    assert yaml.safe_load(texts["robot.yaml"])["robot"] == {"urdf": "arm.urdf", "passive": springs}
+    mine = tmp_path / "mine"
+    mine.mkdir()
+    for name, text in texts.items():
+        (mine / name).write_text(text)
+    read = find_robot("mine/")
+    assert read.springs == robot.springs
+    assert read.visuals
+    meshes = {shape.mesh for shape in read.visuals if shape.shape == "mesh"}
+    assert str(folder / "meshes" / "fore.stl") in meshes
+    texts, robot = robot_texts(Path(FILE), None, False, "a command", {"joint3": springs["slide"]})
+    assert robot.passive_names == ("joint3",)
+    (mine / "robot.yaml").write_text(texts["robot.yaml"])
+    assert find_robot("mine/").passive_names == ("joint3",)
+
+
+def test_a_yaml_keeps_its_urdf() -> None:
+    """With all that it adds to it; shapes and plates stay those of the URDF."""
+    Path("mine").mkdir()
+    added = {"passive": {"slide": {"stiffness": 15.0, "damping": 0.05}}, "tools": ["fore"]}
+    content = {"robot": {"urdf": str(ARM), "base": "hull", **added}}
+    Path("mine/robot.yaml").write_text(yaml.safe_dump(content))
+    texts, robot = robot_texts(Path("mine/robot.yaml"), None, False, "a command")
+    kept = {"urdf": "arm.urdf", "base": "hull", **added}
+    assert yaml.safe_load(texts["robot.yaml"])["robot"] == kept
+    assert list(texts) == ["robot.yaml", "arm.urdf"]
+    for name, text in texts.items():
+        Path("mine", name).write_text(text)
+    read = find_robot("mine/")
+    assert read.passive_names == ("slide",)
+    assert len(read.visuals) == len(Robot.from_urdf(ARM).visuals)
+    areas = [[plate.area for plate in plates_of(one)] for one in (read, robot)]
+    assert areas[0] == pytest.approx(areas[1])
+
+
+@pytest.mark.parametrize("stale", ["mission", "gains"])
+def test_files_for_other_joints_name_the_command_that_mends_them(stale: str) -> None:
+    """A joint made passive by hand leaves mission and gains with a value too many."""
+    texts, robot = robot_texts(ARM, None, False, "a command")
+    Path("mine/gains/tuned").mkdir(parents=True)
+    count = {"mission": 4, "gains": 5}[stale]
+    gains = {"k_p": [1e4] * count, "k_d": [200.0] * count}
+    gains_file = {"controller_node": {"ros__parameters": {"ctc": gains}}}
+    Path("mine/gains/tuned/ctc.yaml").write_text(yaml.safe_dump(gains_file))
+    Path("mine/gains/default_sets.yaml").write_text("ctc: tuned\n")
+    text = mission_text(robot, rest_to_rest(robot), "a command")
+    Path("mine/mission.yaml").write_text(text)
+    for name, text in texts.items():
+        Path("mine", name).write_text(text)
+    with Path("mine/robot.yaml").open("a") as file:
+        file.write("  passive: {slide: {stiffness: 15.0, damping: 0.05}}\n")
+    with pytest.raises(InputError) as caught:
+        resolve(FlightPlan(robot="mine", controller="ctc"))
+    command = "`space-robot new mine/ --out mine --force` makes mission and gains anew"
+    assert command in str(caught.value)
+    said = {"mission": "mine/mission.yaml: waypoints_deg has", "gains": "were expected, got 5: ["}
+    assert said[stale] in str(caught.value)
+
+
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
+        ([str(ARM), "--passive", "leg:1,1"], "unknown passive joint 'leg' of"),
+        ([FILE, "--passive", "leg:1,1"], "unknown passive joint 'leg' of"),
         (["none.urdf"], "none.urdf: no such file"),
         ([FILE, "--base", "hull"], "not a URDF, so base and repair"),
         ([str(ARM), "--base", "leg"], "leg"),
@@ -138,4 +210,14 @@ def test_what_cannot_be_is_said_and_leaves_nothing(
     assert isinstance(result.exception, InputError)
     assert said in str(result.exception)
     assert result.exception.exit_code == 2
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(
+    "text", ["pitch", "pitch:15", "pitch:15,-1", "pitch:inf,1", ":1,2", "a:b,c"]
+)
+def test_a_spring_is_two_numbers(text: str, tmp_path: Path) -> None:
+    result = new(str(ARM), "--passive", text)
+    assert result.exit_code == 2
+    assert "JOINT:STIFFNESS,DAMPING was expected" in result.stderr
     assert not list(tmp_path.iterdir())

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import html
+import json
 import re
 import shutil
 import sys
@@ -17,10 +18,12 @@ from command import Run
 from paths import DATA
 from scene_pages import Scene, plot_data
 
+from space_robot.analysis.described import robot_of
 from space_robot.analysis.metrics import tracking_error
 from space_robot.cli.main import main
 from space_robot.flight.plan import Flight, FlightPlan, resolve
 from space_robot.flight.simulate import simulate
+from space_robot.view.flights import shown_robot
 from space_robot_msgs_py.bag.reader import read_flight
 from space_robot_msgs_py.config.extras import install_command
 
@@ -213,35 +216,54 @@ def test_without_viser_one_line_says_what_to_install(
     assert result.err == f"space-robot: error: {what}\n"
 
 
-def test_a_bag_has_no_shapes_of_a_urdf_until_it_is_named(view: Run, tmp_path: Path) -> None:
+def flown_arm(tmp_path: Path, passive: bool) -> Path:
+    """A flight of the arm of a URDF, with a spring or a motor in its slide, into `flown`."""
     urdf = tmp_path / "urdf" / "arm.urdf"
     urdf.parent.mkdir()
-    urdf.write_bytes((DATA / "arm.urdf").read_bytes())
+    urdf.write_text((DATA / "arm.urdf").read_text().replace("package://arm/", ""))
     trimesh.creation.cone(0.1, 0.4).export(urdf.parent / "fore.stl")
-    urdf.write_text(urdf.read_text().replace("package://arm/", ""))
+    robot = urdf.with_name("sprung.yaml")
+    spring = {"slide": {"stiffness": 50.0, "damping": 1.0}} if passive else {}
+    robot.write_text(json.dumps({"robot": {"urdf": "arm.urdf", "passive": spring}}))
     gains, mission = urdf.with_name("ctc.yaml"), urdf.with_name("mission.yaml")
     gains.write_text("controller_node: {ros__parameters: {ctc: {k_p: [1e4], k_d: [200.0]}}}\n")
+    points, start = ("0.0, 5.0", "0.0") if passive else ("0.0, 0.0, 5.0, 0.1", "0.0, 0.0")
     mission.write_text(
         "mission_node: {ros__parameters: {waypoint_times: [0.0, 1.0],"
-        " waypoints_deg: [0.0, 0.0, 5.0, 0.1]}}\n"
-        "plant_node: {ros__parameters: {initial_joints_deg: [0.0, 0.0]}}\n"
+        f" waypoints_deg: [{points}]}}}}\n"
+        f"plant_node: {{ros__parameters: {{initial_joints_deg: [{start}]}}}}\n"
     )
-    plan = FlightPlan(
-        robot=str(urdf), mission=str(mission), gains=str(gains), controller="ctc", duration=0.1
-    )
+    files = {"robot": str(robot), "mission": str(mission), "gains": str(gains)}
+    plan = FlightPlan(**files, controller="ctc", duration=0.1)
     simulate(Flight(resolve(plan)), tmp_path / "flown")
-    hint = f"bags do not contain the robot's shapes: --robot {urdf} draws them\n"
-    without = view("flown", "--no-open", "--out", "without.html")
-    assert without.code == 0, without.err
-    assert hint in without.err
-    shown = view("flown", "--no-open", "--out", "shown.html", "--robot", urdf)
-    assert shown.code == 0, shown.err
-    assert hint not in shown.err
-    types = {
-        message["type"]
-        for _, message in Scene((tmp_path / "shown.html").read_text("utf-8")).messages
-    }
-    assert {"MeshMessage", "IcosphereMessage", "BoxMessage", "CylinderMessage"} <= types
+    return urdf
+
+
+def drawn(page: Path) -> set[str]:
+    """The kinds of shapes in a page's scene."""
+    messages = Scene(page.read_text("utf-8")).messages
+    return {str(m["type"]) for _, m in messages if m["type"] in SHAPES}
+
+
+SHAPES = {"MeshMessage", "IcosphereMessage", "BoxMessage", "CylinderMessage"}
+
+
+@pytest.mark.parametrize("passive", [False, True])
+def test_a_bag_has_the_shapes_of_its_urdf(view: Run, tmp_path: Path, passive: bool) -> None:
+    """Meshes are files, which only a trusted bag or `--robot` may name; a URDF has no springs."""
+    urdf = flown_arm(tmp_path, passive)
+    hint = "flown: mesh files that the bag names are drawn with --trust\n"
+    own = view("flown", "--no-open", "--out", "own.html")
+    assert own.code == 0, own.err
+    assert hint in own.err
+    assert drawn(tmp_path / "own.html") == SHAPES - {"MeshMessage"}
+    for name, more in (("trusted", ["--trust"]), ("named", ["--robot", str(urdf)])):
+        shown = view("flown", "--no-open", "--out", f"{name}.html", *more)
+        assert shown.code == 0, shown.err
+        assert hint not in shown.err
+        assert drawn(tmp_path / f"{name}.html") == SHAPES
+    log = read_flight(tmp_path / "flown")
+    assert shown_robot(log, str(urdf)).springs == robot_of(log).springs
 
 
 def test_a_live_view_without_ros_ends_with_one_line(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import subprocess
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +21,8 @@ from space_robot.scenario.comparison import differences, recorded_scenario
 from space_robot.scenario.node_settings import FlightSettings
 from space_robot.scenario.options import FlightPlan
 from space_robot_model.robot import Robot
+from space_robot_model.robot.find import find_robot
+from space_robot_model.robot.tree import Visual
 from space_robot_msgs_py.config.directory import GRAPH_FILE, config_directory
 from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.samples import ORBIT_FIELDS
@@ -52,6 +55,16 @@ SCENARIOS: dict[str, dict[str, Any]] = {
     "gears and plates": {
         "robot": Robot.from_dict(driven_paper()),
         "orbit": {"orbital_elements": {"height": 400e3}, "atmosphere": {"density": 4e-12}},
+    },
+    "shapes in an orbit": {
+        "robot": replace(
+            find_robot("paper"),
+            visuals=(
+                Visual("box", (3.0, 1.0, 0.1), np.eye(3), np.array([0.0, 2.0, 0.5]), body=0),
+                Visual("cylinder", (0.2, 1.0), np.eye(3), np.zeros(3), body=3),
+            ),
+        ),
+        "orbit": "iss",
     },
     "another plant": {"robot": "paper", "plant_robot": "paper", "parameters": {"plant": {}}},
 }

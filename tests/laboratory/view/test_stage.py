@@ -9,9 +9,11 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from orbiting_logs import EARTH_RADIUS, CircularOrbit
 
+from space_robot.flight.plan import FlightPlan, resolve
+from space_robot.view.base_surface import clearest_side
 from space_robot.view.horizon import Horizon
 from space_robot.view.orbit_frames import OrbitFrames
-from space_robot.view.stage import DIRECTION, FIELD_OF_VIEW, LAMPS, Rendering, set_stage
+from space_robot.view.stage import DIRECTION, FIELD_OF_VIEW, LAMPS, SIDES, Rendering, set_stage
 
 viser = pytest.importorskip("viser")
 
@@ -99,3 +101,25 @@ def test_in_orbit_the_camera_sees_every_point_and_the_earth_below(
     limb = np.cos(dip) * ahead - np.sin(dip) * local_up
     assert -1.0 < (limb @ above) / (limb @ forward) / slope < -0.2
     assert far > 2.0 * stage.earth_distance > 5000.0 * stage.size
+
+
+def test_the_base_does_not_hide_the_arm() -> None:
+    """Other robots are seen from the usual side."""
+    sides = {}
+    for name in ("paper", "canadarm", "canadarm2"):
+        scenario = resolve(FlightPlan(robot=name, controller="ctc"))
+        robot, waypoints = scenario.robots.plant, scenario.settings.mission.waypoints_deg
+        poses = np.radians(np.reshape(waypoints, (-1, robot.n)))
+        quaternions = np.tile([1.0, 0.0, 0.0, 0.0], (len(poses), 1))
+        sides[name] = clearest_side([(robot, quaternions, poses)])
+    np.testing.assert_array_equal(sides["paper"], SIDES[0])
+    np.testing.assert_array_equal(sides["canadarm2"], SIDES[0])
+    assert sides["canadarm"][2] < 0.0, "the arm is on the other side of the Orbiter's z axis"
+    server = viser.ViserServer(port=0, verbose=False)
+    try:
+        set_stage(server, random_points(1, 2.0), dark=True, side=sides["canadarm"])
+        camera = server.initial_camera
+        back = np.array(camera.position) - np.array(camera.look_at)
+    finally:
+        server.stop()
+    assert np.array_equal(np.sign(back), np.sign(DIRECTION * sides["canadarm"]))

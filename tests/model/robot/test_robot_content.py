@@ -8,8 +8,10 @@ from typing import Any
 
 import numpy as np
 import pytest
+import yaml
 from hypothesis import given
 from hypothesis import strategies as st
+from paths import DATA
 from random_robots import random_robot
 from random_trees import random_bodies
 
@@ -23,7 +25,7 @@ KINDS = ("revolute", "prismatic", "fixed", "passive revolute", "passive prismati
 
 def same(one: Robot, other: Robot) -> None:
     for field in fields(Robot):
-        if field.name in ("visuals", "repairs", "source"):
+        if field.name in ("repairs", "source"):
             continue
         a, b = getattr(one, field.name), getattr(other, field.name)
         if isinstance(a, np.ndarray):
@@ -75,3 +77,34 @@ def test_a_robot_file_made_of_a_robot_has_its_limits(paper_robot: Robot) -> None
     again = Robot.from_dict(json.loads(json.dumps(document_of(robot))))
     for before, after in zip(robot.limits, again.limits, strict=True):
         assert after == pytest.approx(before)
+
+
+def test_shapes_are_part_of_the_numbers() -> None:
+    """So drag and sunlight act on the same plates, whatever a robot is built from."""
+    robot = Robot.from_urdf(DATA / "arm.urdf")
+    assert {shape.shape for shape in robot.visuals} >= {"box", "cylinder", "sphere", "mesh"}
+    exact = Robot.from_dict(json.loads(json.dumps(robot.content)))
+    assert repr(exact.visuals) == repr(robot.visuals)
+    written = Robot.from_dict(yaml.safe_load(yaml.safe_dump(document_of(robot))))
+    for before, after in zip(robot.visuals, written.visuals, strict=True):
+        assert (after.shape, after.body, after.size) == (before.shape, before.body, before.size)
+        assert (after.mesh, after.colour) == (before.mesh, before.colour)
+        np.testing.assert_allclose(after.rotation, before.rotation, atol=1e-15)
+        np.testing.assert_allclose(after.position, before.position, atol=1e-15)
+
+
+@pytest.mark.parametrize(
+    ("shape", "said"),
+    [
+        ({"shape": "box", "size": [1.0, 1.0]}, "size of a box: 3 numbers above 0 were expected"),
+        ({"shape": "sphere", "size": [0.0]}, "size of a sphere: 1 numbers above 0"),
+        ({"shape": "mesh", "size": [1, 1, 1], "mesh": "a.stl"}, "mesh: an absolute path or a URL"),
+        ({"shape": "sphere", "size": [1.0], "mesh": "/a.stl"}, "of a mesh only"),
+        ({"shape": "sphere", "size": [1.0], "link": "leg"}, "unknown link 'leg' of visual 0"),
+    ],
+)
+def test_wrong_shapes_are_refused(paper_robot: Robot, shape: dict[str, Any], said: str) -> None:
+    content = document_of(paper_robot)
+    content["robot"]["visuals"] = [shape]
+    with pytest.raises(InputError, match=said):
+        Robot.from_dict(content)

@@ -8,6 +8,7 @@ import os
 import subprocess
 import sys
 from collections.abc import Iterable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -22,9 +23,12 @@ from space_robot.campaign.store.journal_codec import JournalCodec
 from space_robot.campaign.store.journal_file import damage_of, whole_rows, write_journal
 from space_robot.campaign.store.manifest import Manifest, read_manifest
 from space_robot.campaign.store.schema import Schema
-from space_robot.campaign.store.software import file_digests, source_digest
+from space_robot.campaign.store.software import file_digests, flight_digest, source_digest
 from space_robot.campaign.store.table import file_digest, read_table, table_rows, write_table
 from space_robot.campaign.study import Study
+from space_robot.flight.plan import Flight, FlightPlan, resolve
+from space_robot_model.robot.find import find_robot
+from space_robot_model.robot.tree import Visual
 from space_robot_msgs_py.errors import InputError
 
 pytest.importorskip("pyarrow")
@@ -384,3 +388,14 @@ def test_of_the_names_in_a_file_those_of_settings_and_laws_are_digested(tmp_path
     found = file_digests({"values": names})
     assert set(found) == {str(settings_file), str(law)}
     assert found[str(settings_file)] != found[str(law)]
+
+
+def test_where_a_mesh_is_does_not_change_a_flight() -> None:
+    """So a campaign goes on where its robot's files are in another folder."""
+
+    def digest(mesh: str, scale: float = 1.0) -> str:
+        shape = Visual("mesh", (scale, 1.0, 1.0), np.eye(3), np.zeros(3), mesh)
+        robot = replace(find_robot("paper"), visuals=(shape,))
+        return flight_digest(Flight(resolve(FlightPlan(robot=robot, duration=0.01))))
+
+    assert digest("/a.stl") == digest("/b.stl") != digest("/a.stl", 2.0)
