@@ -27,7 +27,7 @@ from launch_ros.actions import LifecycleNode
 
 from space_robot.cli.launch_arguments import launch_arguments, launched_flight, refuse_unknown
 from space_robot.flight.graph.launched import launched_parameters
-from space_robot.flight.graph.node_names import NODE_NAMES
+from space_robot.flight.graph.node_names import started_nodes
 from space_robot_msgs_py.ros.process_environment import defaults
 
 PACKAGE = "space_robot"
@@ -78,7 +78,7 @@ def fly(context: LaunchContext) -> list:
             output="screen",
             sigterm_timeout=RECORDER_S,
         )
-        for name in NODE_NAMES
+        for name in started_nodes(flight.scenario.options.without)
     ]
     return [
         RegisterEventHandler(OnShutdown(on_shutdown=lambda *_: rmtree(folder))),

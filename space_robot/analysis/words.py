@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from space_robot_control.controller.plain_laws import NoLaw
 from space_robot_msgs_py.bag.law_history import in_words
 
 from ..flight.start_step import sentence
@@ -19,8 +20,10 @@ def flown(described: Mapping[str, Any]) -> str:
     Args:
         described: a report, or the description in a bag.
     """
-    law = law_of(described)
-    known = [f"{key} {described[key]}" for key in ("case", "gains") if described.get(key)]
+    law, keys = law_of(described), ("case", "gains")
+    if law == NoLaw.name:
+        law, keys = "torques from outside", ("case",)
+    known = [f"{key} {described[key]}" for key in keys if described.get(key)]
     return ", ".join([str(law or "unknown law"), *known])
 
 

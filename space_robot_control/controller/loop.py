@@ -67,7 +67,9 @@ class ControllerLoop:
         )
         timebase = settings.timebase
         self._states = StateInput(node, self._controller.names, timebase)
-        self._references = ReferenceInput(node, robot, timebase, settings.reference_timeout)
+        self._references = ReferenceInput(
+            node, robot, timebase, settings.reference_timeout, settings.join_timeout
+        )
         self._answering = StateResponder(
             self._controller,
             self._laws.choice,
@@ -102,7 +104,11 @@ class ControllerLoop:
         self._unanswered = -1
 
     def step(self) -> Wait | None:
-        """Answer a state if it and its reference have arrived."""
+        """Answer a state if it and its reference have arrived.
+
+        Raises:
+            FlightError: no reference has come in time.
+        """
         tick = self._unanswered
         if tick < 0:
             received = self._states.take()
