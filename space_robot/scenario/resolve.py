@@ -152,7 +152,9 @@ def _without_nodes(plan: FlightPlan) -> FlightPlan:
         faults = parse_faults(plan.faults_of(PROCESS_KINDS), KINDS)
         asked += [f"fault {fault}" for fault in faults if NODE_OF[fault.kind] == node]
         if asked:
-            raise InputError(f"{', '.join(asked)}: that is for the project's {node}, which `without` leaves out")
+            raise InputError(
+                f"{', '.join(asked)}: that is for the project's {node}, which `without` leaves out"
+            )
     return plan.model_copy(update={"controller": None}) if "controller" in plan.without else plan
 
 

@@ -77,12 +77,12 @@ class OwnController:
         if self._settings.own_controller:
             raise FlightError(
                 f"no command for {self._settings.silence_timeout:g} s (silence_timeout) at "
-                f"{tick * self._settings.period:.4f} s: the controller is silent, "
+                f"{tick * self._settings.period:.4f} s: the controller is silent; "
                 f"{self._publishers()}"
             )
 
     def _publishers(self) -> str:
         infos = self._node.get_publishers_info_by_topic(self._topic)
-        names = ", ".join(sorted(map(full_name_of, infos)))
+        names = ", ".join(sorted(map(full_name_of, infos))) or "none"
         domain = self._node.context.get_domain_id()
-        return f"{names or 'nobody'} publishes {self._topic} in ROS domain {domain}"
+        return f"publishers of {self._topic} in ROS domain {domain}: {names}"

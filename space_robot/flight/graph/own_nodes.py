@@ -19,8 +19,9 @@ AWAITED = {
 
 
 def topics_of(nodes: Sequence[str]) -> list[topics.Topic]:
-    """Return the topics that nodes of these names publish."""
-    return [topic for schema in SCHEMAS if schema.node in nodes for topic in schema.sends]
+    """Return the topics that nodes of these names must or may publish."""
+    may = [topic for schema in SCHEMAS if schema.node in nodes for topic in schema.sends]
+    return [*may, *(topic for node in nodes for topic in AWAITED[node])]
 
 
 class OwnNodes:
