@@ -15,6 +15,7 @@ prints in the second:
 from __future__ import annotations
 
 from functools import partial
+from typing import Any
 
 import numpy as np
 import rclpy
@@ -26,16 +27,16 @@ STATE = {"joint_states": JointState, "base/state": MultiDOFJointState}
 REFERENCE = {"reference/joints": JointTrajectory, "reference/base": MultiDOFJointTrajectory}
 DEPTH = 10_000  # of queues: the recorder may be some thousand commands behind
 # stiffness and damping about the base's axes (N m/rad, N m s/rad), then of joint1 to joint6
-K_P = [4.975e6, 2.6e6, 2.0675e6, 251e3, 850e3, 728e3, 19.9e3, 20.9e3, 4.62e3]
-K_D = [99.5e3, 52e3, 41.25e3, 5.02e3, 17e3, 14.6e3, 399.0, 419.0, 92.3]
+K_P = np.array([4.975e6, 2.6e6, 2.0675e6, 251e3, 850e3, 728e3, 19.9e3, 20.9e3, 4.62e3])
+K_D = np.array([99.5e3, 52e3, 41.25e3, 5.02e3, 17e3, 14.6e3, 399.0, 419.0, 92.3])
 
 
-def nanoseconds(time) -> int:
+def nanoseconds(time: Any) -> int:
     """Return a stamp, or a duration, as a whole number, by which ticks are equal or not."""
-    return time.sec * 1_000_000_000 + time.nanosec
+    return int(time.sec * 1_000_000_000 + time.nanosec)
 
 
-def rotation(m, d) -> np.ndarray:
+def rotation(m: Any, d: Any) -> Any:
     """Return the small rotation from a measured to a desired quaternion, rad, on base axes."""
     m, d = (np.array([q.w, q.x, q.y, q.z]) for q in (m, d))
     return 2.0 * np.sign(m @ d) * (m[0] * d[1:] - d[0] * m[1:] - np.cross(m[1:], d[1:]))
@@ -46,37 +47,38 @@ class OwnController(Node):
 
     def __init__(self) -> None:
         super().__init__("own_controller")
-        self.parts, self.stamp, self.answered, self.error = {}, -1, 0, np.zeros(9)
+        self.parts: dict[int, dict[str, Any]] = {}
+        self.stamp, self.answered, self.error = -1, 0, np.zeros(9)
         self.command = self.create_publisher(JointState, "command", DEPTH)
         for topic, kind in STATE.items():
             self.create_subscription(kind, topic, partial(self.take_state, topic), DEPTH)
         for topic, kind in REFERENCE.items():
             self.create_subscription(kind, topic, partial(self.take_reference, topic), DEPTH)
 
-    def take_reference(self, topic, message) -> None:
+    def take_reference(self, topic: str, message: Any) -> None:
         """Keep the points of a reference by their stamps; it comes up to 0.5 s ahead."""
         start = nanoseconds(message.header.stamp)
         for point in message.points:
             self.take(start + nanoseconds(point.time_from_start), topic, point)
 
-    def take_state(self, topic, message) -> None:
+    def take_state(self, topic: str, message: Any) -> None:
         """Take one part of a state, again if the plant had no answer for 0.2 s."""
         self.take(nanoseconds(message.header.stamp), topic, message)
 
-    def take(self, stamp, topic, content) -> None:
+    def take(self, stamp: int, topic: str, content: Any) -> None:
         """Keep what has come for a stamp; answer when it is complete."""
         parts = self.parts.setdefault(stamp, {})
         parts[topic] = content
         if len(parts) == len(STATE) + len(REFERENCE):
             self.answer(stamp, *(parts[name] for name in (*STATE, *REFERENCE)))
 
-    def answer(self, stamp, joints, base, desired_joints, desired_base) -> None:
+    def answer(self, stamp: int, joints: Any, base: Any, desired: Any, desired_base: Any) -> None:
         """Publish the torques for a state."""
         error = rotation(base.transforms[0].rotation, desired_base.transforms[0].rotation)
-        self.error = np.append(error, np.subtract(desired_joints.positions, joints.position))
-        desired, omega = desired_base.velocities[0].angular, base.twist[0].angular
-        rate = [desired.x - omega.x, desired.y - omega.y, desired.z - omega.z]
-        rate = np.append(rate, np.subtract(desired_joints.velocities, joints.velocity))
+        self.error = np.append(error, np.subtract(desired.positions, joints.position))
+        wanted, omega = desired_base.velocities[0].angular, base.twist[0].angular
+        turn = [wanted.x - omega.x, wanted.y - omega.y, wanted.z - omega.z]
+        rate = np.append(turn, np.subtract(desired.velocities, joints.velocity))
         command = JointState(name=["base_x", "base_y", "base_z", *joints.name])
         command.header.stamp = joints.header.stamp
         command.effort = (K_P * self.error + K_D * rate).tolist()

@@ -20,11 +20,14 @@ def flown(described: Mapping[str, Any]) -> str:
     Args:
         described: a report, or the description in a bag.
     """
-    law, keys = law_of(described), ("case", "gains")
-    if law == NoLaw.name:
-        law, keys = "torques from outside", ("case",)
-    known = [f"{key} {described[key]}" for key in keys if described.get(key)]
-    return ", ".join([str(law or "unknown law"), *known])
+    law = law_of(described)
+    has_gains = law != NoLaw.name
+    known = [
+        f"{key} {described[key]}"
+        for key in ("case", *(("gains",) if has_gains else ()))
+        if described.get(key)
+    ]
+    return ", ".join([str(law or "unknown law") if has_gains else "torques from outside", *known])
 
 
 def seen_through(report: Report) -> str:
