@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 from command import Run
-from flights import forked_space_robot, ros_environment, space_robot_here
+from flights import Start, forked_space_robot, ros_environment, space_robot_here
 from forked import Forked
 from paths import ROOT
 
@@ -155,3 +155,21 @@ def test_what_a_node_that_is_not_started_would_do_is_refused(
     ended = space_robot("fly", "--without", *options.split())
     assert ended.code == 2
     assert said in ended.err
+
+
+def test_nodes_by_hand_wait_for_a_recorder_that_comes_last(start: Start, tmp_path: Path) -> None:
+    """The recipe of docs/manual/namespaces.md: its bag has the flight from the first tick."""
+    plant = start("plant", wait_for="[recorder_node]", ticks=300)
+    controller = start("controller", wait_for="[recorder_node]")
+    start("mission")
+    time.sleep(1.0)
+    recorder = start("recorder", bag=tmp_path / "bag")
+    output, _ = plant.communicate(timeout=100)
+    assert plant.returncode == 0, output
+    controller.terminate()
+    controller.wait(60)
+    recorder.terminate()
+    recorder.wait(60)
+    log = read_flight(tmp_path / "bag")
+    assert (log.ticks, log.first_tick) == (300, 0)
+    assert not any(log.lost.values())
