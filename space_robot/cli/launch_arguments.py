@@ -65,6 +65,8 @@ def _argument(option: click.Option) -> LaunchArgument:
     if option.show_default:
         help_ += f" [default: {str(option.default).lower() if option.is_flag else option.default}]"
     choices = tuple(option.type.choices) if isinstance(option.type, click.Choice) else ()
+    if option.multiple:  # one text with all of them
+        choices = ()
     if option.is_flag:
         choices = tuple(_TRUTH)
     return LaunchArgument(_name(option), help_, ("", *choices) if choices else ())
