@@ -7,7 +7,6 @@ from collections.abc import Sequence
 from typing import Any
 
 from space_robot_msgs_py import topics
-from space_robot_msgs_py.ros.endpoints import full_name_of
 
 from ...scenario.node_settings import SCHEMAS
 
@@ -52,6 +51,8 @@ class OwnNodes:
 
     def arrived(self) -> str:
         """Describe nodes that have come since the last call; empty if there are none."""
+        from space_robot_msgs_py.ros.endpoints import full_name_of
+
         come = []
         for node in list(self._missing):
             infos = [self._node.get_publishers_info_by_topic(t.name) for t in AWAITED[node]]
