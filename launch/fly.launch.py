@@ -34,7 +34,7 @@ from space_robot.cli.launch_arguments import (
     refuse_unknown,
 )
 from space_robot.flight.graph.launched import LaunchedGraph, launched_parameters, report_failure
-from space_robot.flight.graph.node_names import NODE_NAMES
+from space_robot.flight.graph.node_names import started_nodes
 from space_robot_msgs_py.ros.process_environment import defaults
 
 AUTOSTART, SHUTDOWN = "autostart", "shutdown"
@@ -100,6 +100,7 @@ def fly(context: LaunchContext) -> list:
     folder = Path(mkdtemp(prefix="space_robot_launch_"))
     file = launched_parameters(flight, bag, value(AUTOSTART) == "true", folder, of_ros)
     namespace = flight.scenario.options.namespace
+    names = started_nodes(flight.scenario.options.without)
     nodes = [
         LifecycleNode(
             package=PACKAGE,
@@ -110,9 +111,9 @@ def fly(context: LaunchContext) -> list:
             output="screen",
             sigterm_timeout=RECORDER_S,
         )
-        for name in NODE_NAMES
+        for name in names
     ]
-    graph = LaunchedGraph()
+    graph = LaunchedGraph(names)
     graphs = context.get_locals_as_dict().get(GRAPHS, [])
     if value(SHUTDOWN) == "true":
         graphs.append(graph)

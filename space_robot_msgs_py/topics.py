@@ -158,6 +158,11 @@ BY_NAME = {topic.full_name: topic for topic in ALL}
 """By their full names in the root namespace."""
 # Shapes in the inertial frame, for viewers, while one listens; bags have transforms instead.
 MARKERS = Topic("markers", "visualization_msgs/msg/MarkerArray", 10, is_optional=True)
+# The base once more, in standard messages of one frame each, for others' nodes: while one listens.
+ODOMETRY = Topic("base/odometry", "nav_msgs/msg/Odometry", 100, is_optional=True)
+IMU = Topic("base/imu", "sensor_msgs/msg/Imu", 100, is_optional=True)
+WRENCH = Topic("base/wrench", "geometry_msgs/msg/WrenchStamped", 100, is_optional=True)
+STANDARD = (ODOMETRY, IMU, WRENCH)
 JOINT_TRAJECTORY = Topic(
     "joint_trajectory", "trajectory_msgs/msg/JointTrajectory", 10, is_event=True
 )

@@ -11,7 +11,7 @@ class QueuedInput:
     """A `TrustedSubscription` that hears what the test sends."""
 
     def __init__(self, node: object, topic: topics.Topic, group: object, depth: int = 1) -> None:
-        self.topic = topic
+        self.topic, self.full_name = topic, topic.full_name
         self._sent: deque[bytes] = deque()
 
     def send(self, data: bytes) -> None:

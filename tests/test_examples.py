@@ -31,8 +31,9 @@ def test_an_example_prints_what_it_shows(program: Path, tmp_path: Path) -> None:
     """In a process forked from a loaded one: most of its time would be that of its imports."""
     if module := NEEDS.get(program.stem):
         pytest.importorskip(module)
-    (command,), shown = blocks(program)
-    python, name, *arguments = shlex.split(command)
+    (*others, command), shown = blocks(program)
+    *domain, python, name = shlex.split(command)[: command.split().index("python") + 2]
+    arguments = shlex.split(command)[len(domain) + 2 :]
     assert (python, ROOT / name) == ("python", program)
     scripts = Path(sys.executable).parent
     environment = {
@@ -40,9 +41,16 @@ def test_an_example_prints_what_it_shows(program: Path, tmp_path: Path) -> None:
         "PATH": os.pathsep.join((str(scripts), os.environ.get("PATH", ""))),
         "PYTHONPATH": os.pathsep.join((str(ROOT), os.environ.get("PYTHONPATH", ""))),
     }
+    in_other_terminals = [
+        Forked.of_command(shlex.split(other), environment, tmp_path) for other in others
+    ]
+    environment |= dict(word.split("=") for word in domain)
     process = Forked.of_command([str(program), *arguments], environment, tmp_path)
     output, errors = process.communicate(timeout=200)
     assert process.returncode == 0, errors
+    for other in in_other_terminals:
+        _, errors = other.communicate(timeout=60)
+        assert other.returncode == 0, errors
     found = list(differences([line.strip() for line in shown], output.splitlines()))
     assert not found, "\n".join(found)
     for option, value in zip(arguments[::2], arguments[1::2], strict=True):
@@ -55,4 +63,4 @@ def test_each_example_stands_in_the_table() -> None:
     for program in PROGRAMS:
         assert f"[{program.stem}]({program.name}) |" in table
         assert 25 <= len(program.read_text("utf-8").splitlines()) <= 100
-    assert len(PROGRAMS) == 17
+    assert len(PROGRAMS) == 18

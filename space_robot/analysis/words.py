@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from space_robot_control.controller.plain_laws import NoLaw
 from space_robot_msgs_py.bag.law_history import in_words
 
 from ..flight.start_step import sentence
@@ -20,8 +21,13 @@ def flown(described: Mapping[str, Any]) -> str:
         described: a report, or the description in a bag.
     """
     law = law_of(described)
-    known = [f"{key} {described[key]}" for key in ("case", "gains") if described.get(key)]
-    return ", ".join([str(law or "unknown law"), *known])
+    has_gains = law != NoLaw.name
+    known = [
+        f"{key} {described[key]}"
+        for key in ("case", *(("gains",) if has_gains else ()))
+        if described.get(key)
+    ]
+    return ", ".join([str(law or "unknown law") if has_gains else "torques from outside", *known])
 
 
 def analyzed(report: Report) -> str:

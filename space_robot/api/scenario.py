@@ -27,6 +27,8 @@ from .options_html import options_html
 OF_THE_GRAPH = (
     "realtime",
     "fifo_priority",
+    "without",
+    "join_timeout",
     "restart_controller",
     "composed",
     "domain",

@@ -85,6 +85,8 @@ def _argument(option: click.Option) -> LaunchArgument:
     if option.multiple:
         description += " Separate several with spaces."
     choices = tuple(option.type.choices) if isinstance(option.type, click.Choice) else ()
+    if option.multiple:  # one text with all of them
+        choices = ()
     if option.is_flag:
         choices = tuple(_TRUTH)
     return LaunchArgument(_name(option), description, ("", *choices) if choices else (), default)

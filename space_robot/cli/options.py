@@ -115,6 +115,8 @@ def _click_option(entry: Option) -> Decorator:
             settings["is_flag"] = True
     elif entry.kind == "texts":
         settings |= {"multiple": True, "metavar": entry.metavar, "default": None}
+        if entry.choices:
+            settings["type"] = click.Choice(entry.choices)
     elif entry.choices:
         settings["type"] = click.Choice(entry.choices)
     elif entry.kind == "whole number":

@@ -20,7 +20,9 @@ def default_bag(flight: Flight) -> Path:
     stamp = datetime.now(timezone.utc).strftime("%Y%m%d-%H%M%S")
     case = Path(flight.plant_settings.case).stem
     where = flight.scenario.options.namespace.lstrip("/").replace("/", "_")
-    return Path("flights") / "_".join(filter(None, (where, flight.law.name, f"case{case}", stamp)))
+    return Path("flights") / "_".join(
+        filter(None, (where, flight.controller_name, f"case{case}", stamp))
+    )
 
 
 def check_bag_path(path: Path) -> None:

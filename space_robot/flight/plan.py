@@ -68,6 +68,11 @@ class Flight:
         return self.plant_settings.controls_base
 
     @property
+    def controller_name(self) -> str:
+        """Name of the law in force at the start, or of a controller that is not this project's."""
+        return "own_controller" if "controller" in self.scenario.options.without else self.law.name
+
+    @property
     def flies_by_messages(self) -> bool:
         """True if the controller has to answer as a node does, state by state."""
         is_plain = self.controller_settings.answers_in_python
@@ -92,6 +97,8 @@ class Flight:
         """
         if self.scenario.process_faults:
             asked = f"faults {[str(fault) for fault in self.scenario.process_faults]}"
+        elif self.scenario.options.without:
+            asked = "without"
         elif self.plant_settings.realtime:
             asked = "realtime"
         elif self.plant_settings.paused:

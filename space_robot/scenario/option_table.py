@@ -247,6 +247,24 @@ OPTIONS = (
         is_launched=False,
     ),
     Option(
+        "without",
+        "texts",
+        "Do not start this node, controller or mission: the flight waits for one of your own; may "
+        "be repeated",
+        choices=("controller", "mission"),
+        metavar="NODE",
+        needs_graph=True,
+    ),
+    Option(
+        "join_timeout",
+        "number",
+        "Longest wait for the nodes of --without, s of the wall clock (0: no limit)",
+        60.0,
+        low=0.0,
+        high=1e6,
+        needs_graph=True,
+    ),
+    Option(
         "restart_controller",
         "switch",
         "Restart a controller that died or hangs",

@@ -86,6 +86,9 @@ class FlightPlan(StrictModel):
     controller_code: str = of("controller_code")
     shadow: Literal["none", "c"] = of("shadow")
     restart_controller: bool = of("restart_controller")
+    without: list[Literal["controller", "mission"]] = of("without")
+    """Nodes that are not started: others' take their places."""
+    join_timeout: float = of("join_timeout")
     composed: bool = of("composed")
     domain: int | None = of("domain")
     namespace: Annotated[str, AfterValidator(full_namespace)] = of("namespace")

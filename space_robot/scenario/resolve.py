@@ -22,7 +22,7 @@ from space_robot_sim.environment.disturbance_table import JSON, DisturbanceTable
 from space_robot_sim.faults.grammar import Fault, parse_faults
 
 from .disturbances import sampled
-from .faults import KINDS, PROCESS_KINDS
+from .faults import KINDS, NODE_OF, PROCESS_KINDS
 from .node_settings import FlightSettings
 from .objects import resolve_law
 from .options import FlightPlan
@@ -39,6 +39,7 @@ def resolve(plan: FlightPlan) -> ResolvedScenario:
     Raises:
         InputError: a name does not exist, or settings conflict.
     """
+    plan = _without_nodes(plan)
     settings = FlightSettings.resolve(plan.options(), plan.parameters)
     with explained_by("own-robot"):
         robots = Robots(settings, plan.robot, plan.plant_robot)
@@ -129,12 +130,43 @@ def _assumed_actuators(
     return assumed
 
 
+OF_NODES = {
+    "controller": (
+        *("controller", "gains", "assumed_actuators", "navigation", "swaps"),
+        *("controller_code", "shadow", "restart_controller"),
+    ),
+    "mission": (),
+}
+"""Options that say nothing where a node is another's."""
+
+
+def _without_nodes(plan: FlightPlan) -> FlightPlan:
+    """Check what is asked of nodes that are not started; a flight without controller has no law.
+
+    Raises:
+        InputError: something is.
+    """
+    for node in plan.without:
+        asked = [
+            name
+            for name in OF_NODES[node]
+            if getattr(plan, name) not in (FlightPlan.model_fields[name].default, None, [])
+        ]
+        asked += [f"{node}.{name}" for name in plan.parameters.get(node, {})]
+        faults = parse_faults(plan.faults_of(PROCESS_KINDS), KINDS)
+        asked += [f"fault {fault}" for fault in faults if NODE_OF[fault.kind] == node]
+        if asked:
+            raise InputError(
+                f"{', '.join(asked)}: that is for the project's {node}, which `without` leaves out"
+            )
+    return plan.model_copy(update={"controller": None}) if "controller" in plan.without else plan
+
+
 def _check_composed(plan: FlightPlan) -> None:
     if not plan.composed:
         return
     asked = [f"fault {fault}" for fault in plan.faults_of(PROCESS_KINDS)]
-    if plan.restart_controller:
-        asked.append("restart_controller")
+    asked += [name for name in ("restart_controller", "without") if getattr(plan, name)]
     if asked:
         raise InputError(
             f"{', '.join(asked)}: that needs a process for each node: fly without --composed"

@@ -200,6 +200,7 @@ class ResolvedScenario:
             **({"faults": self.faults} if self.faults else {}),
             **({"swaps": self.swap_texts} if self.swap_texts else {}),
             **({"restart_controller": True} if self.options.restart_controller else {}),
+            **({"without": list(self.options.without)} if self.options.without else {}),
             "parameters": self.parameters,
             "scenario": {k: v for k, v in self.tree.items() if k not in ROBOTS},
             "gains_used": self.gains_used,
@@ -252,6 +253,7 @@ def _tree(scenario: ResolvedScenario) -> dict[str, Any]:
             if getattr(controller, name) != ControllerNodeSettings.model_fields[name].default
         },
         **({"restart_controller": True} if scenario.options.restart_controller else {}),
+        **({"without": list(scenario.options.without)} if scenario.options.without else {}),
         "parameters": {
             node: {
                 **_rest(node, getattr(settings, node)),
@@ -287,6 +289,7 @@ def _rest(node: str, settings: BaseModel) -> dict[str, Any]:
 
 
 _LATER: Mapping[str, Any] = {
+    "base_topics_rate": PlantNodeSettings.model_fields["base_topics_rate"].default,
     "magnetic_torquers": MagneticTorquerSettings().model_dump(mode="json"),
     **{key: AllocationSettings.model_fields[key].default for key in ("dump", "magnetic_gain")},
     **{key: DisturbanceSettings.model_fields[key].default for key in ("table", "table_scale")},

@@ -68,7 +68,9 @@ class ControllerLoop:
         )
         timebase = settings.timebase
         self._states = StateInput(node, self._controller.names, timebase)
-        self._references = ReferenceInput(node, robot, timebase, settings.reference_timeout)
+        self._references = ReferenceInput(
+            node, robot, timebase, settings.reference_timeout, settings.join_timeout
+        )
         self._answering = StateResponder(
             self._controller,
             self._laws.choice,
@@ -105,7 +107,11 @@ class ControllerLoop:
         self._unanswered, self._is_resumed = -1, True
 
     def step(self) -> Wait | None:
-        """Answer a state if it and its reference have arrived."""
+        """Answer a state if it and its reference have arrived.
+
+        Raises:
+            FlightError: no reference has come in time.
+        """
         tick = self._unanswered
         if tick < 0:
             received = self._states.take()

@@ -13,7 +13,7 @@ from rclpy.node import Node
 from space_robot_model.robot import Robot
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.compiled.records import Block
-from space_robot_msgs_py.errors import MessageError
+from space_robot_msgs_py.errors import FlightError, MessageError
 from space_robot_msgs_py.ros.endpoints import PolledCallbackGroup
 from space_robot_msgs_py.ros.loop import Wait
 from space_robot_msgs_py.ros.trusted_subscription import TrustedSubscription
@@ -37,9 +37,24 @@ WAIT_TOLD_S = 0.5
 class ReferenceInput:
     """Reader of both halves of the reference into a `ReferenceBuffer`, without waiting."""
 
-    def __init__(self, node: Node, robot: Robot, timebase: Timebase, timeout_s: float) -> None:
-        """``timeout_s``: longest wait for the mission."""
-        self._timeout_s = timeout_s
+    def __init__(
+        self,
+        node: Node,
+        robot: Robot,
+        timebase: Timebase,
+        timeout_s: float,
+        join_timeout_s: float = 0.0,
+    ) -> None:
+        """Subscribe.
+
+        Args:
+            node: that subscribes.
+            robot: the joints.
+            timebase: conversion between ticks and stamps.
+            timeout_s: longest wait for the mission, s.
+            join_timeout_s: longest wait for its first reference, s; 0: no limit.
+        """
+        self._timeout_s, self._join_timeout_s = timeout_s, join_timeout_s
         self.buffer = ReferenceBuffer(robot.n)
         self.rejected: Counter[str] = Counter()
         """Messages not used, by reason."""
@@ -83,6 +98,9 @@ class ReferenceInput:
         """Return the `Reference` of ``tick``, or the last point if the mission is silent.
 
         None if they have not come yet (`is_awaited`), or if nothing has come that could be held.
+
+        Raises:
+            FlightError: nothing has come in time.
         """
         buffer = self.buffer
         if buffer.covers(tick) or self._look_for(tick):
@@ -94,6 +112,12 @@ class ReferenceInput:
         if held is not None:
             self.is_missing, self._waits_since = True, 0.0
             self.held += 1
+        elif 0.0 < self._join_timeout_s < time.monotonic() - self._waits_since:
+            names = " and ".join(entry.full_name for entry in self.inputs)
+            raise FlightError(
+                f"no reference for tick {tick} within {self._join_timeout_s:g} s (join_timeout): "
+                f"a mission must publish {names}"
+            )
         return held
 
     def take(self) -> bool:

@@ -114,6 +114,11 @@ class ControllerNodeSettings(NodeSettings):
         description="time to wait for a reference, s of the wall clock; then its last point is "
         "held",
     )
+    join_timeout: Annotated[float, Field(ge=0.0, le=1e6)] = Field(
+        0.0,
+        description="longest wait for a mission's first reference, s of the wall clock "
+        "(0: no limit)",
+    )
     state_timeout: Annotated[float, Field(ge=0.001, le=1e6)] = Field(
         2.0, description="time without a state after which this is reported, s of the wall clock"
     )

@@ -25,10 +25,12 @@ from space_robot_msgs_py.wire.clock import ClockCodec
 from space_robot_msgs_py.wire.codecs import CommandCodec, StateCodec
 
 from .actuator_health import ActuatorHealth
+from .base_output import BaseOutput
 from .command_guard import CommandGuard
 from .description import plant_description
 from .late_listeners import LateListeners
 from .messages import NONE, SentState, exchange_of
+from .own_controller import OwnController
 from .plant import Plant
 from .run_control import PAUSED, RunControl
 from .scene_output import SceneOutput
@@ -84,6 +86,7 @@ class PlantLoop:
         self._for_answer = Wait(TIMEOUT_S, (self._command_in,), is_brief=True)
         self._truth = TruthOutput(node, self._plant, timebase)
         self._scene = SceneOutput(node, robot, timebase)
+        self._base = BaseOutput(node, settings)
         self._description_out = RawPublisher(node, topics.PLANT_DESCRIPTION)
         self.outputs = (
             *self._state_out,
@@ -93,7 +96,7 @@ class PlantLoop:
             self._description_out,
         )
         self._late_listeners = LateListeners(
-            (self._state_out[0], self._clock_out, *self._scene.viewed)
+            (self._state_out[0], self._clock_out, *self._scene.viewed, *self._base.outputs)
         )
         self.wait_for = settings.wait_for
         self.is_complete = False
@@ -102,6 +105,7 @@ class PlantLoop:
         self._paused_out = PausedOutput(node)
         self._wall_clock = WallClock(settings.period)
         self._silence_s = settings.silence_timeout or math.inf
+        self._own = OwnController(node, self._command_in, settings)
         self._controller_silent = False
         self._by_the_clock = False
         """True if the tick that is under way lasts its period by the wall clock."""
@@ -142,8 +146,15 @@ class PlantLoop:
         self._node.report()
 
     def step(self) -> Wait | None:
-        """Send a state, or take its answer and step the plant."""
+        """Send a state, or take its answer and step the plant.
+
+        Raises:
+            DivergedError: see `Plant.step`.
+            FlightError: the controller that others start does not come, or has fallen silent.
+        """
         if not self._is_under_way:
+            if self._own.is_awaited():
+                return HELD
             self._begin_tick()
         if self._by_the_clock:
             return self._step_by_the_clock()
@@ -196,6 +207,10 @@ class PlantLoop:
             values["latency_max_ms"] = 1e3 * self._latency_max_s
         if self.control.is_paused:
             return Health(PAUSED, values=values)
+        if self._own.is_missing:
+            return Health(
+                f"waiting for a node that publishes {self._command_in.full_name}", values=values
+            )
         if guard.answered < 0 or tick == 0:  # nothing acts before the first tick ends
             return Health("waiting for the first command", values=values)
         if guard.is_safe:
@@ -221,6 +236,7 @@ class PlantLoop:
             self._clock_out.publish(self._clock_sent)
         self._truth.send(self._plant.truth)
         self._scene.send(self._plant.truth)
+        self._base.send(self._plant.state)
 
     def _send_next(self) -> None:
         self._sent = state = self._unsent.popleft()
@@ -238,11 +254,14 @@ class PlantLoop:
         """Wait on for the answer; ask for it again, or give the controller up for silent."""
         now = time.monotonic()
         if now > self._awaited_since + self._silence_s and self._heard >= 0:
+            self._own.check_silence(self._plant.tick)
             self._node.log(f"no command for {self._silence_s:g} s: the controller is silent")
             self._controller_silent, self._awaits = True, False
             self._wall_clock.start(self._plant.tick)
             self._by_the_clock = True
             return None
+        if self._heard < 0:
+            self._own.check_first(now - self._awaited_since, self._guard.refused)
         if now > self._sent_at + ASK_AGAIN_S:
             self._publish()
             self._clock_out.publish(self._clock_sent)
@@ -279,6 +298,7 @@ class PlantLoop:
             for output, message in zip(self._state_out[:1], self._sent.messages, strict=False):
                 output.publish(message)
             self._scene.show(self._plant.truth)
+            self._base.show(self._plant.state)
         return HELD
 
     def _end_tick(self) -> None:
@@ -290,8 +310,11 @@ class PlantLoop:
             clock.start(tick + 1)
         if tick == 0:
             clock.start(0)  # time begins when the loop is closed
-        elif self._by_the_clock and clock.slip(tick) and (remark := clock.remark()):
-            self._node.log(remark)
+        elif self._by_the_clock:
+            if (tick - self._heard) * self._settings.period > self._silence_s:
+                self._own.check_silence(tick)
+            if clock.slip(tick) and (remark := clock.remark()):
+                self._node.log(remark)
         self.missed_deadlines += guard.answered != tick
         was_safe = guard.is_safe
         command = guard.act(tick)

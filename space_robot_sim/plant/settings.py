@@ -87,6 +87,21 @@ class PlantNodeSettings(PlantSettings, NodeSettings):
         description="longest time that a tick waits for its command in lockstep, s of the wall "
         "clock (0: no limit)",
     )
+    own_controller: bool = Field(
+        False,
+        description="the controller is a node that others start: wait for it, and end with an "
+        "error when it is silent for silence_timeout (false: fly on without commands)",
+    )
+    join_timeout: Annotated[float, Field(ge=0.0, le=1e6)] = Field(
+        0.0,
+        description="longest wait for a controller's first command, s of the wall clock "
+        "(0: no limit)",
+    )
+    base_topics_rate: Annotated[float, Field(ge=0.0, le=1e6)] = Field(
+        100.0,
+        description="messages per simulated second on each of base/odometry, base/imu and "
+        "base/wrench that has a subscriber (0: none)",
+    )
     wait_for: Texts = Field(
         [""],
         description="subscribers to wait for before the first tick: NODE:TOPIC, or NODE for all "

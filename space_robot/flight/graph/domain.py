@@ -8,7 +8,7 @@ from __future__ import annotations
 import os
 import socket
 import time
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
@@ -37,10 +37,13 @@ _held: set[tuple[int, str]] = set()
 
 
 @contextmanager
-def ros_domain(number: int | None = None, namespace: str = ROOT) -> Iterator[int]:
+def ros_domain(
+    number: int | None = None, namespace: str = ROOT, welcome: Collection[str] = ()
+) -> Iterator[int]:
     """``number``, or the user's ROS_DOMAIN_ID, or a free one; held until the context ends.
 
-    Others may have another ``namespace`` of a domain that the user names.
+    Others may have another ``namespace`` of a domain that the user names. Nodes with the names
+    ``welcome`` may be there.
 
     Raises:
         InputError: that namespace of the domain has nodes of this project, or a command that has
@@ -48,7 +51,9 @@ def ros_domain(number: int | None = None, namespace: str = ROOT) -> Iterator[int
         FlightError: none is free.
     """
     number = domain_asked_for(number)
-    domain, lock = _free_domain(namespace) if number is None else (number, _take(number, namespace))
+    domain, lock = (
+        _free_domain(namespace) if number is None else (number, _take(number, namespace, welcome))
+    )
     _held.add((domain, namespace))
     try:
         yield domain
@@ -79,7 +84,7 @@ def _free_domain(namespace: str) -> tuple[int, FileLock]:
     )
 
 
-def _take(domain: int, namespace: str) -> FileLock | None:
+def _take(domain: int, namespace: str, welcome: Collection[str]) -> FileLock | None:
     """Lock a domain chosen by the user; return None if this process holds it already."""
     if (domain, namespace) in _held:
         return None
@@ -88,17 +93,19 @@ def _take(domain: int, namespace: str) -> FileLock | None:
     except HeldError as error:
         raise _refusal(domain, namespace, error.holder) from None
     try:
-        _see_that_nobody_is_there(domain, namespace)
+        _see_that_nobody_is_there(domain, namespace, welcome)
     except BaseException:
         lock.release()
         raise
     return lock
 
 
-def _see_that_nobody_is_there(domain: int, namespace: str) -> None:
+def _see_that_nobody_is_there(domain: int, namespace: str, welcome: Collection[str]) -> None:
     """Refuse foreign nodes; wait for nodes that end because their parent was killed."""
     until = time.monotonic() + TIMEOUT_S
-    while nodes := nodes_in(domain, namespace):
+    while nodes := [
+        node for node in nodes_in(domain, namespace) if node.name.split()[0] not in welcome
+    ]:
         for node in nodes:
             if not node.starter or _is_alive(node.starter) or time.monotonic() > until:
                 raise _refusal(domain, namespace, node)

@@ -19,8 +19,9 @@ from .foreign import ForeignNodes
 from .injection import Injector
 from .listeners import wait_for
 from .monitor import Event, Monitor
-from .node_names import NODE_NAMES, ORDER, PLANT
+from .node_names import PLANT, started_nodes
 from .node_services import change_state
+from .own_nodes import OwnNodes, topics_of
 from .processes import Command, Graph, node_command
 from .watch import Watch
 
@@ -106,7 +107,7 @@ def follow(
     monitor = Monitor(domain, flight.scenario.options.namespace, period=flight.period)
     try:
         follower = _Follower(graph, flight, parameters, monitor, stopped)
-        with flight_progress(follower.total_s, flight.controller.law.name) as show:
+        with flight_progress(follower.total_s, flight.controller_name) as show:
             follower.bring_up(show, nobody_was_there)
             follower.until_complete(show)
         return follower.end()
@@ -128,7 +129,10 @@ class _Follower:
         self.total_s = flight.ticks * flight.period
         self._last_clock_s = self.total_s - flight.plant_settings.clock_decimation * flight.period
         self._graph, self._monitor, self._stopped = graph, monitor, stopped
-        self._foreign = ForeignNodes(monitor.node, NODE_NAMES)
+        options = flight.scenario.options
+        self._names = started_nodes(options.without)
+        self._foreign = ForeignNodes(monitor.node, self._names, topics_of(options.without))
+        self._own = OwnNodes(monitor.node, options.without, options.join_timeout)
         self._fault_kinds = frozenset(fault.kind.name for fault in flight.scenario.process_faults)
         self._realtime = flight.plant_settings.realtime
         self._injector = Injector(flight.scenario.process_faults, graph)
@@ -153,12 +157,16 @@ class _Follower:
     def bring_up(self, show: FlightProgress, nobody_was_there: bool) -> None:
         """Configure all nodes, then activate them, the plant last."""
         show(0.0, "configuring the nodes")
-        self._change(NODE_NAMES, "configure")
+        self._change(self._names, "configure")
         if not nobody_was_there:
             self._foreign.wait(self._check_start)
-        for name in NODE_NAMES:
+        for name in self._names:
             self._change([name], "activate")
-        show.say(f"configured and active: {', '.join(ORDER)}")
+        show.say(
+            f"configured and active: {', '.join(n.removesuffix('_node') for n in self._names)}"
+        )
+        if awaited := self._own.awaited:
+            show.say(f"waiting for {awaited}")
         show(0.0, "waiting for the nodes")
 
     def _change(self, names: Sequence[str], transition: str) -> None:
@@ -178,6 +186,8 @@ class _Follower:
             news = [*monitor.poll(), *injector.poll(monitor.simulated_s)]
             news += self._watch.poll(monitor.simulated_s)
             self._foreign.watch()
+            if arrived := self._own.arrived():
+                show.say(arrived)
             self._show_progress(show)
             self._keep(news, show)
         self._keep(monitor.poll(), show)
@@ -225,7 +235,9 @@ class _Follower:
         elif is_paused:
             self._moved_at = now
             show(self._last_s, PAUSED)
-        elif now - self._moved_at > STALL_TIMEOUT_S:
+        elif now - self._moved_at > STALL_TIMEOUT_S + (
+            0.0 if self._last_s else self._own.timeout_s
+        ):
             output = "\n".join(f"{n}:\n{p.output_tail()}" for n, p in self._graph.nodes.items())
             why = "".join(f"{node}: {mode}\n" for node, mode in monitor.complaints.items())
             raise FlightError(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from typing import Any
 
 from space_robot_msgs_py import topics
@@ -22,10 +22,19 @@ LASTING = 10
 class ForeignNodes:
     """Guard against foreign publishers and duplicate node names in a domain."""
 
-    def __init__(self, node: Any, names: Sequence[str]) -> None:
-        """``node``: an rclpy node to look with; ``names``: of the flight's in its namespace."""
+    def __init__(
+        self, node: Any, names: Sequence[str], of_others: Collection[topics.Topic] = ()
+    ) -> None:
+        """Begin to look.
+
+        Args:
+            node: an rclpy node to look with.
+            names: of the flight's nodes in its namespace.
+            of_others: topics that the user's own nodes publish.
+        """
         namespace = node.get_namespace().rstrip("/")
         self._node, self._names = node, [f"{namespace}/{name}" for name in names]
+        self._topics = [topic.name for topic in topics.RECORDED if topic not in of_others]
         self._joined_at = self._look_at = time.monotonic()
         self._seen: Counter[str] = Counter()
 
@@ -67,9 +76,7 @@ class ForeignNodes:
     def _publishers(self) -> list[str]:
         from space_robot_msgs_py.ros.exclusive import foreign_publishers
 
-        publishers = foreign_publishers(
-            self._node, [topic.name for topic in topics.RECORDED], self._names
-        )
+        publishers = foreign_publishers(self._node, self._topics, self._names)
         return [f"{topic} is also published by {', '.join(n)}" for topic, n in publishers.items()]
 
     def _namesakes(self) -> list[str]:

@@ -7,7 +7,7 @@ from collections.abc import Collection
 from space_robot_msgs_py import topics
 
 from ...scenario.node_settings import SCHEMAS
-from .node_names import PLANT
+from .node_names import NODE_NAMES, PLANT
 
 _TO_CONTROLLER = ("controller_node", "recorder_node")
 
@@ -32,14 +32,16 @@ LISTENERS = {
 }
 """Nodes of the graph that subscribe to each topic."""
 
-RESET_WITH = ["recorder_node", "mission_node", "controller_node"]
-"""Parameter ``reset_with`` of the plant in a whole graph: the others as they are activated."""
+
+def reset_with(absent: Collection[str] = ()) -> list[str]:
+    """Return the parameter ``reset_with`` of the plant: the others as they are activated."""
+    return [name for name in NODE_NAMES if name not in (PLANT, *absent)]
 
 
 def wait_for(node: str, absent: Collection[str] = ()) -> list[str]:
     """Return the parameter ``wait_for`` of the plant or the controller in a whole graph.
 
-    ``absent``: nodes that have ended.
+    ``absent``: nodes that have ended, or are not started.
     """
     (sends,) = (schema.sends for schema in SCHEMAS if schema.node == node)
     return [

@@ -32,7 +32,7 @@ from ..plan import Flight
 from .composed import NAME, composed_command, write_parameters
 from .domain import is_quiet, ros_domain
 from .following import follow
-from .listeners import RESET_WITH, wait_for
+from .listeners import reset_with, wait_for
 from .node_server import Program
 from .processes import Command, Graph, node_command, node_environment
 
@@ -67,8 +67,9 @@ def fly(
     check_bag_path(bag)
     require_ros()
     compile_kernels(bool(flight.plant.names.actuators))
-    namespace = flight.scenario.options.namespace
-    with ros_domain(flight.scenario.options.domain, namespace) as domain, stop_signals() as stopped:
+    options = flight.scenario.options
+    namespace, own = options.namespace, [f"{node}_node" for node in options.without]
+    with ros_domain(options.domain, namespace, own) as domain, stop_signals() as stopped:
         nobody_is_there = is_quiet(domain)
         _claim(bag)
         begin = time.monotonic()
@@ -105,9 +106,14 @@ def _commands(
     flight: Flight, parameters: Mapping[str, Mapping[str, Any]], folder: Path
 ) -> Mapping[str, Command]:
     """Return the commands of the processes; files are written to ``folder``."""
-    started = {node: {**values, "autostart": False} for node, values in parameters.items()}
-    namespace = flight.scenario.options.namespace
-    if flight.scenario.options.composed:
+    options = flight.scenario.options
+    started = {
+        node: {**values, "autostart": False}
+        for node, values in parameters.items()
+        if node not in options.without
+    }
+    namespace = options.namespace
+    if options.composed:
         return {NAME: composed_command(started, namespace, folder)}
     return {node: _command(node, values, namespace, folder) for node, values in started.items()}
 
@@ -167,14 +173,19 @@ def require_ros() -> None:
 def flight_parameters(flight: Flight, bag: Path) -> dict[str, dict[str, Any]]:
     """Return the parameters of every node of a flight that is recorded to ``bag``."""
     parameters = {node: dict(values) for node, values in flight.scenario.parameters.items()}
+    options = flight.scenario.options
+    absent = [f"{node}_node" for node in options.without]
     parameters["plant"] |= {
         "ticks": flight.ticks,
-        "wait_for": wait_for("plant"),
-        "reset_with": RESET_WITH,
+        "wait_for": wait_for("plant", absent),
+        "reset_with": reset_with(absent),
     }
-    parameters["controller"] |= {"wait_for": wait_for("controller")}
+    parameters["controller"] |= {"wait_for": wait_for("controller", absent)}
+    if "controller" in options.without:
+        parameters["plant"] |= {"own_controller": True, "join_timeout": options.join_timeout}
+    elif options.without:
+        parameters["controller"]["join_timeout"] = options.join_timeout
     parameters["recorder"] |= {"bag": str(bag.absolute()), "flight": json.dumps(flight.description)}
-    options = flight.scenario.options
     if options.composed and "drain_period" not in options.parameters.get("recorder", {}):
         parameters["recorder"]["drain_period"] = COMPOSED_DRAIN_S
     return parameters

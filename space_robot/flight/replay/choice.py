@@ -75,8 +75,8 @@ class ControllerChoice:
         named = controller or flown.get("controller") or flight.get("controller")
         if named == NoLaw.name:
             raise InputError(
-                "no law flew: the torques of this flight came from outside, on a bench: name the "
-                "law that shall answer with --controller"
+                "no law flew: the torques of this flight came from outside, on a bench or from a "
+                "controller of your own: name the law that shall answer with --controller"
             )
         if not named:
             raise InputError(

@@ -11,6 +11,7 @@ from paths import CONFIG
 from queued_input import QueuedInput
 
 from space_robot_model.robot import Robot
+from space_robot_msgs_py.errors import FlightError
 from space_robot_msgs_py.samples import ReferenceChunk, Timebase
 from space_robot_msgs_py.wire.reference_codec import ReferenceCodec
 
@@ -27,13 +28,13 @@ TIMEOUT_S = 0.25
 class Bench:
     """A mission that sends, and the input of a controller by a clock of the test's."""
 
-    def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
+    def __init__(self, monkeypatch: pytest.MonkeyPatch, join_timeout_s: float = 0.0) -> None:
         self.now = 100.0
         clock = SimpleNamespace(monotonic=lambda: self.now)
         monkeypatch.setattr(reference_input, "time", clock)
         monkeypatch.setattr(reference_input, "TrustedSubscription", QueuedInput)
         no_node: Any = None
-        self.input = ReferenceInput(no_node, ROBOT, TIMEBASE, TIMEOUT_S)
+        self.input = ReferenceInput(no_node, ROBOT, TIMEBASE, TIMEOUT_S, join_timeout_s)
         self._codec = ReferenceCodec(ROBOT.joint_names, TIMEBASE)
 
     def send(self, start: int, ticks: int) -> None:
@@ -89,3 +90,25 @@ def test_a_mission_that_stays_away_in_flight_is_held_after_the_timeout(
     assert [bench.joint(tick) for tick in (7, 8, 9)] == [7.0, 8.0, 9.0]
     assert not bench.input.is_missing
     assert bench.input.held == 2
+
+
+def test_a_first_reference_that_is_overdue_ends_the_flight_and_a_later_one_is_held(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    bench = Bench(monkeypatch, join_timeout_s=9.0)
+
+    def wait_until(end: float) -> None:
+        while bench.now < end:
+            assert bench.joint(0) is None
+            bench.now += 0.1
+
+    wait_until(108.9)
+    with pytest.raises(FlightError, match=r"no reference for tick 0 within 9 s \(join_timeout\)"):
+        wait_until(110.0)
+    bench = Bench(monkeypatch, join_timeout_s=9.0)
+    bench.send(0, 3)
+    assert bench.joint(2) == 2.0
+    for _ in range(20):
+        bench.joint(3)
+        bench.now += 1.0
+    assert bench.joint(3) == 2.0

@@ -115,7 +115,7 @@ def test_by_hand_there_is_no_law(tmp_path: Path) -> None:
         bench.step([0.1, 0.0, 0.0, *np.zeros(6)])
     flight = bench.flown(tmp_path / "bag")
     assert (flight.outcome, flight.ended_at_s, flight.is_complete) == ("stopped", 0.2, False)
-    assert repr(flight).startswith("<FlownFlight: none, case 1")
+    assert repr(flight).startswith("<FlownFlight: torques from outside, case 1")
     assert [law.name for law in flight.log.laws] == ["none"]
     log = load_bag(tmp_path / "bag")
     np.testing.assert_array_equal(log.quaternion, flight.log.quaternion)

@@ -13,6 +13,8 @@ from paths import ROOT
 from space_robot.cli.fly import fly
 from space_robot.cli.launch_arguments import launch_arguments, launched_flight, refuse_unknown
 from space_robot.cli.scenario_option import NODES
+from space_robot.flight.graph.node_names import started_nodes
+from space_robot.flight.graph.orchestrator import flight_parameters
 from space_robot.flight.plan import Flight, FlightPlan
 from space_robot_msgs_py.errors import InputError
 
@@ -34,7 +36,9 @@ def test_each_option_of_fly_is_an_argument() -> None:
         if (name := next(iter(names(option)))) in arguments:
             said = arguments[name].description
             assert said.startswith((option.help or "").partition(" [default")[0][:20])
-            if isinstance(option.type, click.Choice):
+            if option.multiple:  # one text with all of them
+                assert not arguments[name].choices
+            elif isinstance(option.type, click.Choice):
                 assert arguments[name].choices == ("", *option.type.choices)
 
 
@@ -82,6 +86,18 @@ def test_the_flight_is_the_one_of_the_command(tmp_path: Path) -> None:
     )
     assert flight.scenario.options == plan
     assert bag == tmp_path / "bag"
+
+
+def test_nodes_of_ones_own_take_the_places_of_those_that_are_not_started(tmp_path: Path) -> None:
+    values = {"without": "controller mission", "join_timeout": "5", "bag": str(tmp_path / "bag")}
+    flight, bag = launched_flight(values)
+    assert started_nodes(flight.scenario.options.without) == ("recorder_node", "plant_node")
+    parameters = flight_parameters(flight, bag)["plant"]
+    assert (parameters["own_controller"], parameters["join_timeout"]) == (True, 5.0)
+    assert parameters["reset_with"] == ["recorder_node"]
+    assert {entry.partition(":")[0] for entry in parameters["wait_for"]} == {"recorder_node"}
+    flight, bag = launched_flight({**values, "without": "mission"})
+    assert flight_parameters(flight, bag)["controller"]["join_timeout"] == 5.0
 
 
 def test_nothing_given_is_the_flight_without_options() -> None:

@@ -8,6 +8,7 @@ from __future__ import annotations
 import time
 from collections import deque
 from collections.abc import Callable
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -16,6 +17,7 @@ from numpy.typing import NDArray
 
 from space_robot_model.robot import Robot
 from space_robot_msgs_py import topics
+from space_robot_msgs_py.errors import FlightError
 from space_robot_msgs_py.samples import Command
 from space_robot_msgs_py.wire.clock import ClockCodec
 from space_robot_msgs_py.wire.codecs import CommandCodec, StateCodec
@@ -25,7 +27,7 @@ from space_robot_sim.plant.settings import PlantNodeSettings
 pytest.importorskip("rclpy")
 
 from space_robot_msgs_py.ros.health import Level
-from space_robot_sim.plant import loop, scene_output, truth_output
+from space_robot_sim.plant import base_output, loop, own_controller, scene_output, truth_output
 from space_robot_sim.plant.loop import ASK_AGAIN_S, PlantLoop
 
 Array = NDArray[np.float64]
@@ -81,7 +83,7 @@ class Bench:
         self.states: list[tuple[int, float]] = []
         """Tick and time of each state that was sent."""
         patch.setattr(time, "monotonic", lambda: self.now)
-        for module in (loop, scene_output, truth_output):
+        for module in (loop, base_output, scene_output, truth_output):
             patch.setattr(module, "RawPublisher", Topic)
         patch.setattr(loop, "TrustedSubscription", Topic)
         patch.setattr(loop, "PausedOutput", lambda node: Topic(node, topics.SIMULATION_PAUSED))
@@ -156,6 +158,19 @@ class Bench:
 
     def get_namespace(self) -> str:
         return "/"
+
+    publishers: tuple[str, ...] = ()
+    """Nodes that publish commands."""
+
+    def count_publishers(self, topic: str) -> int:
+        return len(self.publishers)
+
+    def get_publishers_info_by_topic(self, topic: str) -> list[SimpleNamespace]:
+        return [SimpleNamespace(node_namespace="/", node_name=name) for name in self.publishers]
+
+    @property
+    def context(self) -> SimpleNamespace:
+        return SimpleNamespace(get_domain_id=lambda: 7)
 
 
 def torque(tick: int) -> Array:
@@ -301,3 +316,54 @@ def test_at_the_end_the_actuators_are_left_at_zero(
     assert bench.logged == ["flew 0.0200 s in 0.00 s"]
     bench.run(lambda: bench.tick == 42)
     assert not bench.loop._plant.state.applied_torque.any()
+
+
+def test_a_controller_of_others_is_waited_for_and_discovered_by_all_before_the_first_state(
+    paper_robot: Robot, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    bench = Bench(paper_robot, monkeypatch, always, own_controller=True, join_timeout=9.0)
+    bench.run(lambda: bench.now > 1005.0)
+    assert not bench.states
+    assert bench.loop.health().mode == "waiting for a node that publishes command"
+    bench.publishers = ("mine",)
+    bench.run()
+    assert bench.states[0][1] - 1005.0 == pytest.approx(own_controller.DISCOVERY_S, abs=0.1)
+    np.testing.assert_array_equal(bench.numbers, bench.flown_by_hand(torque))
+
+
+@pytest.mark.parametrize("publishers", [(), ("mine",)])
+def test_a_controller_of_others_that_does_not_come_ends_the_flight(
+    paper_robot: Robot, monkeypatch: pytest.MonkeyPatch, publishers: tuple[str, ...]
+) -> None:
+    """Or comes and never answers."""
+    bench = Bench(
+        paper_robot, monkeypatch, lambda tick: False, own_controller=True, join_timeout=4.0
+    )
+    bench.publishers = publishers
+    text = (
+        r"no good command for tick 0 within 4 s \(join_timeout\): publishers of command in ROS "
+        f"domain 7: {'/mine' if publishers else 'none'}$"
+    )
+    with pytest.raises(FlightError, match=text):
+        bench.run()
+    waited = 4.0 + (own_controller.DISCOVERY_S if publishers else 0.0)
+    assert bench.now - 1000.0 == pytest.approx(waited, abs=0.1)
+
+
+@pytest.mark.parametrize("realtime", [False, True])
+def test_a_controller_of_others_that_falls_silent_ends_the_flight(
+    paper_robot: Robot, monkeypatch: pytest.MonkeyPatch, realtime: bool
+) -> None:
+    """As a controller that is killed does."""
+    bench = Bench(
+        paper_robot,
+        monkeypatch,
+        lambda tick: tick < 20,
+        own_controller=True,
+        realtime=realtime,
+        ticks=10_000,
+    )
+    bench.publishers = ("mine",)
+    with pytest.raises(FlightError, match=r"no command for 1 s \(silence_timeout\) at .*: /mine"):
+        bench.run()
+    assert bench.tick * PERIOD == pytest.approx(1.0 if realtime else 0.01, abs=0.03)
