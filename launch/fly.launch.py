@@ -100,7 +100,7 @@ def fly(context: LaunchContext) -> list:
     folder = Path(mkdtemp(prefix="space_robot_launch_"))
     file = launched_parameters(flight, bag, value(AUTOSTART) == "true", folder, of_ros)
     namespace = flight.scenario.options.namespace
-    names = started_nodes(flight.scenario.options.without)
+    node_names = started_nodes(flight.scenario.options.without)
     nodes = [
         LifecycleNode(
             package=PACKAGE,
@@ -111,9 +111,9 @@ def fly(context: LaunchContext) -> list:
             output="screen",
             sigterm_timeout=RECORDER_S,
         )
-        for name in names
+        for name in node_names
     ]
-    graph = LaunchedGraph(names)
+    graph = LaunchedGraph(node_names)
     graphs = context.get_locals_as_dict().get(GRAPHS, [])
     if value(SHUTDOWN) == "true":
         graphs.append(graph)
