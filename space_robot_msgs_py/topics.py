@@ -190,5 +190,14 @@ PLANT_DESCRIPTION = Topic(
 """Description of the plant as JSON, which the recorder stores in the bag."""
 ROSOUT = Topic("/rosout", "rcl_interfaces/msg/Log", 1_000, transient_local=True)
 """The log of all nodes of a domain, with the depth that ROS's own publishers have."""
-FOR_OTHERS = (TF, TF_STATIC, MARKERS, JOINT_TRAJECTORY, DIAGNOSTICS, SIMULATION_PAUSED, ROSOUT)
+FOR_OTHERS = (
+    TF,
+    TF_STATIC,
+    MARKERS,
+    *STANDARD,
+    JOINT_TRAJECTORY,
+    DIAGNOSTICS,
+    SIMULATION_PAUSED,
+    ROSOUT,
+)
 """What the recorder leaves out and `ros2 bag record` hears."""
