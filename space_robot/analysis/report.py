@@ -141,6 +141,7 @@ class Analysis:
             **{key: block.flight.get(key) for key in DESCRIBED},
             "faults": [str(fault) for fault in block.flight.get("faults", ())],
             "events": event_labels(block),
+            **{k: block.flight[k] for k in ("own_gains",) if k in block.flight},
             **{k: str(block.flight[k]) for k in ("disturbance",) if k in block.flight},
             "start_step": start_step_of(block),
             "sensors": sensors_of(block),

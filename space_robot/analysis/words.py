@@ -21,6 +21,8 @@ def flown(described: Mapping[str, Any]) -> str:
     """
     law = law_of(described)
     known = [f"{key} {described[key]}" for key in ("case", "gains") if described.get(key)]
+    if own := described.get("own_gains"):
+        known.append(f"own {', '.join(own)}")
     return ", ".join([str(law or "unknown law"), *known])
 
 

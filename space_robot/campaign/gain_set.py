@@ -20,7 +20,7 @@ from ..scenario.node_settings import FlightSettings
 from ..scenario.robots import Robots
 from ..tuning.demand import demand
 from ..tuning.gain_file import gain_files
-from ..tuning.inertia import SAMPLING, inertia_along
+from ..tuning.inertia import SAMPLING, inertia_along, sampled_reference
 from ..tuning.method import Tuned, tune
 from ..tuning.noise import listen
 from ..tuning.postures import postures_along
@@ -50,8 +50,9 @@ def tuned_set(
     eta = reference.base_quaternion[0] / norm(reference.base_quaternion)
     if abs(eta) <= SINGULAR_ETA:
         raise InputError("base_quaternion: a rotation by 180 degrees, where the laws are singular")
-    if len(reference.waypoint_times) < 2:
-        raise InputError("the mission has only one waypoint: tuning needs a motion")
+    motion = sampled_reference(nominal, reference)
+    if not (motion.joints[:, 1].any() or motion.base[:, 4:].any()):
+        raise InputError("the mission moves neither joints nor base: tuning needs a motion")
     inertias = []
     for case, own in zip(cases, settings, strict=True):
         step(f"inertia, case {case}")

@@ -185,7 +185,7 @@ def held_ripple(flight: Flight, plan: FlightPlan) -> Array | None:
     None: it diverges.
     """
     first = flight.mission_settings.waypoints_deg[: flight.robot.n]
-    there = {"waypoint_times": [0.0], "waypoints_deg": first}
+    there = {"waypoint_times": [0.0], "waypoints_deg": first, "segments": [""]}
     held = plan.with_parameters("mission", there).model_copy(update={"duration": HELD})
     try:
         log = simulate(Flight(resolve(held)))

@@ -63,7 +63,7 @@ def plan(
     from ..console.terminal import echo_json, terminal
     from .plan_display import print_plan
 
-    flight = plan_flight(mission=mission, **options)
+    flight = plan_flight(mission=mission, controller=None, **options)
     robot = flight.scenario.robots.controller
     settings: MissionSettings = flight.mission_settings
     segments = planned_segments(robot, flight.mission)

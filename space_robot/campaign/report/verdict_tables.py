@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import shlex
-from pathlib import Path
 
 from ...console.tables import Column, Group, JudgedCell, Table
 from ..verdicts import requirements
@@ -11,6 +10,7 @@ from ..verdicts.values import GridPoint
 from .findings import Findings
 from .league_tables import number
 from .quantities import Quantity
+from .subject import Subject
 
 TONES = {"met": "good", "not met": "bad", "undecided": "open", "not measured": "open"}
 MORE_RUNS = "more runs"
@@ -166,7 +166,7 @@ def worst_table(
         f"Worst runs by {quantity.label}{of}",
         columns,
         [
-            [str(run), name, _value(row, quantity), command(findings.subject.folder, run, name)]
+            [str(run), name, _value(row, quantity), command(findings.subject, run, name)]
             for run, name, row in zip(
                 rows["run"].tolist(), rows["law"], rows.to_dict("records"), strict=True
             )
@@ -180,8 +180,9 @@ def _value(row: dict[str, object], quantity: Quantity) -> str:
     return f"{row['outcome']} at {row['ended_at_s']:.3g} s"
 
 
-def command(folder: Path, run: int, law: str) -> str:
+def command(subject: Subject, run: int, law: str) -> str:
     """Return the command that flies a row again and records a bag."""
-    words = ["space-robot", "campaign", "rerun", str(folder), str(run), "--law", law]
+    words = ["space-robot", "campaign", "rerun", str(subject.folder), str(run), "--law", law]
     name = law.replace("/", "_").replace("=", "_")
-    return shlex.join([*words, "--bag", f"flights/{run}_{name}"])
+    trust = ["--trust"] if subject.needs_trust else []
+    return shlex.join([*words, "--bag", f"flights/{run}_{name}", *trust])

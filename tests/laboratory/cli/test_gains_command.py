@@ -130,6 +130,14 @@ def tune(folder: Path, *options: str) -> Result:
     return run("tune", *options, "-o", str(folder))
 
 
+def test_a_mission_of_segments_is_tuned_for(tmp_path: Path) -> None:
+    assert tune(tmp_path, "--mission", "line").exit_code == 0
+    assert (tmp_path / "ctc.yaml").is_file()
+    here = "mission.waypoints_deg=[0.0, 90.0, 200.0, 20.0, 30.0, 10.0]"
+    still = tune(tmp_path, "--set", "mission.waypoint_times=[0.0]", "--set", here)
+    assert "moves neither joints nor base" in str(still.exception)
+
+
 def test_a_tuned_set_flies_and_is_sound(tmp_path: Path) -> None:
     folder = tmp_path / "set"
     result = tune(folder, "--case", "1", "--case", "4-2")
