@@ -52,7 +52,8 @@ class FlightPlan(StrictModel):
     """The options of ``fly`` and ``simulate``."""
 
     controller: LawGiven = of("controller")
-    """Unless it is set, that of the gain set's ``controller.yaml``, if there is one. Also a `ControlLaw` class or object; a function, see
+    """Unless it is set, that of the gain set's ``controller.yaml``, if there is one. Also a
+    `ControlLaw` class or object; a function, see
     `space_robot_control.controller.plain_laws`; None: none, on the bench."""
     case: Case = of("case")
     disturbance: DisturbanceGiven = of("disturbance")
@@ -96,8 +97,9 @@ class FlightPlan(StrictModel):
 
     @property
     def has_chosen_law(self) -> bool:
-        """Whether the law was set, and is not the default one."""
-        return "controller" in self.model_fields_set
+        """Whether the user set the law."""
+        own = self.parameters.get("controller", {})
+        return "controller" in self.model_fields_set or "controller" in own
 
     @explained_by("disturbances")
     def faults_of(self, kinds: Kinds) -> list[str]:

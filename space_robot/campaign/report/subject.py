@@ -4,19 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import yaml
 
-from space_robot_control.laws.trust import NotTrustedError
 from space_robot_msgs_py.config.validation import short
 from space_robot_msgs_py.errors import InputError
 
 from ..flown import FlownCampaign
 from ..flown.current_table import recover_table
-from ..flown.flown_campaign import check_study
 from ..row.window import Window
 from ..store.manifest import differences
 from ..study import Requirement, Study
@@ -45,15 +42,6 @@ class Subject:
     """Versions and digests, by name."""
     remarks: Sequence[str] = ()
     """One line for each damaged file and each difference from the study that was flown."""
-
-    @cached_property
-    def needs_trust(self) -> bool:
-        """Whether its flights are flown again with ``--trust`` only: it has code or files."""
-        try:
-            check_study(self.study)
-        except NotTrustedError:
-            return True
-        return False
 
     @property
     def text(self) -> str:
