@@ -19,6 +19,7 @@ from ..flight.plan import FlightPlan
 from ..scenario.node_settings import FlightSettings
 from ..scenario.robots import Robots
 from ..tuning.demand import demand
+from ..tuning.flexible import fast_inertia
 from ..tuning.gain_file import gain_files
 from ..tuning.inertia import SAMPLING, inertia_along, sampled_reference
 from ..tuning.method import Tuned, tune
@@ -58,6 +59,9 @@ def tuned_set(
         step(f"inertia, case {case}")
         loaded = with_payload(nominal, own.plant.payload)
         inertias.append(inertia_along(loaded, reference))
+        if any(loaded.gears):
+            places = motion.joints[:, 0]
+            inertias.append(fast_inertia(loaded, places, motion.base[0, :4]))
     step("forces along the mission")
     asked = demand(nominal, reference, [own.plant for own in settings])
     plant, navigation, noise = settings[0].plant, settings[0].controller.filter_settings, None
@@ -66,7 +70,8 @@ def tuned_set(
         noise = listen(nominal, plant, navigation, reference, plant.period)
     postures = postures_along(nominal, reference, SAMPLING)
     step("gains")
-    return tune(np.concatenate(inertias), postures, asked, wishes, plant.period, noise)
+    has_gears = any(nominal.gears)
+    return tune(np.concatenate(inertias), postures, asked, wishes, plant.period, noise, has_gears)
 
 
 def write_set(tuned: Tuned, command: str, folder: Path) -> list[Path]:

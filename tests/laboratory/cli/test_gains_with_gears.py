@@ -198,6 +198,16 @@ def test_the_base_may_float_freely(motor: str) -> None:
     assert free["laws"] != held["laws"]
 
 
+def test_tuned_gains_pass_the_check(motor: str, tmp_path: Path) -> None:
+    """A law that met the motors with the inertia of the links would grow at once."""
+    tuned = CliRunner().invoke(
+        cli, ["gains", "tune", "--robot", motor, "--mission", "paper", "-o", str(tmp_path)]
+    )
+    assert tuned.exit_code == 0, tuned.exception
+    mission = ("--mission", "paper", "--gains", str(tmp_path) + "/")
+    assert check("--robot", motor, *mission).exit_code == 0
+
+
 def test_of_rigid_joints_nothing_is_said_of_springs() -> None:
     result = check("--json")
     assert result.exit_code == 0
