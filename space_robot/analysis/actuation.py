@@ -15,6 +15,11 @@ from .generalised_motion import measured_rows
 
 Array = NDArray[np.float64]
 
+STANDING = 0.01
+"""Share of the desired velocity below which a joint stands."""
+LEAST_WAY = 1e-3
+"""Way, rad or m, from which on it is of interest whether a joint stands."""
+
 PERCENTILES = {"p50": 50.0, "p99": 99.0, "max": 100.0}
 
 
@@ -157,4 +162,33 @@ class MissedDeadlines(Metric):
             "unanswered_ticks": self._unanswered,
             "compared_ticks": self.compared,
             "differing_ticks": self.differing,
+        }
+
+
+class StandingJoints(Metric):
+    """Share of the way that each joint is to move on which it stands, as friction holds it.
+
+    A joint stands at a tick at which it is slower than `STANDING` of the desired velocity. Ticks
+    count by the desired velocity, so that a joint that starts a little late counts for little.
+    """
+
+    def __init__(self, log: FlightLog) -> None:
+        """``log``: the first rows."""
+        self._joints, self._period = log.reference_joints.shape[2], log.timebase.period
+        self._names = log.joint_names[: self._joints]
+        self._way, self._standing = np.zeros((2, self._joints))
+
+    def add(self, log: FlightLog, error: Array) -> None:
+        """Take further rows."""
+        desired = np.abs(log.reference_joints[:, 1])
+        stands = np.abs(log.joint_velocities[:, : self._joints]) < STANDING * desired
+        self._way += np.sum(desired, axis=0)
+        self._standing += np.sum(desired, axis=0, where=stands)
+
+    def result(self) -> dict[str, float]:
+        """Return the share by joint, of those that are to move by `LEAST_WAY` or more."""
+        return {
+            name: float(standing / way)
+            for name, standing, way in zip(self._names, self._standing, self._way, strict=True)
+            if way * self._period >= LEAST_WAY
         }

@@ -14,7 +14,7 @@ from space_robot_msgs_py.config.validation import short
 from space_robot_msgs_py.errors import InputError
 from space_robot_sim.environment.events import Capture
 
-from .actuation import Latency, MissedDeadlines, Saturation, TorqueLimits
+from .actuation import Latency, MissedDeadlines, Saturation, StandingJoints, TorqueLimits
 from .attitude_drift import UNAVAILABLE, AttitudeDrift, controls_base
 from .columns import recording
 from .deflection import Deflection
@@ -148,6 +148,7 @@ class Analysis:
             **{key: block.flight.get(key) for key in DESCRIBED},
             "faults": [str(fault) for fault in block.flight.get("faults", ())],
             "events": event_labels(block),
+            **{k: block.flight[k] for k in ("own_gains",) if k in block.flight},
             **{k: str(block.flight[k]) for k in ("disturbance",) if k in block.flight},
             "start_step": start_step_of(block),
             "sensors": sensors_of(block),
@@ -226,6 +227,7 @@ _METRICS: dict[str, Callable[[FlightLog], Metric]] = {
     "ripple": lambda log: Ripple(log, robot_of(log)),
     "settling": Settling,
     "saturation": lambda log: Saturation(torque_limits(log)),
+    "standing": StandingJoints,
     "wheel_saturation": lambda log: WheelSaturation(log, flown_actuators(log).wheels),
     "latency": lambda log: Latency(log.timebase.period),
     "missed_deadlines": _missed_deadlines,

@@ -60,8 +60,8 @@ DEFINITIONS = {
 }
 """The meaning of each group of metrics, for someone who sees it for the first time."""
 
-WIDE = 1e6
-"""Torques from which on a number is written with an exponent: of diverged flights."""
+WIDE = 1e4
+"""Torque from which on all torques of a table are written with exponents: of diverged flights."""
 
 
 def rms_table(report: Report) -> Table:
@@ -87,15 +87,18 @@ def rms_table(report: Report) -> Table:
         beside = dict.fromkeys(beside, "") | navigation["rms"]
     rough = *report["chatter"].values(), (report["ripple"] or {}).get("rms", {})
     rows: list[list[Any]] = []
-    for key, value in report["rms"]["mean_axis"].items():
-        is_torque = unit_of(key).startswith("N")
-        rms = _rms(value, is_torque), beside[key] and _rms(beside[key], is_torque)
+    of_axes: dict[str, float] = report["rms"]["mean_axis"]
+    torques = {key for key in of_axes if unit_of(key).startswith("N")}
+    is_wide = any(of_axes[key] >= WIDE for key in torques)
+    for key, value in of_axes.items():
+        has_exponent = is_wide or key not in torques
+        rms = _rms(value, has_exponent), beside[key] and _rms(beside[key], has_exponent)
         rows.append([key, unit_of(key), *rms, *(measure.get(key, "") for measure in rough)])
     return Table(title, columns, [Group(rows)], remarks(report))
 
 
-def _rms(value: float, is_torque: bool) -> str:
-    return f"{value:.4f}" if is_torque and value < WIDE else f"{value:.3e}"
+def _rms(value: float, has_exponent: bool) -> str:
+    return f"{value:.3e}" if has_exponent else f"{value:.4f}"
 
 
 def metrics_table(report: Report) -> Table:

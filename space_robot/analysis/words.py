@@ -10,8 +10,16 @@ from space_robot_msgs_py.bag.law_history import in_words
 
 from ..flight.start_step import sentence
 from .attitude_drift import FREE
+from .metrics import unit_of
 
 Report = dict[str, Any]
+
+FASTEST_CYCLE = 100.0
+"""Hz; faster is chatter, which has a column of its own."""
+PURE_CYCLE, LARGE_CYCLE = 0.5, 0.1
+"""Least RMS of a limit cycle as a share of the torque's ripple, and of the whole torque."""
+LONG_STANDING = 0.05
+"""Least share of its way on which a joint stands that is worth a remark."""
 
 
 def flown(described: Mapping[str, Any]) -> str:
@@ -27,6 +35,8 @@ def flown(described: Mapping[str, Any]) -> str:
         for key in ("case", *(("gains",) if has_gains else ()))
         if described.get(key)
     ]
+    if own := described.get("own_gains"):
+        known.append(f"own {', '.join(own)}")
     return ", ".join([str(law or "unknown law") if has_gains else "torques from outside", *known])
 
 
@@ -73,6 +83,7 @@ def remarks(report: Report) -> list[str]:
         )
     if full := report["wheel_saturation"]:
         remarks += _saturated_wheels(full)
+    remarks += [*_limit_cycles(report), *_standing_joints(report)]
     remarks += [
         text for text in (report["unfinished"], *report["damage"], *report["foreign"]) if text
     ]
@@ -95,6 +106,28 @@ def _saturated_wheels(saturation: dict[str, Any]) -> list[str]:
         f"wheels were at a limit of torque or momentum at {saturation['ticks']} ticks "
         f"({saturation['share']:.2%}), {name} first at {first[name]:g} s"
     ]
+
+
+def _limit_cycles(report: Report) -> list[str]:
+    """Say which torques oscillate at one frequency, by more than a share of what they do."""
+    cycles = [
+        f"{name} at {peak['frequency_hz']:.3g} Hz with {peak['rms']:.2g} {unit_of(name)} RMS"
+        for name, peak in (report["ripple"] or {}).get("peak", {}).items()
+        if peak
+        and peak["frequency_hz"] <= FASTEST_CYCLE
+        and peak["rms"] >= PURE_CYCLE * report["ripple"]["rms"][name]
+        and peak["rms"] >= LARGE_CYCLE * report["rms"]["mean_axis"][name]
+    ]
+    return [f"limit cycle: {', '.join(cycles)}"] if cycles else []
+
+
+def _standing_joints(report: Report) -> list[str]:
+    """Say which joints stood on a part of the way that they were to move."""
+    standing = report["standing"] or {}
+    much = [f"{name} {share:.0%}" for name, share in standing.items() if share >= LONG_STANDING]
+    if not much:
+        return []
+    return [f"joints that stood still on a part of the way they were to move: {', '.join(much)}"]
 
 
 def notes(report: Report) -> list[str]:

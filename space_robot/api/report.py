@@ -12,6 +12,7 @@ FLOWN = (
     "controller",
     "case",
     "gains",
+    "own_gains",
     "robot",
     "mission",
     "sensors",

@@ -19,8 +19,9 @@ from ..flight.plan import FlightPlan
 from ..scenario.node_settings import FlightSettings
 from ..scenario.robots import Robots
 from ..tuning.demand import demand
+from ..tuning.flexible import fast_inertia
 from ..tuning.gain_file import gain_files
-from ..tuning.inertia import SAMPLING, inertia_along
+from ..tuning.inertia import SAMPLING, inertia_along, sampled_reference
 from ..tuning.method import Tuned, tune
 from ..tuning.noise import listen
 from ..tuning.postures import postures_along
@@ -50,13 +51,17 @@ def tuned_set(
     eta = reference.base_quaternion[0] / norm(reference.base_quaternion)
     if abs(eta) <= SINGULAR_ETA:
         raise InputError("base_quaternion: a rotation by 180 degrees, where the laws are singular")
-    if len(reference.waypoint_times) < 2:
-        raise InputError("the mission has only one waypoint: tuning needs a motion")
+    motion = sampled_reference(nominal, reference)
+    if not (motion.joints[:, 1].any() or motion.base[:, 4:].any()):
+        raise InputError("the mission moves neither joints nor base: tuning needs a motion")
     inertias = []
     for case, own in zip(cases, settings, strict=True):
         step(f"inertia, case {case}")
         loaded = with_payload(nominal, own.plant.payload)
         inertias.append(inertia_along(loaded, reference))
+        if any(loaded.gears):
+            places = motion.joints[:, 0]
+            inertias.append(fast_inertia(loaded, places, motion.base[0, :4]))
     step("forces along the mission")
     asked = demand(nominal, reference, [own.plant for own in settings])
     plant, navigation, noise = settings[0].plant, settings[0].controller.filter_settings, None
@@ -65,7 +70,8 @@ def tuned_set(
         noise = listen(nominal, plant, navigation, reference, plant.period)
     postures = postures_along(nominal, reference, SAMPLING)
     step("gains")
-    return tune(np.concatenate(inertias), postures, asked, wishes, plant.period, noise)
+    has_gears = any(nominal.gears)
+    return tune(np.concatenate(inertias), postures, asked, wishes, plant.period, noise, has_gears)
 
 
 def write_set(tuned: Tuned, command: str, folder: Path) -> list[Path]:

@@ -78,7 +78,7 @@ def print_summary(flown: FlownCampaign, console: Console) -> None:
     # where no flight has a number all failed, and the first is as bad as any
     driven = findings.driven
     rows = findings.worst(findings.whole, driven[0], 1) if driven else flown.table
-    again = command(flown.folder, int(rows["run"].iloc[0]), rows["law"].iloc[0])
+    again = command(flown.folder, flown.study, int(rows["run"].iloc[0]), rows["law"].iloc[0])
     say(console, f"{again}    # the worst")
 
 

@@ -24,6 +24,7 @@ from ..tuning.gain_check import GainCheck, check_gains, estimated_with, pair_cor
 from ..tuning.inertia import SAMPLING, inertia_along, sampled_reference
 from ..tuning.mass_errors import COARSE, check_masses, drawn_inertias
 from ..tuning.postures import postures_along
+from ..tuning.spectrum import LEAST_MARGIN
 
 Array = NDArray[np.float64]
 
@@ -53,23 +54,20 @@ class Checked:
 
     @property
     def is_sound(self) -> bool:
-        """True if every law passes its check."""
+        """True if every law passes its check: nothing grows, and there is margin."""
         return all(check.is_sound for check in self.checks)
 
     @property
+    def is_stable(self) -> bool:
+        """True if nothing grows under any law."""
+        return all(check.is_stable for check in self.checks)
+
+    @property
     def faults(self) -> list[str]:
-        """What is wrong with which laws, one clause for each kind of fault."""
-        small = [check.law for check in self.checks if not check.has_margin]
+        """What grows under which laws, one clause for each kind."""
+        diverging = [c.law for c in self.checks if c.spectrum and not c.spectrum.contracts]
         kinds = {
-            "h_bar leaves too little margin in torque scale": [
-                law for law in small if law in self.with_pair - self.with_model
-            ],
-            "the nominal inertia leaves too little margin in torque scale": [
-                law for law in small if law in self.with_model
-            ],
-            "the observer leaves too little margin in torque scale": [
-                law for law in small if law not in self.with_pair
-            ],
+            "the estimate diverges": diverging,
             "small motions grow": [check.law for check in self.checks if not check.loop.is_stable],
             "small oscillations of the gears' springs grow": [
                 check.law
@@ -78,6 +76,19 @@ class Checked:
             ],
         }
         return [f"{', '.join(laws)}: {fault}" for fault, laws in kinds.items() if laws]
+
+    @property
+    def remarks(self) -> list[str]:
+        """Which stable laws have little margin, one line for each kind of estimate."""
+        small = [check.law for check in self.checks if check.is_stable and not check.has_margin]
+        constant = self.with_pair - self.with_model
+        kinds = {
+            "h_bar leaves": [law for law in small if law in constant],
+            "the nominal inertia leaves": [law for law in small if law in self.with_model],
+            "the observer leaves": [law for law in small if law not in self.with_pair],
+        }
+        least = f"a margin below {LEAST_MARGIN:.0%} in torque scale"
+        return [f"remark: {', '.join(laws)}: {why} {least}" for why, laws in kinds.items() if laws]
 
 
 def checked(options: dict[str, Any], mass_uncertainty: float = 0.2) -> Checked:
@@ -174,7 +185,7 @@ def held_ripple(flight: Flight, plan: FlightPlan) -> Array | None:
     None: it diverges.
     """
     first = flight.mission_settings.waypoints_deg[: flight.robot.n]
-    there = {"waypoint_times": [0.0], "waypoints_deg": first}
+    there = {"waypoint_times": [0.0], "waypoints_deg": first, "segments": [""]}
     held = plan.with_parameters("mission", there).model_copy(update={"duration": HELD})
     try:
         log = simulate(Flight(resolve(held)))
@@ -202,6 +213,7 @@ def report_of(checks: Checked) -> dict[str, Any]:
             for key in ("robot", "mission", "case", "actuators", "gains")
         },
         "axes": flight.robot.axis_names,
+        "is_stable": checks.is_stable,
         "is_sound": checks.is_sound,
         **(
             {
@@ -219,6 +231,7 @@ def report_of(checks: Checked) -> dict[str, Any]:
 
 
 def _of_law(check: GainCheck, checks: Checked) -> Iterable[tuple[str, Any]]:
+    yield "is_stable", check.is_stable
     yield "is_sound", check.is_sound
     if spectrum := check.spectrum:
         yield from (

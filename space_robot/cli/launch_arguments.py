@@ -75,8 +75,8 @@ def launch_arguments() -> list[LaunchArgument]:
 
 def _argument(option: click.Option) -> LaunchArgument:
     help_ = " ".join((option.help or "").split())
-    description, told, default = help_.removesuffix("].").partition(" [default: ")
-    if told:
+    description, separator, default = help_.removesuffix("].").partition(" [default: ")
+    if separator:
         description += "."
     elif option.is_flag:
         default = "true" if option.default is True else "false"
@@ -143,10 +143,10 @@ def launched_flight(values: Mapping[str, str], group: str = "") -> LaunchedFligh
     for option in _plan.params:
         if isinstance(option, click.Option) and (text := values.get(_name(option), "")):
             words += _words(option, text)
-    given, of_ros = _of_file(values.get(PARAMS_FILE, ""))
+    own, of_ros = _of_file(values.get(PARAMS_FILE, ""))
     words += [
         f"--set={node}.{name}={json.dumps(value)}"
-        for node, parameters in given.items()
+        for node, parameters in own.items()
         for name, value in parameters.items()
     ]
     try:

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
+from click.core import ParameterSource
 
 from ..scenario.option_table import Option, names, option
 from .completed_names import names_in
@@ -194,6 +195,9 @@ def plan_flight(**options: Any) -> Flight:
 
     from ..flight.plan import Flight, FlightPlan, resolve
 
+    context = click.get_current_context(silent=True)
+    if context and context.get_parameter_source("controller") is ParameterSource.DEFAULT:
+        options.pop("controller", None)  # the robot's own gains may name another
     return Flight(resolve(validate(FlightPlan, options, "options")))
 
 

@@ -66,7 +66,7 @@ def plan(
     from ..console.terminal import echo_json, terminal
     from .plan_display import print_plan
 
-    flight = plan_flight(mission=mission, **options)
+    flight = plan_flight(mission=mission, controller=None, **options)
     robot = flight.scenario.robots.controller
     settings: MissionSettings = flight.mission_settings
     for remark in (*unit_remarks(robot), *turn_remarks(robot, flight.mission.pieces)):

@@ -34,7 +34,7 @@ def print_table(table: Table, console: Console, *, dense: bool = False) -> None:
     )
     is_grouped = table.has_named_groups
     if is_grouped:
-        shown.add_column("", no_wrap=True)
+        shown.add_column("")
     for column in table.columns:
         shown.add_column(column.heading, justify="left" if column.is_label else "right")
     for group in table.groups:

@@ -52,7 +52,8 @@ class FlightPlan(StrictModel):
     """The options of ``fly`` and ``simulate``."""
 
     controller: LawGiven = of("controller")
-    """Also a `ControlLaw` class or object; a function, see
+    """Unless it is set, that of the gain set's ``controller.yaml``, if there is one. Also a
+    `ControlLaw` class or object; a function, see
     `space_robot_control.controller.plain_laws`; None: none, on the bench."""
     case: Case = of("case")
     disturbance: DisturbanceGiven = of("disturbance")
@@ -96,6 +97,12 @@ class FlightPlan(StrictModel):
     split_size: ByteSize | None = of("split_size")
     parameters: dict[str, dict[str, Any]] = Field(default_factory=dict)
     """Further parameters by node, dotted names."""
+
+    @property
+    def has_chosen_law(self) -> bool:
+        """Whether the user set the law."""
+        own = self.parameters.get("controller", {})
+        return "controller" in self.model_fields_set or "controller" in own
 
     @explained_by("disturbances")
     def faults_of(self, kinds: Kinds) -> list[str]:
@@ -144,7 +151,7 @@ class FlightPlan(StrictModel):
             "controller": {
                 **period,
                 "robot": robot,
-                "controller": law_parameter(law),
+                **({"controller": law_parameter(law)} if self.has_chosen_law else {}),
                 "gains": gains,
                 **values,
                 "fifo_priority": self.fifo_priority,

@@ -7,9 +7,11 @@ from dataclasses import replace
 from space_robot_control.allocation.assumed_actuators import assumed_actuators
 from space_robot_control.controller.gains import build_laws
 from space_robot_control.controller.plain_laws import NoLaw
+from space_robot_control.controller.settings import OF_THE_SET
 from space_robot_control.controller.swaps import parse_swaps
 from space_robot_control.guidance.mission import Mission
 from space_robot_control.laws import ControlLaw
+from space_robot_control.laws import laws as known_laws
 from space_robot_model.hardware.base_actuators import BaseActuatorSettings
 from space_robot_model.robot import Robot
 from space_robot_model.robot.find import TRAJECTORIES, remake_advice, robot_files
@@ -105,6 +107,8 @@ def _laws(plan: FlightPlan, settings: FlightSettings, axes: int) -> dict[str, Co
         return {NoLaw.name: NoLaw({}, settings.plant.period, axes)}
     own = resolve_law(plan.controller)
     with explained_by("gains"):
+        if not plan.has_chosen_law:  # a robot's folder runs no code by naming it
+            one_of(settings.controller.controller, known_laws(), "controller", f" of {OF_THE_SET}")
         return build_laws(settings.controller, axes, settings.gains, own or "")
 
 

@@ -119,6 +119,16 @@ class ResolvedScenario:
         return {name: row.tolist() for name, row in self.law.gain_values.items()}
 
     @property
+    def own_gains(self) -> list[str]:
+        """Gains that the user set beside those of the set, as ``<law>.<gain>``."""
+        return [
+            f"{law}.{gain}"
+            for law, gains in self.settings.gains.items()
+            if law in self.laws
+            for gain in gains
+        ]
+
+    @property
     def has_chosen_gains(self) -> bool:
         """True unless the gains are the default set's."""
         return self.controller.gains != DEFAULT or bool(self.settings.gains)
@@ -190,6 +200,7 @@ class ResolvedScenario:
             **plant_description(self.robots.plant, robots["robot_file"], plant, self.plant),
             **({"controller_base_actuators": assumed} if is_other else {}),
             "gains": controller.gains,
+            **({"own_gains": self.own_gains} if self.own_gains else {}),
             "mission": self.mission_name,
             "ticks": self.ticks,
             **(

@@ -89,16 +89,20 @@ def _smooth_force(
     robot = robot.nominal
     chunk = sampled_reference(robot, settings)
     count = len(chunk.joints)
-    quaternion, still = chunk.base[0, :4], np.zeros(3)
-    to_force = np.linalg.inv(attitude_jacobian(quaternion)).T
+    quaternion = chunk.base[0, :4]  # also while the base turns: free space has no directions
+    jacobian = attitude_jacobian(quaternion)
+    to_force = np.linalg.inv(jacobian).T
     rotation, model = np.empty((3, 3)), RhoSpaceModel.allocate(robot.n)
     rotation_matrix(quaternion, rotation)
     disturbance = Disturbance.build(robot.n, case.disturbance) if case else None
     force, torque = np.empty((count, robot.n + 3)), np.zeros(robot.n + 3)
     viscous = coefficients(robot, case.friction)[:, 1] if case else np.zeros(robot.n)
     for k, (theta, rates, accelerations) in enumerate(chunk.joints):
-        rho_space_into(robot.model, quaternion, theta, still, rates, model)
+        omega, alpha = chunk.base[k, 4:7], chunk.base[k, 7:]
+        rho_space_into(robot.model, quaternion, theta, omega, rates, model)
+        of_base = jacobian @ alpha - 0.25 * (omega @ omega) * quaternion[1:]  # J0 alpha + J0dot w0
         force[k] = model.inertia[:, 3:] @ accelerations + model.bias
+        force[k] += model.inertia[:, :3] @ of_base
         if case and disturbance is not None:
             disturbance_torque(disturbance, k * SAMPLING, torque)
             force[k, :3] += to_force @ rotation.T @ torque[:3]

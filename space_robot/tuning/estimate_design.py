@@ -160,9 +160,11 @@ def model_bandwidth(task: TuningTask, own: Array | None = None) -> float:
     """
     if task.wishes.bandwidth:
         return task.wishes.bandwidth
+    most = MOST_PER_TICK
     if own is None:
         own = np.diagonal(task.inertia, axis1=1, axis2=2).max(axis=0)
-    bandwidth = MOST_PER_TICK / task.period
+        most = task.most_per_tick
+    bandwidth = most / task.period
     if not task.wishes.noise_ripple:
         bandwidth = min(quiet_bandwidth(own, task.noise, task.allowed), bandwidth)
     return min(bandwidth, 1.0 / SEPARATION / task.lag) if task.lag else bandwidth

@@ -23,7 +23,7 @@ from space_robot_model.robot import Robot
 from space_robot_model.robot.gears import FlexibleModel, flexible_model, geared_joints
 
 from .closed_loop import SLOWEST_GROWTH, SmallMotion, loop_of
-from .inertia import attitude_jacobian
+from .inertia import attitude_jacobian, inertia_in_rho
 from .linear_law import LinearLaw, linear_laws
 from .postures import Posture, postures_at
 
@@ -85,6 +85,22 @@ def joint_frequencies(robot: Robot, joint_positions: Array) -> Array:
             square = gear.stiffness * float(spring @ compliance @ spring)
             frequencies[row, k] = np.sqrt(square) / (2.0 * np.pi)
     return frequencies
+
+
+def fast_inertia(robot: Robot, joint_positions: Array, quaternion: Array) -> Array:
+    """Return H_S (K, m, m) within a tick, when motors move without the links behind their gears.
+
+    Args:
+        robot: with gears.
+        joint_positions: (K, n) of the actuated joints, rad or m.
+        quaternion: (4,) attitude of the base.
+    """
+    rest = [spring.rest for spring in robot.springs]
+    motors = {joint: 6 + robot.joint_count + k for k, joint in enumerate(geared_joints(robot))}
+    axes = [3, 4, 5, *(motors.get(joint, 6 + joint) for joint in range(robot.n))]
+    models = [flexible_model(robot, np.array([*row, *rest])) for row in joint_positions]
+    inertia = np.array([_reduced(model, np.array(axes)).inertia for model in models])
+    return inertia_in_rho(quaternion, inertia)
 
 
 class FlexibleMotions:

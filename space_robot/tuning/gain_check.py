@@ -100,8 +100,10 @@ class GainCheck:
 
     @property
     def is_stable(self) -> bool:
-        """False if small motions of the rigid robot, or of a gear's spring, grow."""
-        return self.loop.is_stable and (self.flexible is None or self.flexible.is_stable)
+        """False if the estimate, small motions of the rigid robot, or of a gear's spring, grow."""
+        converges = self.spectrum is None or self.spectrum.contracts
+        springs_hold = self.flexible is None or self.flexible.is_stable
+        return converges and self.loop.is_stable and springs_hold
 
 
 def pair_corner(settings: ControllerNodeSettings) -> float:

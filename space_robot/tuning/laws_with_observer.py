@@ -28,6 +28,8 @@ Array = NDArray[np.float64]
 
 MOST_EIGENVALUE = 5.0
 """Largest eigenvalue of ``H_S^-1 J`` with the lightest masses, see the module."""
+BESIDE_SPRINGS = 0.5
+"""Factor on it for a robot with gears, whose springs the observer otherwise excites."""
 ROUNDS = 12
 """In which omega_o of each axis approaches the ripple allowed; the noise grows with its cube."""
 POSTURES = 6
@@ -45,7 +47,8 @@ def tune_adrc(task: TuningTask, design: EstimateDesign) -> TunedLaw:
     """
     largest = float(eigenvalues(task.inertia, design.h_bar).max())
     largest /= 1.0 - task.wishes.mass_uncertainty
-    share = min(1.0, MOST_EIGENVALUE / largest)
+    most = MOST_EIGENVALUE * (BESIDE_SPRINGS if task.has_gears else 1.0)
+    share = min(1.0, most / largest)
     inertia, margin = share * design.h_bar, share * task.wishes.margin
 
     def gains_at(omega_o: Array, slower: float = 1.0) -> dict[str, Array]:

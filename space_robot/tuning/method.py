@@ -43,6 +43,10 @@
    - INDI: the estimate with the nominal inertia and the low-pass of the set; its W by step 4 with
      ``min(lambda) / (1 + mu)`` in place of the margin, at most that of the laws with a model.
 
+**Gears.** H_S is also taken with the motors moving without the links behind their springs, as
+within a tick (`flexible.fast_inertia`). A law with a model multiplies its K_D by the whole inertia,
+so its W is lower by the largest eigenvalue of ``H_S^-1`` with that (`TuningTask.most_per_tick`).
+
 **Nominal inertia.** With H_S of the nominal model in place of h_bar, steps 1 and 2 have nothing to
 choose: lambda is near 1. The low-pass (3) has ``w max(lambda) / (1 - mu) <= 1`` and noise of
 ``H_S rhodd`` within the ripple, all axes together. This pair takes rates and torques as measured,
@@ -74,6 +78,7 @@ from .estimate_design import (
     is_weak,
     model_bandwidth,
     nominal_estimate,
+    with_weight,
 )
 from .laws_with_estimate import tune_dob, tune_indi, tune_tde_smc, tune_tde_stc, tune_tde_tsmc
 from .laws_with_model import tune_ctc, tune_ctc_smc, tune_pd, tune_slotine_li
@@ -145,6 +150,7 @@ def tune(
     wishes: TuningOptions,
     period: float,
     noise: Noise | None = None,
+    has_gears: bool = False,
 ) -> Tuned:
     """Compute a gain set.
 
@@ -155,17 +161,21 @@ def tune(
         wishes: the user's tuning options.
         period: delta, s.
         noise: of sensors and navigation, and its lag (None: no noise, no lag).
+        has_gears: whether the inertia is also that of motors without the links behind their gears.
 
     Raises:
         InputError: the tuning options cannot be met together.
     """
     on_all_axes = asked.on_all_axes(axis_inertia(inertia))
-    task = TuningTask(inertia, postures, on_all_axes, wishes, period, noise)
+    task = TuningTask(inertia, postures, on_all_axes, wishes, period, noise, has_gears)
     has_ripple = bool(wishes.noise_ripple and noise and noise.rates.any())
     constant = constant_estimate(task)
     observer = estimate_at_ripple(task, constant, True) if has_ripple else constant
     if has_ripple:
         constant = estimate_at_ripple(task, constant)
+    elif has_gears:  # the low-pass is also that of `indi`, whose inertia is far above the motors'
+        weight = min(constant.weight, nominal_estimate(task).weight)
+        constant = with_weight(task, constant, weight)
     design, is_auto = constant, wishes.h_bar == AUTO
     if wishes.h_bar == NOMINAL or (is_auto and is_weak(constant, task)):
         design = nominal_estimate(task)

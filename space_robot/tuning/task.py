@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from .demand import ForceDemand
 from .noise import Noise
 from .postures import Posture
+from .spectrum import eigenvalues
 
 Array = NDArray[np.float64]
 
@@ -19,6 +20,8 @@ CONSTANT, NOMINAL, AUTO = "constant", "nominal", "auto"
 """Inertia of the laws with time-delay estimation: see `TuningOptions`."""
 SEPARATION = 4.0
 """Ratio of the estimate's pole to the poles of the loop; see step 4 of `method`."""
+MOST_BY_MODEL = 0.25
+"""Largest bandwidth times period times eigenvalue of ``H_S^-1`` with the model's inertia, rad."""
 MOST_PER_TICK = 0.05
 """Largest bandwidth times period, rad: K_D then removes a tenth of a rate error per tick."""
 
@@ -62,6 +65,8 @@ class TuningTask:
     """s."""
     noise: Noise | None
     """Of sensors and navigation, with its lag; None: no noise, no lag."""
+    has_gears: bool = False
+    """True if some configurations are those of `flexible.fast_inertia`."""
 
     @cached_property
     def shape(self) -> Array:
@@ -73,6 +78,16 @@ class TuningTask:
         """(L, m, m) H_S of the nominal robot, kg m2."""
         own = np.array([posture.inertia for posture in self.postures])
         return np.tile(own, (len(self.inertia) // len(own), 1, 1))
+
+    @cached_property
+    def most_per_tick(self) -> float:
+        """Largest bandwidth times period of the laws with a model, rad.
+
+        The inertia of a motor before its gear, or of joints beside free hinges, may be much smaller
+        than that of the model: K_D then removes more of a rate error per tick.
+        """
+        largest = float(eigenvalues(self.inertia, self.nominal).max())
+        return min(MOST_PER_TICK, MOST_BY_MODEL / largest)
 
     @property
     def allowed(self) -> Array:

@@ -25,14 +25,18 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from space_robot_msgs_py.compiled.kernels import kernel
-from space_robot_msgs_py.compiled.lanes import uniform, whole
+from space_robot_msgs_py.compiled.kernels import kernel, subroutine
+from space_robot_msgs_py.compiled.lanes import uniform, where, whole
 from space_robot_msgs_py.compiled.records import Record, shaped
 
-from .algebra import dot, scale, symmetric, transform_symmetric, vector
+from .algebra import Symmetric, dot, scale, symmetric, transform_symmetric, vector
 from .model import Model
 
 Array = NDArray[np.float64]
+
+THINNEST = 1e-8
+"""Smallest second moment of a body relative to their sum: a plate or a wire without thickness gets
+this one, so that D is positive definite beyond rounding."""
 
 
 class MassCoordinates(Record):
@@ -97,6 +101,7 @@ def second_moments_into(
             arm[k] = frame[3, k] + dot(axes, vector(model.com[i], 0)) - coordinates.centre[k]
         inertia = symmetric(model.inertia[i])
         half = 0.5 * (inertia[0] + inertia[1] + inertia[2])
+        half += _lacking_moment(inertia, half)
         moments = (
             factor[i] * (half - inertia[0]),
             factor[i] * (half - inertia[1]),
@@ -117,6 +122,18 @@ def second_moments_into(
     for k in range(size):
         for c in range(k):
             out[c, k] = out[k, c]
+
+
+@subroutine
+def _lacking_moment(inertia: Symmetric, half: float) -> float:
+    """Return what the second moments of a body lack to be positive definite, kg m2; mostly 0."""
+    xx, yy, zz = half - inertia[0], half - inertia[1], half - inertia[2]
+    xy, xz, yz = inertia[3], inertia[4], inertia[5]  # of the products only squares and xyz count
+    minors = xx * yy - xy * xy + xx * zz - xz * xz + yy * zz - yz * yz
+    determinant = xx * (yy * zz - yz * yz) - yy * xz * xz - zz * xy * xy - 2.0 * xy * xz * yz
+    least = THINNEST * half
+    lacking: float = where(determinant > least * abs(minors), 0.0, least)  # by 1 / sum(1 / moment)
+    return lacking
 
 
 @kernel

@@ -64,6 +64,7 @@ class _Description(_Names):
     seed: Count = 0
     restart_controller: bool = False
     parameters: dict[Text, _Names] = Field(default_factory=dict)
+    own_gains: list[Text] = Field(default_factory=list)
     gains_used: dict[Text, list[float]] = Field(default_factory=dict)
     robot_file: dict[Text, JsonValue] = Field(default_factory=dict)
     base_actuators: dict[Text, JsonValue] = Field(default_factory=dict)

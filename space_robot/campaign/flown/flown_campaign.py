@@ -217,6 +217,15 @@ def check_study(study: Study) -> None:
         )
 
 
+def needs_trust(study: Study) -> bool:
+    """Return True if flights of a study are flown again with ``--trust`` only."""
+    try:
+        check_study(study)
+    except NotTrustedError:
+        return True
+    return False
+
+
 class Rerun(FlownFlight):
     """A flight flown again, compared with its row in the campaign's table."""
 

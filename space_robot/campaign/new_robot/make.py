@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from space_robot_control.controller.settings import DEFAULT_SETS
+from space_robot_control.controller.settings import DEFAULT_SETS, OF_THE_SET
 from space_robot_control.guidance.mission import MissionSettings
 from space_robot_control.laws import laws
 from space_robot_model.robot import Robot
@@ -23,6 +23,7 @@ from space_robot_msgs_py.errors import FlightError, InputError
 from space_robot_sim.environment.environment import EnvironmentSettings
 
 from ...analysis import Analysis
+from ...analysis.metrics import unit_of
 from ...console.files import whole_folder
 from ...flight.plan import Flight, FlightPlan, resolve
 from ...flight.simulate import fly_blocks
@@ -35,6 +36,12 @@ from .texts import CAMPAIGN_FILE, campaign_text
 
 SET, CASE = "tuned", "1"
 """Name of the tuned gain set, and the environment of tuning and flights."""
+TRIAL: Mapping[str, Any] = {"case": "3", "sensors": "fine", "navigation": "filtered"}
+"""Friction and hardware with which the laws are compared."""
+REASON = (
+    "it has the least errors and ripple (geometric mean) with friction, payload and disturbances "
+    "of case 3, sensors fine and navigation filtered"
+)
 WISHES = TuningOptions(margin=0.05, mass_uncertainty=0.2, h_bar=AUTO)
 """Defaults of ``gains tune``, but that the estimate has the nominal inertia where it must."""
 
@@ -126,6 +133,8 @@ class Outcome:
     """RMS of attitude and joint errors and torques, mean of the axes; empty if it failed."""
     failure: str
     """Why the flight ended early; empty if it did not."""
+    score: float
+    """Geometric mean of errors and ripples on `TRIAL`; infinite if it diverged or broke limits."""
 
 
 @dataclass(frozen=True)
@@ -137,6 +146,8 @@ class NewRobot:
     mission: MissionSettings
     flights: dict[str, Outcome]
     """Results by law."""
+    default_law: str
+    """The law with the best score, which the gain set names; empty: none flew."""
     remarks: tuple[str, ...] = ()
     """Remarks on weak laws and on joints that may be passive, in sentences."""
 
@@ -148,6 +159,7 @@ class NewRobot:
             "joints": list(self.robot.joint_names),
             "passive_joints": list(self.robot.passive_names),
             "repaired": list(self.robot.repairs),
+            "default_law": self.default_law,
             "remarks": list(self.remarks),
             "duration": self.mission.waypoint_times[-1],
             "laws": {
@@ -190,21 +202,51 @@ def make_robot(
         (place / OWN_GAINS / DEFAULT_SETS).write_text(f"# The set of each law.\n{default}", "utf-8")
         names = sorted(laws())
         step(f"flying {', '.join(names)}")
-        outcomes = run_all(partial(_fly, place), names, cores())
-    on_gains = filter(None, (estimate_remark(tuned), hinge_remark(robot, command, folder)))
-    remarks = (*unit_remarks(robot), *on_gains)
-    return NewRobot(folder, robot, mission, dict(zip(names, outcomes, strict=True)), remarks)
+        flights = dict(zip(names, run_all(partial(_fly, place), names, cores()), strict=True))
+        best = min(names, key=lambda law: flights[law].score)
+        best = best if math.isfinite(flights[best].score) else ""
+        if best:
+            with (place / OWN_GAINS / SET / OF_THE_SET).open("a", encoding="utf-8") as file:
+                file.write(f"    controller: {best}  # flown unless another is named\n")
+    said = f"{best} is flown unless another law is named: {REASON}." if best else ""
+    advice = (said, estimate_remark(tuned), hinge_remark(robot, command, folder))
+    remarks = (*unit_remarks(robot), *filter(None, advice))
+    return NewRobot(folder, robot, mission, flights, best, remarks)
 
 
 def _fly(folder: Path, law: str) -> Outcome:
-    flight = Flight(resolve(FlightPlan(controller=law, robot=str(folder), case=CASE)))
-    analysis = Analysis()
+    plan = FlightPlan(controller=law, robot=str(folder), case=CASE)
     try:
-        for block in fly_blocks(flight):
-            analysis.add(block)
+        report, _ = _report(plan)
     except FlightError as error:
-        return Outcome({}, str(error))
-    return Outcome(dict(analysis.report()["rms"]["mean_axis"]), "")
+        return Outcome({}, str(error), math.inf)
+    return Outcome(dict(report["rms"]["mean_axis"]), "", _score(plan.model_copy(update=TRIAL)))
+
+
+def _score(plan: FlightPlan) -> float:
+    """Fly a trial and return its score: equal ratios count alike, so that units do not matter."""
+    try:
+        report, is_within = _report(plan)
+    except FlightError:
+        return math.inf
+    ripple = (report["ripple"] or {"rms": {}})["rms"]
+    errors = {k: v for k, v in report["rms"]["mean_axis"].items() if not unit_of(k).startswith("N")}
+    values = np.maximum([*errors.values(), *ripple.values()], np.finfo(float).tiny)
+    return math.exp(float(np.mean(np.log(values)))) if is_within else math.inf
+
+
+def _report(plan: FlightPlan) -> tuple[dict[str, Any], bool]:
+    """Return the report of a flight, and whether the joints kept to their limits of effort.
+
+    Raises:
+        FlightError: it diverged.
+    """
+    flight, analysis, is_within = Flight(resolve(plan)), Analysis(), True
+    effort = np.array([limits.effort for limits in flight.robot.limits])
+    for block in fly_blocks(flight):
+        analysis.add(block)
+        is_within &= bool(np.all(np.abs(block.applied_torque[:, 3:]) <= effort))
+    return analysis.report(), is_within
 
 
 FREQUENCY_HZ, DAMPING_RATIO = 0.5, 0.005

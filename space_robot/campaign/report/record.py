@@ -50,7 +50,7 @@ def record(findings: Findings) -> dict[str, Any]:
                 "outcome": row["outcome"],
                 "reason": row["reason"],
                 "value": row[quantity.column],
-                "command": command(subject.folder, int(row["run"]), row["law"]),
+                "command": command(subject.folder, subject.study, int(row["run"]), row["law"]),
             }
             for quantity in findings.driven
             for part in findings.parts

@@ -6,6 +6,8 @@ import shlex
 from pathlib import Path
 
 from ...console.tables import Column, Group, JudgedCell, Table
+from ..flown.flown_campaign import needs_trust
+from ..study import Study
 from ..verdicts import requirements
 from ..verdicts.values import GridPoint
 from .findings import Findings
@@ -160,13 +162,18 @@ def worst_table(
         Column("value"),
         Column("to fly it again", is_label=True),
     ]
-    rows = findings.worst(part, quantity, count, law)
+    rows, subject = findings.worst(part, quantity, count, law), findings.subject
     of = f", {part.point}" if part.point else ""
     return Table.of(
         f"Worst runs by {quantity.label}{of}",
         columns,
         [
-            [str(run), name, _value(row, quantity), command(findings.subject.folder, run, name)]
+            [
+                str(run),
+                name,
+                _value(row, quantity),
+                command(subject.folder, subject.study, run, name),
+            ]
             for run, name, row in zip(
                 rows["run"].tolist(), rows["law"], rows.to_dict("records"), strict=True
             )
@@ -180,8 +187,9 @@ def _value(row: dict[str, object], quantity: Quantity) -> str:
     return f"{row['outcome']} at {row['ended_at_s']:.3g} s"
 
 
-def command(folder: Path, run: int, law: str) -> str:
+def command(folder: Path, study: Study, run: int, law: str) -> str:
     """Return the command that flies a row again and records a bag."""
     words = ["space-robot", "campaign", "rerun", str(folder), str(run), "--law", law]
     name = law.replace("/", "_").replace("=", "_")
-    return shlex.join([*words, "--bag", f"flights/{run}_{name}"])
+    trust = ["--trust"] if needs_trust(study) else []
+    return shlex.join([*words, "--bag", f"flights/{run}_{name}", *trust])

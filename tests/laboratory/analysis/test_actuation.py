@@ -13,11 +13,19 @@ from hypothesis import strategies as st
 from random_logs import random_log
 
 from space_robot.analysis import analyze
-from space_robot.analysis.actuation import Latency, MissedDeadlines, Saturation, TorqueLimits
+from space_robot.analysis.actuation import (
+    Latency,
+    MissedDeadlines,
+    Saturation,
+    StandingJoints,
+    TorqueLimits,
+)
+from space_robot.analysis.words import remarks
 from space_robot.flight.plan import Flight, FlightPlan, resolve
 from space_robot.flight.simulate import simulate
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.errors import InputError
+from space_robot_msgs_py.samples import Timebase
 
 NONE = TorqueLimits(np.inf, np.inf)
 SOME = TorqueLimits(2.0, 1.5)
@@ -174,3 +182,49 @@ def test_without_answers_there_is_no_latency(latency: np.ndarray | None) -> None
     with pytest.raises(InputError, match="not flown as a graph"):
         figure.result()
     assert "not flown as a graph" in analyze(flown(duration=0.01))["unavailable"]["latency"]
+
+
+def test_joints_stand_where_they_were_to_move() -> None:
+    """By the way: the slow start of a motion counts for little, a joint that holds not at all."""
+    log = FlightLog.allocate(400, ("a", "b", "c"), Timebase(500_000_000))
+    ramp = np.linspace(0.0, 1.0, 400)
+    log.reference_joints[:, 1, 0], log.reference_joints[:, 1, 1] = ramp, -ramp
+    log.joint_velocities[:], log.reference_joints[:, :, 2] = 0.0, 0.0
+    log.joint_velocities[:, 0] = ramp
+    log.joint_velocities[100:, 1] = -0.5 * ramp[100:]
+    metric = StandingJoints(log.rows(0, 1))
+    for rows in (log.rows(0, 150), log.rows(150, 400)):
+        metric.add(rows, np.empty(0))
+    assert metric.result() == {"a": 0.0, "b": pytest.approx(0.0625, abs=1e-3)}
+
+
+@pytest.mark.parametrize("case", ["1", "3"])
+@pytest.mark.parametrize("law", ["tde_stc", "ctc", "pd"])
+def test_shipped_flights_end_without_a_remark_on_them(law: str, case: str) -> None:
+    log = simulate(Flight(resolve(FlightPlan(controller=law, case=case, duration=6.0))))
+    said = " ".join(remarks(analyze(log)))
+    assert "limit" not in said
+    assert "stood" not in said
+
+
+def test_friction_and_a_weak_law_are_said_at_the_end() -> None:
+    """Joints held by 2 N m, of which the law is weak on three."""
+    weak = {f"pd.{name}": [1e4] * 6 + [5.0] * 3 for name in ("k_p", "k_d")}
+    own = {"plant": {"friction.coulomb": 2.0}, "controller": weak}
+    log = simulate(Flight(resolve(FlightPlan(controller="pd", duration=4.0, parameters=own))))
+    report = analyze(log)
+    assert report["standing"]["joint4"] > 0.3
+    (line,) = [text for text in remarks(report) if "stood still" in text]
+    assert f"joint4 {report['standing']['joint4']:.0%}" in line
+
+
+def test_a_limit_cycle_is_said_with_its_frequency() -> None:
+    """A torque that oscillates at 5 Hz with a quarter of what it does, and one of 1 %."""
+    log = simulate(Flight(resolve(FlightPlan(controller="ctc", duration=6.0))))
+    report = analyze(log)
+    size = np.sqrt(2.0) * 0.25 * report["rms"]["mean_axis"]["torque_4_6"]
+    log.applied_torque[:, 6:] += size * np.sin(2.0 * np.pi * 5.0 * log.time)[:, np.newaxis]
+    log.applied_torque[:, :3] += 1e-3 * np.sin(2.0 * np.pi * 5.0 * log.time)[:, np.newaxis]
+    (line,) = [text for text in remarks(analyze(log)) if "limit cycle" in text]
+    assert line.startswith("limit cycle: torque_4_6 at 5 Hz with ")
+    assert "base" not in line

@@ -13,7 +13,7 @@ from random_logs import random_log
 from space_robot.analysis import analyze
 from space_robot.analysis.metrics import unit_of
 from space_robot.analysis.report_lines import Line, lines
-from space_robot.analysis.report_tables import DEFINITIONS
+from space_robot.analysis.report_tables import DEFINITIONS, rms_table
 from space_robot.console.tables import NONE
 from space_robot.flight.plan import Flight, FlightPlan, resolve
 from space_robot.flight.simulate import simulate
@@ -162,9 +162,31 @@ def test_an_error_that_stays_outside_never_settles(reports: list[dict[str, Any]]
     assert found["recording", "damage found"].texts == ["2"]
 
 
+def test_gains_of_ones_own_stand_in_the_title() -> None:
+    own = {"controller": {"ctc.k_p": [90.0], "ctc.k_d": [19.0]}}
+    report = analyze(
+        simulate(Flight(resolve(FlightPlan(controller="ctc", duration=0.01, parameters=own))))
+    )
+    assert report["own_gains"] == ["ctc.k_p", "ctc.k_d"]
+    assert rms_table(report).title.startswith("ctc, case 1, gains default, own ctc.k_p, ctc.k_d:")
+    plain = analyze(simulate(Flight(resolve(FlightPlan(controller="ctc", duration=0.01)))))
+    assert "own" not in rms_table(plain).title
+
+
 @pytest.mark.parametrize(
     ("column", "unit"),
     [("attitude", "-"), ("joints_4_7", "rad"), ("base_torque", "N m"), ("torque_1_1", "N m")],
 )
 def test_units_of_columns(column: str, unit: str) -> None:
     assert unit_of(column) == unit
+
+
+def test_a_diverged_flight_has_all_torques_with_exponents(reports: list[dict[str, Any]]) -> None:
+    report = copy.deepcopy(reports[0])
+    torques = {"base_torque": 2.956e7, "torque_1_3": 99467.7447, "torque_4_6": 1.5}
+    report["rms"]["mean_axis"] |= torques
+    rows = {row[0]: row[2] for row in rms_table(report).groups[0].rows}
+    assert [rows[key] for key in torques] == ["2.956e+07", "9.947e+04", "1.500e+00"]
+    report["rms"]["mean_axis"] |= {"base_torque": 20.0, "torque_1_3": 9.0}
+    rows = {row[0]: row[2] for row in rms_table(report).groups[0].rows}
+    assert [rows[key] for key in torques] == ["20.0000", "9.0000", "1.5000"]

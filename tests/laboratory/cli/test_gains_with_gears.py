@@ -170,10 +170,9 @@ def test_what_grows_is_named_with_exit_code_1(link: str) -> None:
 
 
 def test_both_faults_are_told_in_one_line(link: str) -> None:
-    result = on(link, "--gains", "printed", "--controller", "tde_stc")
+    result = on(link, "--gains", "printed", "--controller", "ctc")
     assert str(result.exception) == (
-        "tde_stc: h_bar leaves too little margin in torque scale; "
-        "tde_stc: small oscillations of the gears' springs grow"
+        "ctc: small motions grow; ctc: small oscillations of the gears' springs grow"
     )
 
 
@@ -197,6 +196,16 @@ def test_the_base_may_float_freely(motor: str) -> None:
     )
     assert free["gears"] == held["gears"]
     assert free["laws"] != held["laws"]
+
+
+def test_tuned_gains_pass_the_check(motor: str, tmp_path: Path) -> None:
+    """A law that met the motors with the inertia of the links would grow at once."""
+    tuned = CliRunner().invoke(
+        cli, ["gains", "tune", "--robot", motor, "--mission", "paper", "-o", str(tmp_path)]
+    )
+    assert tuned.exit_code == 0, tuned.exception
+    mission = ("--mission", "paper", "--gains", str(tmp_path) + "/")
+    assert check("--robot", motor, *mission).exit_code == 0
 
 
 def test_of_rigid_joints_nothing_is_said_of_springs() -> None:

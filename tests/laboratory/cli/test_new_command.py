@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -58,6 +59,13 @@ def test_a_file_becomes_a_folder_that_flies(tmp_path: Path) -> None:
     assert [entry.name for entry in tmp_path.iterdir()] == ["mine"]
     log = simulate(Flight(resolve(FlightPlan(robot="mine", controller="ctc", duration=0.01))))
     assert log.flight["mission"] == "mine"
+    assert (best := report["default_law"]) != "adrc"
+    assert report["remarks"][0].startswith(f"{best} is flown unless another law is named")
+    plain = CliRunner().invoke(cli, ["simulate", "--robot", "mine", "--duration", "0.01", "--json"])
+    assert json.loads(plain.stdout)["controller"] == best
+    assert resolve(FlightPlan(robot="mine")).law.name == best
+    named = resolve(FlightPlan(robot="mine", controller="tde_stc"))
+    assert named.law.name == "tde_stc"
     study = Campaign.load("mine/campaign.yaml").study
     assert study.scenario["robot"] == "mine/"
     flown = CliRunner().invoke(
@@ -67,6 +75,19 @@ def test_a_file_becomes_a_folder_that_flies(tmp_path: Path) -> None:
     assert "pointing" in flown.stdout
     assert (tmp_path / "campaigns/mine/table.parquet").is_file()
     assert isinstance(new(FILE, "--out", "mine").exception, InputError), "it is there"
+
+
+def test_a_gain_set_names_shipped_laws_only(tmp_path: Path) -> None:
+    """So that nobody's folder runs code before the user has named it."""
+    own = tmp_path / "own"
+    shutil.copytree(CONFIG / "gains/paper/tuned", own)
+    text = "controller_node:\n  ros__parameters:\n    controller: "
+    (own / "controller.yaml").write_text(f"{text}pd\n")
+    assert resolve(FlightPlan(gains=f"{own}/")).law.name == "pd"
+    (own / "controller.yaml").write_text(f"{text}evil.py:Law\n")
+    with pytest.raises(InputError, match=r"unknown controller 'evil.py:Law' of controller.yaml"):
+        resolve(FlightPlan(gains=f"{own}/"))
+    assert resolve(FlightPlan(gains=f"{own}/", controller="ctc")).law.name == "ctc"
 
 
 def test_a_law_that_cannot_fly_is_told(monkeypatch: pytest.MonkeyPatch) -> None:

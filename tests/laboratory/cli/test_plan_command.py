@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 import yaml
 from click.testing import CliRunner, Result
+from paths import CONFIG
 
 from space_robot.cli.main import cli
 from space_robot_control.guidance.mission import Mission
@@ -52,6 +53,12 @@ def test_the_papers_mission_asks_for_what_is_known_of_it() -> None:
     assert numbers["momentum"] == pytest.approx(11.3, abs=0.05)
     assert [s["motion"] for s in numbers["segments"]] == ["joints", "joints"]
     assert {a["actuators"]: a["is_feasible"] for a in numbers["actuators"]}["wheels"]
+
+
+def test_a_robot_needs_no_gains(tmp_path: Path, mission: Path) -> None:
+    file = tmp_path / "own.yaml"
+    file.write_text((CONFIG / "robots" / "paper.yaml").read_text("utf-8"))
+    assert report(mission, "--robot", file)["duration_s"] == 37.0
 
 
 def test_the_joints_nearest_to_their_limits() -> None:

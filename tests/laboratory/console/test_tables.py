@@ -79,3 +79,11 @@ def test_a_page_escapes_and_tells_good_from_bad(table: Table) -> None:
         ("good", "1 &lt; 2 holds"),
     ]
     assert html.count('class="group"') == 2
+
+
+@pytest.mark.parametrize("width", [50, 56, 62, 80])
+def test_names_of_groups_are_wrapped_not_cut(width: int) -> None:
+    columns = Column(is_label=True), Column("flights/one"), Column("flights/two")
+    cells = [["base_torque (N m/s)", "12.2 / 4.321e-05", "4.321e-05"]] * 2
+    text = printed(Table("", columns, [Group(cells, "navigation error > 100 Hz")]), width)
+    assert {"navigation", "error", "100", "Hz"} <= set(text.split())

@@ -9,10 +9,11 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from space_robot.analysis.mission_plan import planned_segments
 from space_robot.flight.plan import Flight, FlightPlan, resolve
 from space_robot.tuning.demand import demand
 from space_robot.tuning.inertia import SAMPLING, sampled_reference
-from space_robot_control.guidance.mission import MissionSettings
+from space_robot_control.guidance.mission import Mission, MissionSettings
 from space_robot_model.robot import Robot
 from space_robot_sim.environment.environment import EnvironmentSettings
 
@@ -97,3 +98,16 @@ def test_the_worst_case_counts_axis_by_axis(paper_robot: Robot, order: int) -> N
         np.testing.assert_array_equal(getattr(both, name), worst)
     assert np.all(alone[0].unknown[:3] > alone[1].unknown[:3])
     assert np.all(alone[0].unknown[3:] < alone[1].unknown[3:])
+
+
+def test_a_base_that_turns_asks_what_the_planner_says(paper_robot: Robot) -> None:
+    """A segment that turns the base by 40 degrees; eps is half of an angle, so F is 2 torques."""
+    segments = ["{base: {rpy_deg: [10, 40, -20]}, duration: 12}"]
+    turning = MissionSettings(waypoints_deg=[0, 90, 200, 20, 30, 10], segments=segments)
+    found = demand(paper_robot, turning, [case()])
+    flown = Mission(paper_robot, turning, SAMPLING)
+    (planned,) = planned_segments(paper_robot, flown)
+    torque = np.abs(planned.demand.torque).max(axis=0)
+    assert torque[:3].min() > 1.0
+    np.testing.assert_allclose(found.nominal[:3], 2.0 * torque[:3], rtol=2e-2)
+    np.testing.assert_allclose(found.nominal[3:], torque[3:], rtol=2e-2)

@@ -106,8 +106,16 @@ def test_every_command_flies_a_row_of_the_campaign() -> None:
     words = shlex.split(record(findings)["worst"][0]["command"])
     assert words[:4] == ["space-robot", "campaign", "rerun", "campaigns/a b"]
     assert "--bag" in words
-    assert "'campaigns/a b'" in command(Path("campaigns/a b"), 3, "ctc")
-    assert shlex.split(command(Path("a"), 3, "ctc=/my gains/x"))[-1] == "flights/3_ctc__my gains_x"
+    assert "--trust" not in words
+    assert "'campaigns/a b'" in command(findings.subject.folder, findings.subject.study, 3, "ctc")
+    named = shlex.split(command(Path("a"), findings.subject.study, 3, "ctc=/my gains/x"))
+    assert named[-1] == "flights/3_ctc__my gains_x"
+
+
+def test_the_command_for_a_campaign_with_code_of_its_own_trusts_it() -> None:
+    findings = found(made_table(50), metrics=("attitude_rms",))
+    study = findings.subject.study.model_copy(update={"metrics": {"own": "own.py:own"}})
+    assert command(Path("a"), study, 3, "ctc").endswith(" --trust")
 
 
 def test_the_worst_are_failures_then_the_largest() -> None:
