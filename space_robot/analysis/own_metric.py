@@ -106,6 +106,8 @@ def finite_value(function: MetricFunction | str, log: FlightLog) -> float:
     """
     if isinstance(function, str):
         return OwnMetric(name_of(function), function).finite_value(log)
+    if not callable(function):
+        raise InputError(f"a function or file.py:FUNCTION was expected, got {short(function)}")
     what = f"metric {getattr(function, '__name__', type(function).__name__)}"
     return finite(call(function, log, what), what)
 

@@ -18,12 +18,14 @@ from space_robot_model.robot import Robot
 from space_robot_msgs_py.config.validation import one_of
 from space_robot_msgs_py.errors import InputError
 
-from .checks import check_piece
+from .checks import FARTHEST, FASTEST, SHARPEST, check_piece
 from .courses import Piece
 from .limits import HALFWAY
 from .spline_courses import BrakedTurn, SplineCourse
 
 Array = NDArray[np.float64]
+MOST = {"positions": FARTHEST, "velocities": FASTEST, "accelerations": SHARPEST}
+"""Largest numbers of a point, rad or m, and per s."""
 
 BRAKE_S = 2.0
 """Time in which a moving reference is brought to rest, s."""
@@ -158,4 +160,8 @@ def _row(values: Sequence[float], order: Sequence[int], what: str) -> Array:
     row = np.array(values, dtype=np.float64)[list(order)]
     if not np.all(np.isfinite(row)):
         raise InputError(f"a point has {what} that are not finite")
+    if np.abs(row).max() > MOST[what]:
+        raise InputError(
+            f"a point has {what} of {np.abs(row).max():g}, at most {MOST[what]:g} can be flown"
+        )
     return row

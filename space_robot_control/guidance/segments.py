@@ -14,7 +14,9 @@ from space_robot_msgs_py.config.validation import StrictModel, short, validate
 from space_robot_msgs_py.config.yaml_text import YamlTextError, parse_yaml
 from space_robot_msgs_py.errors import InputError
 
-Seconds = Annotated[float, Field(gt=0.0, le=1e6)]
+MOST_SEGMENTS = 5_000
+"""Largest number of segments of a mission; each is planned for a few milliseconds."""
+Seconds = Annotated[float, Field(ge=1e-6, le=1e6)]
 MOST_BENDS = 100
 Frame = Literal["inertial", "base", "start"]
 MOTIONS = ("joints_deg", "tool", "hold", "reactionless_deg", "file", "trajectory")
@@ -84,9 +86,12 @@ class Segment(StrictModel):
         if not isinstance(content, dict):
             return content
         content = dict(content)
-        if isinstance(inner := content.get("reactionless"), dict) and set(inner) == {"joints_deg"}:
+        if "reactionless" in content:
+            inner = content.pop("reactionless")
+            if not isinstance(inner, dict) or set(inner) != {"joints_deg"}:
+                expected = "reactionless: {joints_deg: [...]} was expected"
+                raise ValueError(f"{expected}, got {short(inner)}")
             content["reactionless_deg"] = inner["joints_deg"]
-            del content["reactionless"]
         if content.get("base") == "free":
             content |= {"is_base_free": True}
             del content["base"]
@@ -132,8 +137,10 @@ def read_segments(texts: Sequence[str]) -> list[Segment]:
     Raises:
         InputError: a segment is wrong; names it, counted from 1.
     """
-    segments = []
-    for number, text in enumerate((text for text in texts if text.strip()), 1):
+    written, segments = [text for text in texts if text.strip()], []
+    if len(written) > MOST_SEGMENTS:
+        raise InputError(f"{len(written)} segments, at most {MOST_SEGMENTS} are planned")
+    for number, text in enumerate(written, 1):
         try:
             content = parse_yaml(text)
         except YamlTextError as error:

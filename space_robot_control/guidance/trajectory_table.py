@@ -106,8 +106,14 @@ class TrajectoryTable:
 def _quaternions(columns: Columns) -> Array:
     """Return unit quaternions (K, 4), each in the hemisphere of the one before."""
     rows = np.column_stack([np.array(columns[name], float) for name in QUATERNION])
-    if not np.all(np.abs(norms(rows) - 1.0) <= 1e-3):
-        raise InputError("trajectory: quaternions must have norm 1")
+    lengths = norms(rows)
+    is_unit = np.abs(lengths - 1.0) <= 1e-3
+    if not np.all(is_unit):
+        k = int(np.argmin(is_unit))
+        raise InputError(
+            f"trajectory: row {k + 1}: the quaternion has a norm of {lengths[k]:.4g}, 0.999 to "
+            "1.001 is allowed"
+        )
     rows = unit_rows(rows)
     products = dot_rows(rows[1:], rows[:-1])
     rows[1:] *= np.cumprod(np.where(products < 0.0, -1.0, 1.0), axis=0)

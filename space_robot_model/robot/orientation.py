@@ -14,13 +14,16 @@ from ..elementary.matrices import direction_norm, norm
 from ..elementary.rotations import quaternion_of_rotation, rotation_of_rpy
 
 Vector = Annotated[list[float], Field(min_length=3, max_length=3)]
+Degrees = Annotated[float, Field(ge=-36_000.0, le=36_000.0)]
+"""An angle of at most a hundred turns: of larger ones too few digits are left."""
+Angles = Annotated[list[Degrees], Field(min_length=3, max_length=3)]
 Quaternion = Annotated[list[float], Field(min_length=4, max_length=4)]
 
 
 class Orientation(StrictModel):
     """An orientation, as roll, pitch and yaw about fixed axes or as a quaternion; or none."""
 
-    rpy_deg: Vector | None = Field(None, description="roll, pitch, yaw about fixed axes, degrees")
+    rpy_deg: Angles | None = Field(None, description="roll, pitch, yaw about fixed axes, degrees")
     quaternion: Quaternion | None = Field(None, description="w, x, y, z")
 
     @model_validator(mode="after")

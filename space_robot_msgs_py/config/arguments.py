@@ -47,7 +47,7 @@ def as_numbers(value: Any, name: str) -> Array:
         numbers = np.asarray(value)
     except ValueError:
         numbers = np.empty(0, dtype=object)
-    if numbers.dtype.kind not in "iuf":
+    if numbers.dtype.kind not in "iuf" or np.ma.is_masked(value):
         raise InputError(f"{name}: numbers were expected, got {short(value)}")
     return numbers.astype(np.float64)
 

@@ -63,8 +63,7 @@ def read_columns(path: Path) -> dict[str, list[float]]:
                 f"{where}: {len(names)} cells expected, got {len(row)} ({listed(names)}{empty})"
             )
         for name, cell in zip(names, row, strict=True):
-            text = cell.replace(",", ".") if has_semicolons else cell
-            columns[name].append(_number(text, f"{where}: {printable(name)}"))
+            columns[name].append(_number(cell, f"{where}: {printable(name)}", has_semicolons))
     return columns
 
 
@@ -90,6 +89,8 @@ def _check_names(names: Sequence[str], path: Path) -> None:
             raise InputError(
                 f"{path}: column {number}{after} has no name (a separator too many in each line?)"
             )
+        if "\t" in name:
+            raise InputError(f"{path}: commas or semicolons separate columns, got tabs")
         if name in seen:
             raise InputError(f"{path}: two columns are called {short(name)}")
         seen.add(name)
@@ -153,12 +154,15 @@ def _parquet_columns(table: Any, path: Path) -> Iterator[tuple[str, list[float]]
         yield name, values
 
 
-def _number(cell: str, where: str) -> float:
+def _number(cell: str, where: str, has_commas: bool) -> float:
+    text = cell.replace(",", ".") if has_commas else cell
     try:
-        value = float(cell)
+        # Python also reads 1_0 and other digits than these
+        value = float(text) if text.isascii() and "_" not in text else math.nan
     except ValueError:
         value = math.nan
     if not math.isfinite(value):
-        comma = " (columns with decimal commas are separated by semicolons)" if "," in cell else ""
+        is_comma = "," in cell and not has_commas
+        comma = " (columns with decimal commas are separated by semicolons)" if is_comma else ""
         raise InputError(f"{where}: a number was expected, got {short(cell.strip())}{comma}")
     return value

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 from space_robot_msgs_py.config.arguments import as_whole_number
+from space_robot_msgs_py.config.text import printable
 from space_robot_msgs_py.errors import FlightError, InputError
 
 from ...analysis.own_metric import check_names, function_of, of_mapping
@@ -15,7 +16,7 @@ from ...flight.batch.sharing import reason_to_fly_alone
 from ...flight.compilation import compile_kernels
 from ...flight.plan import Flight
 from ...flight.simulate import simulate
-from ...processes.pool import OutOfTimeError, WorkerDiedError, run_many
+from ...processes.pool import run_many
 from ...processes.software import commit
 from ..row.bands import BINS
 from ..row.columns import Columns
@@ -117,11 +118,12 @@ class Preparation:
         )
         with closing(tried):
             for done in tried:
-                if isinstance(done.error, (OutOfTimeError, WorkerDiedError)):
+                if done.error is not None and not isinstance(done.error, InputError):
                     names = ", ".join(self.study.metrics)
+                    why = printable(str(done.error))  # of the worker: died, too late, interrupted
                     raise InputError(
-                        f"{where}: metrics {names}: {done.error}, with the nominal flight of {law}"
-                    )
+                        f"{where}: metrics {names}: {why}, with the nominal flight of {law}"
+                    ) from None
                 done.value()
 
     def _measure_nominal(self, law: str) -> None:

@@ -45,7 +45,7 @@ def test_each_option_of_fly_is_an_argument() -> None:
 def test_arguments_show_the_defaults_of_their_options() -> None:
     shown = {argument.name: argument.default for argument in launch_arguments()}
     without = {name for name, default in shown.items() if not default}
-    assert without == {"swap", "fault", "bag", "set", "scenario", "params_file"}
+    assert without == {"swap", "fault", "bag", "set", "scenario", "params_file", "without"}
     of_options = {
         "controller": "tde_stc",
         "friction": "true",
@@ -90,7 +90,7 @@ def test_the_flight_is_the_one_of_the_command(tmp_path: Path) -> None:
 
 def test_nodes_of_ones_own_take_the_places_of_those_that_are_not_started(tmp_path: Path) -> None:
     values = {"without": "controller mission", "join_timeout": "5", "bag": str(tmp_path / "bag")}
-    flight, bag = launched_flight(values)
+    flight, bag, _ = launched_flight(values)
     assert started_nodes(flight.scenario.options.without) == ("recorder_node", "plant_node")
     parameters = flight_parameters(flight, bag)["plant"]
     assert (parameters["own_controller"], parameters["join_timeout"]) == (True, 5.0)

@@ -53,6 +53,10 @@ def deadly(log):
     os._exit(0)
 
 
+def interrupted(log):
+    raise KeyboardInterrupt
+
+
 def elsewhere(log):
     import os
 
@@ -184,6 +188,7 @@ def test_a_mistake_is_told_before_the_first_flight(metrics: dict[str, Any], why:
     [
         ("never", "metrics m: .*3 s.*, with the nominal flight of tde_stc"),
         ("deadly", "metrics m: its process died .*, with the nominal flight of tde_stc"),
+        ("interrupted", "metrics m: KeyboardInterrupt, with the nominal flight of tde_stc"),
         ("nan", "metric m: the function must return a finite number"),
     ],
 )
