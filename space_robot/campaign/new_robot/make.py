@@ -270,7 +270,7 @@ def trial_remark(flights: Mapping[str, Outcome]) -> str:
         for how in (DIVERGED, BEYOND)
     }
     said = [f"{', '.join(names)} {how}" for how, names in failed.items() if names]
-    return f"With {CONDITIONS} {'; '.join(said)}." if said else ""
+    return f"With {CONDITIONS}: {'; '.join(said)}." if said else ""
 
 
 def tool_remark(robot: Robot, folder: Path) -> str:

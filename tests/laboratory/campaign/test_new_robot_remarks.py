@@ -124,7 +124,7 @@ def test_laws_that_failed_in_the_comparison_are_named() -> None:
     }
     remark = trial_remark(flights)
     assert remark.startswith("With friction, payload and disturbances of case 3, ")
-    assert remark.endswith(" a, d diverged; c went beyond the joints' limits of effort.")
+    assert remark.endswith(": a, d diverged; c went beyond the joints' limits of effort.")
     assert trial_remark({"b": flights["b"]}) == ""
 
 
