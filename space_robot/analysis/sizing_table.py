@@ -63,13 +63,7 @@ def _row(quantity: str, unit: str, asked: float, judged: dict[str, Any] | None) 
         return quantity, unit, asked, has, JudgedCell("", "at the limit", "bad")
     margin = judged["margin"]
     if margin is not None and margin <= -MANY_TIMES:
-        return (
-            quantity,
-            unit,
-            asked,
-            has,
-            JudgedCell(f"{1.0 - margin:.3g} times", "what it has", "bad"),
-        )
+        return quantity, unit, asked, has, JudgedCell("", f"{1.0 - margin:.3g} times", "bad")
     text = "" if margin is None else f"{100.0 * margin:+.0f} %"
     verdict = ("has it", "good") if judged["is_met"] else ("lacks it", "bad")
     return quantity, unit, asked, has, JudgedCell(text, *verdict)
