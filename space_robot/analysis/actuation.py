@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from space_robot_model.robot import Robot
 from space_robot_msgs_py.bag.blocks import Metric, last_rows
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.errors import InputError
@@ -17,6 +18,8 @@ Array = NDArray[np.float64]
 
 STANDING = 0.01
 """Share of the desired velocity below which a joint stands."""
+ROUNDING = 1e-9
+"""rad or m of a position, share of the limit of velocity and effort, that is not beyond it."""
 LEAST_WAY = 1e-3
 """Way, rad or m, from which on it is of interest whether a joint stands."""
 
@@ -162,6 +165,40 @@ class MissedDeadlines(Metric):
             "unanswered_ticks": self._unanswered,
             "compared_ticks": self.compared,
             "differing_ticks": self.differing,
+        }
+
+
+class BeyondLimits(Metric):
+    """Number of ticks at which each joint was beyond the limits of the robot's file.
+
+    The plant has no end stops, and does not limit velocity and effort by that file.
+    """
+
+    def __init__(self, log: FlightLog, robot: Robot) -> None:
+        """``log``: the first rows; ``robot`` that was flown."""
+        joints = log.reference_joints.shape[2]
+        self._names = log.joint_names[:joints]
+        self._limits: Array = np.array(robot.limits[:joints]).reshape(joints, 4).T
+        self._ticks = np.zeros((3, joints), dtype=np.intp)
+
+    def add(self, log: FlightLog, error: Array) -> None:
+        """Take further rows."""
+        lower, upper, velocity, effort = self._limits
+        joints = len(self._names)
+        position = log.joint_positions[:, :joints]
+        beyond = (
+            np.maximum(position - upper, lower - position) > ROUNDING,
+            np.abs(log.joint_velocities[:, :joints]) > velocity * (1.0 + ROUNDING),
+            np.abs(log.applied_torque[:, 3:]) > effort * (1.0 + ROUNDING),
+        )
+        self._ticks += np.count_nonzero(beyond, axis=1)
+
+    def result(self) -> dict[str, dict[str, int]]:
+        """Return the ticks beyond position, velocity and effort, by joint that has a limit."""
+        return {
+            name: dict(zip(("position", "velocity", "effort"), map(int, ticks), strict=True))
+            for name, ticks, limits in zip(self._names, self._ticks.T, self._limits.T, strict=True)
+            if np.isfinite(limits).any()
         }
 
 

@@ -49,6 +49,11 @@ class LoadRequirement(NamedTuple):
         return self.asked == 0.0 or self.asked < self.has * (1.0 - AT_LIMIT)
 
     @property
+    def is_at_limit(self) -> bool:
+        """True if what is asked is all that the part has."""
+        return 0.0 < self.has < np.inf and abs(self.asked / self.has - 1.0) <= AT_LIMIT
+
+    @property
     def margin(self) -> float | None:
         """Share of what the part has that is not asked; None: it has no limit, or nothing."""
         if not np.isfinite(self.has) or self.has == 0.0:

@@ -14,7 +14,14 @@ from space_robot_msgs_py.config.validation import short
 from space_robot_msgs_py.errors import InputError
 from space_robot_sim.environment.events import Capture
 
-from .actuation import Latency, MissedDeadlines, Saturation, StandingJoints, TorqueLimits
+from .actuation import (
+    BeyondLimits,
+    Latency,
+    MissedDeadlines,
+    Saturation,
+    StandingJoints,
+    TorqueLimits,
+)
 from .attitude_drift import UNAVAILABLE, AttitudeDrift, controls_base
 from .columns import recording
 from .deflection import Deflection
@@ -228,6 +235,7 @@ _METRICS: dict[str, Callable[[FlightLog], Metric]] = {
     "settling": Settling,
     "saturation": lambda log: Saturation(torque_limits(log)),
     "standing": StandingJoints,
+    "beyond_limits": lambda log: BeyondLimits(log, robot_of(log)),
     "wheel_saturation": lambda log: WheelSaturation(log, flown_actuators(log).wheels),
     "latency": lambda log: Latency(log.timebase.period),
     "missed_deadlines": _missed_deadlines,

@@ -38,6 +38,8 @@ SEGMENT_S = 4.0
 0.75 Hz has sunk to 1e-4 of its power at `SLOWEST`."""
 SHORTEST_S = 1.0
 """s of flight without which nothing can be said."""
+LASTING = 0.1
+"""Share of the mean power from which on a segment has ripple."""
 LINE = 2
 """Frequencies on either side that a sine fills under Hann's window."""
 
@@ -48,7 +50,7 @@ class Peak(NamedTuple):
     frequency: float
     """Hz."""
     rms: float
-    """Of what is within `LINE` frequencies of it; of a sine its whole RMS."""
+    """Of what is within `LINE` frequencies of it, mean over the axes; of a sine its whole RMS."""
 
 
 class RippleSpectrum(NamedTuple):
@@ -79,10 +81,9 @@ class RippleSpectrum(NamedTuple):
             return None
         top = int(tops[np.argmax(power[tops])])
         near = slice(max(0, top - LINE), top + LINE + 1)
-        total = float(np.sum(power[near]))
-        return Peak(
-            float(np.sum(self.frequency[near] * power[near])) / total, float(np.sqrt(total))
-        )
+        rms = np.sqrt(np.sum(self.mean_square[near, axes], axis=0))
+        frequency = float(np.sum(self.frequency[near] * power[near]) / np.sum(power[near]))
+        return Peak(frequency, float(np.mean(rms)))
 
 
 class Ripple(Metric):
@@ -99,7 +100,8 @@ class Ripple(Metric):
             raise InputError(f"ticks less than {0.5 / SLOWEST:g} s apart are needed")
         self._names = (*BASE_AXES, *log.joint_names)
         self._columns = torque_columns(log.axes, controls_base(log), log.prismatic, log.branches)
-        self._spectrum = PowerSpectrum(log.axes, self._period, round(SEGMENT_S / self._period))
+        segment = round(SEGMENT_S / self._period)
+        self._spectrum = PowerSpectrum(log.axes, self._period, segment, SLOWEST)
         self._rows = 0
 
     def add(self, log: FlightLog, error: Array) -> None:
@@ -122,7 +124,8 @@ class Ripple(Metric):
     def result(self) -> dict[str, Any]:
         """Return the RMS by torque column and by axis, N m or N, and the peak of each column.
 
-        ``fast`` is the RMS of what is above `FAST`.
+        ``fast`` is the RMS of what is above `FAST`. ``lasting`` is the share of the segments in
+        which a column has at least `LASTING` of its mean power: of a burst a small one.
         """
         spectrum = self.spectrum()
         columns, rms, fast = self._columns, spectrum.rms(), spectrum.rms(FAST)
@@ -139,7 +142,16 @@ class Ripple(Metric):
                 name: peak and {"frequency_hz": peak.frequency, "rms": peak.rms}
                 for name, peak in peaks.items()
             },
+            "lasting": {name: self._lasting(axes) for name, axes in columns.items()},
         }
+
+    def _lasting(self, axes: AxisIndex) -> float | None:
+        """Return the share of segments with ripple on some axes; None: there are no two."""
+        each = self._spectrum.of_segments()
+        if len(each) < 2:
+            return None
+        power = np.mean(each[:, axes], axis=1)
+        return float(np.mean(power >= LASTING * np.mean(power)))
 
 
 def desired_torque(log: FlightLog, robot: Robot) -> Array:

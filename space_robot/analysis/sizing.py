@@ -122,4 +122,5 @@ def _as_data(requirement: LoadRequirement) -> dict[str, Any]:
         "has": has,
         "margin": requirement.margin,
         "is_met": requirement.is_met,
+        "is_at_limit": requirement.is_at_limit,
     }

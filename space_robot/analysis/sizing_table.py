@@ -19,6 +19,9 @@ BY_AXIS = (
 )
 """Quantity, unit and key of what is asked of each axis."""
 
+MANY_TIMES = 10.0
+"""Lack, as a share of what a part has, from which on the table has a multiple, not a margin."""
+
 
 def sizing_table(report: Report) -> Table | None:
     """Tabulate the sizing of a flight; None where it has none."""
@@ -56,9 +59,14 @@ def _row(quantity: str, unit: str, asked: float, judged: dict[str, Any] | None) 
     if judged is None:
         return quantity, unit, asked, "", ""
     has = "no limit" if judged["has"] is None else f"{judged['has']:.4g}"
-    margin = "" if judged["margin"] is None else f"{100.0 * judged['margin']:+.0f} %"
+    if judged["is_at_limit"]:
+        return quantity, unit, asked, has, JudgedCell("", "at the limit", "bad")
+    margin = judged["margin"]
+    if margin is not None and margin <= -MANY_TIMES:
+        return quantity, unit, asked, has, JudgedCell("", f"{1.0 - margin:.3g} times", "bad")
+    text = "" if margin is None else f"{100.0 * margin:+.0f} %"
     verdict = ("has it", "good") if judged["is_met"] else ("lacks it", "bad")
-    return quantity, unit, asked, has, JudgedCell(margin, *verdict)
+    return quantity, unit, asked, has, JudgedCell(text, *verdict)
 
 
 def _title(sizing: dict[str, Any]) -> str:
@@ -72,8 +80,8 @@ def _notes(report: Report) -> list[str]:
     sizing, notes = report["sizing"], []
     if (report["wheel_saturation"] or {}).get("ticks"):
         notes.append(
-            "wheels were at their limits: a law that is told of it asks for no more, so that this "
-            "flight does not say what its mission asks; fly ideal actuators for that"
+            "wheels were at their limits: what the law then asked for is not what the mission "
+            "asks; fly ideal actuators for that"
         )
     if not sizing["requirements"] or sizing["flown"]:
         return notes

@@ -9,6 +9,7 @@ every `simulate` more time than its report.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from functools import lru_cache
 
@@ -125,25 +126,33 @@ class PowerSpectrum:
     counts alike, whatever happens in it.
     """
 
-    def __init__(self, axes: int, period: float, segment: int) -> None:
+    def __init__(self, axes: int, period: float, segment: int, above: float = 0.0) -> None:
         """Begin without rows.
 
         Args:
             axes: of the signal.
             period: s, from row to row.
             segment: rows of a segment, at least 4.
+            above: Hz, from where on `of_segments` counts.
         """
         self._period = period
         self._segments = Segments(axes, segment, segment // 4)
+        self._first = math.ceil(above * segment * period * (1.0 - 1e-9))
         self._power: Array | float = 0.0
         """The sum over the segments so far."""
-        self._count = 0
+        self._each: list[Array] = []
+        """(axes,) mean square of each of them above a frequency."""
 
     def add(self, values: Array) -> None:
         """Take further rows."""
         for rows in self._segments.add(values):
-            self._power = self._power + self._mean_squares(rows)
-            self._count += 1
+            power = self._mean_squares(rows)
+            self._power = self._power + power
+            self._each.append(np.sum(power[self._first :], axis=0))
+
+    def of_segments(self) -> Array:
+        """Return the mean square above the frequency in each whole segment so far, (S, axes)."""
+        return np.array(self._each)
 
     def value(self) -> tuple[Array, Array]:
         """Return the frequencies, (F,) Hz, and the mean square of each axis at each, (F, axes).
@@ -151,7 +160,7 @@ class PowerSpectrum:
         There must be two rows. The signal's mean square is the sum over all frequencies, and the
         power spectral density the mean square over the distance of two frequencies.
         """
-        power, count, last = self._power, self._count, self._segments.last()
+        power, count, last = self._power, len(self._each), self._segments.last()
         if last is not None:
             power, count = power + self._mean_squares(last), count + 1
         mean: Array = np.asarray(power) / count

@@ -18,6 +18,8 @@ FASTEST_CYCLE = 100.0
 """Hz; faster is chatter, which has a column of its own."""
 PURE_CYCLE, LARGE_CYCLE = 0.5, 0.1
 """Least RMS of a limit cycle as a share of the torque's ripple, and of the whole torque."""
+LASTING_CYCLE = 0.5
+"""Least share of a flight's segments that have the ripple of a limit cycle; a burst has less."""
 LONG_STANDING = 0.05
 """Least share of its way on which a joint stands that is worth a remark."""
 
@@ -83,7 +85,7 @@ def remarks(report: Report) -> list[str]:
         )
     if full := report["wheel_saturation"]:
         remarks += _saturated_wheels(full)
-    remarks += [*_limit_cycles(report), *_standing_joints(report)]
+    remarks += [*_limit_cycles(report), *_standing_joints(report), *_beyond_limits(report)]
     remarks += [
         text for text in (report["unfinished"], *report["damage"], *report["foreign"]) if text
     ]
@@ -115,6 +117,7 @@ def _limit_cycles(report: Report) -> list[str]:
         for name, peak in (report["ripple"] or {}).get("peak", {}).items()
         if peak
         and peak["frequency_hz"] <= FASTEST_CYCLE
+        and (report["ripple"]["lasting"][name] or 0.0) >= LASTING_CYCLE
         and peak["rms"] >= PURE_CYCLE * report["ripple"]["rms"][name]
         and peak["rms"] >= LARGE_CYCLE * report["rms"]["mean_axis"][name]
     ]
@@ -128,6 +131,16 @@ def _standing_joints(report: Report) -> list[str]:
     if not much:
         return []
     return [f"joints that stood still on a part of the way they were to move: {', '.join(much)}"]
+
+
+def _beyond_limits(report: Report) -> list[str]:
+    """Say which joints were beyond which limits of their file, and at how many ticks."""
+    joints = [
+        f"{name} ({', '.join(f'{what} at {n} ticks' for what, n in ticks.items() if n)})"
+        for name, ticks in (report["beyond_limits"] or {}).items()
+        if any(ticks.values())
+    ]
+    return [f"joints beyond the limits of the robot's file: {', '.join(joints)}"] if joints else []
 
 
 def notes(report: Report) -> list[str]:

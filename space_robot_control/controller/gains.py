@@ -54,7 +54,7 @@ def gain_files(robot: str, gain_set: str) -> dict[str, Path]:
     if (folder := files.gains) is None:
         raise InputError(
             f"robot {short(robot)} has no gains of its own: `{new_command(robot)}` makes "
-            "it some, with a mission; or name a folder of <law>.yaml files as gains"
+            "gains and a mission for it; or name a folder of <law>.yaml files as gains"
         )
     if gain_set == DEFAULT:
         if not (folder / DEFAULT_SETS).is_file():

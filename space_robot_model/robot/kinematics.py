@@ -182,7 +182,10 @@ def mounted_tool(robot: ModelledRobot, name: str | None) -> MountedTool:
     if name is not None:
         tools = {tool.name: tool for tool in robot.tools}
         if name not in tools:
-            raise InputError(f"tool: {name!r}: choose one of {', '.join(tools)}")
+            raise InputError(
+                f"tool: {name!r}: choose one of {', '.join(tools)}; `tools: [...]` in robot.yaml "
+                "makes a URDF's link one"
+            )
         tool = tools[name]
     return MountedTool(
         robot.model_rows[tool.body - 1] + 1 if tool.body else 0,

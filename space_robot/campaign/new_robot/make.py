@@ -19,6 +19,8 @@ from space_robot_control.laws import laws
 from space_robot_model.robot import Robot
 from space_robot_model.robot.described import unit_remarks
 from space_robot_model.robot.find import OWN_GAINS, OWN_MISSION
+from space_robot_model.robot.urdf_file import is_urdf, read_urdf_content
+from space_robot_msgs_py.config.validation import read_yaml
 from space_robot_msgs_py.errors import FlightError, InputError
 from space_robot_sim.environment.environment import EnvironmentSettings
 
@@ -32,16 +34,15 @@ from ...tuning.demand import demand
 from ...tuning.task import AUTO, TuningOptions
 from ...tuning.warning import estimate_remark
 from ..gain_set import tuned_set, write_set
-from .texts import CAMPAIGN_FILE, campaign_text
+from .texts import CAMPAIGN_FILE, ROBOT_FILE, campaign_text
 
 SET, CASE = "tuned", "1"
 """Name of the tuned gain set, and the environment of tuning and flights."""
 TRIAL: Mapping[str, Any] = {"case": "3", "sensors": "fine", "navigation": "filtered"}
 """Friction and hardware with which the laws are compared."""
-REASON = (
-    "it has the least errors and ripple (geometric mean) with friction, payload and disturbances "
-    "of case 3, sensors fine and navigation filtered"
-)
+CONDITIONS = "friction, payload and disturbances of case 3, sensors fine and navigation filtered"
+REASON = f"it has the least errors and ripple (geometric mean) with {CONDITIONS}"
+DIVERGED, BEYOND = "diverged", "went beyond the joints' limits of effort"
 WISHES = TuningOptions(margin=0.05, mass_uncertainty=0.2, h_bar=AUTO)
 """Defaults of ``gains tune``, but that the estimate has the nominal inertia where it must."""
 
@@ -134,7 +135,9 @@ class Outcome:
     failure: str
     """Why the flight ended early; empty if it did not."""
     score: float
-    """Geometric mean of errors and ripples on `TRIAL`; infinite if it diverged or broke limits."""
+    """Geometric mean of errors and ripples on `TRIAL`; infinite if it failed there."""
+    trial_failure: str = ""
+    """`DIVERGED` or `BEYOND` if it did that on `TRIAL`; empty if neither or it was not flown."""
 
 
 @dataclass(frozen=True)
@@ -149,7 +152,7 @@ class NewRobot:
     default_law: str
     """The law with the best score, which the gain set names; empty: none flew."""
     remarks: tuple[str, ...] = ()
-    """Remarks on weak laws and on joints that may be passive, in sentences."""
+    """Remarks on failures and weak laws, on tools and joints that may be passive, in sentences."""
 
     def report(self) -> dict[str, Any]:
         """Return the content as data for JSON."""
@@ -209,7 +212,13 @@ def make_robot(
             with (place / OWN_GAINS / SET / OF_THE_SET).open("a", encoding="utf-8") as file:
                 file.write(f"    controller: {best}  # flown unless another is named\n")
     said = f"{best} is flown unless another law is named: {REASON}." if best else ""
-    advice = (said, estimate_remark(tuned), hinge_remark(robot, command, folder))
+    advice = (
+        said,
+        trial_remark(flights),
+        estimate_remark(tuned),
+        tool_remark(robot, folder),
+        hinge_remark(robot, command, folder),
+    )
     remarks = (*unit_remarks(robot), *filter(None, advice))
     return NewRobot(folder, robot, mission, flights, best, remarks)
 
@@ -220,19 +229,24 @@ def _fly(folder: Path, law: str) -> Outcome:
         report, _ = _report(plan)
     except FlightError as error:
         return Outcome({}, str(error), math.inf)
-    return Outcome(dict(report["rms"]["mean_axis"]), "", _score(plan.model_copy(update=TRIAL)))
+    return Outcome(dict(report["rms"]["mean_axis"]), "", *_trial(plan.model_copy(update=TRIAL)))
 
 
-def _score(plan: FlightPlan) -> float:
-    """Fly a trial and return its score: equal ratios count alike, so that units do not matter."""
+def _trial(plan: FlightPlan) -> tuple[float, str]:
+    """Fly a trial and return its score and how it failed.
+
+    Equal ratios count alike in the score, so that units do not matter.
+    """
     try:
         report, is_within = _report(plan)
     except FlightError:
-        return math.inf
+        return math.inf, DIVERGED
+    if not is_within:
+        return math.inf, BEYOND
     ripple = (report["ripple"] or {"rms": {}})["rms"]
     errors = {k: v for k, v in report["rms"]["mean_axis"].items() if not unit_of(k).startswith("N")}
     values = np.maximum([*errors.values(), *ripple.values()], np.finfo(float).tiny)
-    return math.exp(float(np.mean(np.log(values)))) if is_within else math.inf
+    return math.exp(float(np.mean(np.log(values)))), ""
 
 
 def _report(plan: FlightPlan) -> tuple[dict[str, Any], bool]:
@@ -247,6 +261,44 @@ def _report(plan: FlightPlan) -> tuple[dict[str, Any], bool]:
         analysis.add(block)
         is_within &= bool(np.all(np.abs(block.applied_torque[:, 3:]) <= effort))
     return analysis.report(), is_within
+
+
+def trial_remark(flights: Mapping[str, Outcome]) -> str:
+    """Say which laws failed on `TRIAL`, and how; empty if none did."""
+    failed = {
+        how: [law for law, flown in flights.items() if flown.trial_failure == how]
+        for how in (DIVERGED, BEYOND)
+    }
+    said = [f"{', '.join(names)} {how}" for how, names in failed.items() if names]
+    return f"With {CONDITIONS}: {'; '.join(said)}." if said else ""
+
+
+def tool_remark(robot: Robot, folder: Path) -> str:
+    """Say which frame is the tool's, where bodies are fixed to it; empty if none are.
+
+    Args:
+        robot: made of the files.
+        folder: with the robot's files.
+    """
+    content = read_yaml(folder / ROBOT_FILE)
+    if not is_urdf(content) or content["robot"].get("tools"):
+        return ""
+    bodies = read_urdf_content(content, folder, str(folder)).bodies
+    fixed = [
+        body.name
+        for body in bodies
+        if body.parent == robot.tool.name
+        and body.mass
+        and body.joint
+        and body.joint.kind == "fixed"
+    ]
+    if not fixed:
+        return ""
+    return (
+        f"Missions move the frame of {robot.tool.name}, to which {', '.join(fixed)} "
+        f"{'is' if len(fixed) == 1 else 'are'} fixed; `tools: [LINK]` in robot.yaml names another "
+        "link."
+    )
 
 
 FREQUENCY_HZ, DAMPING_RATIO = 0.5, 0.005
@@ -289,8 +341,9 @@ def hinge_remark(robot: Robot, command: str, folder: Path) -> str:
     texts = [f"{name}:{own['stiffness']:g},{own['damping']:g}" for name, own in names.items()]
     options = [word for text in texts for word in ("--passive", text)]
     words = shlex.join([*options, "--out", str(folder), "--force"])
+    each = "each carries" if len(names) > 1 else "it carries"
     return (
-        f"{', '.join(names)}: each carries one body on the base. If that is a panel on a hinge "
+        f"{', '.join(names)}: {each} one body on the base. If that is a panel on a hinge "
         f"without a motor, `{command} {words}` gives it a spring (of {FREQUENCY_HZ:g} Hz: adapt "
         "it)."
     )

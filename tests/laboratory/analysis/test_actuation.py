@@ -23,6 +23,7 @@ from space_robot.analysis.actuation import (
 from space_robot.analysis.words import remarks
 from space_robot.flight.plan import Flight, FlightPlan, resolve
 from space_robot.flight.simulate import simulate
+from space_robot_model.robot.find import find_robot, robot_names
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.samples import Timebase
@@ -228,3 +229,37 @@ def test_a_limit_cycle_is_said_with_its_frequency() -> None:
     (line,) = [text for text in remarks(analyze(log)) if "limit cycle" in text]
     assert line.startswith("limit cycle: torque_4_6 at 5 Hz with ")
     assert "base" not in line
+
+
+def test_a_burst_is_no_limit_cycle() -> None:
+    """The same one, on the last second of eight."""
+    log = simulate(Flight(resolve(FlightPlan(controller="ctc", duration=8.0))))
+    burst = 20.0 * np.sin(2.0 * np.pi * 5.0 * log.time) * (log.time > 7.0)
+    log.applied_torque[:, 6:] += burst[:, np.newaxis]
+    assert not [text for text in remarks(analyze(log)) if "limit cycle" in text]
+
+
+def test_joints_beyond_their_limits_are_said() -> None:
+    """Where the file has limits, and not by rounding."""
+    log = simulate(Flight(resolve(FlightPlan(controller="ctc", duration=0.01))))
+    joints = find_robot("paper").content
+    for number, body in enumerate(body for body in joints["robot"]["bodies"] if body["joint"]):
+        body["joint"]["limits"] = [-3.0, 3.0, 2.0, 60.0] if number < 3 else [None] * 4
+    log.flight["robot_file"] = joints
+    log.joint_positions[:], log.joint_velocities[:], log.applied_torque[:] = 3.0, -2.0, 60.0
+    report = analyze(log)
+    assert list(report["beyond_limits"]) == ["joint1", "joint2", "joint3"]
+    assert not [text for text in remarks(report) if "beyond" in text]
+    log.applied_torque[:7, 4] = -60.1
+    log.joint_positions[:2, 2], log.joint_velocities[3, 2] = -3.1, 2.1
+    (line,) = [text for text in remarks(analyze(log)) if "beyond" in text]
+    assert line == (
+        "joints beyond the limits of the robot's file: joint2 (effort at 7 ticks), "
+        "joint3 (position at 2 ticks, velocity at 1 ticks)"
+    )
+
+
+@pytest.mark.parametrize("name", robot_names())
+def test_shipped_robots_keep_to_the_limits_of_their_files(name: str) -> None:
+    log = simulate(Flight(resolve(FlightPlan(robot=name, controller="ctc", duration=3.0))))
+    assert not [text for text in remarks(analyze(log)) if "beyond" in text]

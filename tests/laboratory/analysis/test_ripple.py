@@ -61,7 +61,9 @@ def test_of_a_sine_it_is_its_rms_at_its_frequency() -> None:
         assert found["rms"][name] == pytest.approx(float(np.mean(rms[axes])), rel=2e-3)
         peak = found["peak"][name]
         assert peak["frequency_hz"] == pytest.approx(17.25, abs=1e-3)
-        assert peak["rms"] == pytest.approx(float(np.sqrt(np.mean(rms[axes] ** 2))), rel=2e-3)
+        assert peak["rms"] == pytest.approx(float(np.mean(rms[axes])), rel=2e-3)
+        assert peak["rms"] <= found["rms"][name]
+        assert found["lasting"][name] == 1.0
 
 
 def test_the_peak_is_the_greater_of_two() -> None:
@@ -72,6 +74,15 @@ def test_the_peak_is_the_greater_of_two() -> None:
         assert found["peak"][name]["frequency_hz"] == pytest.approx(5.0, abs=1e-3)
         rms = float(np.mean(SIZES[axes]) * np.sqrt(0.5 + 0.125))
         assert found["rms"][name] == pytest.approx(rms, rel=1e-3)
+
+
+def test_a_burst_does_not_last() -> None:
+    """A second of eight; of less than two segments nothing is said."""
+    time = seconds(16_000)
+    burst = SIZES * np.sin(2.0 * np.pi * 5.0 * time) * ((time > 0.5) & (time < 1.5))
+    assert set(analyze(log_with(burst))["ripple"]["lasting"].values()) == {0.2}
+    short = analyze(log_with(burst[:9_999]))["ripple"]
+    assert set(short["lasting"].values()) == {None}
 
 
 @pytest.mark.parametrize("frequency", [0.1, 0.25, 0.5, 0.75, 1.0])

@@ -223,6 +223,7 @@ class TestThrusters:
             "asked": pytest.approx(45.5 * rate),
             "margin": pytest.approx(1 - 45500 * rate),
             "is_met": True,
+            "is_at_limit": False,
         }
 
     @given(st.integers(0, 99), st.integers(1, 58))
@@ -278,6 +279,8 @@ def test_at_its_limit_a_part_lacks_it() -> None:
     assert of(6.0, 4.0) == (False, -0.5)
     assert of(0.0, 0.0) == (True, None)
     assert of(9.0, np.inf) == (True, None)
+    assert LoadRequirement("a", "b", "c", 3.999, 4.0).is_at_limit
+    assert not LoadRequirement("a", "b", "c", 6.0, 4.0).is_at_limit
 
 
 def test_of_a_free_base_nothing_was_asked(paper_robot: Robot) -> None:
@@ -309,3 +312,17 @@ def test_the_table_has_every_number_once(paper_robot: Robot) -> None:
     assert texts["wheel_1", "peak torque"] == ["2", "1", "-100 % lacks it"]
     assert texts["wheel_2", "largest momentum"] == ["0", "3", "+100 % has it"]
     assert len(texts) == 3 * 4 + 3 * 2
+
+
+@pytest.mark.parametrize(
+    ("limit", "shown"), [(2.0, "at the limit"), (2.0001, "at the limit"), (0.08, "25 times")]
+)
+def test_at_a_limit_and_far_beyond_it_the_table_has_no_margin(
+    paper_robot: Robot, limit: float, shown: str
+) -> None:
+    wheels = {"axes": flat(np.eye(3)), "max_torque": [limit], "max_momentum": [3.0]}
+    report = analyze(turning_log(paper_robot, 0.0), ActuatorSet("w", hardware(wheels=wheels)))
+    table = sizing_table(report)
+    assert table is not None
+    texts = {(g.name, row[0]): row[4] for g in table.groups for row in table.texts(g)}
+    assert texts["base_x", "peak torque"] == shown

@@ -80,7 +80,7 @@ def test_it_is_said_plainly(paper_robot: Robot) -> None:
     sized = {(r["part"], r["quantity"]): r["is_met"] for r in report["sizing"]["requirements"]}
     table = sizing_table(report)
     assert table is not None
-    assert "does not say what its mission asks" in table.notes[0]
+    assert "what the law then asked for is not what the mission asks" in table.notes[0]
     assert not sized["wheel_3", "peak torque"]
     assert sized["wheel_1", "peak torque"]
 

@@ -14,7 +14,16 @@ from hypothesis import strategies as st
 
 from space_robot.analysis.metrics import axis_groups
 from space_robot.campaign.new_robot import robot_texts
-from space_robot.campaign.new_robot.make import DAMPING_RATIO, FREQUENCY_HZ, hinge_remark
+from space_robot.campaign.new_robot.make import (
+    BEYOND,
+    DAMPING_RATIO,
+    DIVERGED,
+    FREQUENCY_HZ,
+    Outcome,
+    hinge_remark,
+    tool_remark,
+    trial_remark,
+)
 from space_robot.cli.new import new
 from space_robot.tuning.method import Tuned
 from space_robot.tuning.task import TuningOptions
@@ -63,6 +72,10 @@ def test_panels_on_hinges_are_proposed_as_passive_joints(tmp_path: Path) -> None
         ratio = spring["damping"] / (2.0 * inertia * rate)
         assert ratio == pytest.approx(DAMPING_RATIO, rel=0.05)
     assert hinge_remark(passive, "", tmp_path) == ""
+    assert remark.startswith("left_hinge, right_hinge: each carries one body")
+    one = {"left_hinge": proposed["left_hinge"]}
+    _, passive = robot_texts(Path(parsed["robot"]), None, False, "", one)
+    assert hinge_remark(passive, "", tmp_path).startswith("right_hinge: it carries one body")
 
 
 def test_what_is_no_hinge_is_not_proposed(tmp_path: Path) -> None:
@@ -102,3 +115,31 @@ def test_weak_gains_are_told_with_their_reason(slower: float, is_told: bool) -> 
     assert bool(remark) == is_told
     if is_told:
         assert all(number in remark for number in ("0.06 to 120", "12.3 ms", "5 rad/s"))
+
+
+def test_laws_that_failed_in_the_comparison_are_named() -> None:
+    flights = {
+        law: Outcome({"attitude": 1.0}, "", 1.0, how)
+        for law, how in (("a", DIVERGED), ("b", ""), ("c", BEYOND), ("d", DIVERGED))
+    }
+    remark = trial_remark(flights)
+    assert remark.startswith("With friction, payload and disturbances of case 3, ")
+    assert remark.endswith(": a, d diverged; c went beyond the joints' limits of effort.")
+    assert trial_remark({"b": flights["b"]}) == ""
+
+
+def test_the_frame_that_missions_move_is_told_where_a_body_is_fixed_to_it(tmp_path: Path) -> None:
+    camera = LINK.format("camera", 0.1, 1, 0.25) + JOINT.format("mount", "fore", "camera", "fixed")
+    satellite(tmp_path)
+    file = tmp_path / "satellite.urdf"
+    for more, tools, told in (
+        (camera, "", True),
+        (camera, "tools: [camera]", False),
+        ("", "", False),
+    ):
+        text = file.read_text().replace(camera, "").replace("</robot>", f"{more}</robot>")
+        file.write_text(text)
+        (tmp_path / "robot.yaml").write_text(f"robot:\n  urdf: satellite.urdf\n  {tools}\n")
+        remark = tool_remark(Robot.from_yaml(tmp_path / "robot.yaml"), tmp_path)
+        assert remark.startswith("Missions move the frame of fore, to which camera is") == told
+        assert bool(remark) == told
