@@ -194,6 +194,9 @@ def test_what_is_no_scenario_flight_or_number_is_named() -> None:
         for function in (fly_many, bench_many):
             assert "scenarios: a list of them was expected" in refused(function, several)
         assert "scenarios: a list" in refused(fly_many, several, progress=True)
+    assert refused(flight.metric, 5) == "a function or file.py:FUNCTION was expected, got 5"
+    masked = np.ma.array(np.zeros(9), mask=[True] + [False] * 8)
+    assert refused(SHORT.bench().step, masked).startswith("torque: numbers were expected")
     assert refused(flight.view, 5) == "others: flights were expected, got 5"
     assert "failed: RuntimeError: no" in refused(flight.metric, lambda log: NoFloat())
     for value in (np.zeros(6) + 1j, {"base_torque_z": 1j}):

@@ -96,7 +96,7 @@ def test_nodes_of_ones_own_take_the_places_of_those_that_are_not_started(tmp_pat
     assert (parameters["own_controller"], parameters["join_timeout"]) == (True, 5.0)
     assert parameters["reset_with"] == ["recorder_node"]
     assert {entry.partition(":")[0] for entry in parameters["wait_for"]} == {"recorder_node"}
-    flight, bag = launched_flight({**values, "without": "mission"})
+    flight, bag, _ = launched_flight({**values, "without": "mission"})
     assert flight_parameters(flight, bag)["controller"]["join_timeout"] == 5.0
 
 

@@ -41,12 +41,16 @@ def test_commas_or_semicolons_separate_numbers(tmp_path: Path, text: str) -> Non
         ("time,x\n0,1,\n", "line 2: 2 cells expected, got 3 (time, x; the last one is empty: a "),
         ("time,x\n\n0,1\n\n1,z\n", "line 5: x: a number was expected, got 'z'"),
         ('time,x\n0,"0,5"\n', "line 2: x: a number was expected, got '0,5' (columns with decimal "),
+        ("time,x\n0,1_0\n", "line 2: x: a number was expected, got '1_0'"),
+        ("time,x\n0,\u0661\n", "line 2: x: a number was expected, got '\u0661'"),
+        ("time;x\n0;1.234,5\n", "line 2: x: a number was expected, got '1.234,5'"),
+        ("time\tx\n0\t1\n", "commas or semicolons separate columns, got tabs"),
         ("time,x,x\n", "two columns are called 'x'"),
         ("time,x\n" + "0,1\n" * (MOST_ROWS + 1), "more than 100000 rows"),
         (",".join(f"c{k}" for k in range(20_000)), "20000 columns, at most 1000 are read"),
         (",".join(f"c{k}" for k in range(20)) + ("\n" + ",".join("0" * 20)) * 10_000, "10000 rows"),
     ],
-    ids=range(11),
+    ids=range(15),
 )
 def test_wrong_csv_files(tmp_path: Path, text: str, said: str) -> None:
     path = tmp_path / "a.csv"
