@@ -65,7 +65,7 @@ PLACEHOLDERS = {
 """What stands for a word in capitals."""
 EXIT_CODES = {
     r"diff flights/one flights/two": 1,
-    r"gains check --plant-robot": 1,
+    r"gains check --(plant-robot|robot paper_geared)": 1,
     r"replay .*k_1": 1,
     r"robot ETSVII.urdf$": 2,
     r"simulate --controller ctc --gains printed$": 1,

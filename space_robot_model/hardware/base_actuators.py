@@ -109,8 +109,6 @@ class BaseActuatorSettings(StrictModel):
         self.thrusters.check()
         _ = self.magnetic_torquers.largest  # one value, or one per torquer
         _check_torques(self)
-        for name in set(self.names) & set(robot.all_joint_names):
-            raise InputError(f"{name!r} is a joint of robot {robot.name!r}, too: rename the joint")
 
 
 def _check_torques(settings: BaseActuatorSettings) -> None:

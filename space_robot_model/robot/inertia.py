@@ -43,7 +43,7 @@ def check_inertia(values: list[float]) -> list[float]:
     return values
 
 
-LARGEST_MASS, LARGEST_INERTIA = 1e9, 1e15
+LARGEST_MASS, LARGEST_INERTIA = 1e20, 1e20
 """Of a body, kg and kg m2: products of larger numbers overflow."""
 Mass = Annotated[float, Field(gt=0.0, le=LARGEST_MASS)]
 InertiaElement = Annotated[float, Field(ge=-LARGEST_INERTIA, le=LARGEST_INERTIA)]

@@ -21,7 +21,7 @@ Array = NDArray[np.float64]
 BASE = "base"
 """Name of the base in a robot's file."""
 
-Number = Annotated[float, Field(ge=-1e6, le=1e6)]
+Number = Annotated[float, Field(ge=-1e9, le=1e9)]
 """Length, m, or angle, degrees."""
 Vector = Annotated[list[Number], Field(min_length=3, max_length=3)]
 

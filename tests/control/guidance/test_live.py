@@ -238,7 +238,11 @@ NEAR = np.radians(START).tolist()
         (ROBOT.joint_names, [TrajectoryPoint(1.0, [np.nan] * 6, [], [])], "not finite"),
         (ROBOT.joint_names, [TrajectoryPoint(2147483647.0, NEAR, [], [])], r"got 2.14748e.09 s"),
         (ROBOT.joint_names, [TrajectoryPoint(1.0, [1e308] * 6, [], [])], r"positions of 1e\+308"),
-        (ROBOT.joint_names, [TrajectoryPoint(1.0, NEAR, [1e308] * 6, [])], r"velocities of 1e\+308"),
+        (
+            ROBOT.joint_names,
+            [TrajectoryPoint(1.0, NEAR, [1e308] * 6, [])],
+            r"velocities of 1e\+308",
+        ),
         (ROBOT.joint_names, [TrajectoryPoint(1.0, NEAR, [], [1e300] * 6)], "accelerations of 1e"),
         (ROBOT.joint_names, [TrajectoryPoint(1e-9, [3.0] * 6, [], [])], "1e-06 to 1e.06 s"),
         (

@@ -248,16 +248,6 @@ def test_a_limit_of_an_ideal_base_is_refused_with_any_other(name: str) -> None:
         Plant(PAPER, of(name, faults=["saturate_base@1:0.5"]), 5e-4)
 
 
-@pytest.mark.parametrize(
-    ("name", "file"), [("wheel_2", "wheels"), ("torquer_3", "wheels_and_torquers")]
-)
-def test_a_joint_that_is_called_like_an_actuator(name: str, file: str) -> None:
-    content = yaml.safe_load((CONFIG / "robots/paper.yaml").read_text("utf-8"))
-    content["robot"]["links"][2]["name"] = name
-    with pytest.raises(InputError, match=f"actuators {file}: '{name}' is a joint of robot 'paper'"):
-        of(file, orbit="iss").check(Robot.from_dict(content), file)
-
-
 def test_a_name_that_is_none_is_told_with_those_there_are() -> None:
     with pytest.raises(InputError, match="unknown actuator 'best': choose one of ideal, none, sma"):
         of("best")

@@ -60,7 +60,7 @@ def test_launched_nodes_get_files_of_their_own(tmp_path: Path, files: tuple[str,
     flight, folder = Flight(resolve(plan)), tmp_path / "launch"
     folder.mkdir()
     content = yaml.safe_load(
-        launched_parameters(flight, tmp_path / "bag", True, folder).read_text()
+        launched_parameters(flight, tmp_path / "bag", True, folder, {}).read_text()
     )
     parameters = {}
     for name, values in content.items():
