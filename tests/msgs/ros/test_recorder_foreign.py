@@ -108,7 +108,7 @@ def test_the_bag_is_the_flight_and_nothing_else(
         wait(player.is_heard, "listeners")
         player.send(part)
         player.close()
-    time.sleep(0.5)
+    time.sleep(2.0)  # on a busy machine the flood is discovered late
     assert flood.poll() is None
     recorder.terminate()  # and the flood goes on
     output, _ = recorder.communicate(timeout=TIMEOUT_S)
