@@ -109,7 +109,7 @@ def whole_file(path: Path, replace: bool = False) -> Iterator[IO[Any]]:
     if not replace:
         check_free(path)
     with _told(path):
-        unnamed = _unfinished(path)
+        unnamed = unfinished_name(path)
         try:
             with unnamed.open("xb") as file:
                 yield file
@@ -130,7 +130,7 @@ def whole_folder(folder: Path) -> Iterator[Path]:
         InputError: the folder cannot be written.
     """
     make_folder(folder.parent)
-    place = _unfinished(folder)
+    place = unfinished_name(folder)
     old = place.with_suffix(".old")
     try:
         place.mkdir()
@@ -147,7 +147,7 @@ def whole_folder(folder: Path) -> Iterator[Path]:
             shutil.rmtree(left, ignore_errors=True)
 
 
-def _unfinished(path: Path) -> Path:
+def unfinished_name(path: Path) -> Path:
     """Return a new hidden name beside ``path``; remove what killed processes have left of it."""
     for left in path.parent.glob(f".{escape(path.name)}.{'[0-9a-f]' * 8}"):
         with suppress(OSError):  # of somebody else, or gone by now

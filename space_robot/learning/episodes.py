@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from space_robot_msgs_py.compiled.records import Block
-from space_robot_msgs_py.config.arguments import as_numbers, as_whole_number
+from space_robot_msgs_py.config.arguments import as_numbers, as_positive, as_whole_number
 from space_robot_msgs_py.config.validation import one_of, short
 from space_robot_msgs_py.errors import InputError
 from space_robot_sim.plant.plant import Plant
@@ -68,7 +68,7 @@ class ReachTask:
         n = self.flight.robot.n
         self.n, self.period = n, self.flight.period
         self.ticks_per_step = as_whole_number(ticks_per_step, "ticks_per_step", 1)
-        seconds = _positive(duration, "duration")
+        seconds = as_positive(duration, "duration")
         steps = max(1, round(seconds / (self.period * self.ticks_per_step)))
         self.ticks = steps * self.ticks_per_step
         """Length of an episode: whole steps."""
@@ -76,8 +76,8 @@ class ReachTask:
         if scale.shape not in ((), (n + 3,)) or not np.all((scale > 0.0) & np.isfinite(scale)):
             raise InputError(f"torque_scale: 1 or {n + 3} numbers above 0 are allowed, got {scale}")
         self.scale = np.broadcast_to(scale, (n + 3,))
-        self.start_spread = _positive(start_spread, "start_spread", or_zero=True)
-        self.reach = _positive(reach, "reach", or_zero=True)
+        self.start_spread = _not_negative(start_spread, "start_spread")
+        self.reach = _not_negative(reach, "reach")
         self.begin = Plant(self.flight.robot, self.flight.plant_settings, self.period)
         """A plant at tick 0."""
         self.state_size = 13 + 2 * self.flight.robot.joint_count
@@ -112,11 +112,10 @@ def reach_task(settings: Mapping[str, Any]) -> ReachTask:
     return ReachTask(**settings)
 
 
-def _positive(value: float, name: str, or_zero: bool = False) -> float:
+def _not_negative(value: float, name: str) -> float:
     number = as_numbers(value, name)
-    least = "0 or more" if or_zero else "above 0"
-    if number.shape or not np.isfinite(number) or number < 0.0 or (number == 0.0 and not or_zero):
-        raise InputError(f"{name}: a number {least} was expected, got {value!r}")
+    if number.shape or not 0.0 <= number < np.inf:
+        raise InputError(f"{name}: a number 0 or more was expected, got {value!r}")
     return float(number)
 
 

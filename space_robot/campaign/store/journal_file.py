@@ -7,10 +7,10 @@ import sqlite3
 from collections.abc import Iterable, Iterator
 from contextlib import closing, suppress
 from pathlib import Path
-from secrets import token_hex
 
 from space_robot_msgs_py.errors import InputError
 
+from ...console.files import unfinished_name
 from ..row.row import Row
 from .journal_codec import JournalCodec
 
@@ -95,7 +95,7 @@ def write_journal(path: Path, codec: JournalCodec, rows: Iterable[Row]) -> int:
     Raises:
         InputError: the journal cannot be written.
     """
-    unfinished = path.with_name(f".{path.name}.{token_hex(4)}")
+    unfinished = unfinished_name(path)
     try:
         with closing(connect(unfinished)) as database:
             database.execute(_NOTES)
