@@ -17,6 +17,8 @@ from ..dynamics.algebra import Vector, add, scale, store, subtract, vector
 from .gravity import gravity_at, gravity_rate
 
 Array = NDArray[np.float64]
+Motion = tuple[Vector, Vector, Vector, Vector]
+"""Position, m, velocity, acceleration and jerk."""
 
 STEP = 10.0
 """Time between nodes, s."""
@@ -92,25 +94,22 @@ def interpolated(nodes: Array, time: float, part: int) -> tuple[Vector, Vector]:
 
 
 @subroutine
-def point_motion(nodes: Array, time: float, has_j2: float) -> tuple[Vector, Vector, Vector, Vector]:
-    """Return position, velocity, acceleration and jerk of the reference point, m and s."""
+def point_motion(nodes: Array, time: float, has_j2: float) -> Motion:
+    """Return the motion of the reference point from the Earth's centre, inertial axes."""
     r, v = interpolated(nodes, time, 0)
     return r, v, gravity_at(r, has_j2), gravity_rate(r, v, has_j2)
 
 
 @subroutine
-def target_motion(
-    nodes: Array, time: float, has_j2: float
-) -> tuple[Vector, Vector, Vector, Vector]:
-    """Return those of the target from the reference point, inertial axes."""
-    r, v, acceleration, jerk = point_motion(nodes, time, has_j2)
+def target_motion(nodes: Array, time: float, has_j2: float, point: Motion) -> Motion:
+    """Return the motion of the target from the reference point, which moves as given."""
     d, w = interpolated(nodes, time, TARGET)
-    place, motion = add(r, d), add(v, w)
+    place, motion = add(point[0], d), add(point[1], w)
     return (
         d,
         w,
-        subtract(gravity_at(place, has_j2), acceleration),
-        subtract(gravity_rate(place, motion, has_j2), jerk),
+        subtract(gravity_at(place, has_j2), point[2]),
+        subtract(gravity_rate(place, motion, has_j2), point[3]),
     )
 
 
@@ -118,10 +117,8 @@ def target_motion(
 def motions_into(nodes: Array, has_j2: float, of_target: bool, time: Array, out: Array) -> None:
     """Write position, velocity, acceleration and jerk at times (T,), s, into ``out`` (4, T, 3)."""
     for i in range(len(time)):
-        r, v, a, j = point_motion(nodes, time[i], has_j2)
+        motion = point_motion(nodes, time[i], has_j2)
         if of_target:
-            r, v, a, j = target_motion(nodes, time[i], has_j2)
-        store(r, out[0, i], 0)
-        store(v, out[1, i], 0)
-        store(a, out[2, i], 0)
-        store(j, out[3, i], 0)
+            motion = target_motion(nodes, time[i], has_j2, motion)
+        for k in range(4):
+            store(motion[k], out[k, i], 0)
