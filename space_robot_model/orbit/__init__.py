@@ -1,1 +1,1 @@
-"""Orbit of the reference point: elements, gravity, and the propagation that flight software uses."""
+"""Orbit of the reference point: elements, gravity, and flight software's own propagation."""

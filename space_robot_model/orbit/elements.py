@@ -12,6 +12,7 @@ from typing_extensions import Self
 
 from space_robot_msgs_py.config.validation import StrictModel
 
+from ..elementary.matrices import norm
 from ..elementary.series import plain_sin_cos
 
 Array = NDArray[np.float64]
@@ -86,6 +87,18 @@ def state_of(elements: ElementSettings) -> tuple[Array, Array]:
     node, ahead, _ = plane_of(elements)
     p, q = cp * node + sp * ahead, cp * ahead - sp * node
     return along * p + across * q, v_along * p + v_across * q
+
+
+def hill_axes(position: Array, velocity: Array) -> Array:
+    """Return the axes of an orbit as columns (3, 3): radial, along the path, along the normal.
+
+    Args:
+        position: (3,) from the Earth's centre, m.
+        velocity: (3,) m/s.
+    """
+    radial, normal = position / norm(position), np.cross(position, velocity)
+    normal = normal / norm(normal)
+    return np.column_stack([radial, np.cross(normal, radial), normal])
 
 
 def sun_of(elements: ElementSettings, beta_angle_deg: float, noon_deg: float) -> Array:

@@ -14,7 +14,8 @@ from pydantic import Field
 
 from space_robot_msgs_py.config.validation import StrictModel
 
-from .elements import Degrees, ElementSettings
+from ..elementary.matrices import product
+from .elements import Degrees, ElementSettings, hill_axes, state_of, sun_of
 
 Array = NDArray[np.float64]
 
@@ -74,7 +75,7 @@ class AssumedOrbit(StrictModel):
         return self.orbital_elements.height > 0.0
 
 
-class Motion(NamedTuple):
+class OrbitalMotion(NamedTuple):
     """Position and its derivatives, each (T, 3), inertial axes."""
 
     position: Array
@@ -88,7 +89,7 @@ class Motion(NamedTuple):
 
 
 class Ephemeris:
-    """Position of the reference point, and of the target, over time: flight software's own."""
+    """Motion of the reference point, and of the target, over time: flight software's own."""
 
     def __init__(self, assumed: AssumedOrbit) -> None:
         """Begin at tick 0; the orbit is propagated as far as it is asked for.
@@ -98,22 +99,58 @@ class Ephemeris:
         """
         self.assumed = assumed
         """As given."""
-        self.sun: Array = np.zeros(3)
+        self.sun = sun_of(assumed.orbital_elements, assumed.beta_angle_deg, assumed.noon_deg)
         """(3,) unit vector to the Sun, inertial axes."""
+        self.has_j2 = float(assumed.j2)
+        """1 if the propagation knows the oblateness of the Earth, else 0."""
+        errors, position, velocity = assumed.errors, *state_of(assumed.orbital_elements)
+        axes = hill_axes(position, velocity)
+        position = position + product(axes, [errors.radial, errors.along, errors.normal])
+        velocity = velocity + product(
+            axes, [errors.radial_velocity, errors.along_velocity, errors.normal_velocity]
+        )
+        start, still, target = np.zeros((1, 18)), np.zeros(3), assumed.target
+        start[0] = np.concatenate(
+            (position, velocity, still, target.position, target.velocity, still)
+        )
+        self._nodes = start
 
     @property
     def has_target(self) -> bool:
         """True if a target is known."""
         return bool(self.assumed.target.name)
 
-    def motion(self, time: Array) -> Motion:
+    def nodes(self, latest: float) -> Array:
+        """Return the nodes (K, 18) of the motion, at least up to ``latest``, s; see `propagate`."""
+        from .propagation import STEP, propagate  # slow to import
+
+        if latest >= (known := len(self._nodes) - 1) * STEP or not known:
+            extended = np.empty((int(max(latest, 0.0) / STEP) + 2 + known // 2, 18))
+            extended[: known + 1] = self._nodes
+            propagate(extended, known + 1, self.has_j2)
+            self._nodes = extended
+        return self._nodes
+
+    def motion(self, time: Array) -> OrbitalMotion:
         """Return the motion of the reference point from the Earth's centre.
 
         Args:
             time: (T,) s from tick 0; earlier times count as 0.
         """
-        raise NotImplementedError
+        return self._motion(time, of_target=False)
 
-    def target_motion(self, time: Array) -> Motion:
-        """Return the motion of the target from the reference point, at times (T,), s."""
-        raise NotImplementedError
+    def target_motion(self, time: Array) -> OrbitalMotion:
+        """Return the motion of the target from the reference point.
+
+        Args:
+            time: (T,) s from tick 0; earlier times count as 0.
+        """
+        return self._motion(time, of_target=True)
+
+    def _motion(self, time: Array, of_target: bool) -> OrbitalMotion:
+        from .propagation import motions_into  # slow to import
+
+        times, out = np.ascontiguousarray(time, dtype=np.float64), np.empty((4, len(time), 3))
+        nodes = self.nodes(float(times.max(initial=0.0)))
+        motions_into(nodes, self.has_j2, of_target, times, out)
+        return OrbitalMotion(*out)
