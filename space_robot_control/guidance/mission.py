@@ -29,6 +29,7 @@ from .segments import read_pointing, read_segments
 if TYPE_CHECKING:
     from .live import TrajectoryPoint
     from .planner import Planner
+    from .pointing import PointingCourse, PointingGoal
 
 Array = NDArray[np.float64]
 
@@ -159,14 +160,7 @@ class Mission:
             rate = np.radians(settings.base_rate_deg_s)
             before = SteadyTurn(0.0, quaternion, rate) if rate.any() else None
             return BaseMotion(quaternion, before=before)
-        from .pointing import PointingCourse  # slow to import, and most missions need none
-
-        mode = read_pointing(settings.base_point, "start.base")
-        try:
-            course = PointingCourse(mode, self.ephemeris, 0.0, quaternion)
-            course.check(0.0, settings.waypoint_times[-1])
-        except InputError as error:
-            raise InputError(f"start: {error}") from None
+        mode, course = _pointing(settings, self.ephemeris)
         return BaseMotion(course.at(np.zeros(1))[0, :4], course, mode)
 
     @property
@@ -286,3 +280,29 @@ def _leg(begin: float, end: float, start: Array, goal: Array, base: BaseMotion) 
     attitude = held.at(np.array([float(end)]))[0, :4] if base.course else base.quaternion
     course = QuinticLeg(begin, span, start, goal - start)
     return Piece(float(begin), float(end), course, held, goal, attitude, mode=base.mode)
+
+
+def pointing_start(settings: MissionSettings) -> tuple[list[float], list[float]]:
+    """Return attitude (4,) and rate (3,), degrees/s, base axes, of a mission that starts pointing.
+
+    Raises:
+        InputError: what ``base_point`` says cannot be pointed at.
+    """
+    assumed = settings.assumed_orbit
+    _, course = _pointing(settings, Ephemeris(assumed) if assumed.has_orbit else None)
+    motion = course.at(np.zeros(1))[0]
+    return motion[:4].tolist(), np.degrees(motion[4:7]).tolist()
+
+
+def _pointing(
+    settings: MissionSettings, ephemeris: Ephemeris | None
+) -> tuple[PointingGoal, PointingCourse]:
+    from .pointing import PointingCourse  # slow to import, and most missions need none
+
+    mode = read_pointing(settings.base_point, "start.base")
+    try:
+        course = PointingCourse(mode, ephemeris, 0.0, np.array([1.0, 0.0, 0.0, 0.0]))
+        course.check(0.0, settings.waypoint_times[-1])
+    except InputError as error:
+        raise InputError(f"start: {error}") from None
+    return mode, course
