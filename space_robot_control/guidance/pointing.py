@@ -200,7 +200,7 @@ class PointingCourse:
         return self._rows(time, self._anchors_until(float(time.max(initial=0.0))))[:, :10]
 
     def _rows(self, time: Array, anchors: Array) -> Array:
-        from .pointing_kernel import point_into  # slow to import
+        from .pointing_kernel import pointing_into  # slow to import
 
         out, has_j2, nodes = np.empty((len(time), 12)), 0.0, np.empty((0, 18))
         if self._ephemeris is not None:
@@ -208,7 +208,7 @@ class PointingCourse:
             nodes = self._ephemeris.nodes(float(time.max(initial=0.0)))
         turn, begin = self._from_base, self._begin
         times = np.ascontiguousarray(time, dtype=np.float64)
-        point_into(nodes, has_j2, self._kinds, self._fixed, turn, begin, anchors, times, out)
+        pointing_into(nodes, has_j2, self._kinds, self._fixed, turn, begin, anchors, times, out)
         return out
 
     def _anchors_until(self, latest: float) -> Array:

@@ -10,12 +10,21 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from space_robot_model.dynamics.algebra import Vector, cross, dot, scale, store, vector
+from space_robot_model.dynamics.algebra import (
+    Vector,
+    columns_quaternion,
+    cross,
+    dot,
+    multiply,
+    rotated,
+    scale,
+    store,
+    vector,
+)
 from space_robot_model.orbit.propagation import Motion, point_motion, target_motion
 from space_robot_msgs_py.compiled.kernels import kernel, subroutine
 
 Array = NDArray[np.float64]
-Quaternion = tuple[float, float, float, float]
 Derivatives = tuple[Vector, Vector, Vector]
 """A vector with its first two derivatives, inertial axes."""
 
@@ -26,7 +35,7 @@ ANCHOR_S = 5.0
 
 
 @kernel
-def point_into(
+def pointing_into(
     nodes: Array,
     has_j2: float,
     kinds: Array,
@@ -64,7 +73,7 @@ def point_into(
         first = direction(kinds[0], fixed[0], point, target)
         second = direction(kinds[1], fixed[1], point, target)
         t1, t2, t3, length, sine = triad(first[0], second[0])
-        q = multiply(of_axes(t1, t2, t3), turn)
+        q = multiply(columns_quaternion(t1, t2, t3), turn)
         if len(anchors) > 0:
             anchor = anchors[max(int((time[i] - begin) / ANCHOR_S), 0)]
             if q[0] * anchor[0] + q[1] * anchor[1] + q[2] * anchor[2] + q[3] * anchor[3] < 0.0:
@@ -120,39 +129,3 @@ def turning(
     # the rates of v1 and v2 are vd1 + z v2 and vd2 - z v1
     xd = (dot(vdd, t3) + yd * v1 + y * (2.0 * vd1 + z * v2) - x * (2.0 * vd2 - z * v1)) / v2
     return (x, y, z), (xd, yd, zd)
-
-
-@subroutine
-def of_axes(a: Vector, b: Vector, c: Vector) -> Quaternion:
-    """Return the unit quaternion of the rotation with these columns (Shepperd 1978)."""
-    trace = a[0] + b[1] + c[2]
-    if trace >= max(a[0], b[1], c[2]):
-        q = (1.0 + trace, b[2] - c[1], c[0] - a[2], a[1] - b[0])
-    elif a[0] >= max(b[1], c[2]):
-        q = (b[2] - c[1], 1.0 + 2.0 * a[0] - trace, b[0] + a[1], c[0] + a[2])
-    elif b[1] >= c[2]:
-        q = (c[0] - a[2], b[0] + a[1], 1.0 + 2.0 * b[1] - trace, c[1] + b[2])
-    else:
-        q = (a[1] - b[0], c[0] + a[2], c[1] + b[2], 1.0 + 2.0 * c[2] - trace)
-    size = 1.0 / np.sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3])
-    return q[0] * size, q[1] * size, q[2] * size, q[3] * size
-
-
-@subroutine
-def multiply(a: Quaternion, b: Quaternion) -> Quaternion:
-    """Return the product of two quaternions."""
-    return (
-        a[0] * b[0] - a[1] * b[1] - a[2] * b[2] - a[3] * b[3],
-        a[0] * b[1] + a[1] * b[0] + a[2] * b[3] - a[3] * b[2],
-        a[0] * b[2] + a[2] * b[0] + a[3] * b[1] - a[1] * b[3],
-        a[0] * b[3] + a[3] * b[0] + a[1] * b[2] - a[2] * b[1],
-    )
-
-
-@subroutine
-def rotated(q: Quaternion, a: Vector) -> Vector:
-    """Return ``a`` rotated by a unit quaternion."""
-    x, y, z, w = q[1], q[2], q[3], q[0]
-    t = scale(cross((x, y, z), a), 2.0)
-    s = cross((x, y, z), t)
-    return a[0] + w * t[0] + s[0], a[1] + w * t[1] + s[1], a[2] + w * t[2] + s[2]
