@@ -67,9 +67,10 @@ class MatchedSlew:
         from .matched_slew_kernel import turned_into  # slow to import
 
         rows = self._after.at(time)
-        if np.any(time < self._end):
-            rows = np.ascontiguousarray(rows)
-            turned_into(self._turn.at(time - self._begin), rows)
+        if np.any(is_turning := time < self._end):
+            turned = np.ascontiguousarray(rows[is_turning])
+            turned_into(self._turn.at(time[is_turning] - self._begin), turned)
+            rows[is_turning] = turned
         rows[:, :4] *= self._sign
         if np.any(is_early := time < self._begin):
             rows[is_early] = self._before.at(time[is_early])

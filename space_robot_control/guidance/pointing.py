@@ -77,10 +77,7 @@ class PointingGoal(StrictModel):
     @classmethod
     def _is_direction(cls, about: object) -> object:
         if isinstance(about, str) and about not in ABOUT:
-            raise ValueError(
-                f"{short(about)}: {choices(about, ABOUT)}, or a list of three numbers: a direction "
-                "on inertial axes"
-            )
+            raise ValueError(f"{choices(about, ABOUT)}, or a direction [x, y, z] on inertial axes")
         return about
 
     @model_validator(mode="after")
@@ -152,7 +149,6 @@ class PointingCourse:
                 )
             if name == "target" and not ephemeris.has_target:
                 raise InputError(f"base.{key}: target: flight software knows of no target in orbit")
-        sun = None if ephemeris is None else ephemeris.sun
         self._goal, self._ephemeris, self._begin = goal, ephemeris, begin
         self._fixed, self._kinds = np.zeros((2, 3)), np.zeros(2, dtype=np.int64)
         second = goal.about or USUAL_ABOUT.get(goal.point)
@@ -160,10 +156,11 @@ class PointingCourse:
             if name is None:  # of a direction that does not move
                 pointed = self._fixed[0]
                 name = [0.0, 0.0, 1.0] if abs(pointed[2]) <= FAR else [1.0, 0.0, 0.0]
-            vector = sun if name == "sun" else name
-            self._kinds[k] = kinds[vector] if isinstance(vector, str) else FIXED
-            if not isinstance(vector, str):
-                self._fixed[k] = np.array(vector) / norm(vector)
+            if name == "sun" and ephemeris is not None:
+                name = ephemeris.sun.tolist()
+            self._kinds[k] = kinds[name] if isinstance(name, str) else FIXED
+            if not isinstance(name, str):
+                self._fixed[k] = np.array(name) / norm(name)
         self._from_base = goal.from_base
         self._anchors = np.empty((0, 4))
         self._near = near

@@ -38,7 +38,7 @@ ANCHOR_S = 5.0
 def pointing_into(
     nodes: Array,
     has_j2: float,
-    kinds: Array,
+    kinds: NDArray[np.int64],
     fixed: Array,
     from_base: Array,
     begin: float,
