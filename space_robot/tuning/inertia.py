@@ -6,8 +6,8 @@ the common CoM of the robot,
     H_r = sum_i  Jw_i^T I_i Jw_i + m_i (Jv_i - Jv_c)^T (Jv_i - Jv_c),    H_S = J^-T H_r J^-1,
 
 with the Jacobians of body i's angular velocity and CoM, Jv_c their mass-weighted mean, and
-J = blkdiag(J0, E) of (22). The base is at its desired attitude, where ``J0 = E / 2``. Without attitude actuators the base's rotation is eliminated, too, and
-the inertia of the joints is
+J = blkdiag(J0, E) of (22). The base is at its desired attitude, where ``J0 = E / 2``. Without
+attitude actuators the base's rotation is eliminated, too, and the inertia of the joints is
 
     H_f = H_MM - H_MB H_BB^-1 H_BM,    the inverse of the joints' part of H_S^-1.
 

@@ -11,7 +11,7 @@ from space_robot_msgs_py.compiled.records import Block
 from space_robot_msgs_py.errors import MessageError
 from space_robot_msgs_py.samples import Reference, ReferenceChunk
 
-from .signal_kernels import LARGEST, NORM_TOLERANCE
+from .signal_kernels import LARGEST
 
 Array = NDArray[np.float64]
 
@@ -28,8 +28,7 @@ class ReferenceBuffer:
     Once `now` is set, it holds rows around that tick: a part of the ring's length before it, the
     rest after it. Other rows are kept aside in case `begin` sets another time.
     Before that, newer rows push out older ones.
-    Rows with a number not finite, or beyond `LARGEST`, or a quaternion not unit, are refused with a
-    `MessageError`.
+    Rows with a number not finite, or beyond `LARGEST`, are refused with a `MessageError`.
     """
 
     def __init__(self, n: int, capacity: int = 32_768) -> None:
@@ -59,10 +58,6 @@ class ReferenceBuffer:
 
     def add_base(self, start: int, rows: Array) -> None:
         """Add (k, 10) rows from tick ``start`` on."""
-        with np.errstate(all="ignore"):  # numbers that overflow are refused
-            squares = np.sum(rows[:, :4] * rows[:, :4], axis=1)
-        if np.any(np.abs(squares - 1.0) > NORM_TOLERANCE):
-            raise MessageError(f"reference from tick {start}: a quaternion is not unit", "not unit")
         self._store(self._base, start, rows)
 
     def covers(self, tick: int) -> bool:
