@@ -9,23 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from space_robot_model.dynamics.attitude import rotation_matrix
-from space_robot_model.elementary.matrices import norm, product, unit_rows
+from space_robot_model.elementary.matrices import norm, norms, product, unit_rows
 from space_robot_model.elementary.rotations import quaternion_of_rotation
 from space_robot_model.elementary.spline import CubicSpline
 from space_robot_model.robot import Robot
 from space_robot_msgs_py.errors import InputError
 
-from .courses import (
-    KNOT_S,
-    MOST_KNOTS,
-    Course,
-    SteadyTurn,
-    knots,
-    multiplied,
-    quintic,
-    turn_between,
-    turned_by,
-)
+from .courses import KNOT_S, MOST_KNOTS, Course, knots, multiplied, quintic, turn_between, turned_by
 from .demand import demand
 from .free_base import twists_along, with_middles
 from .segments import ToolGoal
@@ -215,13 +205,14 @@ class ToolCourses:
             near = weight > 0.0
             moment = begin + float(times[row])
             motion = base.at(np.array([moment]))[0]
-            quaternion, omega = motion[:4], motion[4:7]
+            quaternion, omega, alpha = motion[:4], motion[4:7], motion[7:]
             rate = product(_matrix(quaternion), omega)
             if axes is not None:
                 rate = rate - product(_matrix(axes[row, :4]), axes[row, 4:7])
             if norm(rate) <= CARRIED:
                 continue
-            steady = SteadyTurn(moment, quaternion, omega).at(begin + times[near])[:, :4]
+            time = (times[near] - times[row])[:, np.newaxis]
+            steady = multiplied(quaternion, _turns(time * (omega + 0.5 * time * alpha)))
             carried = multiplied(steady, quaternion * BACK)
             fixed = multiplied(frame[near], frame[row] * BACK)
             share, place = weight[near, np.newaxis], positions[row]
@@ -237,6 +228,15 @@ class ToolCourses:
 
 BACK = np.array([1.0, -1.0, -1.0, -1.0])
 """Conjugates a quaternion."""
+
+
+def _turns(vectors: Array) -> Array:
+    """Return the quaternions (K, 4) of rotation vectors (K, 3), rad."""
+    from space_robot_model.elementary.sine import sines_cosines  # slow to import
+
+    angles = norms(vectors)
+    sines, cosines = sines_cosines(0.5 * angles)
+    return np.column_stack((cosines, vectors * (sines / np.maximum(angles, 1e-300))[:, np.newaxis]))
 
 
 def _matrices(quaternions: Array) -> Array:
