@@ -43,8 +43,8 @@ def goto(domain: int | None, namespace: str, **options: Any) -> None:
     """Move the tool, the joints or the base of a robot that flies on a graph.
 
     The motion replaces the rest of the mission. A reference that moves is brought to rest first,
-    within 2 s, but for a base that points. What cannot be flown is refused in one line with exit code 1, and the flight goes
-    on as it was.
+    within 2 s, but for a base that points. What cannot be flown is refused in one line with exit
+    code 1, and the flight goes on as it was.
 
     \b
     Examples:
