@@ -264,7 +264,7 @@ def test_the_default_second_direction_of_a_sun_above_the_pole_is_another_one() -
     elements = {"height": 420e3, "inclination_deg": 0.0}
     known = orbit(orbital_elements=elements, beta_angle_deg=90.0)
     course(known, point="sun").check(0.0, 5560.0)
-    with pytest.raises(InputError, match="'normal' is .* degrees from the line of sun"):
+    with pytest.raises(InputError, match=r"'normal' is .* degrees from the line of sun"):
         course(known, point="sun", about="normal").check(0.0, 5560.0)
 
 
