@@ -80,6 +80,8 @@ def forget_workspace(environment: MutableMapping[str, str]) -> None:
         environment[PREFIXES] = os.pathsep.join(others)
 
 
+pytest_plugins = ["hung_tests"]
+
 PREFIXES, MARKER = "AMENT_PREFIX_PATH", "share/ament_index/resource_index/packages/space_robot"
 forget_workspace(os.environ)
 
