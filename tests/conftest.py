@@ -25,7 +25,7 @@ else:
 
 from command import Ran, Run
 from flights import Flown, Start, ros_environment, space_robot_here
-from forked import Forked
+from forked import END_S, Forked
 from paths import CONFIG, TESTS
 
 from space_robot.flight.graph.domain import ros_domain
@@ -248,7 +248,7 @@ def start(domain: int) -> Iterator[Start]:
     yield run
     for process in running:
         process.kill()
-        process.communicate()
+        process.communicate(END_S)
 
 
 @pytest.fixture
