@@ -65,7 +65,7 @@ def scenario_of_flight(context: click.Context, option: click.Parameter, path: Pa
     """Do the same for a command without some options of a flight, which are ignored."""
     from ..scenario.option_table import names
 
-    _use(context, path, names())
+    _use(context, path, set(names()))
 
 
 def _use(context: click.Context, path: Path | None, ignored: Collection[str]) -> None:

@@ -19,6 +19,7 @@ from space_robot_control.guidance.segments import read_segments
 from space_robot_model.elementary.matrices import norms
 from space_robot_model.hardware.base_actuators import BaseActuatorSettings
 from space_robot_model.hardware.capability import actuator_load
+from space_robot_model.orbit.ephemeris import AssumedOrbit, Ephemeris
 from space_robot_model.robot import Robot
 from space_robot_model.robot.base_axes import base_axes, to_base
 from space_robot_msgs_py.compiled.records import assign
@@ -26,7 +27,6 @@ from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.samples import SOURCES, RobotState
 from space_robot_msgs_py.topics import BASE_AXES
 from space_robot_sim.environment.environment import Environment, EnvironmentSettings
-from space_robot_sim.environment.gravity import gravity
 from space_robot_sim.environment.orbit_settings import OrbitSettings
 from space_robot_sim.plant.surroundings import REPORT_TICKS
 from space_robot_sim.plant.tick import PlantMemory, update_true_state
@@ -39,8 +39,6 @@ MOST_SAMPLES = 200_000
 """Samples of all segments together, beside the fewest that each has."""
 OUTSIDE_S = 5.0
 """Spacing of the samples of torques from outside in a long segment, s."""
-LONGEST_STEP = 10.0
-"""Of the integrator of the orbit, s: along an orbit it errs by 0.1 m."""
 MOTION = "motion"
 """The source of the demand that is no torque from outside."""
 
@@ -98,9 +96,9 @@ def mission_demand(
             impulse = impulses[:, -1]
             asked = asked._replace(torque=asked.torque.copy())
             for name, by_source, of_source in zip(SOURCES, outside, impulses, strict=True):
-                given = -to_base(axes, by_source.T).T
-                sources[name] = _source_demand(given, -of_source)
-                asked.torque[:, :3] += given
+                countered = -to_base(axes, by_source.T).T
+                sources[name] = _source_demand(countered, -of_source)
+                asked.torque[:, :3] += countered
                 asked.momentum[:] -= of_source
         yield PieceDemand(piece, asked, sources)
 
@@ -134,52 +132,33 @@ class Surroundings:
     """The torques on a robot in its orbit along a motion, as the plant computes them."""
 
     def __init__(self, robot: Robot, orbit: OrbitSettings) -> None:
-        """Put the robot, whose joints are all actuated, into an orbit at t = 0."""
+        """Put the robot, whose joints are all actuated, into an orbit."""
         self._robot, self._block = robot, PlantMemory.block(robot.n)
-        memory = self._block[0]
         environment = Environment.build(robot, EnvironmentSettings(), orbit)
-        assign(memory, model=robot.model, environment=environment)
+        assign(self._block[0], model=robot.model, environment=environment)
         self._truth = RobotState(0, self._block["truth"])
-        place = environment.orbit
-        self._has_j2 = float(place.has_j2)
-        self._time, self._orbit = 0.0, np.concatenate([place.position, place.velocity])
+        self._ephemeris = Ephemeris(
+            AssumedOrbit(orbital_elements=orbit.orbital_elements, j2=orbit.gravity.j2)
+        )
 
     def torques(self, time: Array, quaternions: Array, joints: Array) -> Array:
         """Return torques (S, K, 3) about the centre of mass by `SOURCES`, N m, inertial axes.
 
         Args:
-            time: (K,) s, rising, and not before that of an earlier call.
+            time: (K,) s.
             quaternions: (K, 4) of the base, unit.
             joints: (K, n) rad or m.
         """
         n, x = self._robot.joint_count, self._block[0]["x"]
+        place = self._ephemeris.motion(time)
         out = np.empty((len(time), len(SOURCES), 3))
         for k, now in enumerate(time):
-            self._fall_to(float(now))
             x[3:7], x[7 : 7 + n] = quaternions[k], joints[k, list(self._robot.order)]
-            x[13 + 2 * n : 19 + 2 * n] = self._orbit
+            x[13 + 2 * n : 16 + 2 * n] = place.position[k]
+            x[16 + 2 * n : 19 + 2 * n] = place.velocity[k]
             update_true_state(self._block, REPORT_TICKS, float(now) / REPORT_TICKS)
             out[k] = self._truth.external_torques.reshape(-1, 3)
         return np.moveaxis(out, 0, 1)
-
-    def _fall_to(self, time: float) -> None:
-        """Follow the orbit by Runge and Kutta's method."""
-        steps = math.ceil((time - self._time) / LONGEST_STEP)
-        step = (time - self._time) / max(steps, 1)
-        for _ in range(steps):
-            x = self._orbit
-            first = self._rates(x)
-            second = self._rates(x + 0.5 * step * first)
-            third = self._rates(x + 0.5 * step * second)
-            fourth = self._rates(x + step * third)
-            self._orbit = x + step / 6.0 * (first + 2.0 * (second + third) + fourth)
-        self._time = time
-
-    def _rates(self, x: Array) -> Array:
-        out = np.empty(6)
-        out[:3] = x[3:]
-        gravity(x[:3], self._has_j2, out[3:])
-        return out
 
 
 class Excess(NamedTuple):
