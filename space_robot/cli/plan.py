@@ -61,7 +61,7 @@ def plan(
       space-robot plan --scenario flight.yaml
     """
     from space_robot_control.guidance.limits import turn_remarks
-    from space_robot_control.guidance.mission import Mission
+    from space_robot_control.guidance.mission import Mission, MissionSettings
     from space_robot_model.robot.described import unit_remarks
     from space_robot_msgs_py.errors import FlightError
 
@@ -74,7 +74,8 @@ def plan(
 
     scenario = resolve_options(mission=mission, controller=None, **options)
     robot, orbit, period = scenario.robots.controller, scenario.plant, scenario.plant.period
-    planned, settings = scenario.reference, scenario.mission
+    planned = scenario.reference
+    settings: MissionSettings = scenario.mission
     chosen = {scenario.plant.actuators: scenario.assumed_actuators}
     held = filter(None, [held_base_remark(scenario)])
     for remark in (*unit_remarks(robot), *turn_remarks(robot, planned.pieces), *held):

@@ -174,7 +174,7 @@ class Excess(NamedTuple):
 
 def excess(hardware: BaseActuatorSettings, demands: Iterable[PieceDemand]) -> Excess:
     """Return what a mission asks of wheels or thrusters, without unloading by torquers."""
-    largest, complaint = [0.0, 0.0], ""
+    largest, complaint = np.zeros(2), ""
     for number, (piece, asked, _) in enumerate(demands, 1):
         momentum = asked.base_momentum
         load = actuator_load(hardware, asked.torque[:, :3], momentum, asked.base[:, 4:7])
@@ -185,7 +185,8 @@ def excess(hardware: BaseActuatorSettings, demands: Iterable[PieceDemand]) -> Ex
             )
         ):
             k = int(np.argmax(shares))
-            largest[i] = max(largest[i], share := float(shares[k]))
+            share = float(shares[k])
+            largest[i] = max(largest[i], share)
             if share > 1.0 and not complaint:
                 axis = int(np.argmax(np.abs(values[k])))
                 complaint = (
@@ -193,7 +194,7 @@ def excess(hardware: BaseActuatorSettings, demands: Iterable[PieceDemand]) -> Ex
                     f"{abs(values[k, axis]):.4g} {unit} about {BASE_AXES[axis]} at "
                     f"t = {asked.time[k]:.2f} s, {100.0 * share:.4g} % of what the actuators {does}"
                 )
-    return Excess(*largest, complaint)
+    return Excess(float(largest[0]), float(largest[1]), complaint)
 
 
 def check_mission_demand(scenario: ResolvedScenario) -> None:
