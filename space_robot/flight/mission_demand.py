@@ -238,13 +238,15 @@ def held_base_remark(scenario: ResolvedScenario) -> str:
     if scenario.plant.controls_base:
         return ""
     pieces, segments = scenario.reference.pieces, read_segments(scenario.mission.segments)
-    first = len(pieces) - len(segments)
-    for number, (piece, segment) in enumerate(zip(pieces[first:], segments, strict=True), 1):
+    legs = [None] * (len(pieces) - len(segments))
+    for number, (piece, segment) in enumerate(zip(pieces, [*legs, *segments], strict=True), 1):
+        if segment and segment.is_base_free:
+            continue
         times = np.linspace(piece.begin, piece.end, FEWEST_KNOTS)
-        leads_tool = segment.tool is not None and segment.tool.frame != "base"
-        if not segment.is_base_free and (leads_tool or piece.base.at(times)[:, 4:7].any()):
+        leads_tool = segment and segment.tool and segment.tool.frame != "base"
+        if leads_tool or piece.base.at(times)[:, 4:7].any():
             return (
-                f"the mission's part {first + number} ({piece.motion}) is planned with a base "
+                f"the mission's part {number} ({piece.motion}) is planned with a base "
                 "whose attitude is controlled, without actuators it floats freely: base: free "
                 "plans for that"
             )
