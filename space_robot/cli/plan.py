@@ -77,6 +77,7 @@ def plan(
     planned = scenario.reference
     settings: MissionSettings = scenario.mission
     chosen = {scenario.plant.actuators: scenario.assumed_actuators}
+    scenario.plant.check(scenario.robots.plant, scenario.plant.actuators)
     held = filter(None, [held_base_remark(scenario)])
     for remark in (*unit_remarks(robot), *turn_remarks(robot, planned.pieces), *held):
         click.echo(f"warning: {remark}", err=True)

@@ -182,6 +182,13 @@ def test_actuators_of_ones_own_are_judged_and_refused(mission: Path, weak_wheels
     assert report(mission, "--actuators", "wheels")["refused"] == ""
 
 
+def test_torquers_need_an_orbit_as_in_flight(mission: Path) -> None:
+    error = run(mission, "--actuators", "wheels_and_torquers").exception
+    assert isinstance(error, InputError)
+    assert "magnetic_torquers need an orbit" in str(error)
+    assert run(mission, "--actuators", "wheels_and_torquers", "--orbit", "iss").exit_code == 0
+
+
 def test_an_orbit_has_torques_by_source(mission: Path) -> None:
     alone, numbers = report(mission), report(mission, "--orbit", "iss")
     assert list(alone["sources"]) == ["motion"]
