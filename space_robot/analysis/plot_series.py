@@ -14,8 +14,14 @@ from space_robot_msgs_py.errors import InputError
 
 from .attitude_drift import controls_base
 from .described import event_times, robot_of
-from .metrics import AxisIndex, error_columns, torque_columns, tracking_error
-from .pointing import PointingError, pointing_error
+from .metrics import AxisIndex, attitude_angles, error_columns, torque_columns, tracking_error
+from .pointing import (
+    BasePointingError,
+    PointingError,
+    base_pointing_error,
+    mission_axis,
+    pointing_error,
+)
 from .ripple import RippleSpectrum, ripple_spectrum
 from .waypoints import junction_ticks
 
@@ -65,13 +71,15 @@ class PlotSeries(NamedTuple):
     time: Array
     """(N,) s."""
     errors: dict[str, Array]
-    """(N,) norm of the error of each column of Table V, in its unit."""
+    """(N,) norm of the error of each column of Table V, in its unit; of the attitude in degrees."""
     torques: dict[str, Array]
     """(N,) norm of the torque of each column of Table V, in its unit."""
     base_torque: BaseTorque | None
     """None where nothing turned the base."""
     pointing: PointingError | None
     """None where the robot is not known."""
+    base_pointing: BasePointingError | None
+    """None where nothing turned the base."""
     latency_ms: Array | None
     """(K,) of every answer, by the wall clock; None for flights without any."""
     ripple: RippleSpectrum | None
@@ -93,13 +101,18 @@ class PlotSeries(NamedTuple):
         if log.latency_s is not None:
             known = log.latency_s[np.isfinite(log.latency_s)]
             latency = 1e3 * known if len(known) else None
+        errors = _norms(error, error_columns(axes, of_base, log.prismatic, log.branches))
+        if of_base:
+            angle = np.linalg.norm(attitude_angles(log), axis=1)
+            errors = {"attitude_deg": angle} | {k: v for k, v in errors.items() if k != "attitude"}
         torque_axes = torque_columns(axes, of_base, log.prismatic, log.branches)
         return cls(
             tick_times(log),
-            _norms(error, error_columns(axes, of_base, log.prismatic, log.branches)),
+            errors,
             _norms(log.applied_torque, torque_axes),
             BaseTorque.of(log) if of_base else None,
             pointing,
+            base_pointing_error(log, mission_axis(log)) if of_base else None,
             latency,
             ripple,
             torque_axes,

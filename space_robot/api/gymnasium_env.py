@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from space_robot_model.robot.base_axes import base_axes, to_base
 from space_robot_msgs_py.config.arguments import as_numbers, as_whole_number
 from space_robot_msgs_py.config.extras import install_command
 from space_robot_msgs_py.config.validation import short
@@ -24,6 +25,7 @@ try:
 except ImportError:
     raise ImportError(f"gymnasium is not installed: {install_command('gym')}") from None
 
+from ..analysis.metrics import relative_attitude
 from .scenario import Scenario
 
 Array = NDArray[np.float64]
@@ -138,15 +140,14 @@ class SpaceRobotEnv(gymnasium.Env[Array, Array]):
     def _errors(self, state: RobotState) -> tuple[Array, Array]:
         """Return the errors of positions and of rates, (m,) each."""
         reference = self.bench.reference
-        side = 1.0 if state.quaternion @ reference.quaternion >= 0.0 else -1.0
-        eps = side * reference.quaternion[1:] - state.quaternion[1:]
+        turned = relative_attitude(reference.quaternion[np.newaxis], state.quaternion[np.newaxis])
+        omega = to_base(base_axes(turned.T), reference.omega_base[:, np.newaxis])[:, 0]
         return (
-            np.concatenate((eps, reference.joint_positions - state.joint_positions)),
             np.concatenate(
-                (
-                    reference.omega_base - state.omega_base,
-                    reference.joint_velocities - state.joint_velocities,
-                )
+                (0.0 - turned[0, 1:], reference.joint_positions - state.joint_positions)
+            ),
+            np.concatenate(
+                (omega - state.omega_base, reference.joint_velocities - state.joint_velocities)
             ),
         )
 

@@ -24,7 +24,7 @@ from ..console.terminal_tables import print_table
 if TYPE_CHECKING:
     from pandas import DataFrame
 
-SHOWN = ("attitude_rms", "joints_4_6_rms", "ripple_base_torque")
+SHOWN = ("attitude_deg_rms", "joints_4_6_rms", "ripple_base_torque")
 """Metrics whose medians are shown if they were computed."""
 
 

@@ -46,7 +46,8 @@ class Reach(Record):
     ticks: float = shaped(lambda n: ())
     """Length of the episode."""
     observation: Array = shaped(lambda n: (2 * n + 6,))
-    """Errors of attitude (vector part) and joints, angular velocity of the base, joint rates."""
+    """Errors of attitude (vector part of the rotation to the desired one) and joints, angular
+    velocity of the base, joint rates."""
     reward: float = shaped(lambda n: ())
     """Of the last step."""
     has_failed: float = shaped(lambda n: ())
@@ -56,13 +57,15 @@ class Reach(Record):
 @kernel
 def observe(reach: Reach, truth: State) -> None:
     """Write the observation of a state."""
-    n, out = reach.target.size, reach.observation
+    n, out, d, q = reach.target.size, reach.observation, reach.attitude, truth.quaternion
     cosine = 0.0
     for i in range(4):
-        cosine += truth.quaternion[i] * reach.attitude[i]
+        cosine += q[i] * d[i]
     side = where(cosine >= 0.0, 1.0, -1.0)
     for i in range(3):
-        out[i] = side * reach.attitude[1 + i] - truth.quaternion[1 + i]
+        j, k = 1 + (i + 1) % 3, 1 + (i + 2) % 3
+        eps = d[0] * q[1 + i] - q[0] * d[1 + i] - (d[j] * q[k] - d[k] * q[j])
+        out[i] = 0.0 - side * eps
         out[3 + n + i] = truth.omega_base[i]
     for i in range(n):
         out[3 + i] = reach.target[i] - truth.joint_positions[i]

@@ -161,7 +161,9 @@ class RowFlyer:
         return self.row_of_log(task, flight, ending, log)
 
     def _measure(self, flight: Flight) -> Measure:
-        return Measure(flight, self.study.require, of_mapping(self.study.metrics))
+        return Measure(
+            flight, self.study.require, of_mapping(self.study.metrics), self.study.pointing
+        )
 
     def _fits(self, flight: Flight) -> bool:
         """Return True if flights like this one may be flown together."""

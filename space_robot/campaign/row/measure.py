@@ -18,6 +18,7 @@ from space_robot_sim.environment.payload import with_payload
 from ...analysis.attitude_drift import attitude_drift
 from ...analysis.metrics import tracking_error
 from ...analysis.own_metric import OwnMetric
+from ...analysis.pointing import PointingBudget, base_pointing_error, pointed_axis
 from ...analysis.tool_error import ToolError
 from ...flight.plan import Flight
 from ..study import Requirement
@@ -30,7 +31,11 @@ class Measure:
     """Accumulates metrics, requirements' metrics and bands of a flight block by block."""
 
     def __init__(
-        self, flight: Flight, require: Mapping[str, Requirement], own: Sequence[OwnMetric] = ()
+        self,
+        flight: Flight,
+        require: Mapping[str, Requirement],
+        own: Sequence[OwnMetric] = (),
+        budget: PointingBudget | None = None,
     ) -> None:
         """Prepare the sums for a flight.
 
@@ -38,6 +43,7 @@ class Measure:
             flight: not flown yet.
             require: the requirements by name.
             own: metrics of the user, which need `add_whole`.
+            budget: of the base's pointing; None: the default.
         """
         self._own, self._demands = own, require
         self._own_results: dict[str, float] = {}
@@ -50,9 +56,10 @@ class Measure:
         self._start: NDArray[np.float64] | None = None
         """(4,) attitude at the first tick."""
         self._tool: ToolError | None = None
-        self._whole = WindowMetrics(Window(), columns.metrics, columns)
+        self._axis = pointed_axis(flight.mission_settings.written_segments)
+        self._whole = WindowMetrics(Window(), columns.metrics, columns, budget)
         self._require = {
-            name: WindowMetrics(_window(demand), [demand.metric], columns)
+            name: WindowMetrics(_window(demand), [demand.metric], columns, budget)
             for name, demand in require.items()
             if not _is_whole(demand) and demand.metric not in names
         }
@@ -69,9 +76,14 @@ class Measure:
         if self._columns.tool:
             self._tool = self._tool or _tool_error(block, self._flight)
             sizes |= zip(self._columns.tool, self._tool.errors(block).T, strict=True)
+        pointing = None
+        if self._columns.angles:
+            pointing = base_pointing_error(block, self._axis)
+            angles = np.degrees(pointing.rotation), *pointing.angles.T
+            sizes |= zip(self._columns.angles, angles, strict=False)
         self._bands.add(block.first_tick, sizes)
         for metrics in (self._whole, *self._require.values()):
-            metrics.add(block, error, sizes, self._robot)
+            metrics.add(block, error, sizes, self._robot, pointing)
 
     def add_whole(self, log: FlightLog) -> None:
         """Evaluate the user's own metrics of a complete flight, and those that are required.
