@@ -75,12 +75,12 @@ class UnusableStateError(FlightError):
 
 
 class SingularAttitudeError(UnusableStateError):
-    """The base has turned by 180 degrees, where the quaternion coordinates end (eta = 0)."""
+    """The base is 180 degrees from its desired attitude, where J0 of (1) is singular."""
 
-    def __init__(self, tick: int, eta: float) -> None:
+    def __init__(self, tick: int) -> None:
         super().__init__(
             tick,
-            f"the base attitude has eta = {eta:.1e}: J0 of eq. (1) is singular at 180 degrees, "
-            "so no command exists there in these coordinates",
-            "attitude near 180 degrees",
+            "the base is 180 degrees from its desired attitude, where J0 of eq. (1) is singular "
+            "and no command exists",
+            "attitude error near 180 degrees",
         )

@@ -73,7 +73,7 @@ class FlownFlight:
         """``complete``, ``diverged`` or ``unanswered``.
 
         Diverged: the simulated state is not physical any more. Unanswered: the law has no command
-        for a state (attitude near 180 degrees, or a number that is not finite).
+        for a state (180 degrees from the desired attitude, or a number that is not finite).
         """
         return self.ending.outcome
 

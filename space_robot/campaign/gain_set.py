@@ -8,8 +8,6 @@ from typing import Any
 
 import numpy as np
 
-from space_robot_model.dynamics.attitude import SINGULAR_ETA
-from space_robot_model.elementary.matrices import norm
 from space_robot_msgs_py.config.validation import validate
 from space_robot_msgs_py.errors import InputError
 from space_robot_sim.environment.payload import with_payload
@@ -48,9 +46,6 @@ def tuned_set(
     plans = [validate(FlightPlan, {**options, "case": case}, "options") for case in cases]
     settings = [FlightSettings.resolve(plan.options(), plan.parameters) for plan in plans]
     nominal, reference = Robots(settings[0], plans[0].robot).plant, settings[0].mission
-    eta = reference.base_quaternion[0] / norm(reference.base_quaternion)
-    if abs(eta) <= SINGULAR_ETA:
-        raise InputError("base_quaternion: a rotation by 180 degrees, where the laws are singular")
     motion = sampled_reference(nominal, reference)
     if not (motion.joints[:, 1].any() or motion.base[:, 4:].any()):
         raise InputError("the mission moves neither joints nor base: tuning needs a motion")
@@ -61,7 +56,7 @@ def tuned_set(
         inertias.append(inertia_along(loaded, reference))
         if any(loaded.gears):
             places = motion.joints[:, 0]
-            inertias.append(fast_inertia(loaded, places, motion.base[0, :4]))
+            inertias.append(fast_inertia(loaded, places))
     step("forces along the mission")
     asked = demand(nominal, reference, [own.plant for own in settings])
     plant, navigation, noise = settings[0].plant, settings[0].controller.filter_settings, None

@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 from space_robot_control.controller.gains import available_laws
 from space_robot_control.laws import ControlLaw
 from space_robot_control.laws.base import NO_ESTIMATE, NOMINAL_INERTIA
-from space_robot_model.dynamics.attitude import SINGULAR_ETA
 from space_robot_msgs_py.config.validation import validate
 from space_robot_msgs_py.errors import FlightError, InputError
 
@@ -106,14 +105,11 @@ def checked(options: dict[str, Any], mass_uncertainty: float = 0.2) -> Checked:
         plan = plan.model_copy(update={"controller": _first_law(plan)})
     flight = Flight(resolve(plan))
     laws = list(flight.laws.values()) if every else [flight.law]
-    quaternion = flight.mission.chunk(0, 1).base[0, :4]
-    if flight.controls_base and abs(quaternion[0]) <= SINGULAR_ETA:
-        raise InputError("base_quaternion: turned by 180 degrees, where the laws are singular")
     corner = pair_corner(flight.controller_settings)
     checks = _on_rigid_robot(flight, laws, corner, mass_uncertainty)
     frequencies: dict[str, tuple[float, float]] = {}
     if any(flight.plant.robot.gears):
-        checks, frequencies = with_gears(flight, checks, laws, quaternion, corner)
+        checks, frequencies = with_gears(flight, checks, laws, corner)
     ripple: dict[str, Array | None] = {}
     if flight.plant_settings.sensors != "ideal":
         names = flight.laws if every else [plan.controller]
@@ -153,11 +149,7 @@ def _on_rigid_robot(
 
 
 def with_gears(
-    flight: Flight,
-    checks: list[GainCheck],
-    laws: Sequence[ControlLaw],
-    quaternion: Array,
-    corner: float,
+    flight: Flight, checks: list[GainCheck], laws: Sequence[ControlLaw], corner: float
 ) -> tuple[list[GainCheck], dict[str, tuple[float, float]]]:
     """Add to the checks the laws' stability with the gears of the robot.
 
@@ -166,9 +158,7 @@ def with_gears(
     """
     robot = flight.plant.robot
     positions = sampled_reference(robot, flight.mission_settings, GEARS_EVERY).joints[:, 0]
-    motions = FlexibleMotions(
-        robot, positions, quaternion, flight.plant.period, flight.controls_base
-    )
+    motions = FlexibleMotions(robot, positions, flight.plant.period, flight.controls_base)
     lowest, highest = motions.frequencies.min(axis=0), motions.frequencies.max(axis=0)
     extremes = zip(lowest.tolist(), highest.tolist(), strict=True)
     with_springs = [

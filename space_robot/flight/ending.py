@@ -9,7 +9,7 @@ from space_robot_msgs_py.errors import DivergedError, FlightError, UnusableState
 
 COMPLETE, DIVERGED, UNANSWERED, FAILED = "complete", "diverged", "unanswered", "failed"
 """Outcomes: flown to its end; the state left the physics; the law has no command for a state (the
-attitude is near 180 degrees, a number is not finite); a node or its messages failed."""
+attitude error is near 180 degrees, a number is not finite); a node or its messages failed."""
 STOPPED = "stopped"
 """Outcome of a flight on a bench that goes on, or was left there."""
 _DIVERGED = re.compile(r"diverged at tick (\d+)")

@@ -17,7 +17,7 @@ from space_robot_sim.environment.environment import EnvironmentSettings
 from space_robot_sim.environment.friction import coefficients
 from space_robot_sim.environment.payload import with_payload
 
-from .inertia import SAMPLING, attitude_jacobian, sampled_reference
+from .inertia import J0, SAMPLING, sampled_reference
 
 Array = NDArray[np.float64]
 NOTHING = 1e-9
@@ -89,23 +89,19 @@ def _smooth_force(
     robot = robot.nominal
     chunk = sampled_reference(robot, settings)
     count = len(chunk.joints)
-    quaternion = chunk.base[0, :4]  # also while the base turns: free space has no directions
-    jacobian = attitude_jacobian(quaternion)
-    to_force = np.linalg.inv(jacobian).T
     rotation, model = np.empty((3, 3)), RhoSpaceModel.allocate(robot.n)
-    rotation_matrix(quaternion, rotation)
+    as_desired = np.array([1.0, 0.0, 0.0, 0.0])
     disturbance = Disturbance.build(robot.n, case.disturbance) if case else None
     force, torque = np.empty((count, robot.n + 3)), np.zeros(robot.n + 3)
     viscous = coefficients(robot, case.friction)[:, 1] if case else np.zeros(robot.n)
     for k, (theta, rates, accelerations) in enumerate(chunk.joints):
         omega, alpha = chunk.base[k, 4:7], chunk.base[k, 7:]
-        rho_space_into(robot.model, quaternion, theta, omega, rates, model)
-        of_base = jacobian @ alpha - 0.25 * (omega @ omega) * quaternion[1:]  # J0 alpha + J0dot w0
+        rho_space_into(robot.model, as_desired, theta, omega, rates, omega, alpha, model)
         force[k] = model.inertia[:, 3:] @ accelerations + model.bias
-        force[k] += model.inertia[:, :3] @ of_base
         if case and disturbance is not None:
             disturbance_torque(disturbance, k * SAMPLING, torque)
-            force[k, :3] += to_force @ rotation.T @ torque[:3]
+            rotation_matrix(chunk.base[k, :4], rotation)
+            force[k, :3] += rotation.T @ torque[:3] / J0
             force[k, 3:] += torque[3:] + viscous * rates
     return force
 

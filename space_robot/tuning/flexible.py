@@ -23,7 +23,7 @@ from space_robot_model.robot import Robot
 from space_robot_model.robot.gears import FlexibleModel, flexible_model, geared_joints
 
 from .closed_loop import SLOWEST_GROWTH, SmallMotion, loop_of
-from .inertia import attitude_jacobian, inertia_in_rho
+from .inertia import J0, inertia_in_rho
 from .linear_law import LinearLaw, linear_laws
 from .postures import Posture, postures_at
 
@@ -87,39 +87,32 @@ def joint_frequencies(robot: Robot, joint_positions: Array) -> Array:
     return frequencies
 
 
-def fast_inertia(robot: Robot, joint_positions: Array, quaternion: Array) -> Array:
+def fast_inertia(robot: Robot, joint_positions: Array) -> Array:
     """Return H_S (K, m, m) within a tick, when motors move without the links behind their gears.
 
     Args:
         robot: with gears.
         joint_positions: (K, n) of the actuated joints, rad or m.
-        quaternion: (4,) attitude of the base.
     """
     rest = [spring.rest for spring in robot.springs]
     motors = {joint: 6 + robot.joint_count + k for k, joint in enumerate(geared_joints(robot))}
     axes = [3, 4, 5, *(motors.get(joint, 6 + joint) for joint in range(robot.n))]
     models = [flexible_model(robot, np.array([*row, *rest])) for row in joint_positions]
     inertia = np.array([_reduced(model, np.array(axes)).inertia for model in models])
-    return inertia_in_rho(quaternion, inertia)
+    return inertia_in_rho(inertia)
 
 
 class FlexibleMotions:
     """Small motions of a robot with gears along a mission, whatever law controls it."""
 
     def __init__(
-        self,
-        robot: Robot,
-        joint_positions: Array,
-        quaternion: Array,
-        period: float,
-        controls_base: bool,
+        self, robot: Robot, joint_positions: Array, period: float, controls_base: bool
     ) -> None:
         """Linearise the robot.
 
         Args:
             robot: with gears.
             joint_positions: (K, n) of the actuated joints in all configurations, rad or m.
-            quaternion: (4,) attitude of the base.
             period: of a tick, s.
             controls_base: whether the base has attitude actuators.
         """
@@ -128,11 +121,11 @@ class FlexibleMotions:
         self.frequencies = joint_frequencies(robot, positions)
         """(K, G) Hz, see `joint_frequencies`."""
         self.period = period
-        self.postures = postures_at(robot, quaternion, joint_positions, controls_base)
+        self.postures = postures_at(robot, joint_positions, controls_base)
         """Of all configurations, without springs."""
         jacobian = np.eye(self.postures[0].axes)
         if controls_base:
-            jacobian[:3, :3] = attitude_jacobian(quaternion)
+            jacobian[:3, :3] *= J0
         self.configurations = [
             _motion(robot, row, jacobian, posture, period)
             for row, posture in zip(positions, self.postures, strict=True)

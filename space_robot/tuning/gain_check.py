@@ -13,7 +13,7 @@ Each law gets three results:
 
 The effect of noise on switching terms depends on its size: ``g sign(s)`` adds up to g, and the
 roots of super-twisting and of the terminal sliding mode add ``h_bar K_1 |s|^1/2``. The torque on
-the base, about its axes, is ``J0^T F``, and rhodot is ``J0 omega_base``. A base without attitude
+the base, about its axes, is ``J0^T F``, and rhodot is ``J0 omega_e``. A base without attitude
 actuators has no torques, and the joints have the inertia H_f of `inertia`.
 """
 
@@ -32,7 +32,7 @@ from space_robot_control.navigation.low_pass import low_pass_weight
 
 from .closed_loop import SLOWEST_GROWTH, RigidLoop
 from .flexible import FlexibleCheck
-from .inertia import attitude_jacobian
+from .inertia import J0
 from .linear_law import depends_on_posture, force_by_rate, linear_laws
 from .mass_errors import MassCheck
 from .postures import Posture
@@ -218,8 +218,7 @@ def noise_gain(law: ControlLaw, postures: Sequence[Posture], weight: float = 1.0
     if len(per_rate) < len(law.memory.s):  # no torque on the base
         return np.concatenate([np.zeros(3), per_rate])
     gain: Array = per_rate.copy()
-    jacobian = attitude_jacobian(postures[0].quaternion)
-    gain[:3] = np.diag(jacobian.T @ np.diag(per_rate[:3]) @ jacobian)
+    gain[:3] *= J0 * J0
     return gain
 
 

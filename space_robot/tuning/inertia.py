@@ -6,8 +6,8 @@ the common CoM of the robot,
     H_r = sum_i  Jw_i^T I_i Jw_i + m_i (Jv_i - Jv_c)^T (Jv_i - Jv_c),    H_S = J^-T H_r J^-1,
 
 with the Jacobians of body i's angular velocity and CoM, Jv_c their mass-weighted mean, and
-J = blkdiag(J0, E) of (22). Without attitude actuators the base's rotation is eliminated, too, and
-the inertia of the joints is
+J = blkdiag(J0, E) of (22). The base is at its desired attitude, where ``J0 = E / 2``. Without
+attitude actuators the base's rotation is eliminated, too, and the inertia of the joints is
 
     H_f = H_MM - H_MB H_BB^-1 H_BM,    the inverse of the joints' part of H_S^-1.
 
@@ -32,6 +32,8 @@ Array = NDArray[np.float64]
 
 SAMPLING = 0.05
 """Time between two evaluated configurations, s; a leg of a mission takes seconds."""
+J0 = 0.5
+"""J0 of (1) without attitude error, times the unit matrix: epsdot_e = J0 omega_e."""
 MOST_SAMPLES = 20_000
 """Largest number of configurations at equal distances."""
 
@@ -79,7 +81,7 @@ def inertia_along(
     inertia = semi_floating_inertia(robot.nominal, chunk.joints[:, 0])
     if robot.springs:
         inertia = np.concatenate([inertia, loose_inertia(robot, chunk.joints[:, 0])])
-    return inertia_in_rho(chunk.base[0, :4], inertia) if controls_base else free_inertia(inertia)
+    return inertia_in_rho(inertia) if controls_base else free_inertia(inertia)
 
 
 def free_inertia(inertia: Array) -> Array:
@@ -106,17 +108,11 @@ def loose_inertia(robot: Robot, joint_positions: Array) -> Array:
     return left
 
 
-def attitude_jacobian(quaternion: Array) -> Array:
-    """Return ``J0 = (eta E + skew(eps)) / 2`` of (1), (3, 3): epsdot = J0 omega_base."""
-    w, x, y, z = quaternion
-    return 0.5 * np.array([[w, -z, y], [z, w, -x], [-y, x, w]])
-
-
-def inertia_in_rho(quaternion: Array, inertia: Array) -> Array:
-    """Return ``J^-T H_r J^-1`` (K, m, m) for H_r = ``inertia`` (K, m, m) at one base attitude."""
-    inverse = np.eye(inertia.shape[-1])
-    inverse[:3, :3] = np.linalg.inv(attitude_jacobian(quaternion))
-    moved: Array = inverse.T @ inertia @ inverse
+def inertia_in_rho(inertia: Array) -> Array:
+    """Return ``J^-T H_r J^-1`` (K, m, m) for H_r = ``inertia`` (K, m, m) of a base as desired."""
+    scale = np.ones(inertia.shape[-1])
+    scale[:3] = 1.0 / J0
+    moved: Array = scale[:, np.newaxis] * inertia * scale
     return moved
 
 

@@ -17,7 +17,7 @@ from space_robot_control.laws.checked import LawError, force_of
 from space_robot_msgs_py.compiled.records import Block, assign
 from space_robot_msgs_py.config.text import one_line_of
 
-from .inertia import attitude_jacobian
+from .inertia import J0
 from .postures import Posture
 
 Array = NDArray[np.float64]
@@ -28,6 +28,7 @@ SWITCHING = ("k_1", "k_2", "gamma")
 """Gains of terms that are not linear; so is ``g`` without a boundary layer ``delta``."""
 OF_INERTIA = ("h_bar", "inertia")
 """Gains that are the inertia which a law assumes of each axis."""
+UPRIGHT = np.array([1.0, 0.0, 0.0, 0.0])
 STEP = 2.0**-33
 """By which inputs are moved: inside any boundary layer, and a power of two, so that columns of a
 law at rest are exact."""
@@ -43,9 +44,6 @@ class LawTrial:
             LawError: its code failed.
         """
         self._law, self._posture = _copy_of(law), posture
-        has_base = posture.axes > posture.robot.n
-        jacobian = attitude_jacobian(posture.quaternion) if has_base else np.eye(3)
-        self._jacobian_inverse = np.linalg.inv(jacobian)
         gains = self._law.gain_values
         switching = SWITCHING if "delta" in gains else (*SWITCHING, "g")
         for name, values in gains.items():
@@ -73,8 +71,8 @@ class LawTrial:
         signals: Signals = block[0]
         inertia = np.eye(posture.robot.n + 3)
         inertia[-posture.axes :, -posture.axes :] = inertia_scale * posture.inertia
-        place = {"quaternion": posture.quaternion, "joint_positions": posture.joints}
-        assign(signals, model=posture.robot.model, **place)
+        place = {"quaternion": UPRIGHT, "joint_positions": posture.joints}
+        assign(signals, model=posture.robot.model, attitude_error=UPRIGHT, **place)
         assign(signals.reference, **place)
         assign(signals.nominal, inertia=inertia)
         assign(signals, base_is_free=posture.axes == posture.robot.n)
@@ -162,14 +160,12 @@ class LawTrial:
 
     def _move_state(self) -> None:
         """Let attitude and joints move with rho, the displacement from the posture."""
-        signals, quaternion = self._signals, self._posture.quaternion
+        signals = self._signals
         signals.joint_positions[:] += signals.rho[3:]
         signals.joint_velocities[:] = signals.rho_rate[3:]
         if self._posture.axes > self._posture.robot.n:
-            eps = signals.rho[:3]
-            signals.quaternion[0] -= quaternion[1:] @ eps / quaternion[0]
-            signals.quaternion[1:] += eps
-            signals.omega_base[:] = self._jacobian_inverse @ signals.rho_rate[:3]
+            signals.quaternion[1:] = signals.attitude_error[1:] = signals.rho[:3]
+            signals.omega_base[:] = signals.rho_rate[:3] / J0
 
 
 def _copy_of(law: ControlLaw) -> ControlLaw:

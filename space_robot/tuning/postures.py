@@ -17,12 +17,10 @@ Array = NDArray[np.float64]
 
 
 class Posture(NamedTuple):
-    """A configuration of the robot as the controller knows it."""
+    """A configuration of the robot as the controller knows it, the base as desired."""
 
     robot: Robot
     """Without payload, passive joints and gears."""
-    quaternion: Array
-    """(4,) attitude of the base."""
     joints: Array
     """(n,) rad or m."""
     inertia: Array
@@ -35,13 +33,13 @@ class Posture(NamedTuple):
 
 
 def postures_at(
-    robot: Robot, quaternion: Array, joint_positions: Iterable[Array], controls_base: bool = True
+    robot: Robot, joint_positions: Iterable[Array], controls_base: bool = True
 ) -> list[Posture]:
     """Return the postures of the nominal ``robot`` for ``joint_positions`` (K, n), rad or m."""
     nominal, positions = robot.nominal, np.asarray(joint_positions)
     inertia = semi_floating_inertia(nominal, positions)
-    inertia = inertia_in_rho(quaternion, inertia) if controls_base else free_inertia(inertia)
-    return [Posture(nominal, quaternion, *pair) for pair in zip(positions, inertia, strict=True)]
+    inertia = inertia_in_rho(inertia) if controls_base else free_inertia(inertia)
+    return [Posture(nominal, *pair) for pair in zip(positions, inertia, strict=True)]
 
 
 def postures_along(
@@ -53,4 +51,4 @@ def postures_along(
         InputError: the waypoints do not fit the times or the joints.
     """
     chunk = sampled_reference(robot, settings, step)
-    return postures_at(robot, chunk.base[0, :4], chunk.joints[:, 0], controls_base)
+    return postures_at(robot, chunk.joints[:, 0], controls_base)

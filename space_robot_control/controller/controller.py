@@ -173,7 +173,7 @@ class Controller(RecordOwner):
         Raises:
             UnusableStateError: the state is not finite, beyond `LARGEST`, or its quaternion not
                 unit; nothing was remembered of it.
-            SingularAttitudeError: the base has turned by 180 degrees.
+            SingularAttitudeError: the base is 180 degrees from its desired attitude.
             LawError: the code of the law failed.
         """
         law = self._law
@@ -231,7 +231,7 @@ class Controller(RecordOwner):
 def unusable(status: int, tick: int, quaternion: Array) -> UnusableStateError:
     """Return the error to raise for a state of a ``status`` other than `USABLE`."""
     if status == SINGULAR:
-        return SingularAttitudeError(tick, float(quaternion[0]))
+        return SingularAttitudeError(tick)
     if status == NOT_UNIT:
         length = norm(quaternion)
         why = f"the base's quaternion has norm {length:.6g}, not 1"

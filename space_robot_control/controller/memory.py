@@ -23,14 +23,16 @@ class ControllerMemory(Record):
     signals: Signals = nested(Signals)
     """Signals of the last tick."""
     pair: TimeDelayPair = nested(TimeDelayPair)
-    quaternion: Array = shaped(lambda n: (4,))
-    """The measured one or its negative: the same attitude, but rho must not jump."""
     jacobian: Array = shaped(lambda n: (3, 3))
-    """J0."""
+    """J0 of q_e."""
     last_jacobian_inverse: Array = shaped(lambda n: (3, 3))
     """J0^-1 of the last tick."""
-    desired_jacobian: Array = shaped(lambda n: (3, 3))
-    """Scratch."""
+    rotation: Array = shaped(lambda n: (3, 3))
+    """Scratch: rotation from the base to the desired frame."""
+    omega_desired: Array = shaped(lambda n: (3,))
+    """Desired angular velocity on the base's axes, rad/s; zero if that is not controlled."""
+    last_omega_desired: Array = shaped(lambda n: (3,))
+    """That of the reference of the last tick, on the desired frame's axes, rad/s."""
     pair_is_as_measured: float = shaped(lambda n: ())
     """1 if the time-delay pair has rates as they were measured, 0 if as navigation has them."""
     rate_as_measured: Array = shaped(lambda n: (n + 3,))

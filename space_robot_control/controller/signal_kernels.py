@@ -5,11 +5,18 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from space_robot_model.dynamics.attitude import SINGULAR_ETA, attitude_jacobian_inverse, rotate
+from space_robot_model.dynamics.attitude import (
+    SINGULAR_ETA,
+    attitude_jacobian,
+    attitude_jacobian_inverse,
+    rotate,
+    rotate_back,
+    rotation_matrix,
+)
 from space_robot_model.dynamics.free_floating import eliminate_rotation
 from space_robot_model.dynamics.rho_space import semi_floating_into, to_rho_space
 from space_robot_msgs_py.compiled.kernels import kernel
-from space_robot_msgs_py.compiled.lanes import all_lanes, uniform, where
+from space_robot_msgs_py.compiled.lanes import all_lanes, uniform, where, whole
 from space_robot_msgs_py.compiled.records import Block
 from space_robot_msgs_py.samples import MOST_WHEELS, Reference, State
 
@@ -17,7 +24,14 @@ from ..laws.base import CONSTANT_INERTIA, NOMINAL_INERTIA
 from ..navigation.navigation import navigate
 from .memory import ControllerMemory
 from .time_delay_estimation import follows, nominal_estimate, observe, time_delay_estimate
-from .tracking import force_from_torque, leave_base_out, measured_rate, show_state, tracking_errors
+from .tracking import (
+    attitude_error_into,
+    force_from_torque,
+    leave_base_out,
+    relative_rate,
+    show_state,
+    tracking_errors,
+)
 
 Array = NDArray[np.float64]
 
@@ -72,8 +86,8 @@ def compute_signals_for(
     """Compute the signals as `compute_signals`, for a record; that of the signals may be it."""
     memory, measured = block[0], state[0]
     signals, controls_base = memory.signals, uniform(memory.controls_base) == 1.0
-    rate, is_filtered = signals.rho_rate, uniform(memory.navigation.is_filtered) == 1.0
-    status: int = status_of(measured, controls_base)
+    is_filtered, desired = uniform(memory.navigation.is_filtered) == 1.0, reference.quaternion
+    status: int = status_of(measured, desired, controls_base)
     if all_lanes(status != USABLE):
         return status
     memory.allocation.reported_speeds[:] = measured.wheel_velocities
@@ -82,17 +96,14 @@ def compute_signals_for(
     if is_filtered:
         navigate(memory.navigation, tick, measured, period)
         measured = memory.navigation.estimate
-        status = where(status == USABLE, status_of(measured, controls_base), status)
+        status = where(status == USABLE, status_of(measured, desired, controls_base), status)
         if all_lanes(status != USABLE):
             return status
-    near, dot = memory.quaternion, 0.0
-    for k in range(4):
-        dot += measured.quaternion[k] * near[k]
-    side = where(dot < 0.0, -1.0, 1.0)
-    for k in range(4):
-        near[k] = side * measured.quaternion[k]
-    measured_rate(measured, near, memory.jacobian, rate)
+    near = signals.attitude_error
     if controls_base:
+        attitude_error_into(desired, measured.quaternion, near)
+        attitude_jacobian(near, memory.jacobian)
+        step_of_rate(memory, tick, reference, period)
         if not follows(memory.pair, tick):  # whatever J0 was, this one's is nearer
             attitude_jacobian_inverse(near, memory.last_jacobian_inverse)
         # the applied torque acted from the last tick on, so that tick's J0 turns it into F_S
@@ -100,11 +111,20 @@ def compute_signals_for(
             memory.last_jacobian_inverse, measured.applied_torque, signals.applied_force
         )
     else:
+        near[:] = measured.quaternion
         signals.applied_force[:] = measured.applied_torque
+    relative_rate(
+        measured.omega_base,
+        measured.joint_velocities,
+        memory.omega_desired,
+        memory.jacobian,
+        memory.omega,
+        signals.rho_rate,
+    )
     signals.tick = tick
     signals.time = tick * period
-    show_state(measured, near, reference, signals)
-    tracking_errors(measured, near, rate, reference, memory.desired_jacobian, signals)
+    show_state(measured, reference, signals)
+    tracking_errors(measured, reference, signals)
     if not controls_base:
         leave_base_out(signals)
     observe_pair(memory, tick, state[0], estimate, period)
@@ -120,7 +140,7 @@ def compute_signals_for(
             signals.nominal,
         )
         if controls_base:
-            to_rho_space(near, signals.nominal)
+            to_rho_space(near, reference.omega_base, reference.alpha_base, signals.nominal)
         else:
             eliminate_rotation(signals.nominal)
     if estimate == CONSTANT_INERTIA:
@@ -128,6 +148,25 @@ def compute_signals_for(
     elif estimate == NOMINAL_INERTIA:
         nominal_estimate(memory.pair, signals.nominal.inertia, signals.n_hat)
     return status
+
+
+@kernel
+def step_of_rate(memory: ControllerMemory, tick: int, reference: Reference, period: float) -> None:
+    """Write the desired angular velocity on the base's axes, and the step of rhodot by its own.
+
+    A reference that is held, or comes in steps, has a desired rate that changes without its
+    acceleration. This is no acceleration of the robot, so whoever differentiates rhodot leaves the
+    step out.
+    """
+    last, omega, alpha = memory.last_omega_desired, reference.omega_base, reference.alpha_base
+    step, elapsed = memory.omega, (tick - whole(memory.pair.tick)) * period
+    for k in range(3):
+        step[k] = last[k] - (omega[k] - elapsed * alpha[k])
+        last[k] = omega[k]
+    rotation_matrix(memory.signals.attitude_error, memory.rotation)
+    rotate_back(memory.rotation, step, memory.omega_desired)
+    rotate(memory.jacobian, memory.omega_desired, memory.signals.rate_step[:3])
+    rotate_back(memory.rotation, omega, memory.omega_desired)
 
 
 @kernel
@@ -142,6 +181,8 @@ def observe_pair(
     """
     signals, pair = memory.signals, memory.pair
     is_filtered = uniform(memory.navigation.is_filtered) == 1.0
+    for k in range(3):
+        pair.rate[k] += signals.rate_step[k]
     if is_filtered:
         is_as_measured = 1.0 if estimate == NOMINAL_INERTIA else 0.0
         if uniform(memory.pair_is_as_measured) != is_as_measured:  # rates of the two differ
@@ -151,8 +192,9 @@ def observe_pair(
         rate, force, omega = memory.rate_as_measured, memory.force_as_measured, memory.omega
         for k in range(3):
             omega[k] = measured.omega_base[k] - memory.navigation.attitude.bias[k]
-        rotate(memory.jacobian, omega, rate[:3])
-        rate[3:] = measured.joint_velocities
+        relative_rate(
+            omega, measured.joint_velocities, memory.omega_desired, memory.jacobian, omega, rate
+        )
         force_from_torque(memory.last_jacobian_inverse, measured.applied_torque, force)
         if uniform(memory.controls_base) == 0.0:
             for k in range(3):
@@ -167,8 +209,8 @@ def observe_pair(
 
 
 @kernel
-def status_of(state: State, controls_base: bool) -> int:
-    """Return `USABLE`, or the reason why a state is not usable."""
+def status_of(state: State, desired: Array, controls_base: bool) -> int:
+    """Return `USABLE`, or the reason why a state is not usable; ``desired`` is the attitude."""
     quaternion, total = state.quaternion, 0.0
     for k in range(4):
         total += quaternion[k] * quaternion[k]
@@ -185,8 +227,17 @@ def status_of(state: State, controls_base: bool) -> int:
         total += abs(state.magnetic_field[k])
     status = USABLE
     if controls_base:
-        status = where(abs(quaternion[0]) <= SINGULAR_ETA, SINGULAR, USABLE)
+        status = where(abs(error_eta(desired, quaternion)) <= SINGULAR_ETA, SINGULAR, USABLE)
     status = where(abs(square - 1.0) > NORM_TOLERANCE, NOT_UNIT, status)
     status = where(total > LARGEST, TOO_LARGE, status)
     # any number that is not finite makes the sum so
     return where(np.isfinite(total), status, NOT_FINITE)
+
+
+@kernel
+def error_eta(desired: Array, actual: Array) -> float:
+    """Return the scalar part of ``q_d* q``, up to its sign."""
+    eta = 0.0
+    for k in range(4):
+        eta += desired[k] * actual[k]
+    return eta

@@ -18,7 +18,14 @@ from space_robot_msgs_py.wire.stamp_guard import accept
 
 from ..laws.compiled import LawCode
 from .kernels import compute_command
-from .signal_kernels import LARGEST, NORM_TOLERANCE, SINGULAR, USABLE, compute_signals_for
+from .signal_kernels import (
+    LARGEST,
+    NORM_TOLERANCE,
+    SINGULAR,
+    USABLE,
+    compute_signals_for,
+    error_eta,
+)
 from .time_delay_estimation import LONGEST_GAP
 
 Array = NDArray[np.float64]
@@ -36,7 +43,8 @@ NO_REFERENCE = SINGULAR + 2
 STATUSES = NO_REFERENCE + 1
 """Number of different statuses of a state."""
 SAFE_BELOW_ETA = 0.02
-"""|eta| below which the mode is safe, since the torques grow without bound: 177.7 degrees."""
+"""|eta| of the error below which the mode is safe, since torques grow without bound: 177.7 degrees
+from the desired attitude."""
 NOMINAL_FROM_ETA = 0.05
 """|eta| from which it is nominal again: 174.3 degrees."""
 
@@ -168,7 +176,7 @@ def admit_state(
     reference: Block,
     period: float,
 ) -> int:
-    """Compute the signals of a state that is usable, and not too near to 180 degrees.
+    """Compute the signals of a state that is usable, and not too near to an error of 180 degrees.
 
     Args: see `compute_signals`.
 
@@ -178,12 +186,17 @@ def admit_state(
     desired = controller[0].signals.reference
     status_with_reference: int = take_reference(reference[0], desired)
     quaternion = state[0].quaternion
+    if status_with_reference == NO_REFERENCE:
+        desired.quaternion[:] = quaternion
     least = NOMINAL_FROM_ETA if block[0].mode == SAFE else SAFE_BELOW_ETA
-    if abs(quaternion[0]) < least and is_unit(quaternion):
+    is_near = abs(error_eta(desired.quaternion, quaternion)) < least
+    if is_near and is_unit(quaternion) and controller[0].controls_base == 1.0:
         return SINGULAR
     status: int = compute_signals_for(
         controller, tick, state, desired, h_bar, estimate, uses_model, period
     )
+    if status_with_reference == NO_REFERENCE:
+        desired.quaternion[:] = 0.0
     return status_with_reference if status == USABLE else status
 
 
@@ -191,14 +204,13 @@ def admit_state(
 def take_reference(reference: Reference, desired: Reference) -> int:
     """Copy a usable reference into ``desired``; of another one, make that rest where it was.
 
-    The conditions are those of a `ReferenceBuffer`, and it holds the same.
+    Its quaternion is unit; the other conditions are those of a `ReferenceBuffer`, which holds the
+    same.
 
     Returns:
         `USABLE`, `REFERENCE_HELD` or `NO_REFERENCE`.
     """
-    is_usable = True
-    for k in range(4):
-        is_usable = is_usable and abs(reference.quaternion[k]) <= LARGEST
+    is_usable = is_unit(reference.quaternion)
     for k in range(3):
         is_usable = is_usable and abs(reference.omega_base[k]) <= LARGEST
         is_usable = is_usable and abs(reference.alpha_base[k]) <= LARGEST

@@ -1,7 +1,7 @@
 """Safe mode of the controller while its inputs are bad, and its recovery.
 
     nominal --bad state--> holding --hold_ticks of them--> safe --good state--> nominal
-    nominal --attitude near 180 degrees--> safe
+    nominal --attitude error near 180 degrees--> safe
 
 A reference that is not finite or too large is held at the last good one, in nominal mode.
 Holding repeats the last good torque, but closes the valves of thrusters: how long a pulse is to be

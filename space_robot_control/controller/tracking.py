@@ -1,11 +1,15 @@
-"""Tracking errors in the coordinates ``rho = [eps, theta]`` of the laws."""
+"""Tracking errors in the coordinates ``rho = [eps_e, theta]`` of the laws.
+
+eps_e is the vector part of the rotation from the desired attitude, ``q_e = q_d* q``, so that no
+flight depends on the choice of the inertial frame, and 180 degrees are singular only as an error.
+"""
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
 
-from space_robot_model.dynamics.attitude import attitude_jacobian, rotate, rotate_back
+from space_robot_model.dynamics.attitude import rotate, rotate_back
 from space_robot_msgs_py.compiled.kernels import kernel
 from space_robot_msgs_py.compiled.lanes import where
 from space_robot_msgs_py.samples import Reference, State
@@ -16,66 +20,74 @@ Array = NDArray[np.float64]
 
 
 @kernel
-def measured_rate(state: State, quaternion: Array, jacobian: Array, rate: Array) -> None:
-    """Write J0 into ``jacobian`` and rhodot (m,) into ``rate`` (22).
+def attitude_error_into(desired: Array, actual: Array, out: Array) -> None:
+    """Write ``q_d* q`` (4,) into ``out``, with the sign nearer to what is there.
 
-    ``quaternion`` is the state's or its negative, here and below.
+    Where there are zeros, eta is not negative.
     """
-    attitude_jacobian(quaternion, jacobian)
-    rotate(jacobian, state.omega_base, rate[:3])
-    rate[3:] = state.joint_velocities
+    a, b, c, d = desired[0], desired[1], desired[2], desired[3]
+    w, x, y, z = actual[0], actual[1], actual[2], actual[3]
+    eta = a * w + b * x + c * y + d * z
+    ex = a * x - b * w - c * z + d * y
+    ey = a * y + b * z - c * w - d * x
+    ez = a * z - b * y + c * x - d * w
+    near = out[0] * eta + out[1] * ex + out[2] * ey + out[3] * ez
+    near = where(near == 0.0, eta, near)
+    side = where(near < 0.0, -1.0, 1.0)
+    out[0], out[1], out[2], out[3] = side * eta, side * ex, side * ey, side * ez
 
 
 @kernel
-def tracking_errors(
-    state: State,
-    quaternion: Array,
-    rate: Array,
-    reference: Reference,
+def relative_rate(
+    omega_base: Array,
+    joint_velocities: Array,
+    omega_desired: Array,
     jacobian: Array,
-    signals: Signals,
+    omega: Array,
+    rate: Array,
 ) -> None:
-    """Write e, edot and rhodd_d into ``signals``.
+    """Write rhodot (m,) of (22) into ``rate``.
 
-    Of the two quaternions of the desired attitude the one on the measured side is taken.
-    ``jacobian`` is scratch.
+    Args:
+        omega_base: (3,) rad/s.
+        joint_velocities: (n,) rad/s or m/s.
+        omega_desired: (3,) desired angular velocity on the base's axes, rad/s.
+        jacobian: (3, 3) J0 of q_e.
+        omega: (3,) scratch.
+        rate: result.
     """
-    error, error_rate = signals.error, signals.error_rate
-    acceleration, desired, omega = (
-        signals.acceleration_desired,
-        reference.quaternion,
-        reference.omega_base,
-    )
-    dot = 0.0
-    for k in range(4):
-        dot += quaternion[k] * desired[k]
-    side = where(dot >= 0.0, 1.0, -1.0)
-    attitude_jacobian(desired, jacobian)
-    rotate(jacobian, omega, error_rate[:3])
-    rotate(jacobian, reference.alpha_base, acceleration[:3])
-    squared_rate = omega[0] * omega[0] + omega[1] * omega[1] + omega[2] * omega[2]
     for k in range(3):
-        error[k] = side * desired[1 + k] - quaternion[1 + k]
-        error_rate[k] = side * error_rate[k] - rate[k]
-        acceleration[k] = side * (acceleration[k] - 0.25 * squared_rate * desired[1 + k])
+        omega[k] = omega_base[k] - omega_desired[k]
+    rotate(jacobian, omega, rate[:3])
+    rate[3:] = joint_velocities
+
+
+@kernel
+def tracking_errors(state: State, reference: Reference, signals: Signals) -> None:
+    """Write e, edot and rhodd_d into ``signals``, which has rho and rhodot of the base."""
+    error, error_rate = signals.error, signals.error_rate
+    for k in range(3):
+        error[k] = 0.0 - signals.rho[k]
+        error_rate[k] = 0.0 - signals.rho_rate[k]
+        signals.acceleration_desired[k] = 0.0
     for i in range(state.joint_positions.size):
         error[3 + i] = reference.joint_positions[i] - state.joint_positions[i]
-        error_rate[3 + i] = reference.joint_velocities[i] - rate[3 + i]
-        acceleration[3 + i] = reference.joint_accelerations[i]
+        error_rate[3 + i] = reference.joint_velocities[i] - signals.rho_rate[3 + i]
+        signals.acceleration_desired[3 + i] = reference.joint_accelerations[i]
 
 
 @kernel
-def show_state(state: State, quaternion: Array, reference: Reference, signals: Signals) -> None:
+def show_state(state: State, reference: Reference, signals: Signals) -> None:
     """Write attitude, rates, joints and their reference into ``signals``."""
     desired = signals.reference
     for k in range(4):
-        signals.quaternion[k] = quaternion[k]
+        signals.quaternion[k] = state.quaternion[k]
         desired.quaternion[k] = reference.quaternion[k]
     for k in range(3):
         signals.omega_base[k] = state.omega_base[k]
         desired.omega_base[k] = reference.omega_base[k]
         desired.alpha_base[k] = reference.alpha_base[k]
-        signals.rho[k] = quaternion[1 + k]
+        signals.rho[k] = signals.attitude_error[1 + k]
     for i in range(state.joint_positions.size):
         signals.joint_positions[i] = state.joint_positions[i]
         signals.joint_velocities[i] = state.joint_velocities[i]

@@ -51,12 +51,12 @@ def disturbance_rejection(signals: Signals, gains: Gains, memory: Memory, period
         inertia, beta = gains.inertia[i], 1.0 / (1.0 + gains.omega_o[i] * period)
         away, by_force = 1.0 - beta, signals.applied_force[i] / inertia
         is_first = np.isnan(z_1[i])
-        acceleration = z_3[i] + by_force
-        predicted = z_1[i] + period * (z_2[i] + 0.5 * period * acceleration)
+        acceleration, last_rate = z_3[i] + by_force, z_2[i] + signals.rate_step[i]
+        predicted = z_1[i] + period * (last_rate + 0.5 * period * acceleration)
         innovation = rho[i] - predicted
         of_rate = 1.5 * away * away * (1.0 + beta) / period
         of_disturbance = away * away * away / (period * period)
-        new_rate = z_2[i] + period * acceleration + of_rate * innovation
+        new_rate = last_rate + period * acceleration + of_rate * innovation
         new_disturbance = z_3[i] + of_disturbance * innovation
         begun = signals.acceleration_desired[i] - by_force
         z_1[i] = where(is_first, rho[i], predicted + (1.0 - beta * beta * beta) * innovation)

@@ -51,8 +51,9 @@ def disturbance_observer(signals: Signals, gains: Gains, memory: Memory, period:
         inertia = gains.inertia[i]
         share = gains.bandwidth[i] * period / (1.0 + gains.bandwidth[i] * period)
         momentum = share / period * inertia
+        last_rate = memory.last_rate[i] + signals.rate_step[i]
         begun = force[i] - inertia * rhodd_d[i] + momentum * rate[i]
-        new = smooth[i] + share * (force[i] + momentum * memory.last_rate[i] - smooth[i])
+        new = smooth[i] + share * (force[i] + momentum * last_rate - smooth[i])
         smooth[i] = where(np.isnan(smooth[i]), begun, new)
         memory.last_rate[i] = rate[i]
         disturbance = smooth[i] - momentum * rate[i]

@@ -35,8 +35,9 @@ class SignalsView(RecordView):
 
 
 class Signals(Record):
-    """Inputs of a law at a tick, in the coordinates ``rho = [eps, theta]``, m = n+3 axes.
+    """Inputs of a law at a tick, in the coordinates ``rho = [eps_e, theta]``, m = n+3 axes.
 
+    eps_e is the vector part of ``attitude_error``; it is desired to be zero.
     The state is the one that flight software knows: measured, or estimated by navigation. For a
     base without attitude actuators all signals of m axes are zero on the base's.
     """
@@ -51,12 +52,18 @@ class Signals(Record):
     tick: float = shaped(lambda n: (), "number of the tick")
     time: float = shaped(lambda n: (), "simulated time, s")
     quaternion: Array = shaped(lambda n: (4,), "base attitude [w, x, y, z], base to inertial frame")
+    """As measured or estimated, of either sign."""
+    attitude_error: Array = shaped(
+        lambda n: (4,), "q_e = q_d* q [w, x, y, z], base to desired frame; free base: to inertial"
+    )
     """The sign is the one for which rho is continuous."""
     omega_base: Array = shaped(lambda n: (3,), "angular velocity in the base frame, rad/s")
     joint_positions: Array = shaped(lambda n: (n,), "rad, or m for prismatic joints")
     joint_velocities: Array = shaped(lambda n: (n,), "rad/s, or m/s")
-    rho: Array = per_axis("rho = [eps, theta]")
+    rho: Array = per_axis("rho = [eps_e, theta]")
     rho_rate: Array = per_axis("rhodot")
+    rate_step: Array = per_axis("step of rhodot since the last tick by one of the desired rate")
+    """Zero while the desired angular velocity changes by its acceleration; no torque causes it."""
     applied_force: Array = per_axis("F_S applied over the last interval", "N m")
     paired_force: Array = per_axis("the same through the low-pass of the time-delay pair", "N m")
     paired_acceleration: Array = per_axis("mean rhodd of that interval, through the same low-pass")

@@ -104,9 +104,10 @@ def slotine_li(signals: Signals, gains: Gains, memory: Memory, period: float) ->
         s[i] = edot[i] + gains.lambda_[i] * e[i]
         v[i] = s[i] + rate[i]
         u[i] = signals.acceleration_desired[i] + gains.lambda_[i] * edot[i]
-    vectors_into(signals.model, signals.quaternion, signals.joint_positions, work)
+    near, desired = signals.attitude_error, signals.reference
+    vectors_into(signals.model, near, signals.joint_positions, work)
     if uniform(signals.base_is_free) == 0.0:
-        take_rho(signals.quaternion, rate, s, v, u, work)
+        take_rho(near, desired.omega_base, desired.alpha_base, rate, s, v, u, work)
         estimated_force(signals.model, memory)
         force_in_rho(work, force)
         for i in range(3):

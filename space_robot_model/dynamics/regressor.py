@@ -12,7 +12,8 @@ and bias force of the robot whose base floats are (`.rho_space`)
 
 so no matrix of the regressor is needed: the force is that of forces ``f_k = sum_l D_kl
 (J_l vdot + Jdot_l v)`` on the vectors, and the gradient by D is the product of the two factors.
-In ``rho = [eps, theta]`` the same holds with ``w0 = J0^-1 epsdot`` (`take_rho`, `force_in_rho`).
+In ``rho = [eps_e, theta]`` the same holds with ``w0 = J0^-1 epsdot_e + omega_d`` (`take_rho`,
+`force_in_rho`).
 """
 
 from __future__ import annotations
@@ -68,7 +69,7 @@ class Regressor(Record):
     jacobian_inverse: Array = shaped(lambda n: (3, 3))
     """``J0^-1`` in the base frame; in inertial axes it is the transpose."""
     rotation: Array = shaped(lambda n: (3, 3))
-    """Rotation from the base frame to the inertial frame."""
+    """Rotation from the base frame to the outer one."""
     vectors: Array = shaped(lambda n: (3, 2 * n + 3))
     """``u_k``."""
     sliding: Array = shaped(lambda n: (3, 2 * n + 3))
@@ -114,12 +115,21 @@ def vectors_into(model: Model, quaternion: Array, joint_positions: Array, out: R
 
 @kernel
 def take_rho(
-    quaternion: Array, rate: Array, s: Array, v: Array, v_rate: Array, out: Regressor
+    quaternion: Array,
+    omega_desired: Array,
+    alpha_desired: Array,
+    rate: Array,
+    s: Array,
+    v: Array,
+    v_rate: Array,
+    out: Regressor,
 ) -> None:
-    """Write ``out.velocity``, ``s``, ``v`` and ``v_rate`` from those in ``rho = [eps, theta]``.
+    """Write ``out.velocity``, ``s``, ``v`` and ``v_rate`` from those in ``rho = [eps_e, theta]``.
 
     Args:
-        quaternion: (4,) base attitude, unit; singular at eta = 0.
+        quaternion: (4,) q_e, see `.rho_space`, unit; singular at eta = 0.
+        omega_desired: (3,) desired angular velocity, on the desired frame's axes, rad/s.
+        alpha_desired: (3,) desired angular acceleration, on the same, rad/s2.
         rate: (m,) rhodot.
         s: (m,) velocity in rho.
         v: (m,) velocity in rho.
@@ -132,12 +142,15 @@ def take_rho(
     w = transform_transposed(inverse, epsilon_rate)
     wv = transform_transposed(inverse, vector(v, 0))
     eta_rate = -0.5 * dot(vector(quaternion, 1), w)
-    # J0dot = (etadot E - skew(epsdot)) / 2 in inertial axes
+    # J0dot = (etadot E - skew(epsdot)) / 2 on the outer axes
     convective = scale(subtract(scale(wv, eta_rate), cross(epsilon_rate, wv)), 0.5)
-    store(w, out.velocity, 0)
+    desired = vector(omega_desired, 0)
+    of_frame = add(vector(alpha_desired, 0), cross(desired, wv))
+    acceleration = transform_transposed(inverse, subtract(vector(v_rate, 0), convective))
+    store(add(w, desired), out.velocity, 0)
     store(transform_transposed(inverse, vector(s, 0)), out.s, 0)
-    store(wv, out.v, 0)
-    store(transform_transposed(inverse, subtract(vector(v_rate, 0), convective)), out.v_rate, 0)
+    store(add(wv, desired), out.v, 0)
+    store(add(acceleration, of_frame), out.v_rate, 0)
     for i in range(3, rate.size):
         out.velocity[i], out.s[i], out.v[i], out.v_rate[i] = rate[i], s[i], v[i], v_rate[i]
 

@@ -1,9 +1,15 @@
-"""The nominal model in the controlled coordinates ``rho = [eps, theta]`` (22)-(26), (28).
+"""The nominal model in the controlled coordinates ``rho = [eps_e, theta]`` (22)-(26), (28).
+
+eps_e is the vector part of ``q_e = q_d* q``, the rotation from the desired frame D, which turns
+with omega_d and alpha_d, to the base. The paper's base is held at the identity, so that its eps is
+eps_e.
 
 The base floats freely (``f0 = 0``), so its translation is eliminated first: with blocks
 1 = v0 and 2 = [w0, thetadot], ``H_r = H22 - H21 H11^-1 H12``, ``c_r = c2 - H21 H11^-1 c1``, which
 is simple since ``H11 = M E``. Then ``H_S = J^-T H_r J^-1`` and
-``c_S = J^-T (c_r - H_r J^-1 Jdot J^-1 rhodot)``, with ``F_S = J^-T F`` on the right of (25).
+``c_S = J^-T (c_r + H_r (b - J^-1 Jdot J^-1 rhodot))``, with ``F_S = J^-T F`` on the right of
+(25). On D's axes, with ``w_e = w0 - omega_d``, the base turns with ``w0dot = J0^-1 (epsdd_e - J0dot
+w_e) + b`` and ``b = alpha_d + omega_d x w_e``; b is zero on all other axes.
 """
 
 from __future__ import annotations
@@ -35,9 +41,9 @@ class RhoSpaceModel(Record):
     full_bias: Array = shaped(lambda n: (n + 6,))
     """c."""
     to_force: Array = shaped(lambda n: (3, 3))
-    """``J0^-T`` in inertial axes, the transpose of ``J0^-1``."""
+    """``J0^-T`` on the outer axes, the transpose of ``J0^-1``."""
     rotation: Array = shaped(lambda n: (3, 3))
-    """Rotation from the base frame to the inertial frame."""
+    """Rotation from the base frame to the outer one: that of the quaternion it was computed for."""
     vectors: Array = shaped(lambda n: (3, 3))
     """Scratch."""
     data: Data = nested(Data)
@@ -50,20 +56,24 @@ def rho_space_into(
     joint_positions: Array,
     omega_base: Array,
     joint_velocities: Array,
+    omega_desired: Array,
+    alpha_desired: Array,
     out: RhoSpaceModel,
 ) -> None:
     """Write H_S and c_S of the free-floating robot into ``out.inertia`` and ``out.bias``.
 
     Args:
         model: the nominal robot.
-        quaternion: (4,) base attitude, unit; singular at eta = 0.
+        quaternion: (4,) q_e, unit; singular at eta = 0.
         joint_positions: (n,) rad, or m for prismatic joints.
         omega_base: (3,) base angular velocity in the base frame, rad/s.
         joint_velocities: (n,) rad/s or m/s.
+        omega_desired: (3,) desired angular velocity, on the desired frame's axes, rad/s.
+        alpha_desired: (3,) desired angular acceleration, on the same, rad/s2.
         out: results and scratch.
     """
     semi_floating_into(model, quaternion, joint_positions, omega_base, joint_velocities, out)
-    to_rho_space(quaternion, out)
+    to_rho_space(quaternion, omega_desired, alpha_desired, out)
 
 
 @kernel
@@ -76,17 +86,23 @@ def force_for(model: RhoSpaceModel, acceleration: Array, rest: Array, force: Arr
 
 
 @kernel
-def to_rho_space(quaternion: Array, out: RhoSpaceModel) -> None:
-    """Convert H_r and c_r of `semi_floating_into` to H_S and c_S."""
+def to_rho_space(
+    quaternion: Array, omega_desired: Array, alpha_desired: Array, out: RhoSpaceModel
+) -> None:
+    """Convert H_r and c_r of `semi_floating_into` to H_S and c_S, see `rho_space_into`."""
     inertia, bias = out.inertia, out.bias
-    omega, convective, moved = out.vectors[0], out.vectors[1], out.vectors[2]
-    # J0 in inertial axes is the transpose of J0 in the base frame, so its J0^-T is the inverse of
-    # the latter. For a unit quaternion J0dot w0 = -|w0|^2 eps / 4.
+    omega, convective, moved, d = out.vectors[0], out.vectors[1], out.vectors[2], omega_desired
+    x, y, z = omega[0] - d[0], omega[1] - d[1], omega[2] - d[2]
+    # J0 on the outer axes is the transpose of J0 in the base frame, so its J0^-T is the inverse of
+    # the latter. For a unit quaternion J0dot w_e = -|w_e|^2 eps_e / 4.
     attitude_jacobian_inverse(quaternion, out.to_force)
-    squared_rate = omega[0] * omega[0] + omega[1] * omega[1] + omega[2] * omega[2]
+    squared_rate = x * x + y * y + z * z
     for k in range(3):
         convective[k] = -0.25 * squared_rate * quaternion[1 + k]
     rotate_back(out.to_force, convective, moved)
+    moved[0] -= alpha_desired[0] + d[1] * z - d[2] * y
+    moved[1] -= alpha_desired[1] + d[2] * x - d[0] * z
+    moved[2] -= alpha_desired[2] + d[0] * y - d[1] * x
     size = bias.size
     for i in range(size):
         for k in range(3):
@@ -113,10 +129,11 @@ def semi_floating_into(
     joint_velocities: Array,
     out: RhoSpaceModel,
 ) -> None:
-    """Write H_r and c_r into ``out.inertia`` and ``out.bias``, the base's part in inertial axes.
+    """Write H_r and c_r into ``out.inertia`` and ``out.bias``, the base's part on outer axes.
 
-    The arguments are those of `rho_space_into`; no attitude is singular. ``out.vectors[0]`` becomes
-    the base's angular velocity in inertial axes, rad/s.
+    The arguments are those of `rho_space_into`; no attitude is singular. The outer axes are those
+    to which the quaternion turns: nothing here depends on how they stand in the inertial frame.
+    ``out.vectors[0]`` becomes the base's angular velocity on them, rad/s.
     """
     rotation_matrix(quaternion, out.rotation)
     rotate(out.rotation, omega_base, out.vectors[0])

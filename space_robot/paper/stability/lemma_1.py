@@ -14,6 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from space_robot_control.controller.tracking import attitude_error_into
 from space_robot_model.dynamics.rho_space import RhoSpaceModel, rho_space_into
 from space_robot_model.robot import Robot
 from space_robot_msgs_py.bag.flight_log import FlightLog
@@ -68,14 +69,17 @@ def inertia_along(robot: Robot, log: FlightLog, ticks: NDArray[np.intp]) -> Arra
     Passive joints are locked.
     """
     nominal, model = robot.nominal.model, RhoSpaceModel.allocate(robot.n)
-    inertia = np.empty((len(ticks), log.axes, log.axes))
+    inertia, error, still = np.empty((len(ticks), log.axes, log.axes)), np.zeros(4), np.zeros(3)
     for k, tick in enumerate(ticks):
+        attitude_error_into(log.reference_base[tick, :4], log.quaternion[tick], error)
         rho_space_into(
             nominal,
-            log.quaternion[tick],
+            error,
             log.joint_positions[tick],
             log.omega_base[tick],
             log.joint_velocities[tick],
+            still,
+            still,
             model,
         )
         inertia[k] = model.inertia

@@ -178,7 +178,7 @@ def test_half_a_turn_is_safe_mode_with_its_reason_and_no_nan(tmp_path: Path) -> 
         "plant.initial_quaternion=[0.01, 0.9, 0.3, 0.3]",
     )
     assert story.result.returncode == 0
-    story.time_of("controller", "safe: attitude near 180 degrees")
+    story.time_of("controller", "safe: attitude error near 180 degrees")
     np.testing.assert_array_equal(story.log.applied_torque, 0.0)
     assert np.isfinite(story.log.quaternion).all()
 

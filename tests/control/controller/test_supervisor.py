@@ -232,7 +232,7 @@ def test_near_half_a_turn_it_is_safe_until_well_away(paper_robot: Robot) -> None
         assert_safe(supervisor, state_at(tick, eta))
         modes.append(supervisor.mode)
     assert modes == [Mode.NOMINAL] * 2 + [Mode.SAFE] * 2 + [Mode.NOMINAL] * 2
-    assert supervisor.rejected == {"attitude near 180 degrees": 2}
+    assert supervisor.rejected == {"attitude error near 180 degrees": 2}
 
 
 def test_a_single_bad_state_near_half_a_turn_is_held_over(paper_robot: Robot) -> None:
