@@ -17,10 +17,11 @@ from .described import event_times, robot_of
 from .metrics import AxisIndex, attitude_angles, error_columns, torque_columns, tracking_error
 from .pointing import (
     BasePointingError,
+    PointingBudget,
     PointingError,
     base_pointing_error,
-    mission_axis,
     pointing_error,
+    segments_of,
 )
 from .ripple import RippleSpectrum, ripple_spectrum
 from .waypoints import junction_ticks
@@ -90,8 +91,12 @@ class PlotSeries(NamedTuple):
     """Times of what was captured and released, s."""
 
     @classmethod
-    def of(cls, log: FlightLog) -> Self:
-        """Compute them from a whole flight or an excerpt."""
+    def of(cls, log: FlightLog, budget: PointingBudget | None = None) -> Self:
+        """Compute them from a whole flight or an excerpt.
+
+        ``budget``: of the base's pointing; None: the default.
+        """
+        axis = np.array((budget or PointingBudget()).of(segments_of(log)).axis)
         error, axes, of_base = tracking_error(log), log.axes, controls_base(log)
         pointing = ripple = None
         with suppress(InputError):
@@ -112,7 +117,7 @@ class PlotSeries(NamedTuple):
             _norms(log.applied_torque, torque_axes),
             BaseTorque.of(log) if of_base else None,
             pointing,
-            base_pointing_error(log, mission_axis(log)) if of_base else None,
+            base_pointing_error(log, axis) if of_base else None,
             latency,
             ripple,
             torque_axes,

@@ -17,11 +17,12 @@ from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field
+from pydantic import Field, field_validator
 
 from space_robot_model.elementary.arctangent import arctan2
 from space_robot_model.elementary.matrices import direction_norm, dot_rows, norms, unit_rows
 from space_robot_model.robot import Robot
+from space_robot_model.robot.orientation import Vector
 from space_robot_model.robot.tool import tool_pose
 from space_robot_msgs_py.bag.blocks import Metric
 from space_robot_msgs_py.bag.flight_log import FlightLog
@@ -34,8 +35,6 @@ Array = NDArray[np.float64]
 
 ARCSEC = np.pi / 180.0 / 3600.0
 """rad."""
-BASE_Z = (0.0, 0.0, 1.0)
-"""Axis of the base that points where no mission says which, base frame."""
 BASE_ANGLES = ("half_cone_arcsec", "about_arcsec", "rotation_arcsec")
 """Keys of the angles of a `BasePointingError`."""
 
@@ -49,6 +48,28 @@ class PointingBudget(StrictModel):
     window_s: Annotated[float, Field(gt=0.0, le=1e6)] = Field(
         1.0, description="window over which jitter counts, s"
     )
+    axis: Vector | None = Field(
+        None,
+        description="axis of the base that points, base frame, any length (none: of the mission's "
+        "first pointing segment, else z)",
+    )
+
+    @field_validator("axis", mode="after")
+    @classmethod
+    def _has_direction(cls, axis: list[float] | None) -> list[float] | None:
+        if axis is not None:
+            direction_norm(axis, "axis")
+        return axis
+
+    def of(self, segments: Sequence[str]) -> PointingBudget:
+        """Return the budget with the axis that points, of unit length.
+
+        Args:
+            segments: of the mission, as YAML texts.
+        """
+        axis = pointed_axis(segments) if self.axis is None else np.array(self.axis)
+        unit = (axis / direction_norm(axis, "axis")).tolist()
+        return self.model_copy(update={"axis": unit})
 
 
 class PointingError(NamedTuple):
@@ -110,18 +131,18 @@ class BasePointingError(NamedTuple):
         return angles
 
 
-def base_pointing_error(log: FlightLog, axis: Sequence[float] = BASE_Z) -> BasePointingError:
+def base_pointing_error(log: FlightLog, axis: Array) -> BasePointingError:
     """Compute the base's error of pointing at every tick.
 
     Args:
         log: rows of a flight.
         axis: (3,) that points, base frame, unit length.
     """
-    error, along = attitude_error(log), np.array(axis)
+    error = attitude_error(log)
     eps = error[:, 1:]
-    about = dot_rows(eps, along[np.newaxis])
+    about = dot_rows(eps, axis[np.newaxis])
     vector = rotation_vectors(error)
-    across, rest = eps - about * along, np.hstack([error[:, :1], about])
+    across, rest = eps - about * axis, np.hstack([error[:, :1], about])
     return BasePointingError(
         half_cone=2.0 * arctan2(norms(across), norms(rest)),
         about=2.0 * arctan2(np.abs(about[:, 0]), error[:, 0]),
@@ -137,9 +158,9 @@ class Jitter:
     A window that the flight does not fill does not count.
     """
 
-    def __init__(self, ticks: int, axis: Sequence[float]) -> None:
+    def __init__(self, ticks: int, axis: Array) -> None:
         """``ticks``: of a window; ``axis``: (3,) that points, base frame, unit length."""
-        self._ticks, self._axis = max(2, ticks), np.array(axis)
+        self._ticks, self._axis = max(2, ticks), axis
         self._rest: Array = np.empty((0, 3))
         self._rms, self._maximum = AxisRms(3), AxisMaximum(3)
 
@@ -165,30 +186,20 @@ class Jitter:
 class BasePointing(Metric):
     """RMS, maximum and last value, share of time within a band, and jitter of the base's angles."""
 
-    def __init__(
-        self,
-        log: FlightLog,
-        budget: PointingBudget | None = None,
-        axis: tuple[float, float, float] | None = None,
-    ) -> None:
-        """Begin.
-
-        Args:
-            log: the first rows.
-            budget: None: the default.
-            axis: that points, see `pointed_axis` (None: of the mission that the log tells).
-        """
-        self._budget, self.axis = budget or PointingBudget(), axis or mission_axis(log)
+    def __init__(self, log: FlightLog, budget: PointingBudget | None = None) -> None:
+        """``log``: the first rows; ``budget``: None for the default."""
+        self._budget = (budget or PointingBudget()).of(segments_of(log))
+        self._axis = np.array(self._budget.axis)
         self._rms, self._maximum = AxisRms(3), AxisMaximum(3)
         self._within, self._end = np.zeros(3), np.zeros(3)
-        self._jitter = Jitter(round(self._budget.window_s / log.timebase.period), self.axis)
+        self._jitter = Jitter(round(self._budget.window_s / log.timebase.period), self._axis)
 
     def add(self, log: FlightLog, error: Array) -> None:
         """Take further rows."""
-        self.add_error(base_pointing_error(log, self.axis))
+        self.add_error(base_pointing_error(log, self._axis))
 
     def add_error(self, error: BasePointingError) -> None:
-        """Take the error of further rows, at least one, about `axis`."""
+        """Take the error of further rows, at least one, about the budget's axis."""
         angles = error.angles
         self._rms.add(angles)
         self._maximum.add(angles)
@@ -208,7 +219,6 @@ class BasePointing(Metric):
             "jitter_max": jitter and jitter[1],
         }
         return {
-            "axis": list(self.axis),
             **self._budget.model_dump(),
             **{
                 name: {
@@ -220,31 +230,28 @@ class BasePointing(Metric):
         }
 
 
-def pointed_axis(segments: Sequence[str]) -> tuple[float, float, float]:
-    """Return the axis of the first segment of a mission that points the base; else `BASE_Z`.
+def pointed_axis(segments: Sequence[str]) -> Array:
+    """Return the axis (3,) of the first segment of a mission that points the base; else z.
 
     Args:
         segments: as YAML texts.
-
-    Returns:
-        (3,) base frame, unit length.
     """
     for text in segments:
         with suppress(ValueError, TypeError, AttributeError):  # a bag may hold anything
             base = parse_yaml(text).get("base")
             if isinstance(base, dict) and "point" in base:
-                axis = np.array(base.get("axis", BASE_Z), dtype=np.float64)
-                x, y, z = axis / direction_norm(axis, "axis")
-                return float(x), float(y), float(z)
-    return BASE_Z
+                axis = np.array(base.get("axis", (0.0, 0.0, 1.0)), dtype=np.float64)
+                direction_norm(axis, "axis")
+                return axis
+    return np.array([0.0, 0.0, 1.0])
 
 
-def mission_axis(log: FlightLog) -> tuple[float, float, float]:
-    """Return `pointed_axis` of the mission of a log."""
+def segments_of(log: FlightLog) -> list[str]:
+    """Return the segments of the mission of a log, as YAML texts; none if it does not tell them."""
     scenario = log.flight.get("scenario")
     mission = scenario.get("mission") if isinstance(scenario, dict) else None
     segments = mission.get("segments") if isinstance(mission, dict) else None
-    return pointed_axis(segments if isinstance(segments, list) else [])
+    return [str(text) for text in segments] if isinstance(segments, list) else []
 
 
 def pointing_error(log: FlightLog, robot: Robot, start: Array | None = None) -> PointingError:

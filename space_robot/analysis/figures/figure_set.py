@@ -90,7 +90,7 @@ class FigureSet:
         self._missions.setdefault(reference.tobytes(), (name, desired_joints(log)))
         if not self._flights:
             self._first = control_results(log, title(name, log))
-        self._flights[name] = PlotSeries.of(log)
+        self._flights[name] = PlotSeries.of(log, self._budget)
         kinds = {
             _of_gears: bool(log.geared_names),
             _of_orbit: log.orbit_position.shape[1] > 0,

@@ -18,7 +18,7 @@ from space_robot_sim.environment.payload import with_payload
 from ...analysis.attitude_drift import attitude_drift
 from ...analysis.metrics import tracking_error
 from ...analysis.own_metric import OwnMetric
-from ...analysis.pointing import PointingBudget, base_pointing_error, pointed_axis
+from ...analysis.pointing import PointingBudget, base_pointing_error
 from ...analysis.tool_error import ToolError
 from ...flight.plan import Flight
 from ..study import Requirement
@@ -56,7 +56,8 @@ class Measure:
         self._start: NDArray[np.float64] | None = None
         """(4,) attitude at the first tick."""
         self._tool: ToolError | None = None
-        self._axis = pointed_axis(flight.mission_settings.written_segments)
+        budget = (budget or PointingBudget()).of(flight.mission_settings.written_segments)
+        self._axis = np.array(budget.axis)
         self._whole = WindowMetrics(Window(), columns.metrics, columns, budget)
         self._require = {
             name: WindowMetrics(_window(demand), [demand.metric], columns, budget)

@@ -121,7 +121,7 @@ class WindowMetrics:
         if self._has_pointing and pointing is not None:
             within = BasePointingError(*(values[rows] for values in pointing))
             self._angles.add(np.degrees(within.vector))
-            self._pointing = self._pointing or BasePointing(log, self._budget, BASE_Z)
+            self._pointing = self._pointing or BasePointing(log, self._budget)
             self._pointing.add_error(within)
         if self._has_ripple:
             self._ripple = self._ripple or Ripple(log, robot)
