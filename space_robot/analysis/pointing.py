@@ -160,7 +160,7 @@ class Jitter:
 
     def __init__(self, ticks: int, axis: Array) -> None:
         """``ticks``: of a window; ``axis``: (3,) that points, base frame, unit length."""
-        self._ticks, self._axis = max(2, ticks), axis
+        self._ticks, self._axis = ticks, axis
         self._rest: Array = np.empty((0, 3))
         self._rms, self._maximum = AxisRms(3), AxisMaximum(3)
 
@@ -192,7 +192,8 @@ class BasePointing(Metric):
         self._axis = np.array(self._budget.axis)
         self._rms, self._maximum = AxisRms(3), AxisMaximum(3)
         self._within, self._end = np.zeros(3), np.zeros(3)
-        self._jitter = Jitter(round(self._budget.window_s / log.timebase.period), self._axis)
+        ticks = window_ticks(self._budget.window_s, log.timebase.period)
+        self._jitter = Jitter(ticks, self._axis)
 
     def add(self, log: FlightLog, error: Array) -> None:
         """Take further rows."""
@@ -228,6 +229,11 @@ class BasePointing(Metric):
                 for i, name in enumerate(BASE_ANGLES)
             },
         }
+
+
+def window_ticks(window_s: float, period: float) -> int:
+    """Return the number of ticks in a window, at least 2; ``period`` in s."""
+    return max(2, round(window_s / period))
 
 
 def pointed_axis(segments: Sequence[str]) -> Array:

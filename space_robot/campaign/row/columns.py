@@ -12,7 +12,7 @@ from space_robot_msgs_py.bag.flight_log import FlightLog
 
 from ...analysis.attitude_drift import controls_base
 from ...analysis.metrics import AxisIndex, error_columns, largest_of_columns, torque_columns
-from ...analysis.pointing import BASE_ANGLES
+from ...analysis.pointing import BASE_ANGLES, window_ticks
 from ...analysis.ripple import FAST, SHORTEST_S, SLOWEST
 from ...flight.plan import Flight
 
@@ -114,6 +114,21 @@ class Columns(NamedTuple):
             for values, columns in ((error, self.errors), (log.applied_torque, self.torques))
             for name, axes in columns.items()
         }
+
+
+def missing_for_jitter(metric: str, ticks: int, period: float, window_s: float) -> str:
+    """Return why a jitter metric cannot be computed; empty if it can.
+
+    Args:
+        metric: any metric's name.
+        ticks: of the flight, or of a window in it.
+        period: of the ticks, s.
+        window_s: of the budget.
+    """
+    is_one = metric.startswith(POINTING) and metric.endswith((JITTER_RMS, JITTER_MAX))
+    if not is_one or ticks >= window_ticks(window_s, period):
+        return ""
+    return f"needs {window_s:g} s of flight (pointing.window_s), got {ticks * period:g} s"
 
 
 def missing_for_ripple(metric: str, ticks: int, period: float) -> str:

@@ -23,7 +23,7 @@ from ...analysis.tool_error import ToolError
 from ...flight.plan import Flight
 from ..study import Requirement
 from .bands import Bands
-from .columns import DRIFT, Columns, missing_for_ripple
+from .columns import DRIFT, Columns, missing_for_jitter, missing_for_ripple
 from .window import Window, WindowMetrics
 
 
@@ -134,6 +134,7 @@ def check_requirements(
     where: str,
     context: str = "",
     own: Collection[str] = (),
+    budget: PointingBudget | None = None,
 ) -> None:
     """Check that a flight has the metrics of all requirements.
 
@@ -143,6 +144,7 @@ def check_requirements(
         where: the file, for errors.
         context: difference from the nominal flight, for errors.
         own: names of the user's own metrics.
+        budget: of the base's pointing; None: the default.
 
     Raises:
         InputError: an unknown metric, a window without ticks, or one too short for the metric.
@@ -166,7 +168,9 @@ def check_requirements(
                 f"{key}.to_s: no tick between {demand.from_s:g} and {demand.to_s:g} s, "
                 f"the period is {flight.period:g} s{context}"
             )
+        seconds = (budget or PointingBudget()).window_s
         lacking = missing_for_ripple(demand.metric, ticks, flight.period)
+        lacking = lacking or missing_for_jitter(demand.metric, ticks, flight.period, seconds)
         if lacking and demand.metric not in own:
             raise InputError(f"{key}.metric: {demand.metric} {lacking}{context}")
 
