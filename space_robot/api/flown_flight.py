@@ -106,9 +106,9 @@ class FlownFlight:
         """Metrics of the flight, as in ``space-robot analyze --json``.
 
         The columns of Table V have short names, too, for the mean-axis RMS:
-        ``metrics["attitude"]`` is ``metrics["rms"]["mean_axis"]["attitude"]``, the vector part of the
-        error quaternion; ``metrics["attitude_deg"]`` is the same as an angle. Empty if the flight
-        has no complete tick.
+        ``metrics["attitude"]`` is ``metrics["rms"]["mean_axis"]["attitude"]``, of the vector part
+        of the error quaternion; ``metrics["attitude_deg"]`` is that of the angles. Empty if the
+        flight has no complete tick.
         """
         report = self._report
         if not report:
