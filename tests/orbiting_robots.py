@@ -195,6 +195,22 @@ def across(a: Exact, b: Exact) -> Exact:
     return (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
 
 
+def exact_gravity(r: Exact, has_j2: bool) -> Exact:
+    """Return the acceleration by the textbook's formula (Vallado, equation 8-30)."""
+    square = times(r, r)
+    distance = square.sqrt()
+    fall = -Decimal(MU) / (square * distance)
+    if not has_j2:
+        return fall * r[0], fall * r[1], fall * r[2]
+    share = Decimal("1.5") * Decimal(J2) * Decimal(EARTH_RADIUS) ** 2 / square
+    height = 5 * r[2] * r[2] / square
+    return (
+        fall * r[0] * (1 + share * (1 - height)),
+        fall * r[1] * (1 + share * (1 - height)),
+        fall * r[2] * (1 + share * (3 - height)),
+    )
+
+
 def earth_potential(r: Exact, has_j2: bool) -> Decimal:
     """Return ``-mu / r (1 - J2 (R_E / r)^2 P_2(z / r))``, m2/s2."""
     square = times(r, r)

@@ -24,7 +24,7 @@ ROOMS = {
         "ros",
         "recorder_node",
     ),
-    "space_robot_model": ("elementary", "dynamics", "robot", "hardware"),
+    "space_robot_model": ("elementary", "dynamics", "robot", "hardware", "orbit"),
     "space_robot_sim": ("faults", "environment", "actuators", "sensors", "plant", "plant_node"),
     "space_robot_control": (
         "laws",

@@ -124,7 +124,11 @@ def _of_duration(text: str, span: float) -> str:
 def mission_text(settings: MissionSettings) -> str:
     """Return a mission as a document in YAML."""
     n = len(settings.waypoints_deg) // len(settings.waypoint_times)
-    base = {"quaternion": settings.base_quaternion}
+    base: dict[str, Any] = {"quaternion": settings.base_quaternion}
+    if any(settings.base_rate_deg_s):
+        base["rate_deg_s"] = settings.base_rate_deg_s
+    if settings.base_point.strip():
+        base = parse_yaml(settings.base_point)
     start = {"joints_deg": settings.waypoints_deg[:n], "base": base}
     document = {"mission": {"start": start, "segments": _segments(settings)}}
     return yaml.safe_dump(document, sort_keys=False, default_flow_style=None, width=100)

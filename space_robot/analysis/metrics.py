@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from space_robot_model.dynamics.attitude import attitude_error_into
 from space_robot_model.elementary.arctangent import angle_of
 from space_robot_model.elementary.matrices import dot_rows, norm
 from space_robot_msgs_py.bag.blocks import Metric, blocks_of
@@ -130,21 +131,15 @@ def relative_attitude(first: Array, second: Array) -> Array:
         first: (N, 4 or more) columns after the fourth are ignored.
         second: (N, 4).
     """
-    error = np.empty((len(second), 4))
-    _relative_attitude(np.ascontiguousarray(first), np.ascontiguousarray(second), error)
+    error = np.zeros((len(second), 4))
+    _relative_attitudes(np.ascontiguousarray(first), np.ascontiguousarray(second), error)
     return error
 
 
 @kernel
-def _relative_attitude(first: Array, second: Array, out: Array) -> None:
+def _relative_attitudes(first: Array, second: Array, out: Array) -> None:
     for i in range(len(out)):
-        d, q = first[i], second[i]
-        eta = d[0] * q[0] + d[1] * q[1] + d[2] * q[2] + d[3] * q[3]
-        side = -1.0 if eta < 0.0 else 1.0
-        out[i, 0] = side * eta
-        out[i, 1] = side * (d[0] * q[1] - q[0] * d[1] - (d[2] * q[3] - d[3] * q[2]))
-        out[i, 2] = side * (d[0] * q[2] - q[0] * d[2] - (d[3] * q[1] - d[1] * q[3]))
-        out[i, 3] = side * (d[0] * q[3] - q[0] * d[3] - (d[1] * q[2] - d[2] * q[1]))
+        attitude_error_into(first[i], second[i], out[i])
 
 
 def attitude_angles(log: FlightLog) -> Array:

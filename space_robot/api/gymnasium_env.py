@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from space_robot_model.robot.base_axes import base_axes, to_base
+from space_robot_model.dynamics.attitude import attitude_error_into, rotate_back, rotation_matrix
 from space_robot_msgs_py.config.arguments import as_numbers, as_whole_number
 from space_robot_msgs_py.config.extras import install_command
 from space_robot_msgs_py.config.validation import short
@@ -25,7 +25,6 @@ try:
 except ImportError:
     raise ImportError(f"gymnasium is not installed: {install_command('gym')}") from None
 
-from ..analysis.metrics import relative_attitude
 from .scenario import Scenario
 
 Array = NDArray[np.float64]
@@ -46,8 +45,9 @@ class SpaceRobotEnv(gymnasium.Env[Array, Array]):
     """Environment of a scenario's mission on m = n+3 axes: base x, y, z, then n actuated joints.
 
     - Observation (2 m + n,), as measured by the sensors: the error ``rho_d - rho`` (m,), for the
-      base the vector part of the quaternion, for joints rad (or m); its rate (m,), for the base
-      the angular velocity in the base frame, rad/s; the joint positions (n,).
+      base the vector part of the rotation from the actual to the desired attitude, for joints rad
+      (or m); its rate (m,), for the base the angular velocity in the base frame, rad/s; the joint
+      positions (n,).
     - Action (m,) from -1 to 1: the torque divided by ``torque_scale``, held over
       ``ticks_per_step`` ticks. On the base's axes it is limited by the actuators.
     - Reward: -cost dt for every step of dt s, from the true state, with the cost per second
@@ -140,12 +140,12 @@ class SpaceRobotEnv(gymnasium.Env[Array, Array]):
     def _errors(self, state: RobotState) -> tuple[Array, Array]:
         """Return the errors of positions and of rates, (m,) each."""
         reference = self.bench.reference
-        turned = relative_attitude(reference.quaternion[np.newaxis], state.quaternion[np.newaxis])
-        omega = to_base(base_axes(turned.T), reference.omega_base[:, np.newaxis])[:, 0]
+        turn, rotation, omega = np.zeros(4), np.empty((3, 3)), np.empty(3)
+        attitude_error_into(reference.quaternion, state.quaternion, turn)
+        rotation_matrix(turn, rotation)
+        rotate_back(rotation, reference.omega_base, omega)
         return (
-            np.concatenate(
-                (0.0 - turned[0, 1:], reference.joint_positions - state.joint_positions)
-            ),
+            np.concatenate((-turn[1:], reference.joint_positions - state.joint_positions)),
             np.concatenate(
                 (omega - state.omega_base, reference.joint_velocities - state.joint_velocities)
             ),

@@ -17,13 +17,17 @@ SECTION = "Fly"
 @click.option("--rpy", metavar="R,P,Y", help="Orientation of the tool, degrees.")
 @click.option(
     "--frame",
-    type=click.Choice(["start", "inertial", "base"]),
+    type=click.Choice(["start", "inertial", "base", "orbit"]),
     default="start",
     show_default=True,
-    help="Of the tool's goal; start: relative to where the tool is.",
+    help="Of the tool's goal; start: relative to where the tool is; orbit: so, on its axes.",
 )
 @click.option("--joints", metavar="A,B,...", help="Positions of all joints, degrees or m.")
-@click.option("--base", metavar="R,P,Y", help="Attitude of the base, degrees.")
+@click.option(
+    "--base",
+    metavar="R,P,Y|POINT",
+    help="Attitude of the base, degrees, or what it points at: nadir, velocity, sun, target.",
+)
 @click.option(
     "--duration",
     type=FiniteRange(min=0.0, min_open=True),
@@ -39,14 +43,15 @@ def goto(domain: int | None, namespace: str, **options: Any) -> None:
     """Move the tool, the joints or the base of a robot that flies on a graph.
 
     The motion replaces the rest of the mission. A reference that moves is brought to rest first,
-    within 2 s. What cannot be flown is refused in one line with exit code 1, and the flight goes
-    on as it was.
+    within 2 s, but for a base that points. What cannot be flown is refused in one line with exit
+    code 1, and the flight goes on as it was.
 
     \b
     Examples:
       space-robot goto --tool 0.2,0,-0.1 --duration 8
       space-robot goto --tool 1.9,0,2.4 --rpy 0,20,0 --frame inertial --duration 10
       space-robot goto --joints 0,120,220,0,-10,0 --base 0,0,10 --duration 20
+      space-robot goto --base nadir --duration 120
     """
     from ..flight.graph.orchestrator import require_ros
     from ..flight.graph.simulation_calls import go_to
@@ -76,7 +81,8 @@ def _segment(
     if joints is not None:
         segment["joints_deg"] = _numbers(joints, "--joints")
     if base is not None:
-        segment["base"] = {"rpy_deg": _numbers(base, "--base", 3)}
+        is_name = base.isalpha()
+        segment["base"] = {"point": base} if is_name else {"rpy_deg": _numbers(base, "--base", 3)}
     if len(segment) == 1:
         raise click.UsageError("give --tool, --rpy, --joints or --base")
     return segment

@@ -8,6 +8,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from space_robot_model.dynamics.attitude import attitude_error_into
 from space_robot_msgs_py.compiled.kernels import kernel
 from space_robot_msgs_py.compiled.lane_rows import spread
 from space_robot_msgs_py.compiled.lane_words import as_lanes
@@ -37,6 +38,8 @@ class Reach(Record):
     """Attitude to be kept, unit quaternion."""
     scale: Array = shaped(lambda n: (n + 3,))
     """Torque of an action of 1, N m or N."""
+    attitude_error: Array = shaped(lambda n: (4,))
+    """Rotation from there to the attitude."""
     action: Array = shaped(lambda n: (n + 3,))
     """Of the present step."""
     torque: Array = shaped(lambda n: (n + 3,))
@@ -46,8 +49,8 @@ class Reach(Record):
     ticks: float = shaped(lambda n: ())
     """Length of the episode."""
     observation: Array = shaped(lambda n: (2 * n + 6,))
-    """Errors of attitude (vector part of the rotation to the desired one) and joints, angular
-    velocity of the base, joint rates."""
+    """Errors of attitude (vector part of the rotation) and joints, angular velocity of the base,
+    joint rates."""
     reward: float = shaped(lambda n: ())
     """Of the last step."""
     has_failed: float = shaped(lambda n: ())
@@ -57,15 +60,11 @@ class Reach(Record):
 @kernel
 def observe(reach: Reach, truth: State) -> None:
     """Write the observation of a state."""
-    n, out, d, q = reach.target.size, reach.observation, reach.attitude, truth.quaternion
-    cosine = 0.0
-    for i in range(4):
-        cosine += q[i] * d[i]
-    side = where(cosine >= 0.0, 1.0, -1.0)
+    n, out, error = reach.target.size, reach.observation, reach.attitude_error
+    attitude_error_into(reach.attitude, truth.quaternion, error)
+    side = where(error[0] >= 0.0, -1.0, 1.0)
     for i in range(3):
-        j, k = 1 + (i + 1) % 3, 1 + (i + 2) % 3
-        eps = d[0] * q[1 + i] - q[0] * d[1 + i] - (d[j] * q[k] - d[k] * q[j])
-        out[i] = 0.0 - side * eps
+        out[i] = side * error[1 + i]
         out[3 + n + i] = truth.omega_base[i]
     for i in range(n):
         out[3 + i] = reach.target[i] - truth.joint_positions[i]

@@ -48,8 +48,8 @@ class ReachEnv(gymnasium.Env[Array, Array]):
     """An arm that is to reach postures while its base keeps its attitude; m = n+3 axes.
 
     - Reset: joints at rest at a random start, and a random target for them.
-    - Observation (2 m,): errors of the base's attitude (vector part of the error quaternion) and of
-      the joints, rad (or m); angular velocity of the base in its frame and joint rates, rad/s.
+    - Observation (2 m,): errors of the base's attitude (vector part of the rotation) and of the
+      joints, rad (or m); angular velocity of the base in its frame and joint rates, rad/s.
     - Action (m,): torque divided by ``torque_scale``, held over ``ticks_per_step`` ticks.
     - Reward: -cost dt with the cost per second
       ``4 |e_eps|^2 + |e_theta|^2 + 0.1 |omega, thetadot|^2 + 0.001 |action|^2``.

@@ -7,15 +7,19 @@ from typing import Any, NamedTuple
 
 from space_robot_control.controller.gains import gains_as_path, split_gains
 from space_robot_control.controller.settings import ControllerNodeSettings
+from space_robot_control.guidance.mission import pointing_start
 from space_robot_control.guidance.settings import MissionNodeSettings
 from space_robot_control.laws import ControlLaw
 from space_robot_control.navigation.assumed_sensors import assumed_numbers
+from space_robot_model.orbit.ephemeris import AssumedOrbit
 from space_robot_msgs_py.bag.recorder_settings import RecorderNodeSettings
 from space_robot_msgs_py.config.files import GIVEN
 from space_robot_msgs_py.config.settings import NodeSettings
 from space_robot_msgs_py.config.trees import Tree, flatten, merge, nest
-from space_robot_msgs_py.config.validation import one_of
+from space_robot_msgs_py.config.validation import one_of, validate
 from space_robot_msgs_py.errors import InputError, explained_by
+from space_robot_sim.environment.events import Capture
+from space_robot_sim.environment.neighbouring_orbit import meet
 from space_robot_sim.plant.settings import PlantNodeSettings
 
 SCHEMAS: tuple[type[NodeSettings], ...] = (
@@ -79,6 +83,8 @@ class FlightSettings(NamedTuple):
         controller, gains = _controller(chosen["controller"], plant)
         with explained_by("own-trajectory"):
             mission = MissionNodeSettings.resolve(chosen["mission"])
+        mission = with_assumed_orbit(mission, plant)
+        plant = _at_pointing_start(plant, mission)
         settings = cls(
             plant, controller, mission, RecorderNodeSettings.resolve(chosen["recorder"]), gains
         )
@@ -133,6 +139,45 @@ def _controller(
     if (filtered := controller.filter_settings) is not None:
         controller = controller.model_copy(update={"navigation_filter": filtered})
     return controller, gains
+
+
+def with_assumed_orbit(
+    mission: MissionNodeSettings, plant: PlantNodeSettings
+) -> MissionNodeSettings:
+    """Return a mission's settings in which what is not said of the assumed orbit is the plant's."""
+    if not plant.has_orbit:
+        return mission
+    known: Tree = {
+        "orbital_elements": plant.orbital_elements.model_dump(),
+        "j2": plant.gravity.j2,
+        "beta_angle_deg": plant.sunlight.beta_angle_deg,
+        "noon_deg": plant.sunlight.noon_deg,
+    }
+    targets = [e.target for e in plant.parsed_events if isinstance(e, Capture)]
+    for target in [target for target in targets if target.is_in_orbit][:1]:
+        start = meet(target, plant, 0.0)
+        place = {"position": start.position.tolist(), "velocity": start.motion.velocity}
+        known["target"] = {"name": target.name, **place}
+    own = mission.assumed_orbit.model_dump(exclude_unset=True)
+    assumed = validate(AssumedOrbit, merge(known, own), "mission.assumed_orbit")
+    return mission.model_copy(update={"assumed_orbit": assumed})
+
+
+def _at_pointing_start(plant: PlantNodeSettings, mission: MissionNodeSettings) -> PlantNodeSettings:
+    """Return a plant's settings that begin where the reference does, if that begins by pointing.
+
+    Attitude or rate that are given stay.
+    """
+    if not mission.base_point.strip():
+        return plant
+    try:
+        attitude, rate_deg_s = pointing_start(mission)
+    except InputError as error:
+        raise InputError(f"{mission.mission or 'mission'}: {error}") from None
+    start = {"initial_quaternion": attitude, "initial_rate_deg_s": rate_deg_s}
+    return plant.model_copy(
+        update={key: value for key, value in start.items() if key not in plant.model_fields_set}
+    )
 
 
 def check_may_be_set(parameters: Given) -> None:

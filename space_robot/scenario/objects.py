@@ -176,10 +176,11 @@ def mission_of(mission: str | Tree) -> tuple[str, Tree, Tree]:
     of_mission = {key: v for key, v in mission.items() if key not in OF_PLANT}
     waypoints = validate(MissionSettings, of_mission, "mission")
     joints = len(waypoints.waypoints_deg) // len(waypoints.waypoint_times)
-    start = {
-        "initial_joints_deg": waypoints.waypoints_deg[:joints],
-        "initial_quaternion": waypoints.base_quaternion,
-    }
+    start: Tree = {"initial_joints_deg": waypoints.waypoints_deg[:joints]}
+    if not waypoints.base_point.strip():
+        start["initial_quaternion"] = waypoints.base_quaternion
+    if any(waypoints.base_rate_deg_s):
+        start["initial_rate_deg_s"] = waypoints.base_rate_deg_s
     return GIVEN, of_mission, start | {key: mission[key] for key in OF_PLANT if key in mission}
 
 

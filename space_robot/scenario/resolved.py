@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -46,7 +46,7 @@ SECTIONS: Mapping[str, type[BaseModel]] = {
     "orbit": OrbitSettings,
 }
 """Options that hold numbers of the plant; an orbit only where there is one."""
-BY_THE_MISSION = ("initial_joints_deg", "initial_quaternion")
+BY_THE_MISSION = ("initial_joints_deg", "initial_quaternion", "initial_rate_deg_s")
 """Options that a mission sets for the plant."""
 OF_PLANT = ("period", "substeps", "command_latency_ticks")
 OF_THE_GRAPH = ("realtime", "paused", "fifo_priority")
@@ -231,7 +231,10 @@ def _tree(scenario: ResolvedScenario) -> dict[str, Any]:
     disturbance: Tree = {}
     if text := sections["case"]["disturbance"].pop("table", ""):
         disturbance = {"disturbance": DisturbanceTable.parse(text).columns}
-    mission = settings.mission.model_dump(mode="json", include=set(MissionSettings.model_fields))
+    of_mission = {*MissionSettings.model_fields}
+    if not scenario.reference.uses_orbit:
+        of_mission.remove("assumed_orbit")
+    mission = _without_defaults(settings.mission.model_dump(mode="json", include=of_mission))
     navigation: Tree = {}
     if (filtered := controller.filter_settings) is not None:
         navigation = {"navigation_filter": filtered.model_dump(mode="json")}
@@ -246,7 +249,7 @@ def _tree(scenario: ResolvedScenario) -> dict[str, Any]:
             if name != NoLaw.name and law.gain_values
         },
         **scenario.robots.options,
-        "mission": {**mission, **{name: numbers[name] for name in BY_THE_MISSION}},
+        "mission": {**mission, **_some(numbers, BY_THE_MISSION)},
         "events": events,
         **sections,
         **disturbance,
@@ -275,6 +278,10 @@ def _tree(scenario: ResolvedScenario) -> dict[str, Any]:
     }
 
 
+def _some(numbers: Tree, keys: Iterable[str]) -> Tree:
+    return {key: numbers[key] for key in keys if key in numbers}
+
+
 _ELSEWHERE = ("events", *OF_PLANT)
 
 
@@ -301,6 +308,9 @@ def _rest(node: str, settings: BaseModel) -> dict[str, Any]:
 
 _LATER: Mapping[str, Any] = {
     "base_topics_rate": PlantNodeSettings.model_fields["base_topics_rate"].default,
+    "initial_rate_deg_s": [0.0, 0.0, 0.0],
+    "base_rate_deg_s": [0.0, 0.0, 0.0],
+    "base_point": "",
     "magnetic_torquers": MagneticTorquerSettings().model_dump(mode="json"),
     **{key: AllocationSettings.model_fields[key].default for key in ("dump", "magnetic_gain")},
     **{key: DisturbanceSettings.model_fields[key].default for key in ("table", "table_scale")},

@@ -29,6 +29,7 @@ OF_PLANT = frozenset(
     {
         *("friction", "disturbance", "payload", "initial_joints_deg", "initial_quaternion"),
         *("orbital_elements", "gravity", "atmosphere", "sunlight", "magnetism"),
+        "initial_rate_deg_s",
         *("torque_echo", "echo_scale", "echo_bias", "substeps", "command_latency_ticks"),
         *("drive_scale", "drive_bias", "drive_step", "drive_dead_band", "drive_lag"),
         *("base_torque_limit", "joint_torque_limit", "star_tracker", "gyro", "encoders"),
@@ -37,6 +38,8 @@ OF_PLANT = frozenset(
 """Parameters of the plant on which nothing else in a scenario depends."""
 OF_SENSORS = frozenset({"star_tracker", "gyro", "encoders"})
 """Those that navigation assumes to be known, if they are given without a file."""
+OF_ORBIT = frozenset({"orbital_elements", "gravity", "sunlight"})
+"""Those that a mission assumes to be known, if it depends on the orbit."""
 
 
 @dataclass
@@ -65,6 +68,8 @@ def varied(nominal: ResolvedScenario, variation: Variation) -> ResolvedScenario 
     if parameters or known.keys() != gains.keys() or not of_plant.keys() <= OF_PLANT:
         return None
     if of_plant.keys() & OF_SENSORS and nominal.plant.sensors == GIVEN:
+        return None
+    if of_plant.keys() & OF_ORBIT and nominal.reference.uses_orbit:
         return None
     options = nominal.options.model_copy(
         update={"seed": variation.seed, "faults": variation.faults}

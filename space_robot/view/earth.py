@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from space_robot_model.elementary.matrices import unit_rows
-from space_robot_sim.environment.gravity import EARTH_RADIUS
+from space_robot_model.orbit.elements import EARTH_RADIUS
 
 from .glb import grid_faces, unlit_glb
 from .orbit_frames import OrbitFrames

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from space_robot_sim.environment.gravity import EARTH_RADIUS
+from space_robot_model.orbit.elements import EARTH_RADIUS
 
 from .orbit_frames import OrbitFrames
 

@@ -8,10 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from space_robot_model.elementary.matrices import unit_rows
+from space_robot_model.orbit.elements import EARTH_RADIUS
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.errors import InputError
-from space_robot_sim.environment.gravity import EARTH_RADIUS
-from space_robot_sim.environment.orbit import sun_of
 
 from ..analysis.described import orbit_of
 from .frames import held_rows
@@ -86,7 +85,7 @@ def sun_direction(log: FlightLog) -> Array | None:
         settings = orbit_of(log)
     except InputError:
         return None
-    return sun_of(settings) if settings.has_orbit and settings.sunlight.pressure > 0.0 else None
+    return settings.sun if settings.has_orbit and settings.sunlight.pressure > 0.0 else None
 
 
 def is_in_shadow(position: Array, sun: Array | None) -> Mask:

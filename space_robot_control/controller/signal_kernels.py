@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from space_robot_model.dynamics.attitude import (
     SINGULAR_ETA,
+    attitude_error_into,
     attitude_jacobian,
     attitude_jacobian_inverse,
     rotate,
@@ -24,14 +25,7 @@ from ..laws.base import CONSTANT_INERTIA, NOMINAL_INERTIA
 from ..navigation.navigation import navigate
 from .memory import ControllerMemory
 from .time_delay_estimation import follows, nominal_estimate, observe, time_delay_estimate
-from .tracking import (
-    attitude_error_into,
-    force_from_torque,
-    leave_base_out,
-    relative_rate,
-    show_state,
-    tracking_errors,
-)
+from .tracking import force_from_torque, leave_base_out, relative_rate, show_state, tracking_errors
 
 Array = NDArray[np.float64]
 

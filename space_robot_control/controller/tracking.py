@@ -11,30 +11,11 @@ from numpy.typing import NDArray
 
 from space_robot_model.dynamics.attitude import rotate, rotate_back
 from space_robot_msgs_py.compiled.kernels import kernel
-from space_robot_msgs_py.compiled.lanes import where
 from space_robot_msgs_py.samples import Reference, State
 
 from ..laws import Signals
 
 Array = NDArray[np.float64]
-
-
-@kernel
-def attitude_error_into(desired: Array, actual: Array, out: Array) -> None:
-    """Write ``q_d* q`` (4,) into ``out``, with the sign nearer to what is there.
-
-    Where there are zeros, eta is not negative.
-    """
-    a, b, c, d = desired[0], desired[1], desired[2], desired[3]
-    w, x, y, z = actual[0], actual[1], actual[2], actual[3]
-    eta = a * w + b * x + c * y + d * z
-    ex = a * x - b * w - c * z + d * y
-    ey = a * y + b * z - c * w - d * x
-    ez = a * z - b * y + c * x - d * w
-    near = out[0] * eta + out[1] * ex + out[2] * ey + out[3] * ez
-    near = where(near == 0.0, eta, near)
-    side = where(near < 0.0, -1.0, 1.0)
-    out[0], out[1], out[2], out[3] = side * eta, side * ex, side * ey, side * ez
 
 
 @kernel

@@ -1,18 +1,21 @@
 """Motions of the joints and of the base over time, from which a mission is put together.
 
 Each gives position, rate and acceleration that belong together at any time. Before it begins and
-after it ends it is at rest.
+after it ends it is at rest, unless the base turns on.
 """
 
 from __future__ import annotations
 
 import math
-from typing import NamedTuple, Protocol
+from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from space_robot_model.elementary.matrices import norm
+
+if TYPE_CHECKING:
+    from .pointing import PointingGoal
 
 Array = NDArray[np.float64]
 
@@ -46,6 +49,26 @@ class Piece(NamedTuple):
     """(4,) quaternion at the end."""
     motion: str = "joints"
     """What is moved how, in a word or two."""
+    mode: PointingGoal | None = None
+    """What the base points at from the end on, as ``base`` does; None: it is at rest then."""
+
+
+class BaseMotion(NamedTuple):
+    """How the base moves where a segment begins."""
+
+    quaternion: Array
+    """(4,) attitude, unit."""
+    course: Course | None = None
+    """What it goes on along unless a segment leads it elsewhere; None: it is at rest."""
+    mode: PointingGoal | None = None
+    """What it points at so."""
+    before: Course | None = None
+    """What a segment that leads it elsewhere begins with; None: ``course``."""
+
+    @property
+    def held(self) -> Course:
+        """The course of a segment that does not lead the base."""
+        return self.course or at_rest(self.quaternion)
 
 
 def quintic(u: Array) -> tuple[Array, Array, Array]:
@@ -159,6 +182,31 @@ class Slew(NamedTuple):
         rows[:, 4:7] = (self.angle * rate / self.span)[:, np.newaxis] * self.axis
         rows[:, 7:] = (self.angle * acceleration / self.span**2)[:, np.newaxis] * self.axis
         return rows
+
+
+class SteadyTurn(NamedTuple):
+    """The base turns about one axis at a constant rate."""
+
+    begin: float
+    """s."""
+    quaternion: Array
+    """(4,) attitude at the begin, unit."""
+    omega: Array
+    """(3,) angular velocity, rad/s, base frame."""
+
+    def at(self, time: Array) -> Array:
+        """Return (T, 10) at times (T,), s: quaternion, velocity and acceleration, base frame."""
+        rows, rate = np.zeros((len(time), 10)), norm(self.omega)
+        rows[:, :4], rows[:, 4:7] = self.quaternion, self.omega
+        if rate:
+            turns = turned_by(self.omega / rate, rate * (time - self.begin))
+            rows[:, :4] = multiplied(self.quaternion, turns)
+        return rows
+
+
+def at_rest(quaternion: Array) -> Slew:
+    """Return the course of a base that is held at an attitude (4,)."""
+    return Slew(0.0, 1.0, quaternion, np.zeros(3), 0.0)
 
 
 def multiplied(first: Array, second: Array) -> Array:

@@ -1,7 +1,8 @@
 """Changes of a mission in flight: a segment, or a trajectory of the joints, from now on.
 
 Position and rate of the reference do not jump. Before a segment the reference is brought to rest;
-a trajectory is joined with the reference's present rate and acceleration.
+a trajectory is joined with the reference's present rate and acceleration. A base that points, or
+is on its way there, goes on.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ from space_robot_msgs_py.config.validation import one_of
 from space_robot_msgs_py.errors import InputError
 
 from .checks import FARTHEST, FASTEST, SHARPEST, check_piece
-from .courses import Piece
+from .courses import BaseMotion, Course, Piece
 from .limits import HALFWAY
 from .spline_courses import BrakedTurn, SplineCourse
 
@@ -47,26 +48,33 @@ class TrajectoryPoint(NamedTuple):
     accelerations: Sequence[float]
 
 
-def braking(begin: float, joints: Array, base: Array) -> Piece:
+def braking(begin: float, joints: Array, rates: Array, base: BaseMotion) -> Piece:
     """Return the piece that brings a moving reference to rest.
 
     Args:
         begin: s.
         joints: (3, n) reference of the joints at ``begin``.
-        base: (10,) reference of the base.
+        rates: (10,) reference of the base.
+        base: how the base goes on; one without a course comes to rest.
     """
     rest = np.zeros_like(joints)
     rest[0] = joints[0] + 0.5 * BRAKE_S * joints[1]
     spline = QuinticSpline(np.array([0.0, BRAKE_S]), np.array([joints, rest]))
-    turn = BrakedTurn(begin, BRAKE_S, base[:4], base[4:7], base[7:])
+    turn, course = _onwards(begin, rates, base), SplineCourse(begin, spline)
     end = begin + BRAKE_S
     attitude = turn.at(np.array([end]))[0, :4]
-    return Piece(begin, end, SplineCourse(begin, spline), turn, rest[0], attitude, "braking")
+    return Piece(begin, end, course, turn, rest[0], attitude, "braking", base.mode)
 
 
-def is_moving(joints: Array, base: Array) -> bool:
-    """Return whether a reference (3, n) and (10,) moves."""
-    return bool(max(np.abs(joints[1:]).max(), np.abs(base[4:]).max()) > AT_REST)
+def _onwards(begin: float, rates: Array, base: BaseMotion) -> Course:
+    """Return how the base goes on, or comes to rest."""
+    return base.course or BrakedTurn(begin, BRAKE_S, rates[:4], rates[4:7], rates[7:])
+
+
+def is_moving(joints: Array, rates: Array, base: BaseMotion) -> bool:
+    """Return whether a reference (3, n) and (10,) moves that is to come to rest."""
+    of_base = 0.0 if base.course else np.abs(rates[4:]).max()
+    return bool(max(np.abs(joints[1:]).max(), of_base) > AT_REST)
 
 
 @np.errstate(all="ignore")  # numbers that overflow are refused, in one line
@@ -76,7 +84,8 @@ def joined(
     points: Sequence[TrajectoryPoint],
     begin: float,
     joints: Array,
-    base: Array,
+    rates: Array,
+    base: BaseMotion,
     late: float = 0.0,
 ) -> Piece:
     """Return a trajectory of the joints that begins with the present reference.
@@ -92,7 +101,8 @@ def joined(
             says otherwise.
         begin: s.
         joints: (3, n) reference of the joints at ``begin``.
-        base: (10,) reference of the base, which comes to rest.
+        rates: (10,) reference of the base.
+        base: how the base goes on; one without a course comes to rest.
         late: s, from the trajectory's start to ``begin``.
 
     Raises:
@@ -126,11 +136,11 @@ def joined(
     states = _states(times, points, order, joints)
     course = SplineCourse(begin, QuinticSpline(times, states))
     end = begin + float(times[-1])
-    turn = BrakedTurn(begin, BRAKE_S, base[:4], base[4:7], base[7:])
+    turn = _onwards(begin, rates, base)
     attitude = turn.at(np.array([begin + BRAKE_S]))[0, :4]
     left_out = f" without its first {'point' if first == 1 else f'{first} points'}" if first else ""
     motion = f"trajectory{left_out}"
-    piece = Piece(begin, end, course, turn, states[-1, 0], attitude, motion)
+    piece = Piece(begin, end, course, turn, states[-1, 0], attitude, motion, base.mode)
     check_piece(robot, piece)
     return piece
 

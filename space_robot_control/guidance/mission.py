@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from functools import cached_property
 from itertools import pairwise
 from typing import TYPE_CHECKING, Annotated
 
@@ -12,20 +13,23 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from space_robot_model.elementary.matrices import direction_norm
+from space_robot_model.orbit.ephemeris import AssumedOrbit, Ephemeris
 from space_robot_model.robot import Robot
+from space_robot_model.robot.orientation import Rates
 from space_robot_msgs_py.config.settings import Texts
 from space_robot_msgs_py.config.validation import StrictModel
 from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.samples import ReferenceChunk
 
 from .checks import check_piece
-from .courses import Piece, QuinticLeg, Slew
+from .courses import BaseMotion, Piece, QuinticLeg, Slew, SteadyTurn
 from .limits import MissionLimits, check_positions
-from .segments import read_segments
+from .segments import read_pointing, read_segments
 
 if TYPE_CHECKING:
     from .live import TrajectoryPoint
     from .planner import Planner
+    from .pointing import PointingCourse, PointingGoal
 
 Array = NDArray[np.float64]
 
@@ -48,12 +52,23 @@ class MissionSettings(StrictModel):
     base_quaternion: Annotated[list[float], Field(min_length=4, max_length=4)] = Field(
         [1.0, 0.0, 0.0, 0.0], description="base attitude to hold: w, x, y, z"
     )
+    base_rate_deg_s: Rates = Field(
+        [0.0, 0.0, 0.0],
+        description="angular velocity of the base at the start, degrees/s, base axes, with which a "
+        "first segment that moves the base begins",
+    )
+    base_point: str = Field(
+        "",
+        description="what the base points at from the start on, in place of base_quaternion, as "
+        "YAML text: {point: nadir}",
+    )
     segments: Texts = Field(
         [""],
         description="segments that follow the last waypoint, each as YAML text: see the manual on "
         "missions",
     )
     limits: MissionLimits = MissionLimits()
+    assumed_orbit: AssumedOrbit = AssumedOrbit()
 
     @property
     def has_segments(self) -> bool:
@@ -96,24 +111,27 @@ class Mission:
         length = direction_norm(settings.base_quaternion, "base_quaternion")
         waypoints = robot.from_degrees(np.reshape(settings.waypoints_deg, (len(times), n)))
         check_positions(robot, waypoints)
-        quaternion = np.array(settings.base_quaternion) / length
+        self._assumed_orbit = settings.assumed_orbit
+        base = self._base_at_start(settings, np.array(settings.base_quaternion) / length)
         self.period = period
         """s, of a tick."""
         self.pieces = [
-            _leg(begin, end, start, goal, quaternion)
+            _leg(begin, end, start, goal, base)
             for (begin, end), (start, goal) in zip(
                 pairwise(times), pairwise(waypoints), strict=True
             )
         ]
         """Legs between the waypoints, then the segments; at least one."""
-        still = [] if self.pieces else [_leg(0.0, 1.0, waypoints[0], waypoints[0], quaternion)]
+        still = [] if self.pieces else [_leg(0.0, 1.0, waypoints[0], waypoints[0], base)]
         for leg in (*self.pieces, *still):
             check_piece(robot, leg, has_limits=False)  # flights warn of those of waypoints
         self._robot = robot.nominal
-        self._start, self._limits = (waypoints[0].copy(), quaternion), settings.limits
+        self._start, self._limits = (waypoints[0].copy(), base.quaternion), settings.limits
         if segments := read_segments(settings.segments):
+            if self.pieces:
+                base = BaseMotion(self.pieces[-1].attitude, base.course, base.mode)
             planner = self._new_planner()
-            self.pieces += planner.plan(float(times[-1]), waypoints[-1], quaternion, segments)
+            self.pieces += planner.plan(float(times[-1]), waypoints[-1], base, segments)
         self.duration = self.pieces[-1].end if self.pieces else 0.0
         """s, until the end of the last segment."""
         self.pieces = self.pieces or still
@@ -125,7 +143,25 @@ class Mission:
     def _new_planner(self) -> Planner:
         from .planner import Planner  # slow to import, and a mission of waypoints needs none
 
-        return Planner(self._robot, *self._start, self._limits)
+        return Planner(self._robot, *self._start, self._limits, lambda: self.ephemeris)
+
+    @cached_property
+    def ephemeris(self) -> Ephemeris | None:
+        """The orbit that the mission is planned with; None: none is known."""
+        return Ephemeris(self._assumed_orbit) if self._assumed_orbit.has_orbit else None
+
+    @property
+    def uses_orbit(self) -> bool:
+        """Whether the reference depends on the assumed orbit."""
+        return self.__dict__.get("ephemeris") is not None
+
+    def _base_at_start(self, settings: MissionSettings, quaternion: Array) -> BaseMotion:
+        if not settings.base_point.strip():
+            rate = np.radians(settings.base_rate_deg_s)
+            before = SteadyTurn(0.0, quaternion, rate) if rate.any() else None
+            return BaseMotion(quaternion, before=before)
+        mode, course = _pointing(settings, self.ephemeris)
+        return BaseMotion(course.at(np.zeros(1))[0, :4], course, mode)
 
     @property
     def times(self) -> Array:
@@ -142,7 +178,8 @@ class Mission:
     def go_to(self, tick: int, segment: str) -> Piece:
         """Fly a segment, written as in a mission, from a tick on, in place of what was planned.
 
-        A reference that moves at that tick is brought to rest first.
+        Joints that move at that tick are brought to rest first, and so is the base, unless it
+        points or is on its way there.
 
         Returns:
             The planned segment.
@@ -152,18 +189,19 @@ class Mission:
         """
         from .live import braking, is_moving
 
-        begin, joints, base = self._state_at(tick)
+        begin, joints, rates, base = self._state_at(tick)
         before = []
-        if is_moving(joints, base):
-            before = [braking(begin, joints, base)]
+        if is_moving(joints, rates, base):
+            before = [braking(begin, joints, rates, base)]
             check_piece(self._robot, before[0])
-            begin, joints, base = before[0].end, before[0].goal[np.newaxis], before[0].attitude
+            begin, joints = before[0].end, before[0].goal[np.newaxis]
+            base = base._replace(quaternion=before[0].attitude)
         segments = read_segments([segment])
         if not segments:
             raise InputError("a segment was expected, got an empty text")
         if segments[0].file is not None:  # whoever reaches the node could have it read any file
             raise InputError("file: no file is read in flight, give the columns as trajectory")
-        pieces = self._new_planner().plan(begin, joints[0], base[:4], segments)
+        pieces = self._new_planner().plan(begin, joints[0], base, segments)
         self._replace([*before, *pieces])
         return pieces[-1]
 
@@ -199,17 +237,21 @@ class Mission:
             late = max(0.0, tick * self.period - start)
         piece = joined(self._robot, names, points, *self._state_at(tick), late)
         end = np.array([piece.end])
-        joints, base = piece.joints.at(end)[0], piece.base.at(end)[0]
-        after = [braking(piece.end, joints, base)] if is_moving(joints, base) else []
+        joints, rates = piece.joints.at(end)[0], piece.base.at(end)[0]
+        base = BaseMotion(rates[:4], piece.base if piece.mode else None, piece.mode)
+        is_rolling = is_moving(joints, rates, base)
+        after = [braking(piece.end, joints, rates, base)] if is_rolling else []
         for part in after:
             check_piece(self._robot, part)
         self._replace([piece, *after])
         return piece
 
-    def _state_at(self, tick: int) -> tuple[float, Array, Array]:
-        """Return time, and the reference of joints (3, n) and base (10,), at a tick."""
-        chunk = self.chunk(tick, 1)
-        return tick * self.period, chunk.joints[0], chunk.base[0]
+    def _state_at(self, tick: int) -> tuple[float, Array, Array, BaseMotion]:
+        """Return time, the reference of joints (3, n) and base (10,), and how the base goes on."""
+        chunk, time = self.chunk(tick, 1), tick * self.period
+        piece = self.pieces[int(np.searchsorted(self._begins[1:], time, side="right"))]
+        base = BaseMotion(chunk.base[0, :4], piece.base if piece.mode else None, piece.mode)
+        return time, chunk.joints[0], chunk.base[0], base
 
     def _replace(self, pieces: list[Piece]) -> None:
         """Put pieces in the place of all that begins later."""
@@ -231,8 +273,36 @@ class Mission:
         )
 
 
-def _leg(begin: float, end: float, start: Array, goal: Array, quaternion: Array) -> Piece:
-    """Return a leg of the joints between two waypoints; the attitude is held."""
-    span, still = float(end - begin), Slew(begin, 1.0, quaternion, np.zeros(3), 0.0)
+def _leg(begin: float, end: float, start: Array, goal: Array, base: BaseMotion) -> Piece:
+    """Return a leg of the joints between two waypoints; the attitude or what points is held."""
+    span = float(end - begin)
+    held = base.course or Slew(begin, 1.0, base.quaternion, np.zeros(3), 0.0)
+    attitude = held.at(np.array([float(end)]))[0, :4] if base.course else base.quaternion
     course = QuinticLeg(begin, span, start, goal - start)
-    return Piece(float(begin), float(end), course, still, goal, quaternion)
+    return Piece(float(begin), float(end), course, held, goal, attitude, mode=base.mode)
+
+
+def pointing_start(settings: MissionSettings) -> tuple[list[float], list[float]]:
+    """Return attitude (4,) and rate (3,), degrees/s, base axes, of a mission that starts pointing.
+
+    Raises:
+        InputError: what ``base_point`` says cannot be pointed at.
+    """
+    assumed = settings.assumed_orbit
+    _, course = _pointing(settings, Ephemeris(assumed) if assumed.has_orbit else None)
+    motion = course.at(np.zeros(1))[0]
+    return motion[:4].tolist(), np.degrees(motion[4:7]).tolist()
+
+
+def _pointing(
+    settings: MissionSettings, ephemeris: Ephemeris | None
+) -> tuple[PointingGoal, PointingCourse]:
+    from .pointing import PointingCourse  # slow to import, and most missions need none
+
+    mode = read_pointing(settings.base_point, "start.base")
+    try:
+        course = PointingCourse(mode, ephemeris, 0.0, np.array([1.0, 0.0, 0.0, 0.0]))
+        course.check(0.0, settings.waypoint_times[-1])
+    except InputError as error:
+        raise InputError(f"start: {error}") from None
+    return mode, course

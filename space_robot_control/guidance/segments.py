@@ -5,20 +5,23 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Annotated, Any, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field, PlainValidator, model_validator
 
-from space_robot_model.robot.orientation import Attitude, Orientation, Vector
+from space_robot_model.elementary.matrices import direction_norm
+from space_robot_model.robot.orientation import Attitude, Degrees, Orientation, Vector
 from space_robot_msgs_py.config.choices import choices
 from space_robot_msgs_py.config.text import printable
 from space_robot_msgs_py.config.validation import StrictModel, short, validate
 from space_robot_msgs_py.config.yaml_text import YamlTextError, parse_yaml
 from space_robot_msgs_py.errors import InputError
 
+from .pointing import PointingGoal
+
 MOST_SEGMENTS = 5_000
 """Largest number of segments of a mission; each is planned for a few milliseconds."""
 Seconds = Annotated[float, Field(ge=1e-6, le=1e6)]
 MOST_BENDS = 100
-Frame = Literal["inertial", "base", "start"]
+Frame = Literal["inertial", "base", "start", "orbit"]
 MOTIONS = ("joints_deg", "tool", "hold", "reactionless_deg", "file", "trajectory")
 """Keys of which a segment has one; a segment of the base alone has none."""
 WRITTEN = (
@@ -26,7 +29,7 @@ WRITTEN = (
     *("base", "duration"),
 )
 """Keys of a segment in a mission's document."""
-ALONE = ("hold", "reactionless_deg", "file", "trajectory")
+ALONE = ("reactionless_deg", "file", "trajectory")
 """Those that go without ``base``."""
 
 
@@ -37,7 +40,8 @@ class ToolGoal(Orientation):
     frame: Frame = Field(
         "start",
         description="axes of the goal: inertial (origin: the base at t = 0), base (at the end of "
-        "the segment), or start (a displacement and a turn on inertial axes)",
+        "the segment), start (a displacement and a turn on inertial axes), or orbit (the same on "
+        "axes that turn with the orbit: x ahead, y against its normal, z to the Earth's centre)",
     )
     link: str | None = Field(None, description="name of the tool, of a robot with several")
     least: Literal["motion", "momentum"] = Field(
@@ -53,8 +57,47 @@ class ToolGoal(Orientation):
         return self
 
 
+class BaseTurn(StrictModel):
+    """``base: {turn_deg: 190, axis: [1, 2, 3]}``: a turn about one axis, from rest to rest."""
+
+    turn_deg: Degrees = Field(description="angle, degrees")
+    axis: Vector = Field(description="of the turn, base frame, any length")
+
+    @model_validator(mode="after")
+    def _has_axis(self) -> BaseTurn:
+        direction_norm(self.axis, "axis")
+        return self
+
+
+KINDS_OF_BASE: dict[str, type[Attitude] | type[PointingGoal] | type[BaseTurn]] = {
+    "rpy_deg": Attitude,
+    "quaternion": Attitude,
+    "point": PointingGoal,
+    "turn_deg": BaseTurn,
+}
+"""Keys that tell what is said of the base."""
+OF_BASE = tuple(dict.fromkeys(key for kind in KINDS_OF_BASE.values() for key in kind.model_fields))
+"""All keys of ``base``."""
+
+
+def base_goal(content: Any) -> Attitude | PointingGoal | BaseTurn:
+    """Return where a segment brings the base, by its keys; a name is what the base points at.
+
+    Raises:
+        ValidationError: a key or a value is wrong.
+    """
+    if isinstance(content, (Attitude, PointingGoal, BaseTurn)):
+        return content
+    if isinstance(content, str):
+        content = {"point": content}
+    keys = [key for key in KINDS_OF_BASE if isinstance(content, dict) and key in content]
+    if len({KINDS_OF_BASE[key] for key in keys}) > 1:
+        raise ValueError(f"{' and '.join(keys)} were given: give one of them")
+    return (KINDS_OF_BASE[keys[0]] if keys else Attitude).model_validate(content)
+
+
 class Segment(StrictModel):
-    """A part of a mission, from rest to rest."""
+    """A part of a mission; the joints move from rest to rest."""
 
     joints_deg: list[float] | None = Field(None, description="joints, degrees or m")
     bends_deg: list[list[float]] | None = Field(
@@ -72,7 +115,9 @@ class Segment(StrictModel):
     trajectory: dict[str, list[float]] | None = Field(
         None, description="the columns of such a file"
     )
-    base: Attitude | None = None
+    base: Annotated[Attitude | PointingGoal | BaseTurn | None, PlainValidator(base_goal)] = Field(
+        None, description="attitude, turn, or what the base points at from now on"
+    )
     is_base_free: bool = Field(
         False, description="the base turns as the arm's motion turns it: base: free"
     )
@@ -111,7 +156,7 @@ class Segment(StrictModel):
             raise ValueError(f"base cannot be combined with {motions[0]}")
         if self.bends_deg is not None and self.joints_deg is None:
             raise ValueError("bends_deg needs joints_deg")
-        if self.is_base_free and (not motions or motions[0] in ALONE):
+        if self.is_base_free and (not motions or motions[0] in ("hold", *ALONE)):
             raise ValueError("base: free needs joints_deg or tool")
         timed = [self.duration is not None, self.fast, self.hold is not None]
         if self.file is not None or self.trajectory is not None:
@@ -145,16 +190,33 @@ def read_segments(texts: Sequence[str]) -> list[Segment]:
             content = parse_yaml(text)
         except YamlTextError as error:
             raise InputError(f"segment {number}: {error}") from None
-        _check_keys(content, f"segment {number}")
+        _check_keys(content, f"segment {number}", (*WRITTEN, *Segment.model_fields), WRITTEN)
+        if isinstance(content, dict) and isinstance(base := content.get("base"), dict):
+            _check_keys(base, f"segment {number}: base", OF_BASE, OF_BASE)
         segments.append(validate(Segment, content, f"segment {number}"))
     return segments
 
 
-def _check_keys(content: Any, where: str) -> None:
-    """Refuse an unknown key with those that a document may have, not those of `Segment`."""
+def read_pointing(text: str, where: str) -> PointingGoal:
+    """Return what the base points at, written as YAML text.
+
+    Raises:
+        InputError: it is wrong; names ``where``.
+    """
+    try:
+        content = parse_yaml(text)
+    except YamlTextError as error:
+        raise InputError(f"{where}: {error}") from None
+    content = {"point": content} if isinstance(content, str) else content
+    _check_keys(content, where, tuple(PointingGoal.model_fields), tuple(PointingGoal.model_fields))
+    return validate(PointingGoal, content, where)
+
+
+def _check_keys(content: Any, where: str, known: Sequence[str], told: Sequence[str]) -> None:
+    """Refuse a key that is not ``known``, with those that a document may have."""
     for key, value in content.items() if isinstance(content, dict) else ():
-        if key not in WRITTEN and key not in Segment.model_fields:
-            advice = choices(str(key), WRITTEN)
+        if key not in known:
+            advice = choices(str(key), told)
             raise InputError(
                 f"{where}: {printable(str(key))}: unknown key, got {short(value)}: {advice}"
             )

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from space_robot_model.elementary.matrices import dot_rows, norms, unit_rows
+from space_robot_model.elementary.matrices import dot_rows, norms, product, unit_rows
 from space_robot_model.elementary.spline import CubicSpline
 from space_robot_model.robot.mission_document import QUATERNION
 from space_robot_msgs_py.config.columns import MOST_ROWS, missing_column
@@ -15,7 +15,7 @@ from space_robot_msgs_py.config.validation import short
 from space_robot_msgs_py.errors import InputError
 
 from .checks import FARTHEST, SHORTEST_S
-from .courses import Course, Slew
+from .courses import BaseMotion, Course, multiplied
 from .spline_courses import AttitudeCourse, SplineCourse
 
 Array = NDArray[np.float64]
@@ -81,8 +81,15 @@ class TrajectoryTable:
         if columns_of_base:
             self._attitude = CubicSpline(self._time, _quaternions(columns))
 
-    def courses(self, begin: float, joints: Array, quaternion: Array) -> tuple[Course, Course]:
-        """Return the courses of joints and base from a time, posture and attitude on.
+    @property
+    def leads_base(self) -> bool:
+        """Whether there are columns of the base's attitude."""
+        return self._attitude is not None
+
+    def courses(self, begin: float, joints: Array, base: BaseMotion) -> tuple[Course, Course]:
+        """Return the courses of joints and base from a time, posture and motion of the base on.
+
+        Without columns of its attitude the base goes on as it moves.
 
         Raises:
             InputError: the trajectory begins elsewhere.
@@ -96,11 +103,17 @@ class TrajectoryTable:
             )
         course = SplineCourse(begin, self._joints)
         if self._attitude is None:
-            return course, Slew(begin, self.duration, quaternion, np.zeros(3), 0.0)
-        first = self._attitude.values[0]
+            return course, base.held
+        first, quaternion = self._attitude.values[0], base.quaternion
         if min(np.abs(first - quaternion).max(), np.abs(first + quaternion).max()) > SAME_PLACE:
             raise InputError("trajectory: the base begins with another attitude than the mission's")
-        return course, AttitudeCourse(begin, self._attitude)
+        attitude = self._attitude
+        if base.course is not None:
+            motion = base.course.at(np.array([begin]))[0]
+            sign = 1.0 if product(first, motion[:4]) >= 0.0 else -1.0
+            rate = 0.5 * sign * multiplied(motion[:4], np.append(0.0, motion[4:7]))
+            attitude = CubicSpline(self._time, attitude.values, rate, np.zeros(4))
+        return course, AttitudeCourse(begin, attitude)
 
 
 def _quaternions(columns: Columns) -> Array:

@@ -4,6 +4,7 @@
       start: {joints_deg: [0, 120, 220, 0, -10, 0], base: {rpy_deg: [0, 0, 0]}}
       segments:
         - {tool: {xyz: [0.3, 0.0, -0.2]}, duration: 10}
+        - {base: {point: nadir}, duration: 60}
       limits: {base_torque: 2.0}
       events: []
 
@@ -20,7 +21,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from space_robot_msgs_py.config.columns import missing_column, read_columns
 from space_robot_msgs_py.config.files import GIVEN, node_parameters
@@ -29,7 +30,7 @@ from space_robot_msgs_py.config.validation import StrictModel, read_yaml, valida
 from space_robot_msgs_py.errors import InputError, explained_by
 
 from .find import TRAJECTORIES, find_robot
-from .orientation import Attitude
+from .orientation import Orientation, Rates
 
 KEY = "mission"
 PLANT = "plant"
@@ -37,11 +38,38 @@ QUATERNION = ("q_w", "q_x", "q_y", "q_z")
 """Columns of the base's attitude in a trajectory."""
 
 
+class StartBase(Orientation):
+    """Attitude and rate of the base that a mission begins with; what is not given is zero."""
+
+    rate_deg_s: Rates = Field(
+        [0.0, 0.0, 0.0], description="angular velocity of the base, degrees/s, base axes"
+    )
+
+    @model_validator(mode="after")
+    def _something(self) -> StartBase:
+        if not self.model_fields_set:
+            raise ValueError("give rpy_deg, quaternion, rate_deg_s, or point")
+        return self
+
+
 class Start(StrictModel):
-    """Posture and attitude that a mission begins with."""
+    """Posture, attitude and rate that a mission begins with, or what its base points at."""
 
     joints_deg: list[float] = Field(description="joints with motors, degrees, or m of prismatic")
-    base: Attitude | None = None
+    base: StartBase | None = None
+    base_point: str = Field("", description="what the base points at: base: {point: ...}, as JSON")
+
+    @model_validator(mode="before")
+    @classmethod
+    def _as_written(cls, content: Any) -> Any:
+        """Accept ``base: nadir`` and ``base: {point: ...}``."""
+        base = content.get("base") if isinstance(content, dict) else None
+        if isinstance(base, str):
+            base = {"point": base}
+        if not isinstance(base, dict) or "point" not in base:
+            return content
+        rest = {key: value for key, value in content.items() if key != "base"}
+        return {**rest, "base_point": json.dumps(base)}
 
 
 class MissionDocument(StrictModel):
@@ -54,22 +82,24 @@ class MissionDocument(StrictModel):
 
     def parameters(self) -> Tree:
         """Return the same as settings of a mission, with the plant's start and events."""
-        base = [1.0, 0.0, 0.0, 0.0]
-        if self.start.base is not None:
-            base = np.asarray(self.start.base.unit_quaternion).tolist()
-        return {
+        start = self.start.base or StartBase(rpy_deg=[0.0, 0.0, 0.0])
+        base, rate = np.asarray(start.unit_quaternion).tolist(), start.rate_deg_s
+        parameters: Tree = {
             "waypoint_times": [0.0],
             "waypoints_deg": self.start.joints_deg,
-            "base_quaternion": base,
             "segments": [json.dumps(segment) for segment in self.segments],
             **({"limits": self.limits} if self.limits else {}),
             "initial_joints_deg": self.start.joints_deg,
-            "initial_quaternion": base,
             **({"events": self.events} if self.events else {}),
         }
+        if self.start.base_point:  # the plant's attitude and rate follow from the orbit
+            return parameters | {"base_point": self.start.base_point}
+        if any(rate):
+            parameters |= {"base_rate_deg_s": rate, "initial_rate_deg_s": rate}
+        return parameters | {"base_quaternion": base, "initial_quaternion": base}
 
 
-OF_PLANT = ("initial_joints_deg", "initial_quaternion", "events")
+OF_PLANT = ("initial_joints_deg", "initial_quaternion", "initial_rate_deg_s", "events")
 """Settings of a mission for the plant: its initial state, captures and releases."""
 
 

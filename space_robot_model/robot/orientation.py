@@ -17,6 +17,9 @@ Vector = Annotated[list[float], Field(min_length=3, max_length=3)]
 Degrees = Annotated[float, Field(ge=-36_000.0, le=36_000.0)]
 """An angle of at most a hundred turns: of larger ones too few digits are left."""
 Angles = Annotated[list[Degrees], Field(min_length=3, max_length=3)]
+Rate = Annotated[float, Field(ge=-3_600.0, le=3_600.0)]
+"""An angular velocity of at most ten turns a second, degrees/s."""
+Rates = Annotated[list[Rate], Field(min_length=3, max_length=3)]
 Quaternion = Annotated[list[float], Field(min_length=4, max_length=4)]
 
 

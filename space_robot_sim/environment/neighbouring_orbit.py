@@ -15,11 +15,11 @@ from numpy.typing import NDArray
 
 from space_robot_model.dynamics.attitude import quaternion_rate, rotation_matrix
 from space_robot_model.elementary.matrices import norm, product, solve
+from space_robot_model.orbit.elements import MU, hill_axes, state_of
+from space_robot_model.orbit.gravity import gravity
 from space_robot_model.robot.inertia import inertia_tensor
 from space_robot_msgs_py.errors import InputError
 
-from .gravity import MU, gravity
-from .orbit import state_of
 from .orbit_settings import OrbitSettings
 from .target import Target, TargetMotion
 
@@ -41,18 +41,6 @@ class Meeting(NamedTuple):
     """Relative to the inertial frame."""
     reach: float
     """Largest distance from where the tool holds it, m."""
-
-
-def hill_axes(position: Array, velocity: Array) -> Array:
-    """Return the axes of an orbit as columns (3, 3): radial, along the path, along the normal.
-
-    Args:
-        position: (3,) from the Earth's centre, m.
-        velocity: (3,) m/s.
-    """
-    radial, normal = position / norm(position), np.cross(position, velocity)
-    normal = normal / norm(normal)
-    return np.column_stack([radial, np.cross(normal, radial), normal])
 
 
 def meet(target: Target, orbit: OrbitSettings, time: float) -> Meeting:
@@ -103,6 +91,18 @@ def fall(target: Target, orbit: OrbitSettings, times: Array) -> tuple[Array, Arr
         now = float(time)
         poses[k, :3], poses[k, 3:] = x[6:9], x[12:16]
     return poses[:, :3], poses[:, 3:]
+
+
+def relative_state(target: Target, orbit: OrbitSettings) -> tuple[Array, Array]:
+    """Return position, m, and velocity, m/s, of a target from the reference point at tick 0.
+
+    Each (3,), inertial axes, as seen from the inertial frame.
+
+    Raises:
+        InputError: there is no orbit.
+    """
+    x = _at_tick_0(target, orbit)
+    return x[6:9], x[9:12]
 
 
 def _at_tick_0(target: Target, orbit: OrbitSettings) -> Array:

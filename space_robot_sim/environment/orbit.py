@@ -6,26 +6,23 @@ J2 makes its orbit none of Kepler's.
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 from numpy.typing import NDArray
 
 from space_robot_model.dynamics.algebra import Vector, add, dot, scale, store, subtract, vector
 from space_robot_model.elementary.series import plain_sin_cos
 from space_robot_model.elementary.sine import sin_cos
+from space_robot_model.orbit.elements import EARTH_RADIUS, TO_RAD, state_of
 from space_robot_msgs_py.compiled.kernels import kernel, subroutine
 from space_robot_msgs_py.compiled.lanes import where
 from space_robot_msgs_py.compiled.records import Record, assign, shaped
 
-from .gravity import EARTH_RADIUS, MU
-from .orbit_settings import ElementSettings, OrbitSettings
+from .orbit_settings import OrbitSettings
 
 Array = NDArray[np.float64]
 
 EARTH_RATE = 7.292115e-5
 """Angular velocity of the Earth, rad/s."""
-TO_RAD = math.pi / 180.0
 
 
 class Orbit(Record):
@@ -82,7 +79,7 @@ class Orbit(Record):
             density=atmosphere.density,
             at_height=atmosphere.at_height,
             scale_height=atmosphere.scale_height,
-            sun=sun_of(settings),
+            sun=settings.sun,
             pressure=settings.sunlight.pressure,
             strength=magnetism.strength,
             tilt=plain_sin_cos(magnetism.tilt_deg * TO_RAD),
@@ -90,41 +87,6 @@ class Orbit(Record):
             residual_dipole=magnetism.residual_dipole,
         )
         return orbit
-
-
-def plane_of(elements: ElementSettings) -> tuple[Array, Array, Array]:
-    """Return the unit vectors to the ascending node, 90 degrees ahead of it, and of the normal."""
-    s, c = plain_sin_cos(elements.raan_deg * TO_RAD)
-    si, ci = plain_sin_cos(elements.inclination_deg * TO_RAD)
-    return (np.array([c, s, 0.0]), np.array([-s * ci, c * ci, si]), np.array([s * si, -c * si, ci]))
-
-
-def state_of(elements: ElementSettings) -> tuple[Array, Array]:
-    """Return position, m, and velocity, m/s, by Kepler's equation."""
-    e, a = elements.eccentricity, elements.semi_major_axis
-    mean = math.remainder(elements.anomaly_deg * TO_RAD, 2.0 * math.pi)
-    anomaly = mean if e < 0.8 else math.copysign(math.pi, mean)
-    for _ in range(50):
-        s, c = plain_sin_cos(anomaly)
-        anomaly -= (anomaly - e * s - mean) / (1.0 - e * c)
-    s, c = plain_sin_cos(anomaly)
-    root = math.sqrt(1.0 - e * e)
-    rate = math.sqrt(MU / a) / (1.0 - e * c)
-    along, across = a * (c - e), a * root * s
-    v_along, v_across = -rate * s, rate * root * c
-    sp, cp = plain_sin_cos(elements.perigee_deg * TO_RAD)
-    node, ahead, _ = plane_of(elements)
-    p, q = cp * node + sp * ahead, cp * ahead - sp * node
-    return along * p + across * q, v_along * p + v_across * q
-
-
-def sun_of(settings: OrbitSettings) -> Array:
-    """Return the unit vector to the Sun."""
-    node, ahead, normal = plane_of(settings.orbital_elements)
-    s, c = plain_sin_cos(settings.sunlight.noon_deg * TO_RAD)
-    sb, cb = plain_sin_cos(settings.sunlight.beta_angle_deg * TO_RAD)
-    direction: Array = cb * (c * node + s * ahead) + sb * normal
-    return direction
 
 
 @kernel

@@ -4,49 +4,13 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from pydantic import Field, model_validator
-from typing_extensions import Self
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field
 
+from space_robot_model.orbit.elements import FARTHEST, Degrees, ElementSettings, sun_of
 from space_robot_msgs_py.config.validation import StrictModel
 from space_robot_msgs_py.errors import InputError
-
-from .gravity import EARTH_RADIUS
-
-Degrees = Annotated[float, Field(ge=-360.0, le=360.0)]
-FARTHEST = 1e9
-"""Largest height, m."""
-
-
-class ElementSettings(StrictModel):
-    """Orbit of the reference point at tick 0; positions of the robot are relative to that point."""
-
-    height: Annotated[float, Field(ge=0.0, le=FARTHEST)] = Field(
-        0.0, description="semi-major axis less the Earth's radius of 6378137 m, m (0: no orbit)"
-    )
-    eccentricity: Annotated[float, Field(ge=0.0, lt=1.0)] = Field(0.0, description="eccentricity")
-    inclination_deg: Annotated[float, Field(ge=0.0, le=180.0)] = Field(
-        0.0, description="inclination to the equator, degrees"
-    )
-    raan_deg: Degrees = Field(0.0, description="right ascension of the ascending node, degrees")
-    perigee_deg: Degrees = Field(0.0, description="argument of perigee, degrees")
-    anomaly_deg: Degrees = Field(0.0, description="mean anomaly at tick 0, degrees")
-
-    @property
-    def semi_major_axis(self) -> float:
-        """Half the longest diameter of the orbit, m."""
-        return EARTH_RADIUS + self.height
-
-    @model_validator(mode="after")
-    def _stays_outside(self) -> Self:
-        perigee = self.semi_major_axis * (1.0 - self.eccentricity) - EARTH_RADIUS
-        if self.height and perigee <= 0.0:
-            most = self.height / self.semi_major_axis
-            raise ValueError(
-                f"the perigee must be outside the Earth, with height {self.height:g} and "
-                f"eccentricity {self.eccentricity:g} its height is {perigee:g} m: height is that "
-                f"of the semi-major axis, with which the eccentricity must be below {most:.3g}"
-            )
-        return self
 
 
 class GravitySettings(StrictModel):
@@ -114,6 +78,12 @@ class OrbitSettings(StrictModel):
     def has_orbit(self) -> bool:
         """True if the robot is in an orbit."""
         return self.orbital_elements.height > 0.0
+
+    @property
+    def sun(self) -> NDArray[np.float64]:
+        """(3,) unit vector to the Sun, inertial axes."""
+        light = self.sunlight
+        return sun_of(self.orbital_elements, light.beta_angle_deg, light.noon_deg)
 
     @property
     def has_surfaces(self) -> bool:

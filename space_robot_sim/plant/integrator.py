@@ -10,6 +10,7 @@ from space_robot_model.dynamics.attitude import quaternion_rate, rotate
 from space_robot_model.dynamics.kinematics import forward_kinematics, spatial_velocities
 from space_robot_model.dynamics.model import MOST_JOINTS, MOST_MOVING, Data, Model
 from space_robot_model.dynamics.rotors import rotor_row
+from space_robot_model.orbit.gravity import gravity
 from space_robot_msgs_py.compiled.kernels import kernel, subroutine
 from space_robot_msgs_py.compiled.lanes import uniform, whole
 from space_robot_msgs_py.compiled.records import Record, nested, shaped
@@ -18,7 +19,7 @@ from space_robot_msgs_py.samples import MOST_WHEELS
 from ..environment.disturbance import disturbance_torque
 from ..environment.environment import Environment
 from ..environment.friction import friction_torque
-from ..environment.gravity import add_gravity_gradient, gravity
+from ..environment.gravity_gradient import add_gravity_gradient
 from ..environment.prescribed_loads import add_loads
 from ..environment.surfaces import add_surface_wrenches
 

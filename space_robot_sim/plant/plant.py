@@ -13,6 +13,9 @@ from pydantic import Field
 from space_robot_model.elementary.matrices import direction_norm
 from space_robot_model.hardware.sensors import SensorSettings
 from space_robot_model.robot import Robot
+from space_robot_model.robot.base_axes import base_axes, cross, to_inertial
+from space_robot_model.robot.momentum import Motion, robot_momentum
+from space_robot_model.robot.orientation import Rates
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.compiled.records import RecordOwner, assign
 from space_robot_msgs_py.errors import DivergedError, InputError
@@ -51,6 +54,11 @@ class PlantSettings(
     )
     initial_quaternion: Annotated[list[float], Field(min_length=4, max_length=4)] = Field(
         [1.0, 0.0, 0.0, 0.0], description="base attitude at tick 0: w, x, y, z"
+    )
+    initial_rate_deg_s: Rates = Field(
+        [0.0, 0.0, 0.0],
+        description="angular velocity of the base at tick 0, degrees/s, base axes; the robot turns "
+        "as one body about its centre of mass, which is at rest",
     )
     substeps: Annotated[int, Field(ge=1, le=MOST_SUBSTEPS)] = Field(
         1, description="integration steps per tick; the command is held over all of them"
@@ -95,7 +103,7 @@ class Plant(RecordOwner):
     _views = ("truth", "state")
 
     def __init__(self, robot: Robot, settings: PlantSettings, period: float) -> None:
-        """Place the robot at rest.
+        """Place the robot at its start.
 
         Raises:
             InputError: initial configuration, actuators, sensors or faults do not fit the robot or
@@ -134,12 +142,15 @@ class Plant(RecordOwner):
             (robot.from_degrees(settings.initial_joints_deg), [s.rest for s in robot.springs])
         )
         memory.x[7 : 7 + robot.joint_count] = positions[list(robot.order)]
+        turns = any(settings.initial_rate_deg_s)
+        if turns:
+            self._set_turning(robot, settings.initial_rate_deg_s, positions)
         speeds = memory.x[13 + 2 * robot.joint_count :][:MOST_WHEELS]
         mount_wheels(settings.wheels, memory.model, memory.environment.friction, speeds)
         mount_gears(robot, memory.model, memory.environment.friction, memory.x)
         check_springs(robot, positions, period / settings.substeps, settings.substeps)
         self._look_into_blocks()
-        # at rest: what `write_truth` would say, without waiting for compiled code
+        # of joints at rest: what `write_truth` would say, without waiting for compiled code
         self.truth.quaternion[:] = memory.x[3:7]
         self.truth.joint_positions[:] = positions[:n]
         self.truth.passive_positions[: len(robot.springs)] = positions[n:]
@@ -147,7 +158,8 @@ class Plant(RecordOwner):
         geared = [position for position, gear in zip(positions, robot.gears, strict=False) if gear]
         self.truth.motor_positions[: len(geared)] = geared
         self._put_into_orbit(robot)
-        if self.captures.exchanges or settings.has_orbit:  # so that no tick has to wait for it
+        # so that no tick has to wait for it
+        if turns or self.captures.exchanges or settings.has_orbit:
             update_true_state(self.block, 0, period)
         motors = measured_motors(robot)
         sensors = Sensors.build(
@@ -179,6 +191,16 @@ class Plant(RecordOwner):
         It needs `begin_tick`: compiled code may fly up to there.
         """
         self.begin_tick(0)
+
+    def _set_turning(self, robot: Robot, rate_deg_s: list[float], positions: Array) -> None:
+        """Let the robot turn as one body about its centre of mass."""
+        n, quaternion = robot.joint_count, self.memory.x[3:7]
+        omega = np.radians(rate_deg_s)
+        motion = Motion(*(row[np.newaxis] for row in (quaternion, omega, positions, 0 * positions)))
+        centre = robot_momentum(robot, motion).centre_of_mass
+        turn = to_inertial(base_axes(quaternion[:, np.newaxis]), omega[:, np.newaxis])
+        self.memory.x[7 + n : 10 + n] = cross(centre.T, turn)[:, 0]
+        self.memory.x[10 + n : 13 + n] = turn[:, 0]
 
     def _put_into_orbit(self, robot: Robot) -> None:
         """Put the origin's position and velocity at tick 0 into the state."""

@@ -23,7 +23,7 @@ from space_robot_msgs_py.compiled.lanes import uniform, whole
 from space_robot_msgs_py.samples import State
 
 from ..environment.environment import Environment
-from ..environment.gravity import add_gravity_gradient
+from ..environment.gravity_gradient import add_gravity_gradient
 from ..environment.orbit import density_at, light, magnetic_field, wind
 from ..environment.surfaces import press_on_surfaces
 from .integrator import first_orbit_number

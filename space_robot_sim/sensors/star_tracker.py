@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from space_robot_model.elementary.matrices import norm
+from space_robot_model.elementary.series import plain_sin_cos
 from space_robot_model.elementary.sine import sin_cos
 from space_robot_model.elementary.steps import in_steps
 from space_robot_model.hardware.star_tracker import LEAST_RATE, MOST_UNDER_WAY, StarTrackerSettings
@@ -59,7 +60,7 @@ class StarTracker(Record):
     def build(
         cls, n: int, settings: StarTrackerSettings, period: float, truth: State
     ) -> StarTracker:
-        """Read the settings; before tick 0 the robot was at rest at ``truth``.
+        """Read the settings; before tick 0 the base turned as at ``truth``, at a constant rate.
 
         Raises:
             InputError: the settings do not fit one another or the period.
@@ -89,9 +90,27 @@ class StarTracker(Record):
             boresight=np.array(settings.boresight) / norm(settings.boresight),
             interval=interval,
             delay=delay,
-            held=truth.quaternion,
+            held=_turned_back(truth, delay * period),
         )
         return tracker
+
+
+def _turned_back(truth: State, time: float) -> Array:
+    """Return the attitude (4,) so many s before a state whose rate is constant."""
+    turn = -time * truth.omega_base
+    if (angle := norm(turn)) == 0.0:
+        return truth.quaternion
+    sine, cosine = plain_sin_cos(0.5 * angle)
+    x, y, z = turn * (sine / angle)
+    a, b, c, d = truth.quaternion
+    return np.array(
+        [
+            a * cosine - b * x - c * y - d * z,
+            a * x + b * cosine + c * z - d * y,
+            a * y + c * cosine + d * x - b * z,
+            a * z + d * cosine + b * y - c * x,
+        ]
+    )
 
 
 @kernel
@@ -99,16 +118,17 @@ def track_stars(tracker: StarTracker, truth: State, tick: int, measured: State) 
     """Write the attitude released last at ``tick`` into ``measured``.
 
     Measurement k shows the attitude of tick ``k interval``, is released ``delay`` ticks later and
-    held until the next one; while the tracker is blind, none is taken. The robot was at rest
-    before tick 0, so the first is there at once.
+    held until the next one; while the tracker is blind, none is taken. The one that is there at
+    tick 0 shows the attitude that `StarTracker.build` has put into ``held``.
     """
     interval, delay = whole(tracker.interval), whole(tracker.delay)
     if tick % interval == 0:
         place = (tick // interval) % MOST_UNDER_WAY
         tracker.taken[place] = 1.0 - tracker.blind[0]
-        expose(tracker, truth.quaternion, tracker.draws[row_of(tick)], tracker.under_way[place])
         if tick == 0:
+            expose(tracker, tracker.held, tracker.draws[row_of(tick)], tracker.under_way[place])
             _release(tracker, place)
+        expose(tracker, truth.quaternion, tracker.draws[row_of(tick)], tracker.under_way[place])
     exposed = tick - delay
     if exposed >= 0 and exposed % interval == 0:
         _release(tracker, (exposed // interval) % MOST_UNDER_WAY)

@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from space_robot_control.controller.tracking import attitude_error_into
+from space_robot_model.dynamics.attitude import attitude_error_into
 from space_robot_model.dynamics.rho_space import RhoSpaceModel, rho_space_into
 from space_robot_model.robot import Robot
 from space_robot_msgs_py.bag.flight_log import FlightLog

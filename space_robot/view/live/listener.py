@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from space_robot_model.hardware.base_actuators import BaseActuatorSettings
+from space_robot_model.orbit.elements import state_of
 from space_robot_model.robot import Robot
 from space_robot_model.robot.find import find_robot
 from space_robot_msgs_py import topics
@@ -26,7 +27,6 @@ from space_robot_msgs_py.wire.truth_base import TruthBase
 from space_robot_msgs_py.wire.truth_joints import TruthJoints
 from space_robot_msgs_py.wire.truth_orbit import TruthOrbit
 from space_robot_msgs_py.wire.wheels_state import WheelsState
-from space_robot_sim.environment.orbit import state_of
 from space_robot_sim.environment.orbit_settings import OrbitSettings
 
 from ...flight.graph.monitor import Event, Monitor

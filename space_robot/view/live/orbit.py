@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from space_robot_model.orbit.elements import state_of
 from space_robot_model.robot import Robot
-from space_robot_sim.environment.orbit import state_of, sun_of
 from space_robot_sim.environment.orbit_settings import OrbitSettings
 
 from ..arrows import ArrowSize, BaseArrows, arrow_directions, arrow_kinds
@@ -38,7 +38,7 @@ def whole_orbit(settings: OrbitSettings, first: Array) -> OrbitFrames:
         elements = settings.orbital_elements.model_copy(update={"anomaly_deg": float(anomaly)})
         places.append(np.concatenate(state_of(elements)))
     position, velocity = np.hsplit(np.array(places), 2)
-    sun = sun_of(settings) if settings.sunlight.pressure > 0.0 else None
+    sun = settings.sun if settings.sunlight.pressure > 0.0 else None
     return OrbitFrames(position, velocity, sun, np.zeros(len(places), bool))
 
 

@@ -16,7 +16,6 @@ from orbiting_robots import body_places, centre_of_mass, orbiting_plant, set_mot
 
 from space_robot_model.robot import Robot
 from space_robot_model.robot.plates import plates_of
-from space_robot_sim.environment.orbit import sun_of
 from space_robot_sim.environment.orbit_settings import OrbitSettings
 
 from ..kernels import plant_steps
@@ -81,7 +80,7 @@ class Orbiting:
     @property
     def sun(self) -> Array:
         """(3,) unit vector to the Sun."""
-        return sun_of(OrbitSettings.model_validate(ORBIT))
+        return OrbitSettings.model_validate(ORBIT).sun
 
 
 class Moment(NamedTuple):

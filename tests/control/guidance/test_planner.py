@@ -329,7 +329,7 @@ BAD: list[tuple[dict[str, Any] | str, str]] = [
     ({"hold": 0}, "greater than or equal to 0.000001"),
     ({"base": {"rpy_deg": [1e300, 0, 0]}, "duration": 5}, "less than or equal to 36000"),
     ({"reactionless": {}, "duration": 5}, r"{joints_deg: \[...\]} was expected, got {}"),
-    ({"hold": 1, "base": {"rpy_deg": [0, 0, 1]}}, "base cannot be combined with hold"),
+    ({"hold": 1, "base": "free"}, "base: free needs joints_deg or tool"),
     ({"hold": float("inf")}, "hold"),
     ({"tool": {}, "duration": 2}, "give xyz, rpy_deg or quaternion"),
     ({"tool": {"xyz": [1, 2]}, "duration": 2}, "xyz"),

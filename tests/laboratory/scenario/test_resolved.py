@@ -66,6 +66,26 @@ SCENARIOS: dict[str, dict[str, Any]] = {
         ),
         "orbit": "iss",
     },
+    "a start that points, with errors of the assumed orbit": {
+        "mission": {
+            "start": {"joints_deg": [0, 90, 200, 20, 30, 10], "base": "nadir"},
+            "segments": [{"base": {"point": "sun", "offset_deg": [0, 0, 5]}, "duration": 60}],
+        },
+        "orbit": "iss",
+        "sensors": "fine",
+        "parameters": {"mission": {"assumed_orbit.errors.along": 2e3}},
+    },
+    "a start with a rate": {
+        "mission": {
+            "start": {
+                "joints_deg": [0, 90, 200, 20, 30, 10],
+                "base": {"rpy_deg": [0, 0, 170], "rate_deg_s": [0.1, -0.2, 0.3]},
+            },
+            "segments": [{"base": {"rpy_deg": [0, 0, 0]}, "duration": 60}],
+        },
+        "sensors": "fine",
+        "navigation": "filtered",
+    },
     "another plant": {"robot": "paper", "plant_robot": "paper", "parameters": {"plant": {}}},
 }
 

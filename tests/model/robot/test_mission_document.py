@@ -5,12 +5,14 @@ from __future__ import annotations
 import json
 import math
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import pytest
 
 from space_robot import Scenario
 from space_robot_model.robot.find import find_robot
 from space_robot_model.robot.mission_document import mission_layer
+from space_robot_msgs_py.config.trees import Tree
 from space_robot_msgs_py.errors import InputError
 
 HEADER = "time,joint1,joint2,joint3,joint4,joint5,joint6"
@@ -77,3 +79,44 @@ def test_a_robot_without_file_is_refused(tmp_path: Path) -> None:
     path = write(tmp_path / "my.csv", HEADER, *ROWS)
     with pytest.raises(InputError, match="robot with a file or name"):
         mission_layer(path, "mission", "given")
+
+
+def layers(start: str) -> tuple[Tree, Tree]:
+    """Return the parameters of plant and mission of a document with a start."""
+    with TemporaryDirectory() as folder:
+        text = f"mission: {{start: {{joints_deg: [0, 0], {start}}}, segments: [{{hold: 1}}]}}"
+        path = write(Path(folder) / "my.yaml", text)
+        plant, mission = (mission_layer(path, node, "paper") for node in ("plant", "mission"))
+        return plant, mission
+
+
+def test_a_start_may_have_a_rate_and_then_needs_no_attitude() -> None:
+    plant, mission = layers("base: {rate_deg_s: [0, 0.5, -1]}")
+    assert plant["initial_rate_deg_s"] == mission["base_rate_deg_s"] == [0.0, 0.5, -1.0]
+    assert plant["initial_quaternion"] == mission["base_quaternion"] == [1.0, 0.0, 0.0, 0.0]
+    plant, mission = layers("base: {rpy_deg: [0, 0, 180]}")
+    assert not {"initial_rate_deg_s", "base_rate_deg_s"} & {*plant, *mission}
+    assert abs(plant["initial_quaternion"][3]) == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize("base", ["nadir", "{point: nadir}"])
+def test_the_attitude_of_a_start_that_points_follows_from_the_orbit(base: str) -> None:
+    plant, mission = layers(f"base: {base}")
+    assert set(plant) == {"initial_joints_deg"}
+    assert json.loads(mission["base_point"]) == {"point": "nadir"}
+    assert "base_quaternion" not in mission
+
+
+@pytest.mark.parametrize(
+    ("base", "said"),
+    [
+        ("{}", "start.base: give rpy_deg, quaternion, rate_deg_s, or point, got {}"),
+        ("{rate_deg_s: [1, 2]}", r"start.base.rate_deg_s: List should have at least 3 items"),
+        ("{rate_deg_s: [1, 2, 1e9]}", "less than or equal to 3600"),
+        ("{rate: [1, 2, 3]}", r"start.base.rate: unknown key.*\(did you mean rate_deg_s\?\)"),
+        ("{rpy_deg: [0, 0, 0], quaternion: [1, 0, 0, 0]}", "give one of them"),
+    ],
+)
+def test_a_wrong_start_is_refused(base: str, said: str) -> None:
+    with pytest.raises(InputError, match=said):
+        layers(f"base: {base}")

@@ -19,9 +19,9 @@ from orbiting_robots import (
 )
 from scipy.spatial.transform import Rotation
 
+from space_robot_model.orbit.elements import state_of
 from space_robot_msgs_py.errors import InputError
 from space_robot_sim.environment.neighbouring_orbit import fall, hill_axes, meet
-from space_robot_sim.environment.orbit import state_of
 from space_robot_sim.environment.orbit_settings import OrbitSettings
 from space_robot_sim.environment.target import Target
 

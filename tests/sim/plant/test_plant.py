@@ -162,6 +162,32 @@ def test_momentum_is_conserved_over_10_s_of_violent_arm_motion(
     assert plant.tick == 20_000
 
 
+@given(
+    rate_deg_s=st.lists(st.floats(-50.0, 50.0), min_size=3, max_size=3),
+    seed=st.integers(0, 2**31 - 1),
+)
+def test_a_start_with_a_rate_turns_the_robot_about_its_centre_of_mass(
+    paper_robot: Robot, rate_deg_s: list[float], seed: int
+) -> None:
+    """As one body: no linear momentum, no joint moves; and free of torque both momenta stay."""
+    rng = np.random.default_rng(seed)
+    settings = {
+        "initial_joints_deg": rng.uniform(-180.0, 180.0, 6).tolist(),
+        "initial_quaternion": random_quaternion(rng).tolist(),
+    }
+    plant = plant_of(paper_robot, initial_rate_deg_s=rate_deg_s, **settings)
+    state = plant.truth
+    np.testing.assert_allclose(np.degrees(state.omega_base), rate_deg_s, rtol=0.0, atol=1e-13)
+    assert not state.joint_velocities.any()
+    linear, angular = momentum(paper_robot, state)
+    assert np.abs(linear).max() < 1e-10
+    assert np.array_equal(plant.state.omega_base, state.omega_base)
+    fly(plant, np.zeros((10, 9)))
+    later = momentum(paper_robot, plant.state)
+    np.testing.assert_allclose(later[0], 0.0, atol=1e-9)
+    np.testing.assert_allclose(later[1], angular, rtol=1e-9, atol=1e-9)
+
+
 def test_angular_momentum_grows_by_the_base_torque_only(paper_robot: Robot) -> None:
     """The opposite case: a torque fixed in the turning base, integrated by Simpson's rule."""
     torque = np.array([5.0, -3.0, 4.0, 20.0, -10.0, 5.0, 1.0, 1.0, -1.0])

@@ -47,6 +47,19 @@ def test_it_is_sampled_held_and_late_to_the_tick(interval: int, delay: int) -> N
     assert ticks_shown(bench, 200) == expected
 
 
+@given(st.integers(1, 40), st.integers(0, 80))
+def test_a_base_that_turned_before_tick_0_is_shown_as_it_was_then(
+    interval: int, delay: int
+) -> None:
+    """With no jump of what is told: late from the first tick on."""
+    truth = turning(0)
+    truth.omega_base[2] = 1e-3 / PERIOD
+    settings = {"rate": 1.0 / (interval * PERIOD), "delay": delay % (8 * interval) * PERIOD}
+    bench, late = Bench(truth=truth, star_tracker=settings), delay % (8 * interval)
+    shown = [(tick - late) // interval * interval if tick >= late else -late for tick in range(200)]
+    assert ticks_shown(bench, 200) == shown
+
+
 @pytest.mark.parametrize("period", [PERIOD, 4e-3])
 def test_an_interval_is_a_whole_number_of_ticks(period: float) -> None:
     """The nearest, at any period."""

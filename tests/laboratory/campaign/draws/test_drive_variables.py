@@ -10,10 +10,10 @@ from driven_robots import DRIVE, PLATES, driven_paper
 
 from space_robot.campaign.draws import Draws
 from space_robot.campaign.study import Study
+from space_robot_model.orbit.elements import EARTH_RADIUS
 from space_robot_model.robot import Robot
 from space_robot_model.robot.plates import plates_of
 from space_robot_msgs_py.errors import InputError
-from space_robot_sim.environment.gravity import EARTH_RADIUS
 from space_robot_sim.plant.plant import Plant
 
 DRIVEN = Robot.from_dict(driven_paper())

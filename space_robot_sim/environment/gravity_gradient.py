@@ -36,34 +36,11 @@ from space_robot_model.dynamics.algebra import (
     vector,
 )
 from space_robot_model.dynamics.model import Data, Model
+from space_robot_model.orbit.elements import MU, OBLATENESS
 from space_robot_msgs_py.compiled.kernels import kernel, subroutine
 from space_robot_msgs_py.compiled.lanes import uniform, whole
 
 Array = NDArray[np.float64]
-
-MU = 3.986004418e14
-"""Gravitational parameter of the Earth, m3/s2."""
-EARTH_RADIUS = 6378137.0
-"""Equatorial radius of the Earth, m (WGS 84)."""
-J2 = 1.08262668e-3
-"""Second zonal harmonic of the Earth (EGM96)."""
-OBLATENESS = 1.5 * J2 * MU * EARTH_RADIUS * EARTH_RADIUS
-"""m5/s2."""
-
-
-@kernel
-def gravity(position: Array, has_j2: float, out: Array) -> None:
-    """Write the acceleration of free fall at ``position`` (3,) into ``out`` (3,), m/s2."""
-    r = vector(position, 0)
-    square = dot(r, r)
-    distance = np.sqrt(square)
-    fall = scale(r, -MU / (square * distance))
-    if uniform(has_j2) != 0.0:
-        factor = -OBLATENESS / (square * square * distance)
-        height = 5.0 * r[2] * r[2] / square
-        pull = (r[0] * (1.0 - height), r[1] * (1.0 - height), r[2] * (3.0 - height))
-        fall = add(fall, scale(pull, factor))
-    store(fall, out, 0)
 
 
 @subroutine

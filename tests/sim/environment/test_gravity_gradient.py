@@ -1,8 +1,8 @@
-"""Gravity and its difference against decimal arithmetic of 50 digits, and J2's precession."""
+"""Difference of gravity against decimal arithmetic of 50 digits, and J2's precession."""
 
 from __future__ import annotations
 
-from decimal import Decimal, localcontext
+from decimal import localcontext
 
 import numpy as np
 import pytest
@@ -14,20 +14,18 @@ from orbiting_robots import (
     EARTH_RADIUS,
     J2,
     MU,
-    Exact,
     coast,
-    earth_potential,
     exact,
+    exact_gravity,
     mean_motion,
     orbiting_plant,
     plus,
     rigid_robot,
-    times,
 )
 from scipy.integrate import solve_ivp
 
 from space_robot_model.dynamics.model import Data
-from space_robot_sim.environment.gravity import add_gravity_gradient, gravity
+from space_robot_sim.environment.gravity_gradient import add_gravity_gradient
 
 Array = NDArray[np.float64]
 
@@ -41,22 +39,6 @@ FEW = settings(max_examples=200)
 def vector(direction: tuple[float, ...], length: float) -> Array:
     """Return a vector (3,) of that length."""
     return np.asarray(length * np.array(direction) / np.linalg.norm(direction))
-
-
-def exact_gravity(r: Exact, has_j2: bool) -> Exact:
-    """Return the acceleration by the textbook's formula (Vallado, equation 8-30)."""
-    square = times(r, r)
-    distance = square.sqrt()
-    fall = -Decimal(MU) / (square * distance)
-    if not has_j2:
-        return fall * r[0], fall * r[1], fall * r[2]
-    share = Decimal("1.5") * Decimal(J2) * Decimal(EARTH_RADIUS) ** 2 / square
-    height = 5 * r[2] * r[2] / square
-    return (
-        fall * r[0] * (1 + share * (1 - height)),
-        fall * r[1] * (1 + share * (1 - height)),
-        fall * r[2] * (1 + share * (3 - height)),
-    )
 
 
 def exact_difference(r: Array, d: Array, has_j2: bool) -> Array:
@@ -78,20 +60,6 @@ def difference(r: Array, d: Array, has_j2: bool) -> Array:
 
 
 @FEW
-@given(DIRECTION, HEIGHTS, st.booleans())
-def test_gravity_agrees_with_many_digits(
-    direction: tuple[float, ...], height: float, has_j2: bool
-) -> None:
-    r = vector(direction, EARTH_RADIUS + height)
-    out = np.empty(3)
-    gravity(r, float(has_j2), out)
-    with localcontext() as context:
-        context.prec = DIGITS
-        expected = np.array([float(x) for x in exact_gravity(exact(r), has_j2)])
-    np.testing.assert_allclose(out, expected, rtol=0, atol=1e-15 * np.linalg.norm(expected))
-
-
-@FEW
 @given(DIRECTION, HEIGHTS, DIRECTION, DISTANCES, st.booleans())
 def test_gravity_difference_loses_no_digits(
     direction: tuple[float, ...],
@@ -105,26 +73,6 @@ def test_gravity_difference_loses_no_digits(
     size = MU * distance / (EARTH_RADIUS + height) ** 3
     expected = exact_difference(r, d, has_j2)
     np.testing.assert_allclose(difference(r, d, has_j2), expected, rtol=0, atol=1e-14 * size)
-
-
-@FEW
-@given(DIRECTION, HEIGHTS, st.booleans())
-def test_gravity_is_the_gradient_of_its_potential(
-    direction: tuple[float, ...], height: float, has_j2: bool
-) -> None:
-    """By central differences of decimal numbers, over a nanometre."""
-    r = vector(direction, EARTH_RADIUS + height)
-    out, gradient = np.empty(3), np.empty(3)
-    gravity(r, float(has_j2), out)
-    with localcontext() as context:
-        context.prec = 2 * DIGITS
-        step = 1e-9
-        for axis in range(3):
-            aside = exact(step * np.eye(3)[axis])
-            back = exact(-step * np.eye(3)[axis])
-            ends = [earth_potential(plus(exact(r), d), has_j2) for d in (aside, back)]
-            gradient[axis] = float((ends[0] - ends[1]) / (2 * Decimal(step)))
-    np.testing.assert_allclose(out, -gradient, rtol=0, atol=1e-15 * np.linalg.norm(out))
 
 
 def test_nothing_pulls_at_the_point_itself() -> None:

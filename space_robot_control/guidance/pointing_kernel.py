@@ -1,0 +1,131 @@
+"""Attitude of a base that points, with its rate and acceleration, at many times.
+
+The frame T has its first axis along p, where the base points, and the second one in the half plane
+of p and v, the second direction: on its axes ``p = (P, 0, 0)`` and ``v = (v1, v2, 0)``, ``v2 > 0``.
+That both stay so, while p and v change, gives T's angular velocity, and its derivative.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from space_robot_model.dynamics.algebra import (
+    Vector,
+    columns_quaternion,
+    cross,
+    dot,
+    multiply,
+    rotated,
+    scale,
+    store,
+    vector,
+)
+from space_robot_model.orbit.propagation import Motion, point_motion, target_motion
+from space_robot_msgs_py.compiled.kernels import kernel, subroutine
+
+Array = NDArray[np.float64]
+Derivatives = tuple[Vector, Vector, Vector]
+"""A vector with its first two derivatives, inertial axes."""
+
+FIXED, NADIR, VELOCITY, NORMAL, TARGET = range(5)
+"""Kinds of directions."""
+ANCHOR_S = 5.0
+"""Time between the attitudes that decide the sign of a quaternion, s."""
+
+
+@kernel
+def pointing_into(
+    nodes: Array,
+    has_j2: float,
+    kinds: NDArray[np.int64],
+    fixed: Array,
+    from_base: Array,
+    begin: float,
+    anchors: Array,
+    time: Array,
+    out: Array,
+) -> None:
+    """Write the motion of a base that points.
+
+    Args:
+        nodes: (K, 18) of the orbit, see `propagate`; not read if both directions are fixed.
+        has_j2: 1 with the Earth's oblateness, else 0.
+        kinds: (2,) integers, of the direction to point in and of the second one.
+        fixed: (2, 3) these directions on inertial axes, where they are fixed.
+        from_base: (4,) quaternion from the base's frame to T.
+        begin: s, of the first anchor.
+        anchors: (A, 4) quaternions every `ANCHOR_S`, in whose hemisphere is that of a time after
+            them, or (0, 4).
+        time: (T,) s.
+        out: (T, 12) quaternion, angular velocity, rad/s, and acceleration on the base's axes; then
+            the sine of the angle between the directions, and the length of the first one.
+    """
+    turn = (from_base[0], from_base[1], from_base[2], from_base[3])
+    back = (turn[0], -turn[1], -turn[2], -turn[3])
+    zero = (0.0, 0.0, 0.0)
+    point, target = (zero, zero, zero, zero), (zero, zero, zero, zero)
+    for i in range(len(time)):
+        if kinds[0] != FIXED or kinds[1] != FIXED:
+            point = point_motion(nodes, time[i], has_j2)
+        if kinds[0] == TARGET or kinds[1] == TARGET:
+            target = target_motion(nodes, time[i], has_j2, point)
+        first = direction(kinds[0], fixed[0], point, target)
+        second = direction(kinds[1], fixed[1], point, target)
+        t1, t2, t3, length, sine = triad(first[0], second[0])
+        q = multiply(columns_quaternion(t1, t2, t3), turn)
+        if len(anchors) > 0:
+            anchor = anchors[max(int((time[i] - begin) / ANCHOR_S), 0)]
+            if q[0] * anchor[0] + q[1] * anchor[1] + q[2] * anchor[2] + q[3] * anchor[3] < 0.0:
+                q = (-q[0], -q[1], -q[2], -q[3])
+        omega, alpha = turning(first, second, t1, t2, t3)
+        out[i, 0], out[i, 1], out[i, 2], out[i, 3] = q
+        store(rotated(back, omega), out[i], 4)
+        store(rotated(back, alpha), out[i], 7)
+        out[i, 10], out[i, 11] = sine, length
+
+
+@subroutine
+def direction(kind: int, fixed: Array, point: Motion, target: Motion) -> Derivatives:
+    """Return a direction, of any length, with its derivatives."""
+    if kind == FIXED:
+        zero = (0.0, 0.0, 0.0)
+        return vector(fixed, 0), zero, zero
+    if kind == TARGET:
+        return target[0], target[1], target[2]
+    r, v, a, j = point
+    if kind == NADIR:
+        return scale(r, -1.0), scale(v, -1.0), scale(a, -1.0)
+    if kind == VELOCITY:
+        return v, a, j
+    va, rj = cross(v, a), cross(r, j)
+    return cross(r, v), cross(r, a), (va[0] + rj[0], va[1] + rj[1], va[2] + rj[2])
+
+
+@subroutine
+def triad(p: Vector, v: Vector) -> tuple[Vector, Vector, Vector, float, float]:
+    """Return the axes of T, the length of ``p`` and the sine of the angle between the vectors."""
+    length, other = np.sqrt(dot(p, p)), np.sqrt(dot(v, v))
+    t1, aside = scale(p, 1.0 / length), scale(v, 1.0 / other)
+    t3 = cross(t1, aside)
+    sine = np.sqrt(dot(t3, t3))
+    t3 = scale(t3, 1.0 / sine)
+    return t1, cross(t3, t1), t3, length, sine
+
+
+@subroutine
+def turning(
+    first: Derivatives, second: Derivatives, t1: Vector, t2: Vector, t3: Vector
+) -> tuple[Vector, Vector]:
+    """Return angular velocity and acceleration of T, on its axes."""
+    (p, pd, pdd), (v, vd, vdd) = first, second
+    length, stretch = dot(p, t1), dot(pd, t1)
+    v1, v2 = dot(v, t1), dot(v, t2)
+    vd1, vd2 = dot(vd, t1), dot(vd, t2)
+    y, z = -dot(pd, t3) / length, dot(pd, t2) / length
+    x = (dot(vd, t3) + y * v1) / v2
+    yd = (x * z * length - 2.0 * y * stretch - dot(pdd, t3)) / length
+    zd = (dot(pdd, t2) - 2.0 * z * stretch - x * y * length) / length
+    # the rates of v1 and v2 are vd1 + z v2 and vd2 - z v1
+    xd = (dot(vdd, t3) + yd * v1 + y * (2.0 * vd1 + z * v2) - x * (2.0 * vd2 - z * v1)) / v2
+    return (x, y, z), (xd, yd, zd)
