@@ -81,7 +81,7 @@ def check(as_json: bool, mass_uncertainty: float, **options: Any) -> None:
 
 
 @gains.command()
-@flight_options("robot", "mission", "sensors", "navigation", "set")
+@flight_options("robot", "mission", "orbit", "sensors", "navigation", "period", "set")
 @click.option(
     "--case",
     "cases",
