@@ -79,7 +79,8 @@ class WindowMetrics:
         self._largest: dict[str, float] = {}
         self._ripple: Ripple | None = None
         self._budget = budget
-        self._angles, self._pointing = AxisRms(3), None
+        self._angles = AxisRms(3)
+        self._pointing: BasePointing | None = None
         self._has_pointing = any(name.startswith((ANGLE, *POINTING)) for name in wanted)
         self._ticks, self._period = 0, 0.0
         self._has_ripple = any(name.startswith((RIPPLE, FAST_RIPPLE)) for name in wanted)
