@@ -25,7 +25,7 @@ else:
 
 from command import Ran, Run
 from flights import Flown, Start, ros_environment, space_robot_here
-from forked import Forked
+from forked import END_S, Forked
 from paths import CONFIG, TESTS
 
 from space_robot.flight.graph.domain import ros_domain
@@ -79,6 +79,8 @@ def forget_workspace(environment: MutableMapping[str, str]) -> None:
         others = [p for p in prefixes.split(os.pathsep) if not (Path(p) / MARKER).exists()]
         environment[PREFIXES] = os.pathsep.join(others)
 
+
+pytest_plugins = ["hung_tests"]
 
 PREFIXES, MARKER = "AMENT_PREFIX_PATH", "share/ament_index/resource_index/packages/space_robot"
 forget_workspace(os.environ)
@@ -246,7 +248,7 @@ def start(domain: int) -> Iterator[Start]:
     yield run
     for process in running:
         process.kill()
-        process.communicate()
+        process.communicate(END_S)
 
 
 @pytest.fixture

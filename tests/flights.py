@@ -7,8 +7,8 @@ import os
 import subprocess
 import sys
 import time
-from collections.abc import Callable
-from contextlib import redirect_stderr, redirect_stdout
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, redirect_stderr, redirect_stdout
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -77,6 +77,15 @@ def space_robot_here(*arguments: str) -> subprocess.CompletedProcess[str]:
     code = int(ended.value.code or 0)
     out, err = (stream.buffer.getvalue().decode() for stream in streams.values())
     return subprocess.CompletedProcess([*COMMAND, *arguments], code, out, err)
+
+
+@contextmanager
+def ended(process: subprocess.Popen[str]) -> Iterator[None]:
+    """Kill a process that a failed test leaves: the context of `Popen` waits for its end."""
+    try:
+        yield
+    finally:
+        process.kill()
 
 
 def wait_for_nodes(domain: int, timeout_s: float = 60.0) -> None:

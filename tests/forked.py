@@ -26,6 +26,8 @@ ERRORS = "FORKED_STANDARD_ERROR"
 """In a command's environment: the inode of the pipe that takes its standard error."""
 SPACE_ROBOT = "space-robot"
 POLL_S = 0.005
+END_S = 60.0
+"""Longest wait for the end of a process that is killed, or is about to end."""
 
 
 class Forked:
@@ -128,7 +130,9 @@ class Forked:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        self.communicate()
+        if kind:  # it may wait for what the test has not come to
+            self.kill()
+        self.communicate(END_S)
 
 
 def main() -> None:

@@ -18,6 +18,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <sys/socket.h>
+#include <sys/time.h>
 #include <unistd.h>
 
 /* Kinds of requests. */
@@ -80,6 +81,7 @@ static void serve(space_robot_state *state, const request *asked, answer *given)
 
 static int listen_on(uint16_t port)
 {
+    const struct timeval second = {.tv_sec = 1}; /* a signal may come just before the wait */
     struct sockaddr_in address = {0};
     const int udp = socket(AF_INET, SOCK_DGRAM, 0);
     address.sin_family = AF_INET;
@@ -89,6 +91,7 @@ static int listen_on(uint16_t port)
         perror("flight_computer");
         exit(2);
     }
+    (void)setsockopt(udp, SOL_SOCKET, SO_RCVTIMEO, &second, sizeof(second));
     return udp;
 }
 
@@ -115,7 +118,7 @@ int main(int count, char **arguments)
         socklen_t length = sizeof(peer);
         const ssize_t size =
             recvfrom(udp, &asked, sizeof(asked), 0, (struct sockaddr *)&peer, &length);
-        if (size != (ssize_t)sizeof(asked)) { /* interrupted, or not for this software */
+        if (size != (ssize_t)sizeof(asked)) { /* none came, or not for this software */
             given.kind = -1;
             if (size > 0) {
                 (void)sendto(udp, &given, sizeof(given.kind), 0, (struct sockaddr *)&peer, length);

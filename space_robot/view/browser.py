@@ -8,7 +8,7 @@ import subprocess
 import tempfile
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from typing import TYPE_CHECKING
 
 from space_robot_msgs_py.errors import FlightError, InputError
@@ -29,6 +29,8 @@ OPTIONS = (
 """Options: software rendering, and no network requests except to this process."""
 TIMEOUT_S = 60.0
 LOOK_S = 0.1
+END_S = 10.0
+"""Time to end when asked."""
 FRAME_TIMEOUT_S = 120.0
 """Timeout of a picture; the first one is slow without a graphics card."""
 
@@ -75,6 +77,9 @@ def headless_browser(server: ViserServer) -> Iterator[ClientHandle]:
                 yield _client(server, process)
             finally:
                 process.terminate()
+                with suppress(subprocess.TimeoutExpired):
+                    process.wait(END_S)
+                process.kill()
 
 
 def _client(server: ViserServer, process: subprocess.Popen[bytes]) -> ClientHandle:

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 import pytest
 import ros_interfaces
-from flights import COMMAND, ros_environment, space_robot_here, wait_for_nodes
+from flights import COMMAND, ended, ros_environment, space_robot_here, wait_for_nodes
 
 from space_robot_model.robot.find import find_robot
 from space_robot_msgs_py.bag.reader import read_flight
@@ -117,13 +117,16 @@ def flight(control_msgs: Path, free_domain: int, tmp_path: Path) -> Iterator[sub
     """A paused flight of 7 s, some ticks after its start."""
     paths = [str(control_msgs), os.environ.get("PYTHONPATH", "")]
     options = ["--duration", "7", "--domain", str(free_domain), "--bag", str(tmp_path / "bag")]
-    with subprocess.Popen(
-        [*COMMAND, "fly", "--paused", *options],
-        env={**ros_environment(), "PYTHONPATH": os.pathsep.join(filter(None, paths))},
-        stdout=subprocess.PIPE,
-        stderr=subprocess.STDOUT,
-        text=True,
-    ) as process:
+    with (
+        subprocess.Popen(
+            [*COMMAND, "fly", "--paused", *options],
+            env={**ros_environment(), "PYTHONPATH": os.pathsep.join(filter(None, paths))},
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+        ) as process,
+        ended(process),
+    ):
         try:
             wait_for_nodes(free_domain)
             until(lambda: sim(free_domain, "step", "--ticks", "500") == 0)
@@ -131,6 +134,7 @@ def flight(control_msgs: Path, free_domain: int, tmp_path: Path) -> Iterator[sub
         finally:
             if process.poll() is None:
                 process.send_signal(signal.SIGINT)
+                process.communicate(timeout=TIMEOUT_S)
 
 
 def test_goals_are_followed_superseded_and_cancelled(

@@ -181,8 +181,8 @@ def flight_computer(tmp_path: Path) -> Iterator[int]:
     assert running.stdout.readline() == f"flight software of 9 axes listens on 127.0.0.1:{port}\n"
     yield port
     running.terminate()
-    answered = running.stdout.read()
-    assert running.wait(10) == 0
+    answered, _ = running.communicate(timeout=10)
+    assert running.returncode == 0
     assert "states answered" in answered
 
 

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import psutil
 import pytest
-from flights import COMMAND, ros_environment, space_robot_here
+from flights import COMMAND, ended, ros_environment, space_robot_here
 
 from space_robot.flight import disk_space as room
 from space_robot.flight.plan import Flight, FlightPlan, resolve
@@ -55,12 +55,13 @@ def test_memory_does_not_grow_with_the_flight(recorded: bool, tmp_path: Path) ->
 def test_the_longest_flight_flies_and_can_be_interrupted(tmp_path: Path) -> None:
     """It ended in a traceback before its first tick."""
     bag = tmp_path / "bag"
-    with subprocess.Popen(
-        [*COMMAND, "simulate", "--duration", "1e6", "--bag", str(bag)],
-        stderr=subprocess.PIPE,
-        text=True,
-        env=ros_environment(),
-    ) as process:
+    command = [*COMMAND, "simulate", "--duration", "1e6", "--bag", str(bag)]
+    with (
+        subprocess.Popen(
+            command, stderr=subprocess.PIPE, text=True, env=ros_environment()
+        ) as process,
+        ended(process),
+    ):
         while not (bag / "bag_0.mcap").exists() or (bag / "bag_0.mcap").stat().st_size < 1_000_000:
             assert process.poll() is None
             time.sleep(0.02)

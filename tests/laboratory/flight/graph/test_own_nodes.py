@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 from command import Run
 from flights import Start, forked_space_robot, ros_environment, space_robot_here
-from forked import Forked
+from forked import END_S, Forked
 from paths import ROOT
 
 from space_robot.processes.node_modules import MODULES
@@ -42,7 +42,7 @@ def begin(free_domain: int) -> Iterator[Begin]:
     yield start
     for process in running:
         process.kill()
-        process.communicate()
+        process.communicate(END_S)
 
 
 def test_a_controller_of_ones_own_flies_as_the_law_that_it_has(

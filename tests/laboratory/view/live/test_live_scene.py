@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from flights import COMMAND, forked_space_robot, ros_environment, space_robot_here
+from flights import COMMAND, ended, forked_space_robot, ros_environment, space_robot_here
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
@@ -210,20 +210,21 @@ def test_two_flights_one_after_the_other(tmp_path: Path, free_domain: int) -> No
 
 
 def test_ctrl_c_ends_it(free_domain: int) -> None:
-    with subprocess.Popen(
-        [*COMMAND, "view", "--live", "--no-open", "--port", "0", "--domain", str(free_domain)],
-        stderr=subprocess.PIPE,
-        text=True,
-        env=ros_environment(),
-    ) as process:
+    command = [*COMMAND, "view", "--live", "--no-open", "--port", "0", "--domain", str(free_domain)]
+    with (
+        subprocess.Popen(
+            command, stderr=subprocess.PIPE, text=True, env=ros_environment()
+        ) as process,
+        ended(process),
+    ):
         assert process.stderr is not None
         assert process.stderr.readline().strip() == "starting the scene ..."
         address, waiting = process.stderr.readline(), process.stderr.readline()
         assert address.startswith("the scene is at http://127.0.0.1:")
         assert waiting.strip() == serving.WAITING
         process.send_signal(signal.SIGINT)
-        assert process.stderr.read().strip() == "ended"
-        assert process.wait(TIMEOUT_S) == 0
+        assert process.communicate(timeout=TIMEOUT_S)[1].strip() == "ended"
+        assert process.returncode == 0
 
 
 def test_a_flight_in_orbit_has_the_earth_below(tmp_path: Path, free_domain: int) -> None:
