@@ -33,6 +33,12 @@ def quaternion_of(rotation: Rotation) -> Array:
     return np.roll(rotation.as_quat(), 1)
 
 
+def multiplied(a: Array, b: Array) -> Array:
+    """Hamilton's product of two quaternions ``[w, x, y, z]`` of any norm."""
+    w = a[0] * b[0] - a[1:] @ b[1:]
+    return np.array([w, *(a[0] * b[1:] + b[0] * a[1:] + np.cross(a[1:], b[1:]))])
+
+
 def turned(quaternion: ArrayLike, angle_inertial: ArrayLike) -> Array:
     """``quaternion`` turned by a rotation vector on inertial axes, on the same side."""
     result = quaternion_of(
