@@ -11,7 +11,15 @@ import numpy as np
 import pytest
 from hypothesis import assume, given, settings
 from numpy.typing import NDArray
-from oracles import attitude_jacobian_inertial, multiplied, quaternion_of, rotation_of, skew, turned
+from oracles import (
+    RelativeMotion,
+    attitude_jacobian_inertial,
+    multiplied,
+    quaternion_of,
+    rotation_of,
+    skew,
+    turned,
+)
 from random_robots import Case, State, branched_cases, cases, random_quaternion, random_state
 from scipy.spatial.transform import Rotation
 
@@ -56,24 +64,13 @@ def second_rate(frame: Frame, s: State, acceleration: Array) -> Array:
     The base's ``acceleration`` (3,) is inertial, on the frame's axes, as all of ``s``.
     """
 
-    def pure(vector: Array) -> Array:
-        return np.concatenate([[0.0], vector])
-
-    def conjugate(quaternion: Array) -> Array:
-        return quaternion * [1.0, -1.0, -1.0, -1.0]
-
     to_inertial = rotation_of(frame.quaternion)
-    w, wdot = (pure(to_inertial.apply(vector)) for vector in (s.w0, acceleration))
-    q, q_d = multiplied(frame.quaternion, s.quaternion), frame.quaternion
-    q_rate = 0.5 * multiplied(w, q)
-    q_second = 0.5 * (multiplied(wdot, q) + multiplied(w, q_rate))
-    d_rate = 0.5 * multiplied(q_d, pure(frame.omega))
-    d_second = 0.5 * (multiplied(d_rate, pure(frame.omega)) + multiplied(q_d, pure(frame.alpha)))
-    return (
-        multiplied(conjugate(d_second), q)
-        + 2.0 * multiplied(conjugate(d_rate), q_rate)
-        + multiplied(conjugate(q_d), q_second)
-    )[1:]
+    inertial = s._replace(
+        quaternion=multiplied(frame.quaternion, s.quaternion), w0=to_inertial.apply(s.w0)
+    )
+    motion = RelativeMotion.of(np.concatenate(frame), inertial)
+    side = np.sign(motion.error @ s.quaternion)
+    return side * motion.second_rate(to_inertial.apply(acceleration))
 
 
 def jacobian_rate(s: State) -> Array:
