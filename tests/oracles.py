@@ -62,7 +62,8 @@ class RelativeMotion(NamedTuple):
         def second_rate(acceleration: Array) -> Array:
             own = multiplied(np.array([0.0, *acceleration]), q) + multiplied(w, q_rate)
             second = multiplied(back[2], q) + 2.0 * multiplied(back[1], q_rate)
-            return (second + multiplied(back[0], 0.5 * own))[1:]
+            result: Array = (second + multiplied(back[0], 0.5 * own))[1:]
+            return result
 
         rate = multiplied(back[1], q) + multiplied(back[0], q_rate)
         return cls(multiplied(back[0], q), rate[1:], second_rate)
