@@ -22,6 +22,7 @@ from space_robot_model.robot import Robot
 from space_robot_msgs_py.config.yaml_text import parse_yaml
 from space_robot_msgs_py.errors import InputError
 
+from ..flight.mission_demand import MOTION
 from .bends import best_bends
 
 WORTHWHILE = 0.98
@@ -40,6 +41,8 @@ def stretched_mission(
 ) -> MissionSettings:
     """Return the mission with every segment as long as the limits ask for, or as it is if longer.
 
+    Torques from outside count for nothing: that of gravity does not fall with longer durations.
+
     Args:
         settings: of the mission.
         report: its `space_robot.analysis.mission_plan.plan_report`.
@@ -48,11 +51,11 @@ def stretched_mission(
     """
     spans = []
     for segment in report["segments"]:
-        factor = 1.0
+        factor, motion = 1.0, segment["sources"][MOTION]
         if base_torque is not None:
-            factor = max(factor, float(np.sqrt(segment["base_torque"] / base_torque)))
+            factor = max(factor, float(np.sqrt(motion["base_torque"] / base_torque)))
         if momentum is not None:
-            factor = max(factor, segment["momentum"] / momentum)
+            factor = max(factor, motion["momentum"] / momentum)
         span = segment["duration_s"] * (factor if factor == 1.0 else factor * BETWEEN_SAMPLES)
         spans.append(span if factor == 1.0 else float(np.ceil(span * 10**DIGITS) / 10**DIGITS))
     legs = len(settings.waypoint_times) - 1

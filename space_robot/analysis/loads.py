@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from space_robot_model.elementary.matrices import product
-from space_robot_model.hardware.capability import ThrusterTorques, wheel_shares
+from space_robot_model.hardware.capability import ThrusterTorques, wheel_loads
 from space_robot_model.hardware.thrusters import ThrusterSettings
 from space_robot_model.hardware.wheels import WheelSettings
 from space_robot_msgs_py.bag.flight_log import FlightLog
@@ -107,25 +107,10 @@ class WheelLoad(Load):
 
 
 class OtherWheelLoad(WheelLoad):
-    """The same of wheels that did not fly.
-
-    Their motors must give what changes their momentum, the turning of the base under it included,
-    and what their own friction takes: ``u = -P (tau + w x h) + f``, with h what they hold together.
-    """
-
-    def __init__(self, wheels: WheelSettings) -> None:
-        super().__init__(wheels)
-        self._shares = wheel_shares(wheels)
-        self._initial = wheels.spin_momenta(wheels.values("initial_speed"))
+    """The same of wheels that did not fly, see `wheel_loads`."""
 
     def _series(self, log: FlightLog, demand: Demand) -> WheelRows:
-        wheels = self._wheels
-        momentum = product(demand.momentum, self._shares.T) + self._initial
-        turning = np.cross(demand.omega, product(momentum, wheels.unit_axes))
-        torque = -product(demand.torque + turning, self._shares.T)
-        speed = momentum / wheels.values("rotor_inertia")
-        friction = wheels.values("coulomb") * np.sign(speed) + wheels.values("viscous") * speed
-        return WheelRows(torque + friction, momentum)
+        return WheelRows(*wheel_loads(self._wheels, demand.torque, demand.momentum, demand.omega))
 
 
 class ThrusterLoad(Load):

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -10,17 +12,18 @@ from numpy.typing import NDArray
 
 from space_robot_control.allocation.assumed_actuators import assumed_actuators
 from space_robot_control.guidance.courses import Piece
-from space_robot_control.guidance.demand import MotionDemand, demand
+from space_robot_control.guidance.demand import MotionDemand
 from space_robot_control.guidance.mission import Mission
 from space_robot_control.guidance.tool_path import ToolFollower
 from space_robot_model.elementary.least_squares import singular_values
 from space_robot_model.elementary.matrices import norms
 from space_robot_model.hardware.base_actuators import BaseActuatorSettings
-from space_robot_model.hardware.capability import limits_of, shares_of
 from space_robot_model.robot import Robot
 from space_robot_msgs_py.config.directory import config_directory
 from space_robot_msgs_py.errors import InputError
+from space_robot_sim.environment.orbit_settings import OrbitSettings
 
+from ..flight.mission_demand import PieceDemand, SourceDemand, excess, mission_demand
 from .joint_margins import joint_margins
 
 Array = NDArray[np.float64]
@@ -30,10 +33,13 @@ POSTURES = 51
 
 
 class PlannedSegment(NamedTuple):
-    """A segment and what it asks for, with zero momentum and without friction."""
+    """A segment and what it asks for, without friction."""
 
     piece: Piece
     demand: MotionDemand
+    """Of the actuators: in an orbit less what the torques from outside give."""
+    sources: Mapping[str, SourceDemand]
+    """See `space_robot.flight.mission_demand.PieceDemand`."""
     tool: Array
     """(K, 3) m, positions of the tool from the robot's centre of mass, inertial axes."""
     singular_value: float
@@ -43,14 +49,11 @@ class PlannedSegment(NamedTuple):
     """The same with a free base: 0 in a dynamic singularity."""
 
     @property
-    def base_torque(self) -> float:
-        """N m, largest component on the base's axes."""
-        return float(np.max(self.demand.base_torque))
-
-    @property
-    def momentum(self) -> float:
-        """N m s, largest angular momentum that the base's actuators take up."""
-        return float(np.max(self.demand.stored_momentum))
+    def of_base(self) -> SourceDemand:
+        """What the base's actuators give, whatever the source."""
+        stored = self.demand.stored_momentum
+        torque = float(np.max(self.demand.base_torque))
+        return SourceDemand(torque, float(stored.max()), float(stored[-1]))
 
 
 class Feasibility(NamedTuple):
@@ -59,37 +62,42 @@ class Feasibility(NamedTuple):
     actuators: str
     is_feasible: bool
     torque: float
-    """Largest torque asked, as a share of what they give about that axis; NaN: not known."""
+    """Largest torque asked, as a share of what they give in that direction."""
     momentum: float
     """Largest momentum asked, as a share of what they hold; 0: they need not hold any."""
+    complaint: str
+    """What is asked too much, where and when; empty: nothing is."""
 
 
-def planned_segments(robot: Robot, mission: Mission) -> list[PlannedSegment]:
+def planned_segments(
+    robot: Robot, mission: Mission, orbit: OrbitSettings | None = None
+) -> list[PlannedSegment]:
     """Return all pieces of a mission with their demands.
 
     Args:
         robot: as the flight software knows it.
         mission: the plan.
+        orbit: with the torques from outside; None: there are none.
 
     Raises:
         InputError: it has a single waypoint.
     """
     if not mission.duration:
         raise InputError("the mission has no motion to plan: a single waypoint")
-    nominal = robot.nominal
-    follower = ToolFollower(nominal, None)
-    return [_planned(nominal, piece, follower) for piece in mission.pieces]
+    follower = ToolFollower(robot.nominal, None)
+    demands = mission_demand(robot, mission.pieces, orbit or OrbitSettings())
+    return [_planned(asked, follower) for asked in demands]
 
 
-def _planned(robot: Robot, piece: Piece, follower: ToolFollower) -> PlannedSegment:
-    asked = demand(robot, piece.joints, piece.base, piece.begin, piece.end)
+def _planned(of_piece: PieceDemand, follower: ToolFollower) -> PlannedSegment:
+    asked = of_piece.asked
     rows = np.unique(np.linspace(0, len(asked.time) - 1, POSTURES).astype(int))
     poses = [follower.pose(asked.base[k, :4], asked.joints[k, 0]) for k in rows]
     smallest = [
         min(_smallest(pose.jacobian, pose.from_base) for pose in poses),
         min(_smallest(pose.free_jacobian, pose.from_base) for pose in poses),
     ]
-    return PlannedSegment(piece, asked, np.array([pose.position for pose in poses]), *smallest)
+    return PlannedSegment(*of_piece, np.array([pose.position for pose in poses]), *smallest)
 
 
 def _smallest(jacobian: Array, lever: Array) -> float:
@@ -99,41 +107,58 @@ def _smallest(jacobian: Array, lever: Array) -> float:
     return float(values[0])
 
 
-def feasibility(robot: Robot, segments: list[PlannedSegment]) -> list[Feasibility]:
-    """Return for each of the shipped actuators whether they give what a mission asks for."""
-    torque = np.vstack([segment.demand.torque[:, :3] for segment in segments])
-    momentum = np.vstack([segment.demand.base_momentum for segment in segments])
-    judged = []
+def feasibility(
+    robot: Robot, segments: Sequence[PlannedSegment], chosen: Mapping[str, BaseActuatorSettings]
+) -> list[Feasibility]:
+    """Return whether actuators give what a mission asks for: the chosen ones, and those shipped."""
+    sets = {name: hardware for name, hardware in chosen.items() if _is_limited(hardware)}
     for file in sorted((config_directory() / "actuators").glob("*.yaml")):
-        try:
+        with suppress(InputError):  # not for this robot
             hardware = assumed_actuators(file.stem, robot)
-        except InputError:  # not for this robot
-            continue
-        if hardware.base_actuation == "hardware":
-            judged.append(_judged(file.stem, hardware, torque, momentum))
-    return judged
+            if _is_limited(hardware) and hardware not in sets.values():
+                sets[file.stem] = hardware
+    demands = [PieceDemand(*segment[:3]) for segment in segments]
+    judged = ((name, excess(hardware, demands)) for name, hardware in sets.items())
+    return [Feasibility(name, not of.complaint, *of) for name, of in judged]
 
 
-def _judged(
-    name: str, hardware: BaseActuatorSettings, torque: Array, momentum: Array
-) -> Feasibility:
-    of_torque, of_momentum = (
-        float(shares_of(limit, asked).max())
-        for limit, asked in zip(limits_of(hardware), (torque, momentum), strict=True)
-    )
-    return Feasibility(name, max(of_torque, of_momentum) <= 1.0, of_torque, of_momentum)
+def _is_limited(hardware: BaseActuatorSettings) -> bool:
+    return hardware.base_actuation == "hardware"
 
 
-def plan_report(robot: Robot, segments: list[PlannedSegment]) -> dict[str, Any]:
-    """Return the plan as numbers and texts: segments, demands, limits, actuators."""
+def plan_report(
+    robot: Robot,
+    segments: Sequence[PlannedSegment],
+    chosen: Mapping[str, BaseActuatorSettings] | None = None,
+) -> dict[str, Any]:
+    """Return the plan as numbers and texts: segments, demands, limits, actuators.
+
+    Args:
+        robot: as the flight software knows it.
+        segments: of its mission.
+        chosen: actuators to be judged before those shipped, by name; ``refused`` says what the
+            mission asks too much of them.
+    """
+    chosen = chosen or {}
+    judged = feasibility(robot, segments, chosen)
+    by_source = {
+        name: _over_all([segment.sources[name] for segment in segments])
+        for name in segments[0].sources
+    }
     return {
         "duration_s": segments[-1].piece.end,
-        "base_torque": max(segment.base_torque for segment in segments),
-        "momentum": max(segment.momentum for segment in segments),
+        **_over_all([segment.of_base for segment in segments])._asdict(),
+        "sources": {name: of._asdict() for name, of in by_source.items()},
         "segments": [_row(robot, number, s) for number, s in enumerate(segments, 1)],
         "joints": joint_margins(robot, [segment.demand for segment in segments]),
-        "actuators": [judged._asdict() for judged in feasibility(robot, segments)],
+        "actuators": [of._asdict() for of in judged],
+        "refused": "; ".join(of.complaint for of in judged if of.actuators in chosen),
     }
+
+
+def _over_all(demands: Sequence[SourceDemand]) -> SourceDemand:
+    torque, momentum, ends = zip(*demands, strict=True)
+    return SourceDemand(max(torque), max(momentum), ends[-1])
 
 
 def _row(robot: Robot, number: int, segment: PlannedSegment) -> dict[str, Any]:
@@ -144,8 +169,8 @@ def _row(robot: Robot, number: int, segment: PlannedSegment) -> dict[str, Any]:
         "motion": piece.motion,
         "begin_s": piece.begin,
         "duration_s": piece.end - piece.begin,
-        "base_torque": segment.base_torque,
-        "momentum": segment.momentum,
+        **segment.of_base._asdict(),
+        "sources": {name: of._asdict() for name, of in segment.sources.items()},
         "joint_rates": dict(zip(robot.joint_names, rates.tolist(), strict=True)),
         "goal_deg": robot.to_degrees(piece.goal).tolist(),
         "attitude": piece.attitude.tolist(),

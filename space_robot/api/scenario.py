@@ -17,7 +17,6 @@ from space_robot_msgs_py.errors import InputError
 from ..console.progress import check_progress
 from ..flight.compilation import compile_kernels
 from ..flight.plan import Flight, resolve
-from ..flight.start_step import sentence
 from ..scenario.options import FlightPlan
 from .bench import Bench
 from .flown_flight import FlownFlight
@@ -52,7 +51,8 @@ class Scenario(FlightPlan):
       one for all axes or n+3 (base x, y, z, joints); or such a mapping for each of several laws
     - ``mission``: `MissionSettings` or a mapping: ``waypoint_times`` s, ``waypoints_deg`` (flat,
       degrees, or m for prismatic joints), ``base_quaternion`` ``[w, x, y, z]``,
-      ``initial_joints_deg`` (default: the first waypoint), ``events``
+      ``base_point``, ``base_rate_deg_s``, ``initial_joints_deg``, ``initial_quaternion`` and
+      ``initial_rate_deg_s`` (default: the mission's start), ``events``; or a mission's document
     - ``case``, ``sensors``, ``actuators``: their settings, objects or mappings
     - ``assumed_actuators``: the base's actuators as assumed by the flight software
     - ``parameters``: any parameter of a node, ``{"plant": {"friction.coulomb": 0.0}}``
@@ -121,7 +121,8 @@ class Scenario(FlightPlan):
 
         A diverged flight is a result, too: see `FlownFlight.outcome`. The first flight on a machine
         compiles the kernels. A start away from the mission's, with commands far above those of the
-        mission, causes a `UserWarning`.
+        mission, causes a `UserWarning`, and so does a mission that controls the attitude of a base
+        without actuators.
 
         Args:
             bag: folder to record to, which must not exist.
@@ -136,8 +137,8 @@ class Scenario(FlightPlan):
             raise InputError("controller is None, so there is nothing to fly: use bench()")
         check_progress(progress)
         path, flight = None if bag is None else as_path(bag, "bag"), self.check()
-        if step := flight.start_step:
-            warnings.warn(sentence(step), stacklevel=2)
+        for remark in flight.remarks:
+            warnings.warn(remark, stacklevel=2)
         return fly_with_progress(flight, path, progress, keep_log)
 
     def bench(self, record: bool = True) -> Bench:

@@ -19,7 +19,6 @@ from ..flight.batch.sharing import batches
 from ..flight.compilation import compile_kernels
 from ..flight.ending import Ending
 from ..flight.plan import Flight
-from ..flight.start_step import sentence
 from .flown_flight import FlownFlight
 from .in_process import fly_in_process
 from .scenario import Scenario
@@ -98,8 +97,8 @@ def _checked(scenarios: Iterable[Scenario], is_flown: bool = True) -> Iterator[t
             flight = scenario.check()
         except InputError as error:
             raise InputError(f"{where}: {error}") from None
-        if is_flown and (step := flight.start_step):
-            warnings.warn(f"{where}: {sentence(step)}", stacklevel=3)
+        for remark in flight.remarks if is_flown else ():
+            warnings.warn(f"{where}: {remark}", stacklevel=3)
         yield number, flight
 
 

@@ -12,10 +12,11 @@ from click.core import ParameterSource
 
 from ..scenario.option_table import Option, names, option
 from .completed_names import names_in
-from .scenario_option import NameOrNumbers, parameters, scenario
+from .scenario_option import NameOrNumbers, parameters, scenario, scenario_of_flight
 
 if TYPE_CHECKING:
     from ..flight.plan import Flight
+    from ..scenario.resolved import ResolvedScenario
 
 Decorator = Callable[[Any], Any]
 
@@ -160,11 +161,20 @@ OTHERS: dict[str, Decorator] = {
         expose_value=False,
         help="YAML file with any of these options; those given here come first.",
     ),
+    "scenario_of_flight": click.option(
+        "--scenario",
+        type=click.Path(path_type=Path),
+        is_eager=True,
+        callback=scenario_of_flight,
+        expose_value=False,
+        help="YAML file of a flight's options, of which those of this command count.",
+    ),
     "json": click.option("--json", "as_json", is_flag=True, help="Print the report as JSON."),
 }
 """Options of flying commands that do not define the flight."""
-ON_A_FLIGHT = (*names(needs_graph=False), *OTHERS)
-ON_A_GRAPH = (*names(), *OTHERS)
+_OF_A_FLIGHT = ("bag", "set", "scenario", "json")
+ON_A_FLIGHT = (*names(needs_graph=False), *_OF_A_FLIGHT)
+ON_A_GRAPH = (*names(), *_OF_A_FLIGHT)
 
 
 def flight_option(name: str) -> Decorator:
@@ -191,26 +201,39 @@ def plan_flight(**options: Any) -> Flight:
     Raises:
         InputError: options conflict, or a name is unknown.
     """
+    from ..flight.plan import Flight
+
+    return Flight(resolve_options(**options))
+
+
+def resolve_options(**options: Any) -> ResolvedScenario:
+    """Return the scenario defined by the options of a command, as `plan_flight` flies it.
+
+    Raises:
+        InputError: options conflict, or a name is unknown.
+    """
     from space_robot_msgs_py.config.validation import validate
 
-    from ..flight.plan import Flight, FlightPlan, resolve
+    from ..scenario.options import FlightPlan
+    from ..scenario.resolve import resolve
 
     context = click.get_current_context(silent=True)
     if context and context.get_parameter_source("controller") is ParameterSource.DEFAULT:
         options.pop("controller", None)  # the robot's own gains may name another
-    return Flight(resolve(validate(FlightPlan, options, "options")))
+    return resolve(validate(FlightPlan, options, "options"))
 
 
 def remarks_on(flight: Flight) -> list[str]:
     """Return the warnings to print before a flight begins.
 
-    On a repaired robot file, a start away from the mission's, gains with too
-    little margin (of default gains only where hardware or a fault tries the margin), of joints
-    that are asked too much.
+    On a repaired robot file, a start away from the mission's, a base that floats freely under a
+    mission that controls it, waypoints that ask too much of the actuators, gains with too little
+    margin (of default gains only where hardware or a fault tries the margin), of joints that are
+    asked too much.
     """
     from space_robot_model.robot.described import unit_remarks
 
-    from ..flight.start_step import sentence
+    from ..flight.mission_demand import demand_remark
     from ..tuning.gain_check import pair_corner
     from ..tuning.warning import limit_remarks, margin_remarks
 
@@ -232,8 +255,8 @@ def remarks_on(flight: Flight) -> list[str]:
         nominal=flight.robot,
     )
     on_limits = limit_remarks(flight.plant.robot, flight.mission_settings)
-    step = flight.start_step
-    on_start = [f"warning: {sentence(step)}"] if step else []
+    on_start = [f"warning: {text}" for text in flight.remarks]
+    on_demand = [f"warning: {text}" for text in [demand_remark(flight.scenario)] if text]
     repaired = [f"repaired: {text}" for text in flight.robot.repairs]
     units = [f"warning: {text}" for text in unit_remarks(flight.robot)]
-    return [*repaired, *units, *on_start, *on_gains, *on_limits]
+    return [*repaired, *units, *on_start, *on_demand, *on_gains, *on_limits]

@@ -24,6 +24,17 @@ SIGMA = (
     "σ: smallest singular value of the tool's Jacobian, with the base's attitude held and with a "
     "free base; its rows of translation are divided by the tool's distance from the base"
 )
+STORED = Column("at its end", "N m s", ".3g")
+"""Momentum at the end of a segment, shown where there is any: at rest without an orbit it is zero.
+"""
+NO_MOMENTUM = 1e-9
+"""N m s."""
+SOURCES = (
+    Column("given for", is_label=True),
+    Column("torque", "N m", ".3g"),
+    Column("momentum", "N m s", ".3g"),
+    Column("at the end", "N m s", ".3g"),
+)
 ACTUATORS = (
     Column("actuators", is_label=True),
     Column("torque", "%", ".0f"),
@@ -37,6 +48,7 @@ MANY = 1e3
 
 def print_plan(report: Mapping[str, Any], console: Console) -> None:
     """Print the report of `space_robot.analysis.mission_plan.plan_report`."""
+    has_ends = any(s["momentum_end"] > NO_MOMENTUM for s in report["segments"])
     rows = [
         (
             f"{s['segment']} {s['motion']}",
@@ -44,13 +56,22 @@ def print_plan(report: Mapping[str, Any], console: Console) -> None:
             s["tool_travel_m"],
             s["base_torque"],
             s["momentum"],
+            *([s["momentum_end"]] if has_ends else []),
             s["singular_value"],
             s["free_singular_value"],
         )
         for s in report["segments"]
     ]
-    print_table(Table.of("", SEGMENTS, rows), console)
+    columns = (*SEGMENTS[:5], STORED, *SEGMENTS[5:]) if has_ends else SEGMENTS
+    print_table(Table.of("", columns, rows), console)
     say(console, SIGMA)
+    if len(report["sources"]) > 1:
+        sources = {**report["sources"], "all, without unloading": report}
+        rows = [
+            (name.replace("_", " "), of["base_torque"], of["momentum"], of["momentum_end"])
+            for name, of in sources.items()
+        ]
+        print_table(Table.of("", SOURCES, rows), console)
     judged = [
         (
             a["actuators"],

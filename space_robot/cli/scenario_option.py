@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from pathlib import Path
 from typing import Any
 
@@ -57,6 +58,17 @@ def _set(tree: dict[str, dict[str, Any]], text: str, where: str) -> None:
 
 def scenario(context: click.Context, option: click.Parameter, path: Path | None) -> None:
     """Use the values of a scenario as defaults of the options."""
+    _use(context, path, ())
+
+
+def scenario_of_flight(context: click.Context, option: click.Parameter, path: Path | None) -> None:
+    """Do the same for a command without some options of a flight, which are ignored."""
+    from ..scenario.option_table import names
+
+    _use(context, path, set(names()))
+
+
+def _use(context: click.Context, path: Path | None, ignored: Collection[str]) -> None:
     if path is None:
         return
     from space_robot_msgs_py.config.validation import one_of, read_yaml
@@ -66,7 +78,7 @@ def scenario(context: click.Context, option: click.Parameter, path: Path | None)
         for parameter in context.command.params
         if parameter.name and parameter.name not in ("scenario", "help")
     }
-    content = read_yaml(path)
+    content = {k: v for k, v in read_yaml(path).items() if k in options or k not in ignored}
     for key in content:
         one_of(key, options, "key", f" in {path}")
     if (parameters := content.pop("parameters", None)) is not None:

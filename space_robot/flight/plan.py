@@ -17,8 +17,8 @@ from ..processes.software import commit, versions
 from ..scenario.options import NO_FRICTION, FlightPlan
 from ..scenario.resolve import resolve
 from ..scenario.resolved import ResolvedScenario
-from .mission_demand import check_mission_demand
-from .start_step import start_step
+from .mission_demand import check_mission_demand, held_base_remark
+from .start_step import sentence, start_step
 
 __all__ = ["NO_FRICTION", "Flight", "FlightPlan", "resolve"]
 
@@ -125,6 +125,13 @@ class Flight:
             self.ticks,
         )
         return step and step._asdict()
+
+    @property
+    def remarks(self) -> list[str]:
+        """What a user should know of start and base before the flight, a sentence each."""
+        step = self.start_step
+        remarks = [sentence(step) if step else "", held_base_remark(self.scenario)]
+        return [remark for remark in remarks if remark]
 
     @property
     def brief(self) -> dict[str, Any]:

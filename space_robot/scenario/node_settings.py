@@ -173,7 +173,8 @@ def _at_pointing_start(plant: PlantNodeSettings, mission: MissionNodeSettings) -
     try:
         attitude, rate_deg_s = pointing_start(mission)
     except InputError as error:
-        raise InputError(f"{mission.mission or 'mission'}: {error}") from None
+        file = f"{mission.mission}: " if mission.mission not in ("", GIVEN) else ""
+        raise InputError(f"{file}{error}") from None
     start = {"initial_quaternion": attitude, "initial_rate_deg_s": rate_deg_s}
     return plant.model_copy(
         update={key: value for key, value in start.items() if key not in plant.model_fields_set}

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from space_robot_model.elementary.matrices import unit_rows
+from space_robot_model.elementary.matrices import product, unit_rows
 from space_robot_model.hardware.base_actuators import BaseActuatorSettings
 from space_robot_model.hardware.thrusters import ThrusterSettings
 from space_robot_model.hardware.wheels import WheelSettings
@@ -30,11 +30,17 @@ def largest_torque(hardware: BaseActuatorSettings) -> Array:
 
     However they share it: a linear programme, see `_largest`.
     """
+    rows, low, high = _reach(hardware)
+    return _largest(rows.T, low, high)
+
+
+def _reach(hardware: BaseActuatorSettings) -> tuple[Array, Array, Array]:
+    """Return torques (A, 3) of wheels, for 1 N m, and of thrusters, and limits of their factors."""
     wheels, thrusters = hardware.wheels, hardware.thrusters
-    columns, limit = np.vstack([wheels.unit_axes, thrusters.torques]).T, wheels.limits("max_torque")
-    high = np.concatenate([limit, np.ones(thrusters.count)])
+    limit = wheels.limits("max_torque")
     low = np.concatenate([-limit, np.zeros(thrusters.count)])
-    return _largest(columns, low, high)
+    high = np.concatenate([limit, np.ones(thrusters.count)])
+    return np.vstack([wheels.unit_axes, thrusters.torques]), low, high
 
 
 def largest_momentum(wheels: WheelSettings) -> Array:
@@ -43,21 +49,65 @@ def largest_momentum(wheels: WheelSettings) -> Array:
     return _largest(wheels.unit_axes.T, -limit, limit)
 
 
-def limits_of(hardware: BaseActuatorSettings) -> tuple[Array, Array]:
-    """(3,) N m and (3,) N m s: the largest torque and momentum about each axis.
+class ActuatorLoad(NamedTuple):
+    """What a motion asks of actuators, at K times; a share of 1 is all that they have."""
 
-    Where thrusters can unload the wheels, momentum has no limit.
+    torque: Array
+    """(K, 3) N m, base axes: what is asked of them, the turning of the wheels' momentum included.
     """
-    momentum = np.full(3, np.inf)
-    if hardware.wheel_count and not hardware.thruster_count:
-        momentum = largest_momentum(hardware.wheels)
-    return largest_torque(hardware), momentum
+    torque_share: Array
+    """(K,) of the torque that they can give in that direction."""
+    momentum_share: Array
+    """(K,) of the momentum that they can hold; 0 where thrusters can unload the wheels."""
 
 
-def shares_of(limit: Array, asked: Array) -> Array:
-    """(K, 3) what is ``asked`` (K, 3) about each axis, as shares of a limit (3,), maybe 0."""
-    with np.errstate(divide="ignore", invalid="ignore"):
-        return np.where(asked == 0.0, 0.0, np.abs(asked) / limit)
+def actuator_load(
+    hardware: BaseActuatorSettings, torque: Array, momentum: Array, omega: Array
+) -> ActuatorLoad:
+    """Return what is asked of actuators that turn a base.
+
+    Wheels alone share a torque as the allocation does, see `wheel_loads`; thrusters, and thrusters
+    with wheels, in the best way.
+
+    Args:
+        hardware: wheels, thrusters, or both.
+        torque: (K, 3) N m, of the base.
+        momentum: (K, 3) N m s, that the base has been given.
+        omega: (K, 3) rad/s, of the base. All on its axes.
+    """
+    wheels, nothing = hardware.wheels, np.zeros(len(torque))
+    if hardware.thruster_count:
+        spaces = _half_spaces(*_reach(hardware))
+        return ActuatorLoad(torque, _largest_product(spaces, torque), nothing)
+    motors, held = wheel_loads(wheels, torque, -momentum, omega)
+    turning = np.cross(omega, product(held, wheels.unit_axes))
+    shares = [
+        np.max(np.abs(values) / wheels.limits(name), axis=1)
+        for values, name in ((motors, "max_torque"), (held, "max_momentum"))
+    ]
+    return ActuatorLoad(torque + turning, *shares)
+
+
+def wheel_loads(
+    wheels: WheelSettings, torque: Array, momentum: Array, omega: Array
+) -> tuple[Array, Array]:
+    """Return torque (K, W), N m, of each wheel's motor, and momentum (K, W), N m s, of each wheel.
+
+    The motors give what changes the wheels' momentum, the turning of the base under it included,
+    and what friction takes: ``u = -P (tau + w x h) + f``, with P of `wheel_shares`.
+
+    Args:
+        wheels: on the base.
+        torque: (K, 3) tau, N m, on the base.
+        momentum: (K, 3) N m s, that the wheels together have got since their initial speeds.
+        omega: (K, 3) w, rad/s, of the base. All on its axes.
+    """
+    shares = wheel_shares(wheels)
+    held = product(momentum, shares.T) + wheels.spin_momenta(wheels.values("initial_speed"))
+    turning = np.cross(omega, product(held, wheels.unit_axes))
+    speed = held / wheels.values("rotor_inertia")
+    friction = wheels.values("coulomb") * np.sign(speed) + wheels.values("viscous") * speed
+    return -product(torque + turning, shares.T) + friction, held
 
 
 def wheel_shares(wheels: WheelSettings) -> Array:
@@ -104,8 +154,7 @@ class ThrusterTorques(NamedTuple):
     def of(cls, thrusters: ThrusterSettings) -> ThrusterTorques:
         """Find the half-spaces of thrusters that can give a torque in any direction.
 
-        All torques are a zonotope, whose faces are spanned by two of the thrusters' torques. The
-        torques for 1 kg/s are the convex hull of what each thruster gives for it.
+        The torques for 1 kg/s are the convex hull of what each thruster gives for it.
 
         Raises:
             InputError: they are too unlike one another for that.
@@ -113,18 +162,12 @@ class ThrusterTorques(NamedTuple):
         from scipy.spatial import ConvexHull, QhullError  # slow to import
 
         torques = thrusters.torques
-        sizes = np.linalg.norm(torques, axis=1)
-        turning = torques[sizes > PARALLEL * sizes.max()]
-        pairs = np.array([np.cross(a, b) for a, b in combinations(turning, 2)])
-        length = np.linalg.norm(pairs, axis=1)
-        faces = pairs[length > PARALLEL * length.max()]
-        normals = _unlike(np.vstack([faces, -faces]))
-        reach = np.sum(np.maximum(normals @ torques.T, 0.0), axis=1)
+        spaces = _half_spaces(torques, np.zeros(thrusters.count), np.ones(thrusters.count))
         try:
             hull = ConvexHull(torques / thrusters.mass_flow[:, None]).equations
         except QhullError:
             raise InputError("the thrusters' torques hardly span all directions") from None
-        return cls(normals / reach[:, None], -hull[:, :3] / hull[:, 3:])
+        return cls(spaces, -hull[:, :3] / hull[:, 3:])
 
     def share(self, torque: Array) -> Array:
         """(N,) share of what can be given in the direction of each torque (N, 3), N m."""
@@ -133,6 +176,26 @@ class ThrusterTorques(NamedTuple):
     def propellant(self, torque: Array) -> Array:
         """(N,) kg/s, the least that gives each torque (N, 3), N m, were the valves continuous."""
         return _largest_product(self.of_mass, torque)
+
+
+def _half_spaces(torques: Array, low: Array, high: Array) -> Array:
+    """Return (K, 3) 1/(N m), for a ``torque`` within all: ``row . torque <= 1``.
+
+    All torques ``sum x_i torques_i`` with ``low <= x <= high`` are a zonotope, whose faces are
+    spanned by two of the rows (A, 3).
+    """
+    sizes = np.linalg.norm(torques, axis=1)
+    turning = torques[sizes > PARALLEL * sizes.max()]
+    pairs = np.array([np.cross(a, b) for a, b in combinations(turning, 2)])
+    length = np.linalg.norm(pairs, axis=1)
+    faces = pairs[length > PARALLEL * length.max()]
+    normals = _unlike(np.vstack([faces, -faces]))
+    along = normals @ torques.T
+    is_across = np.abs(along) <= PARALLEL * sizes  # of no use, though its limit were infinite
+    parts = np.where(along > 0.0, high, low) * np.where(is_across, 1.0, along)
+    reach = np.sum(parts, axis=1, where=~is_across)
+    spaces: Array = normals / reach[:, None]
+    return spaces
 
 
 def _unlike(vectors: Array) -> Array:

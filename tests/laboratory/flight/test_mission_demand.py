@@ -1,14 +1,36 @@
-"""Segments that ask the base's actuators for too much are refused before the flight."""
+"""What missions ask of the base's actuators, in an orbit, too; too much is refused or remarked."""
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
+import numpy as np
+import pinocchio as pin
 import pytest
+from numpy.typing import NDArray
+from oracles import pinocchio_model
+from orbiting_robots import EARTH_RADIUS, MU
+from scipy.spatial.transform import Rotation
 
 import space_robot as sr
+from space_robot.cli.options import remarks_on
+from space_robot.flight.mission_demand import (
+    MOST_SAMPLES,
+    MOTION,
+    Surroundings,
+    demand_remark,
+    held_base_remark,
+    mission_demand,
+)
 from space_robot.flight.plan import Flight, FlightPlan, resolve
+from space_robot.flight.simulate import simulate
+from space_robot_control.guidance.courses import Piece, QuinticLeg
+from space_robot_model.robot import Robot
 from space_robot_msgs_py.errors import InputError
+from space_robot_msgs_py.samples import SOURCES
+from space_robot_sim.environment.orbit_settings import OrbitSettings
+
+Array = NDArray[np.float64]
 
 LINE = {"tool": {"xyz": [0.3, 0.0, -0.4]}}
 SLOW_TURN = {"base": {"rpy_deg": [0, 0, 30]}, "duration": 60}
@@ -52,3 +74,146 @@ def test_what_they_can_give_is_flown(
 
 def test_missions_of_waypoints_are_flown_as_ever() -> None:
     assert sr.Scenario(actuators="small_wheels", controller="ctc", duration=0.05).fly().log.ticks
+
+
+TURN = {"base": {"rpy_deg": [10, 40, -20]}, "duration": 60}
+WORLD = {
+    "orbital_elements": {"height": 400e3, "inclination_deg": 51.6, "anomaly_deg": 30.0},
+    "atmosphere": {"density": 3e-12, "at_height": 400e3},
+    "sunlight": {"pressure": 4.56e-6, "beta_angle_deg": 30.0},
+    "magnetism": {"strength": 2.98e-5, "residual_dipole": [10.0, -20.0, 30.0]},
+}
+CIRCLE = {"orbital_elements": {"height": 400e3}, "gravity": {"gradient": True, "j2": False}}
+
+
+class Spin(NamedTuple):
+    """A base that turns at a constant rate."""
+
+    rate: Array
+    """(3,) rad/s, base axes."""
+
+    def at(self, time: Array) -> Array:
+        rows = np.zeros((len(time), 10))
+        xyzw = Rotation.from_rotvec(np.outer(time, self.rate)).as_quat()
+        rows[:, :4], rows[:, 4:7] = xyzw[:, [3, 0, 1, 2]], self.rate
+        return rows
+
+
+def spinning(rate: Array, span: float) -> Piece:
+    joints = np.radians([0, 90, 200, 20, 30, 10])
+    course = QuinticLeg(0.0, 1.0, joints, np.zeros(6))
+    base = Spin(rate)
+    return Piece(0.0, span, course, base, joints, base.at(np.array([span]))[0, :4])
+
+
+def composite_inertia(robot: Robot, quaternion: Array, joints: Array) -> Array:
+    """Of the whole robot about its centre of mass, inertial axes, by Pinocchio."""
+    model = pinocchio_model(robot)
+    data, still = model.createData(), np.zeros(model.nv)
+    q = np.concatenate([np.zeros(3), np.roll(quaternion, -1), joints[list(robot.order)]])
+    pin.ccrba(model, data, q, still)
+    return np.asarray(data.Ig.inertia)
+
+
+def test_gravity_gradient_is_that_of_the_composite_inertia(paper_robot: Robot) -> None:
+    orbit = OrbitSettings.model_validate(CIRCLE)
+    rng = np.random.default_rng(1)
+    quaternions = rng.normal(size=(5, 4))
+    quaternions /= np.linalg.norm(quaternions, axis=1)[:, np.newaxis]
+    joints, time = rng.uniform(-2.0, 2.0, (5, 6)), np.linspace(0.0, 4000.0, 5)
+    torques = Surroundings(paper_robot, orbit).torques(time, quaternions, joints)
+    away = EARTH_RADIUS + 400e3
+    angle = np.sqrt(MU / away**3) * time
+    for k, (quaternion, posture) in enumerate(zip(quaternions, joints, strict=True)):
+        up = np.array([np.cos(angle[k]), np.sin(angle[k]), 0.0])
+        inertia = composite_inertia(paper_robot, quaternion, posture)
+        wanted = 3.0 * MU / away**3 * np.cross(up, inertia @ up)
+        np.testing.assert_allclose(torques[0, k], wanted, atol=3e-6 * np.linalg.norm(wanted))
+    assert not torques[1:].any()
+
+
+def test_a_base_that_turns_steadily_needs_the_gyroscopic_torque(paper_robot: Robot) -> None:
+    """The body has its momentum from the start on: the wheels store what changes of it."""
+    rate, span = np.array([4e-4, -1.1e-3, 2e-4]), 5560.0
+    piece = spinning(rate, span)
+    ((_, asked, sources),) = mission_demand(paper_robot, [piece], OrbitSettings())
+    inertia = composite_inertia(paper_robot, np.array([1.0, 0, 0, 0]), piece.goal)
+    wanted = np.cross(rate, inertia @ rate)
+    assert np.linalg.norm(wanted) > 1e-4
+    np.testing.assert_allclose(
+        asked.torque[:, :3], np.tile(wanted, (len(asked.time), 1)), rtol=1e-9
+    )
+    turned = Rotation.from_rotvec(np.outer(asked.time, rate)).apply(inertia @ rate)
+    np.testing.assert_allclose(asked.momentum, turned - inertia @ rate, atol=1e-9)
+    np.testing.assert_allclose(asked.momentum[0], 0.0)
+    assert list(sources) == [MOTION]
+
+
+def test_the_momentum_is_that_which_a_flight_gives_its_base(paper_robot: Robot) -> None:
+    """Under the exact model, with all torques of an orbit, while arm and base move."""
+    mission = {
+        "start": {"joints_deg": [0, 90, 200, 20, 30, 10]},
+        "segments": [{**TURN, "joints_deg": [30, 60, 170, 40, 20, 40]}, {"hold": 90}],
+    }
+    plan = FlightPlan(controller="ctc", mission=mission, orbit=WORLD, period=0.005, friction=False)
+    flight = Flight(resolve(plan))
+    log = simulate(flight)
+    demands = list(mission_demand(paper_robot, flight.mission.pieces, flight.plant_settings))
+    turned = Rotation.from_quat(log.quaternion[:-1, [1, 2, 3, 0]])
+    flown = 0.005 * np.cumsum(turned.apply(log.applied_torque[1:, :3]), axis=0)
+    (_, moved, _), (_, held, sources) = demands
+    time = np.concatenate([moved.time, held.time[1:]])
+    momentum = np.concatenate([moved.momentum, held.momentum[1:]])
+    planned = np.column_stack([np.interp(log.time[1:], time, axis) for axis in momentum.T])
+    largest, end = (np.linalg.norm(x) for x in (np.abs(momentum).max(axis=0), momentum[-1]))
+    assert largest > 10.0
+    assert end > 0.1
+    np.testing.assert_allclose(flown, planned, rtol=0.0, atol=1e-4 * largest)
+    np.testing.assert_allclose(flown[-1], planned[-1], rtol=0.0, atol=2e-3 * end)
+    impulses = 0.005 * np.sum(log.external_torques, axis=0).reshape(-1, 3)
+    for name, impulse in zip(SOURCES, impulses, strict=True):
+        assert sources[name].momentum_end == pytest.approx(np.linalg.norm(impulse), rel=1e-3)
+        assert sources[name].base_torque > 0.0
+
+
+def test_samples_of_long_missions_are_bounded(paper_robot: Robot) -> None:
+    pieces = [spinning(np.zeros(3), 1e4)] * 40
+    demands = list(mission_demand(paper_robot, pieces, OrbitSettings()))
+    assert sum(len(asked.time) for _, asked, _ in demands) <= MOST_SAMPLES
+
+
+@pytest.mark.parametrize(
+    ("segment", "part"),
+    [
+        ({**LINE, "duration": 20}, "part 1 (tool)"),
+        (TURN, "part 1 (base)"),
+        ({**LINE, "duration": 20, "base": "free"}, ""),
+        ({"tool": {"xyz": [1.0, 0.3, 0.2], "frame": "base"}, "duration": 60}, ""),
+        ({"joints_deg": [0, 80, 190, 20, 30, 10], "duration": 20}, ""),
+        ({"hold": 5}, ""),
+    ],
+)
+def test_a_free_base_under_a_mission_that_holds_it_is_remarked(
+    segment: dict[str, Any], part: str
+) -> None:
+    flown = flight(segment, "none")
+    assert held_base_remark(flight(segment, "ideal").scenario) == ""
+    remark = held_base_remark(flown.scenario)
+    assert bool(remark) == bool(part)
+    if part:
+        assert f"the mission's {part} is planned with a base whose attitude is contr" in remark
+        assert "base: free" in remark
+        assert "\n" not in remark
+        assert f"warning: {remark}" in remarks_on(flown)
+        with pytest.warns(UserWarning, match="base: free"):
+            sr.Scenario(**{**flown.scenario.tree, "duration": 0.01}).fly()
+
+
+def test_waypoints_beyond_the_wheels_are_warned_of_if_they_are_flown() -> None:
+    remarks = [
+        demand_remark(resolve(FlightPlan(actuators=actuators, duration=duration)))
+        for actuators, duration in (("small_wheels", None), ("small_wheels", 0.1), ("wheels", None))
+    ]
+    assert "the mission's part 1 (joints) asks for " in remarks[0]
+    assert "% of what the actuators give" in remarks[0]
+    assert remarks[1:] == ["", ""]

@@ -15,6 +15,7 @@ from scipy.spatial import ConvexHull
 
 from space_robot_model.hardware.capability import (
     ThrusterTorques,
+    actuator_load,
     largest_momentum,
     largest_torque,
     wheel_shares,
@@ -117,3 +118,69 @@ def test_wheels_share_as_the_allocation_does(seed: int, count: int) -> None:
         hardware(wheels={"axes": flat(bench.axes), "max_torque": most.tolist()}).wheels
     )
     np.testing.assert_allclose(-shares @ demand, bench.command, rtol=1e-6, atol=1e-12)
+
+
+def test_wheels_turn_their_momentum_with_the_base() -> None:
+    """A base that turns steadily about z, with what its wheels hold about x, wants w x h about y.
+
+    One wheel gives it; the wheels' friction comes on top.
+    """
+    wheels = {
+        "axes": flat(np.eye(3)),
+        "max_torque": [2.0],
+        "max_momentum": [40.0],
+        "rotor_inertia": [0.5],
+        "initial_speed": [20.0, 0.0, 0.0],
+        "coulomb": [0.0, 0.0, 0.1],
+    }
+    omega, still = np.array([[0.0, 0.0, 0.1]]), np.zeros((1, 3))
+    load = actuator_load(hardware(wheels=wheels), still, np.array([[-10.0, 0.0, -4.0]]), omega)
+    np.testing.assert_allclose(load.torque, [[0.0, 0.1 * 20.0, 0.0]])
+    np.testing.assert_allclose(load.torque_share, [1.0])
+    np.testing.assert_allclose(load.momentum_share, [0.5])
+
+
+@settings(deadline=None)
+@given(SEEDS)
+def test_the_share_of_a_pyramid_is_its_fullest_wheels(seed: int) -> None:
+    """By the pseudoinverse, as the allocation shares it; about several axes it is more than about
+    each."""
+    rng = np.random.default_rng(seed)
+    torque, still = rng.normal(size=(8, 3)), np.zeros((8, 3))
+    found = hardware(wheels={"axes": PYRAMID, "max_torque": [0.2], "max_momentum": [7.0]})
+    load = actuator_load(found, torque, torque, still)
+    shares = np.abs(torque @ np.linalg.pinv(found.wheels.unit_axes.T).T).max(axis=1)
+    np.testing.assert_allclose(load.torque_share, shares / 0.2)
+    np.testing.assert_allclose(load.momentum_share, shares / 7.0)
+    assert np.all(load.torque_share >= np.abs(torque).max(axis=1) / (0.8 / np.sqrt(3.0)) - 1e-9)
+
+
+@settings(deadline=None, max_examples=30)
+@given(SEEDS)
+def test_wheels_and_thrusters_give_what_the_linear_programme_says(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    wheels = {"axes": rng.normal(size=6).tolist(), "max_torque": rng.uniform(0.1, 5.0, 2).tolist()}
+    thrusters = random_thrusters(rng, 5)
+    found = hardware(wheels=wheels, thrusters=thrusters.thrusters.model_dump())
+    wanted, still = rng.normal(size=(4, 3)), np.zeros((4, 3))
+    load = actuator_load(found, wanted, still, still)
+    limits: list[tuple[float, float | None]]
+    limits = [(-limit, limit) for limit in found.wheels.limits("max_torque")]
+    limits += [(0.0, 1.0)] * found.thruster_count + [(0.0, None)]
+    columns = np.vstack([found.wheels.unit_axes, found.thrusters.torques]).T
+    for torque, share in zip(wanted, load.torque_share, strict=True):
+        solved = linprog(
+            np.append(np.zeros(len(columns.T)), -1.0),
+            A_eq=np.column_stack([columns, -torque]),
+            b_eq=np.zeros(3),
+            bounds=limits,
+        )
+        assert 1.0 / share == pytest.approx(-solved.fun, rel=1e-6)
+    np.testing.assert_array_equal(load.momentum_share, 0.0)
+
+
+def test_wheels_without_a_limit_are_asked_for_no_share() -> None:
+    found = hardware(wheels={"axes": PYRAMID, "max_torque": [0.0], "max_momentum": [0.0]})
+    load = actuator_load(found, np.ones((2, 3)), np.ones((2, 3)), np.zeros((2, 3)))
+    np.testing.assert_array_equal(load.torque_share, 0.0)
+    np.testing.assert_array_equal(load.momentum_share, 0.0)
