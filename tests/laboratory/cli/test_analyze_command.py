@@ -103,6 +103,7 @@ def test_pictures_are_pngs_and_renewed(
         assert result.code == 0
         pictures = {path.name: path for path in (tmp_path / "figures").glob("*.png")}
         assert set(pictures) == {
+            "base_pointing.png",
             "desired_joints.png",
             "control_results.png",
             "chatter.png",
