@@ -21,7 +21,7 @@ from .pointing import (
     PointingError,
     base_pointing_error,
     pointing_error,
-    segments_of,
+    pointing_of,
 )
 from .ripple import RippleSpectrum, ripple_spectrum
 from .waypoints import junction_ticks
@@ -96,7 +96,7 @@ class PlotSeries(NamedTuple):
 
         ``budget``: of the base's pointing; None: the default.
         """
-        axis = np.array((budget or PointingBudget()).of(segments_of(log)).axis)
+        axis = np.array((budget or PointingBudget()).of(*pointing_of(log)).axis)
         error, axes, of_base = tracking_error(log), log.axes, controls_base(log)
         pointing = ripple = None
         with suppress(InputError):

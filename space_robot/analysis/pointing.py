@@ -51,7 +51,7 @@ class PointingBudget(StrictModel):
     axis: Vector | None = Field(
         None,
         description="axis of the base that points, base frame, any length (none: of the mission's "
-        "first pointing segment, else z)",
+        "first pointing segment, or of its start, else z)",
     )
 
     @field_validator("axis", mode="after")
@@ -61,13 +61,18 @@ class PointingBudget(StrictModel):
             direction_norm(axis, "axis")
         return axis
 
-    def of(self, segments: Sequence[str]) -> PointingBudget:
+    def of(self, segments: Sequence[str], start: str = "") -> PointingBudget:
         """Return the budget with the axis that points, of unit length.
 
         Args:
             segments: of the mission, as YAML texts.
+            start: what the base points at from the start on, as YAML text; empty: nothing.
         """
-        axis = pointed_axis(segments) if self.axis is None else np.array(self.axis)
+        axis = (
+            pointed_axis([*segments, f"base: {start}"])
+            if self.axis is None
+            else np.array(self.axis)
+        )
         unit = (axis / direction_norm(axis, "axis")).tolist()
         return self.model_copy(update={"axis": unit})
 
@@ -188,7 +193,7 @@ class BasePointing(Metric):
 
     def __init__(self, log: FlightLog, budget: PointingBudget | None = None) -> None:
         """``log``: the first rows; ``budget``: None for the default."""
-        self._budget = (budget or PointingBudget()).of(segments_of(log))
+        self._budget = (budget or PointingBudget()).of(*pointing_of(log))
         self._axis = np.array(self._budget.axis)
         self._rms, self._maximum = AxisRms(3), AxisMaximum(3)
         self._within, self._end = np.zeros(3), np.zeros(3)
@@ -211,7 +216,7 @@ class BasePointing(Metric):
     def result(self) -> dict[str, Any]:
         """Return axis, band and window, and by `BASE_ANGLES` what was found of each angle."""
         jitter = self._jitter.value
-        found = {
+        figures = {
             "rms": self._rms.value,
             "max": self._maximum.value,
             "end": self._end,
@@ -224,7 +229,7 @@ class BasePointing(Metric):
             **{
                 name: {
                     kind: None if values is None else float(values[i])
-                    for kind, values in found.items()
+                    for kind, values in figures.items()
                 }
                 for i, name in enumerate(BASE_ANGLES)
             },
@@ -252,12 +257,15 @@ def pointed_axis(segments: Sequence[str]) -> Array:
     return np.array([0.0, 0.0, 1.0])
 
 
-def segments_of(log: FlightLog) -> list[str]:
-    """Return the segments of the mission of a log, as YAML texts; none if it does not tell them."""
+def pointing_of(log: FlightLog) -> tuple[list[str], str]:
+    """Return segments and start of a log's mission, see `PointingBudget.of`, as far as it tells."""
     scenario = log.flight.get("scenario")
     mission = scenario.get("mission") if isinstance(scenario, dict) else None
-    segments = mission.get("segments") if isinstance(mission, dict) else None
-    return [str(text) for text in segments] if isinstance(segments, list) else []
+    if not isinstance(mission, dict):
+        return [], ""
+    segments = mission.get("segments")
+    texts = [str(text) for text in segments] if isinstance(segments, list) else []
+    return texts, str(mission.get("base_point") or "")
 
 
 def pointing_error(log: FlightLog, robot: Robot, start: Array | None = None) -> PointingError:

@@ -127,8 +127,8 @@ def with_angles(report: Report) -> Report:
         maxima = in_angles(report["maxima"] | {"attitude_deg": angles["max"]})
         changed |= {"rms": rms, "maxima": maxima}
     if navigation and (angles := navigation.get("attitude_deg")):
-        rms = in_angles(navigation["rms"] | {"attitude_deg": angles["rms"]})
-        changed |= {"navigation_error": navigation | {"rms": rms}}
+        of_law = in_angles(navigation["rms"] | {"attitude_deg": angles["rms"]})
+        changed |= {"navigation_error": navigation | {"rms": of_law}}
     return report | changed
 
 

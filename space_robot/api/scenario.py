@@ -51,7 +51,8 @@ class Scenario(FlightPlan):
       one for all axes or n+3 (base x, y, z, joints); or such a mapping for each of several laws
     - ``mission``: `MissionSettings` or a mapping: ``waypoint_times`` s, ``waypoints_deg`` (flat,
       degrees, or m for prismatic joints), ``base_quaternion`` ``[w, x, y, z]``,
-      ``initial_joints_deg`` (default: the first waypoint), ``events``
+      ``base_point``, ``base_rate_deg_s``, ``initial_joints_deg``, ``initial_quaternion`` and
+      ``initial_rate_deg_s`` (default: the mission's start), ``events``; or a mission's document
     - ``case``, ``sensors``, ``actuators``: their settings, objects or mappings
     - ``assumed_actuators``: the base's actuators as assumed by the flight software
     - ``parameters``: any parameter of a node, ``{"plant": {"friction.coulomb": 0.0}}``

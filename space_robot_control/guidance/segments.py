@@ -212,11 +212,11 @@ def read_pointing(text: str, where: str) -> PointingGoal:
     return validate(PointingGoal, content, where)
 
 
-def _check_keys(content: Any, where: str, known: Sequence[str], told: Sequence[str]) -> None:
+def _check_keys(content: Any, where: str, known: Sequence[str], allowed: Sequence[str]) -> None:
     """Refuse a key that is not ``known``, with those that a document may have."""
     for key, value in content.items() if isinstance(content, dict) else ():
         if key not in known:
-            advice = choices(str(key), told)
+            advice = choices(str(key), allowed)
             raise InputError(
                 f"{where}: {printable(str(key))}: unknown key, got {short(value)}: {advice}"
             )

@@ -56,7 +56,8 @@ class Measure:
         self._start: NDArray[np.float64] | None = None
         """(4,) attitude at the first tick."""
         self._tool: ToolError | None = None
-        budget = (budget or PointingBudget()).of(flight.mission_settings.written_segments)
+        mission = flight.mission_settings
+        budget = (budget or PointingBudget()).of(mission.written_segments, mission.base_point)
         self._axis = np.array(budget.axis)
         self._whole = WindowMetrics(Window(), columns.metrics, columns, budget)
         self._require = {

@@ -79,7 +79,8 @@ class WindowMetrics:
         self._largest: dict[str, float] = {}
         self._ripple: Ripple | None = None
         self._budget = budget
-        self._angles, self._pointing = AxisRms(3), None
+        self._angles = AxisRms(3)
+        self._pointing: BasePointing | None = None
         self._has_pointing = any(name.startswith((ANGLE, *POINTING)) for name in wanted)
         self._ticks, self._period = 0, 0.0
         self._has_ripple = any(name.startswith((RIPPLE, FAST_RIPPLE)) for name in wanted)
@@ -154,15 +155,15 @@ class WindowMetrics:
     def _of_pointing(self) -> dict[str, float]:
         if self._pointing is None:
             return {}
-        found = self._pointing.result()
+        report = self._pointing.result()
         values = {
             f"{ANGLE}_rms": float(np.mean(self._angles.value)),
-            OUTSIDE: 1.0 - found[POINTING[0]]["within_band"],
+            OUTSIDE: 1.0 - report[POINTING[0]]["within_band"],
         }
         for name in POINTING:
-            values[f"{name}_rms"] = found[name]["rms"]
+            values[f"{name}_rms"] = report[name]["rms"]
             for kind in (JITTER_RMS, JITTER_MAX):
-                if (jitter := found[name][kind[1:]]) is not None:
+                if (jitter := report[name][kind[1:]]) is not None:
                     values[f"{name}{kind}"] = jitter
         return values
 

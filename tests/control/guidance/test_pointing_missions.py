@@ -35,10 +35,10 @@ SMALL = {"xyz": [0.1, -0.1, -0.1], "rpy_deg": [0.0, 0.0, 10.0]}
 
 def planned(*segments: dict[str, Any], orbit: bool = True, **settings: Any) -> Mission:
     texts = [json.dumps(segment) for segment in segments]
-    given = {"waypoints_deg": START, "segments": texts, **settings}
+    numbers = {"waypoints_deg": START, "segments": texts, **settings}
     if orbit:
-        given["assumed_orbit"] = ISS
-    return Mission(ROBOT, MissionSettings.model_validate(given), PERIOD)
+        numbers["assumed_orbit"] = ISS
+    return Mission(ROBOT, MissionSettings.model_validate(numbers), PERIOD)
 
 
 def whole(mission: Mission, beyond: float = 0.0) -> tuple[Array, Array]:

@@ -210,6 +210,15 @@ def test_the_axis_that_points_is_that_of_the_first_pointing_segment(
     assert np.linalg.norm(pointed_axis(segments)) > 0.0
 
 
+def test_a_start_that_points_gives_the_axis_where_no_segment_does() -> None:
+    start = '{"point": "nadir", "axis": [0, 2, 0]}'
+    assert PointingBudget().of([], start).axis == [0.0, 1.0, 0.0]
+    assert PointingBudget().of(MISSIONS[0][0], start).axis == pytest.approx([0.0, 0.6, 0.8])
+    assert PointingBudget(axis=[5, 0, 0]).of(MISSIONS[0][0], start).axis == [1.0, 0.0, 0.0]
+    with pytest.raises(ValueError, match="axis must have a norm"):
+        PointingBudget(axis=[0, 0, 0])
+
+
 def test_the_error_of_a_log_is_that_which_the_law_saw() -> None:
     """Also where the base is to stand at 180 degrees from the inertial frame."""
     half_turn = [0.0, 0.6, 0.0, 0.8]

@@ -62,8 +62,8 @@ def test_a_base_that_points_from_the_start_on_is_where_the_flight_software_belie
 
 
 def test_an_attitude_of_the_plant_that_is_given_stays() -> None:
-    given = {"plant": {"initial_quaternion": [0.0, 1.0, 0.0, 0.0]}}
-    flight = flight_of("nadir", {"hold": 1}, orbit="iss", parameters=given)
+    own = {"plant": {"initial_quaternion": [0.0, 1.0, 0.0, 0.0]}}
+    flight = flight_of("nadir", {"hold": 1}, orbit="iss", parameters=own)
     assert flight.plant_settings.initial_quaternion == [0.0, 1.0, 0.0, 0.0]
     assert flight.plant_settings.initial_rate_deg_s[1] == pytest.approx(-0.0646, abs=1e-4)
 

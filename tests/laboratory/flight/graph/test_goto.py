@@ -41,10 +41,10 @@ DURATION = "4"
 
 
 @contextmanager
-def paused(domain: int, bag: Path) -> Iterator[Forked]:
+def paused(domain: int, bag: Path, *more: str) -> Iterator[Forked]:
     """A flight that has flown some ticks of its mission, and is paused."""
     options = ("--duration", DURATION, "--domain", str(domain), "--bag", str(bag), "--json")
-    process = forked_space_robot("fly", "--paused", *options)
+    process = forked_space_robot("fly", "--paused", *options, *more)
     try:
         wait_for_nodes(domain)
         until(lambda: sim(domain, "step", "--ticks", str(STEP_TICKS)) == 0)
@@ -101,6 +101,22 @@ def test_goto_moves_joints_and_base(free_domain: int, tmp_path: Path) -> None:
     assert log.reference_base[-1, 3] == pytest.approx(np.sin(np.radians(0.25)), rel=1e-12)
     replay = space_robot_here("replay", str(bag), "--json")
     assert replay.returncode == 0, replay.stderr
+
+
+def test_goto_makes_the_base_point_with_the_orbit_of_the_plant(
+    free_domain: int, tmp_path: Path
+) -> None:
+    bag, where = tmp_path / "bag", ("--domain", str(free_domain))
+    with paused(free_domain, bag, "--orbit", "iss") as process:
+        refused = space_robot_here("goto", "--base", "target", "--duration", "60", *where)
+        assert refused.returncode == 1
+        assert "base.point: target: flight software knows of no target" in refused.stderr
+        words = ("--base", "nadir", "--tool", "0,0.1,0", "--frame", "orbit", "--duration", "60")
+        moved = space_robot_here("goto", *words, *where)
+        assert moved.returncode == 0, moved.stderr
+        log = flown(process, free_domain, bag)
+    rates = np.linalg.norm(log.reference_base[:, 4:7], axis=1)
+    assert rates[-1] == rates.max() > 1e-5
 
 
 REFUSED = (
