@@ -8,9 +8,9 @@ within limits, by DAQP: `pip install 'daqp>=0.8'`.
 
 prints the RMS errors in 5 s of case 1, with at most 0.7 N m on each axis of the base:
 
-    ctc:                 attitude 8.4e-05, joints 1-3 2.5e-04 rad
-    mpc, equal weights:  attitude 2.1e-05, joints 1-3 6.3e-06 rad
-    mpc, attitude first: attitude 7.1e-08, joints 1-3 1.1e-04 rad
+    ctc:                 attitude 9.6e-03 deg, joints 1-3 2.5e-04 rad
+    mpc, equal weights:  attitude 2.5e-03 deg, joints 1-3 6.3e-06 rad
+    mpc, attitude first: attitude 8.1e-06 deg, joints 1-3 1.1e-04 rad
 """
 
 from __future__ import annotations
@@ -91,7 +91,8 @@ def main() -> None:
         ("mpc, attitude first:", mpc.replace(gains={**gains, "weight": [1e4] * 3 + [1.0] * 6})),
     ):
         rms = flown.fly().metrics
-        print(f"{title:20} attitude {rms['attitude']:.1e}, joints 1-3 {rms['joints_1_3']:.1e} rad")
+        attitude, joints = rms["attitude_deg"], rms["joints_1_3"]
+        print(f"{title:20} attitude {attitude:.1e} deg, joints 1-3 {joints:.1e} rad")
 
 
 if __name__ == "__main__":

@@ -9,8 +9,8 @@ controller holds the rest. The nominal model cancels the reaction on the base.
 
 prints the largest errors in 5 s of case 1, beside a PD controller with the same weak gains:
 
-    joints alone: tool 107.6 mm, attitude 1.4e-04, joints 4-6 0.023 rad
-    tool law:     tool   0.7 mm, attitude 6.1e-06, joints 4-6 0.031 rad
+    joints alone: tool 107.6 mm, attitude 1.6e-02 deg, joints 4-6 0.023 rad
+    tool law:     tool   0.7 mm, attitude 7.0e-04 deg, joints 4-6 0.031 rad
 """
 
 from __future__ import annotations
@@ -57,7 +57,8 @@ def main() -> None:
         tool, largest = flight.metrics["tool"], flight.metrics["maxima"]
         print(
             f"{title:13} tool {1e3 * tool['largest_m']:5.1f} mm, "
-            f"attitude {largest['attitude']:.1e}, joints 4-6 {largest['joints_4_6']:.3f} rad"
+            f"attitude {flight.metrics['attitude_error_deg']['max']:.1e} deg, "
+            f"joints 4-6 {largest['joints_4_6']:.3f} rad"
         )
 
 

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Any
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple
 
 import mujoco
 import numpy as np
@@ -31,6 +31,42 @@ def rotation_of(quaternion: ArrayLike) -> Rotation:
 def quaternion_of(rotation: Rotation) -> Array:
     """``[w, x, y, z]`` of SciPy's rotation."""
     return np.roll(rotation.as_quat(), 1)
+
+
+def multiplied(a: Array, b: Array) -> Array:
+    """Hamilton's product of two quaternions ``[w, x, y, z]`` of any norm."""
+    w = a[0] * b[0] - a[1:] @ b[1:]
+    return np.array([w, *(a[0] * b[1:] + b[0] * a[1:] + np.cross(a[1:], b[1:]))])
+
+
+class RelativeMotion(NamedTuple):
+    """A base relative to a desired frame D, by the product rule of quaternions."""
+
+    error: Array
+    """q_e = q_d* q, eta >= 0."""
+    rate: Array
+    """epsdot_e."""
+    second_rate: Callable[[Array], Array]
+    """epsdd_e for an angular acceleration (3,) of the base, on inertial axes."""
+
+    @classmethod
+    def of(cls, desired: Array, state: State) -> RelativeMotion:
+        """Of a reference (10,): q_d, omega_d and alpha_d on D's axes; ``state`` is inertial."""
+        q_d, omega, alpha = desired[:4], *(np.array([0.0, *desired[k : k + 3]]) for k in (4, 7))
+        w = np.array([0.0, *state.w0])
+        q = state.quaternion if state.quaternion @ q_d >= 0.0 else -state.quaternion
+        d_rate, q_rate = 0.5 * multiplied(q_d, omega), 0.5 * multiplied(w, q)
+        d_second = 0.5 * (multiplied(d_rate, omega) + multiplied(q_d, alpha))
+        back = [part * [1.0, -1.0, -1.0, -1.0] for part in (q_d, d_rate, d_second)]
+
+        def second_rate(acceleration: Array) -> Array:
+            own = multiplied(np.array([0.0, *acceleration]), q) + multiplied(w, q_rate)
+            second = multiplied(back[2], q) + 2.0 * multiplied(back[1], q_rate)
+            result: Array = (second + multiplied(back[0], 0.5 * own))[1:]
+            return result
+
+        rate = multiplied(back[1], q) + multiplied(back[0], q_rate)
+        return cls(multiplied(back[0], q), rate[1:], second_rate)
 
 
 def turned(quaternion: ArrayLike, angle_inertial: ArrayLike) -> Array:

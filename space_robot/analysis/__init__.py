@@ -15,7 +15,7 @@ All are accumulated over blocks of a flight (`blocks`), which may be longer than
 """
 
 from .excerpt import excerpt
-from .metrics import tracking_error
+from .metrics import attitude_angles, tracking_error
 from .report import Analysis, analyze
 
-__all__ = ["Analysis", "analyze", "excerpt", "tracking_error"]
+__all__ = ["Analysis", "analyze", "attitude_angles", "excerpt", "tracking_error"]

@@ -15,7 +15,7 @@ from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.bag.law_history import as_data, laws_of
 
 from .attitude_drift import controls_base
-from .metrics import tracking_error
+from .metrics import attitude_angles, tracking_error
 
 Array = NDArray[np.float64]
 
@@ -112,6 +112,7 @@ def _columns(log: FlightLog) -> Iterator[tuple[list[str], Array]]:
         yield _of_joints(f"reference_{{}}_{number}", joints, lengths, per), joints_d[:, k]
     if controls_base(log):
         yield _each("error_q", XYZ), error[:, :3]
+        yield _each("error_base", XYZ, "deg"), attitude_angles(log)
     yield _of_joints("error_{}", joints, lengths), error[:, 3:]
 
 

@@ -10,7 +10,6 @@ the telemetry.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -22,12 +21,7 @@ from space_robot_msgs_py.bag.law_history import laws_of
 from space_robot_msgs_py.errors import InputError
 
 from .attitude_drift import controls_base
-from .generalised_motion import (
-    applied_force,
-    continuous_quaternion,
-    mean_acceleration,
-    measured_rows,
-)
+from .generalised_motion import applied_force, continuous_error, mean_acceleration, measured_rows
 from .metrics import AxisMaximum, AxisRms, Table, axis_groups
 
 Array = NDArray[np.float64]
@@ -78,17 +72,16 @@ class Intervals:
     def __init__(self) -> None:
         self._last: FlightLog | None = None
         self._side = 1.0
-        """1 if Q continues from Q in the last row, -1 if from -Q."""
+        """1 if q_e continues from that of the last row with eta >= 0, -1 if from its negative."""
 
     def of(self, log: FlightLog) -> tuple[FlightLog, Array]:
         """Return the rows at which the new intervals begin, and one more; and (K, 2, m) of each."""
         rows = joined(self._last, log)
-        turned = replace(rows, quaternion=self._side * continuous_quaternion(rows))
+        error = self._side * continuous_error(rows)
         with np.errstate(divide="ignore", invalid="ignore"):  # J0 may be singular
-            pairs = np.stack([applied_force(turned), mean_acceleration(turned)], axis=1)
+            pairs = np.stack([applied_force(rows, error), mean_acceleration(rows, error)], axis=1)
         self._last = last_rows(log, 1)
-        same = np.array_equal(turned.quaternion[-1], rows.quaternion[-1])
-        self._side = 1.0 if same else -1.0
+        self._side = -1.0 if error[-1, 0] < 0.0 else 1.0
         return rows, pairs
 
 
@@ -166,7 +159,7 @@ class EstimateError(Metric):
             raise InputError("three measured states in a row are needed")
         each, largest, groups = self._rms.value, self._maximum.value, self._groups
         if not np.isfinite([each[axes].sum() for axes in groups.values()]).all():
-            raise InputError("the base turned by 180 degrees, where J0 of (1) is singular")
+            raise InputError("the attitude's error was 180 degrees, where J0 of (1) is singular")
         return {
             "rms": {name: float(np.mean(each[axes])) for name, axes in groups.items()},
             "max": {name: float(np.max(largest[axes])) for name, axes in groups.items()},

@@ -6,6 +6,7 @@ RMS values instead. Both are given, named ``eq64`` and ``mean_axis``.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from functools import reduce
 from typing import Any
@@ -13,7 +14,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from space_robot_model.elementary.matrices import norm
+from space_robot_model.dynamics.attitude import attitude_error_into
+from space_robot_model.elementary.arctangent import angle_of
+from space_robot_model.elementary.matrices import dot_rows, norm
 from space_robot_msgs_py.bag.blocks import Metric, blocks_of
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.compiled.kernels import kernel
@@ -26,6 +29,9 @@ AxisIndex = slice | list[int]
 """Some of the n+3 axes, as an index."""
 UNITS = {
     "attitude_drift": "rad",
+    "attitude_deg": "deg",
+    "half_cone_arcsec": "arcsec",
+    "about_arcsec": "arcsec",
     "attitude": "-",
     "joints_prismatic": "m",
     "joints": "rad",
@@ -99,27 +105,77 @@ def unit_of(column: str) -> str:
 
 
 def tracking_error(log: FlightLog) -> Array:
-    """Compute ``e = rho_d - rho`` (N, n+3): eps, then joints, rad or m.
+    """Compute ``e = rho_d - rho = [-eps_e, theta_d - theta]`` (N, n+3): -, then rad or m.
 
-    Of +-Q_d it is that of the one on Q's side.
+    ``eps_e`` is the vector part of `attitude_error`.
     """
     error = np.empty((log.ticks, log.axes))
     error[:, 3:] = log.reference_joints[:, 0]
     error[:, 3:] -= log.joint_positions
-    _attitude_error(
-        np.ascontiguousarray(log.reference_base), np.ascontiguousarray(log.quaternion), error
-    )
+    np.subtract(0.0, attitude_error(log)[:, 1:], out=error[:, :3])
+    return error
+
+
+def attitude_error(log: FlightLog) -> Array:
+    """Compute ``q_e = q_d* (x) q`` (N, 4), the rotation from the desired attitude to the true one.
+
+    Of +-q_e it is the one with eta >= 0. Its vector part is the same on the axes of both frames.
+    """
+    return relative_attitude(log.reference_base, log.quaternion)
+
+
+def relative_attitude(first: Array, second: Array) -> Array:
+    """Compute ``first* (x) second`` (N, 4), of quaternions ``[w, x, y, z]``; eta >= 0.
+
+    Args:
+        first: (N, 4 or more) columns after the fourth are ignored.
+        second: (N, 4).
+    """
+    error = np.zeros((len(second), 4))
+    _relative_attitudes(np.ascontiguousarray(first), np.ascontiguousarray(second), error)
     return error
 
 
 @kernel
-def _attitude_error(desired: Array, quaternion: Array, error: Array) -> None:
-    """Write the error of the attitude into the first three columns."""
-    for i in range(len(error)):
-        q, d = quaternion[i], desired[i]
-        side = -1.0 if q[0] * d[0] + q[1] * d[1] + q[2] * d[2] + q[3] * d[3] < 0.0 else 1.0
-        for k in range(3):
-            error[i, k] = side * d[k + 1] - q[k + 1]
+def _relative_attitudes(first: Array, second: Array, out: Array) -> None:
+    for i in range(len(out)):
+        attitude_error_into(first[i], second[i], out[i])
+
+
+def attitude_angles(log: FlightLog) -> Array:
+    """Compute the error of the attitude, (N, 3) deg: the rotation vector of ``q_e*``.
+
+    Like `tracking_error` it is that of the desired attitude less the true one.
+    """
+    angles: Array = -np.degrees(rotation_vectors(attitude_error(log)))
+    return angles
+
+
+def angles_of(eps: Array) -> Array:
+    """Compute rotation vectors (N, 3), deg, of the vector parts (N, 3) of quaternions."""
+    angles: Array = np.degrees(rotation_vectors(quaternions_of(eps)))
+    return angles
+
+
+def quaternions_of(eps: Array) -> Array:
+    """Return the unit quaternions (N, 4) with the vector parts (N, 3), and eta >= 0."""
+    return np.hstack([np.sqrt(np.maximum(1.0 - dot_rows(eps, eps), 0.0)), eps])
+
+
+def rotation_vectors(quaternions: Array) -> Array:
+    """Compute the rotation vectors (N, 3), rad, of quaternions (N, 4) with eta >= 0."""
+    vectors = np.empty((len(quaternions), 3))
+    _rotation_vectors(np.ascontiguousarray(quaternions), vectors)
+    return vectors
+
+
+@kernel
+def _rotation_vectors(quaternions: Array, out: Array) -> None:
+    for i in range(len(out)):
+        w, x, y, z = quaternions[i]
+        sine = math.sqrt(x * x + y * y + z * z)
+        factor = 2.0 * angle_of(sine, w) / sine if sine > 0.0 else 2.0
+        out[i, 0], out[i, 1], out[i, 2] = factor * x, factor * y, factor * z
 
 
 @kernel
@@ -251,6 +307,31 @@ class Maxima(Metric):
     def result(self) -> dict[str, float]:
         """By column, in its unit."""
         return _by_column(self._error.value, self._torque.value, np.max, *self._kinds)
+
+
+class AttitudeError(Metric):
+    """The angles of the attitude's error, degrees, by the definitions of `Rms` and `Maxima`.
+
+    They are the components of `attitude_angles`.
+    """
+
+    def __init__(self) -> None:
+        self._rms, self._maximum = AxisRms(3), AxisMaximum(3)
+
+    def add(self, log: FlightLog, error: Array) -> None:
+        """Take further rows."""
+        angles = attitude_angles(log)
+        self._rms.add(angles)
+        self._maximum.add(angles)
+
+    def result(self) -> dict[str, float]:
+        """``mean_axis``, ``eq64`` and ``max``."""
+        rms = self._rms.value
+        return {
+            "mean_axis": float(np.mean(rms)),
+            "eq64": eq64(rms),
+            "max": float(np.max(self._maximum.value)),
+        }
 
 
 class Chatter(Metric):

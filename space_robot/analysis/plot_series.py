@@ -14,8 +14,15 @@ from space_robot_msgs_py.errors import InputError
 
 from .attitude_drift import controls_base
 from .described import event_times, robot_of
-from .metrics import AxisIndex, error_columns, torque_columns, tracking_error
-from .pointing import PointingError, pointing_error
+from .metrics import AxisIndex, attitude_angles, error_columns, torque_columns, tracking_error
+from .pointing import (
+    BasePointingError,
+    PointingBudget,
+    PointingError,
+    base_pointing_error,
+    pointing_error,
+    pointing_of,
+)
 from .ripple import RippleSpectrum, ripple_spectrum
 from .waypoints import junction_ticks
 
@@ -65,13 +72,15 @@ class PlotSeries(NamedTuple):
     time: Array
     """(N,) s."""
     errors: dict[str, Array]
-    """(N,) norm of the error of each column of Table V, in its unit."""
+    """(N,) norm of the error of each column of Table V, in its unit; of the attitude in degrees."""
     torques: dict[str, Array]
     """(N,) norm of the torque of each column of Table V, in its unit."""
     base_torque: BaseTorque | None
     """None where nothing turned the base."""
     pointing: PointingError | None
     """None where the robot is not known."""
+    base_pointing: BasePointingError | None
+    """None where nothing turned the base."""
     latency_ms: Array | None
     """(K,) of every answer, by the wall clock; None for flights without any."""
     ripple: RippleSpectrum | None
@@ -82,8 +91,12 @@ class PlotSeries(NamedTuple):
     """Times of what was captured and released, s."""
 
     @classmethod
-    def of(cls, log: FlightLog) -> Self:
-        """Compute them from a whole flight or an excerpt."""
+    def of(cls, log: FlightLog, budget: PointingBudget | None = None) -> Self:
+        """Compute them from a whole flight or an excerpt.
+
+        ``budget``: of the base's pointing; None: the default.
+        """
+        axis = np.array((budget or PointingBudget()).of(*pointing_of(log)).axis)
         error, axes, of_base = tracking_error(log), log.axes, controls_base(log)
         pointing = ripple = None
         with suppress(InputError):
@@ -93,13 +106,18 @@ class PlotSeries(NamedTuple):
         if log.latency_s is not None:
             known = log.latency_s[np.isfinite(log.latency_s)]
             latency = 1e3 * known if len(known) else None
+        errors = _norms(error, error_columns(axes, of_base, log.prismatic, log.branches))
+        if of_base:
+            angle = np.linalg.norm(attitude_angles(log), axis=1)
+            errors = {"attitude_deg": angle} | {k: v for k, v in errors.items() if k != "attitude"}
         torque_axes = torque_columns(axes, of_base, log.prismatic, log.branches)
         return cls(
             tick_times(log),
-            _norms(error, error_columns(axes, of_base, log.prismatic, log.branches)),
+            errors,
             _norms(log.applied_torque, torque_axes),
             BaseTorque.of(log) if of_base else None,
             pointing,
+            base_pointing_error(log, axis) if of_base else None,
             latency,
             ripple,
             torque_axes,

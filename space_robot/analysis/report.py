@@ -43,11 +43,11 @@ from .described import (
 from .described_estimator import estimator
 from .estimate_error import EstimateError
 from .external_torques import DisturbanceBySource
-from .metrics import Chatter, Maxima, Rms, tracking_error
+from .metrics import AttitudeError, Chatter, Maxima, Rms, tracking_error
 from .missed_captures import MissedCaptures
 from .momentum import MomentumBudget
 from .navigation import NavigationError
-from .pointing import Pointing
+from .pointing import BasePointing, Pointing, PointingBudget
 from .ripple import Ripple
 from .settling import Settling
 from .sizing import ActuatorSet, Sizing
@@ -60,6 +60,8 @@ OF_TRUTH = ("navigation_error",)
 """Metrics that only flights have whose truth was recorded beside what was measured."""
 OF_FREE_BASE = ("attitude_drift",)
 """Metrics that only flights have in which nothing turns the base."""
+OF_HELD_BASE = ("attitude_error_deg", "base_pointing")
+"""Metrics that only flights have in which something turns the base."""
 OF_HARDWARE = ("momentum",)
 """Metrics that only flights have whose base was not turned by ideal torques."""
 OF_WHEELS = ("wheel_saturation",)
@@ -72,7 +74,9 @@ OF_GEARS = ("deflection",)
 """Metrics that only flights have whose joints have gears."""
 
 
-def analyze(log: FlightLog, actuators: ActuatorSet | None = None) -> dict[str, Any]:
+def analyze(
+    log: FlightLog, actuators: ActuatorSet | None = None, budget: PointingBudget | None = None
+) -> dict[str, Any]:
     """Compute the flight's report, the same from a graph flight, an in-process one, or a bag.
 
     A metric that this flight does not have is None; ``unavailable`` says why, by its key. Of a
@@ -81,13 +85,14 @@ def analyze(log: FlightLog, actuators: ActuatorSet | None = None) -> dict[str, A
     Args:
         log: a flight.
         actuators: of the base, for the sizing; None: those that flew.
+        budget: of the base's pointing; None: the default.
 
     Raises:
         InputError: no tick has both a state and a reference, or ``log`` is no flight.
     """
     if not isinstance(log, FlightLog):
         raise InputError(f"log: a FlightLog was expected (load_bag reads one), got {short(log)}")
-    analysis = Analysis(actuators, log.ticks)
+    analysis = Analysis(actuators, log.ticks, budget)
     for block in blocks_of(_without_gaps(log)):
         analysis.add(block)
     return analysis.report()
@@ -96,17 +101,26 @@ def analyze(log: FlightLog, actuators: ActuatorSet | None = None) -> dict[str, A
 class Analysis:
     """Does what `analyze` does, of a flight without gaps in blocks, as `blocks_of` cuts it."""
 
-    def __init__(self, actuators: ActuatorSet | None = None, flight_ticks: int = 0) -> None:
+    def __init__(
+        self,
+        actuators: ActuatorSet | None = None,
+        flight_ticks: int = 0,
+        budget: PointingBudget | None = None,
+    ) -> None:
         """Begin.
 
         Args:
             actuators: of the base, for the sizing; None: those that flew.
             flight_ticks: of the whole flight, if only a part of it follows.
+            budget: of the base's pointing; None: the default.
         """
         self.ticks = 0
         """Rows so far."""
         self._flight_ticks = flight_ticks
-        self._kinds = _METRICS | {"sizing": lambda log: _sizing(log, actuators)}
+        self._kinds = _METRICS | {
+            "base_pointing": lambda log: BasePointing(log, budget),
+            "sizing": lambda log: _sizing(log, actuators),
+        }
         self._metrics: dict[str, Metric] = {}
         self._unavailable: dict[str, str] = {}
         self._head: dict[str, Any] = {}
@@ -170,6 +184,8 @@ class Analysis:
                 continue
             if name in OF_FREE_BASE and controls_base(block):
                 continue
+            if name in OF_HELD_BASE and not controls_base(block):
+                continue
             if name in OF_HARDWARE and not block.flight.get("base_actuators"):
                 continue
             if name in OF_WHEELS and not block.wheel_velocities.shape[1]:
@@ -226,6 +242,7 @@ def _sizing(log: FlightLog, other: ActuatorSet | None) -> Sizing:
 _METRICS: dict[str, Callable[[FlightLog], Metric]] = {
     "rms": lambda log: Rms(log.axes, controls_base(log), log.prismatic, log.branches),
     "maxima": lambda log: Maxima(log.axes, controls_base(log), log.prismatic, log.branches),
+    "attitude_error_deg": lambda log: AttitudeError(),
     "attitude_drift": AttitudeDrift,
     "navigation_error": NavigationError,
     "chatter": lambda log: Chatter(
@@ -240,6 +257,7 @@ _METRICS: dict[str, Callable[[FlightLog], Metric]] = {
     "latency": lambda log: Latency(log.timebase.period),
     "missed_deadlines": _missed_deadlines,
     "estimate_error": lambda log: EstimateError(log, *estimator(log)),
+    "base_pointing": BasePointing,
     "pointing": lambda log: Pointing(log, robot_of(log)),
     "tool": lambda log: ToolError(log, captures_of(log), assumed_robot_of(log)),
     "sizing": lambda log: _sizing(log, None),

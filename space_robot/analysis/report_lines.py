@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from typing import Any, NamedTuple
 
 from ..console.tables import NONE
 from .metrics import unit_of
-from .pointing import ARCSEC
+from .pointing import ARCSEC, BASE_ANGLES
 from .words import Report
+
+OF_BASE = ("base, half cone", "base, about the axis", "base, rotation")
+"""Groups of the angles of the base's pointing."""
 
 
 class Line(NamedTuple):
@@ -31,17 +34,18 @@ def lines(reports: Sequence[Report], brief: bool = False) -> list[Line]:
         brief: without what `rms_table` shows.
     """
     each, one = partial(_each_key, reports), partial(_line, reports)
+    in_angles = partial(_each_key, [with_angles(report) for report in reports], label=named)
     rows: list[Line] = []
     if not brief:
-        rows += each("RMS, mean of axes", ("rms", "mean_axis"), unit_of)
-        rows += each("RMS, eq. (64)", ("rms", "eq64"), unit_of)
+        rows += in_angles("RMS, mean of axes", ("rms", "mean_axis"), unit_of)
+        rows += in_angles("RMS, eq. (64)", ("rms", "eq64"), unit_of)
         rows += each("variation per s", ("chatter", "total_variation_per_s"), _per_second)
         rows += each("power > 100 Hz", ("chatter", "power_above_100_hz"))
         rows += each("ripple", ("ripple", "rms"), unit_of)
     rows += each("ripple's peak", ("ripple", "peak"), text_of=_peak_of)
     rows += each("attitude drift", ("attitude_drift",), "deg", label=_end_or_max)
-    rows += each("navigation error", ("navigation_error", "rms"), unit_of)
-    rows += each("maximum", ("maxima",), unit_of)
+    rows += in_angles("navigation error", ("navigation_error", "rms"), unit_of)
+    rows += in_angles("maximum", ("maxima",), unit_of)
     rows += each("settled after", ("settling", "settled_s"), "s", text=_settled)
     rows.append(one("saturation", "ticks at a limit", "", _saturated))
     rows += each("saturation", ("wheel_saturation", "wheels"), "", text=_full)
@@ -52,6 +56,8 @@ def lines(reports: Sequence[Report], brief: bool = False) -> list[Line]:
     for kind in ("rms", "max"):
         label = partial(_axes, kind=kind)
         rows += each("estimate error", ("estimate_error", kind), _group_unit, label=label)
+    for key, group in zip(BASE_ANGLES, OF_BASE, strict=True):
+        rows += each(group, ("base_pointing", key), text_of=_of_base, label=_kind_of_base)
     for group, key in (("pointing", "boresight_rad"), ("rotation", "rotation_rad")):
         rows += each(group, ("pointing", key), text=_angle, label=_upper)
     for group, key in (("tool position", "tool_position_m"), ("base's drift", "base_drift_m")):
@@ -109,6 +115,36 @@ def lines(reports: Sequence[Report], brief: bool = False) -> list[Line]:
     ]
 
 
+def with_angles(report: Report) -> Report:
+    """Return a report in whose columns of errors the attitude's are angles, see `in_angles`."""
+    angles, navigation = report["attitude_error_deg"], report["navigation_error"]
+    changed: Report = {}
+    if angles:
+        rms = {
+            kind: in_angles(columns | {"attitude_deg": angles[kind]})
+            for kind, columns in report["rms"].items()
+        }
+        maxima = in_angles(report["maxima"] | {"attitude_deg": angles["max"]})
+        changed |= {"rms": rms, "maxima": maxima}
+    if navigation and (angles := navigation.get("attitude_deg")):
+        of_law = in_angles(navigation["rms"] | {"attitude_deg": angles["rms"]})
+        changed |= {"navigation_error": navigation | {"rms": of_law}}
+    return report | changed
+
+
+def in_angles(columns: Mapping[str, float]) -> dict[str, float]:
+    """Return columns with ``attitude_deg`` in the place of the vector part ``attitude``."""
+    if "attitude_deg" not in columns:
+        return dict(columns)
+    names = ("attitude_deg" if name == "attitude" else name for name in columns)
+    return {name: columns[name] for name in names}
+
+
+def named(column: str) -> str:
+    """Return the label of a column, which has its unit elsewhere."""
+    return column.removesuffix("_deg")
+
+
 def _number(value: float) -> str:
     return f"{value:.4g}"
 
@@ -153,9 +189,25 @@ def _line(
 
 
 def _angle(value: float) -> str:
-    arcsec = value / ARCSEC
-    readable = f"{arcsec:.3g} arcsec" if arcsec < 3600 else f"{arcsec / 3600:.3g} deg"
-    return f"{value:.3g} rad\n{readable}"
+    return f"{value:.3g} rad\n{_readable(value / ARCSEC)}"
+
+
+def _readable(arcsec: float | None) -> str:
+    if arcsec is None:
+        return NONE
+    return f"{arcsec:.3g} arcsec" if arcsec < 3600 else f"{arcsec / 3600:.3g} deg"
+
+
+def _of_base(kind: str) -> Callable[[Any], str]:
+    return "{:.2%}".format if kind == "within_band" else _readable
+
+
+def _kind_of_base(kind: str) -> str:
+    """Return the label of a key of the base's pointing: ``jitter, RMS`` for ``jitter_rms``."""
+    words = kind.split("_")
+    if kind == "within_band":
+        return "time within the band"
+    return ", ".join(_upper(word) for word in words)
 
 
 def _peak_of(column: str) -> Callable[[dict[str, float] | None], str]:

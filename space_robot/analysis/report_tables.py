@@ -9,7 +9,7 @@ from typing import Any
 from ..console.tables import Column, Group, Table
 from .described import IDEAL
 from .metrics import unit_of
-from .report_lines import Line, lines
+from .report_lines import OF_BASE, Line, lines, named, with_angles
 from .settling import BAND
 from .words import Report, analyzed, flown, law_of, notes, remarks, seen_through
 
@@ -29,14 +29,19 @@ DEFINITIONS = {
     "ripple's peak": "frequency at which the ripple's spectrum is highest, and the root mean "
     "square of what is within 0.5 Hz of it",
     "settled after": "time from the last waypoint after which the error stays to the end within "
-    f"{BAND:g} (rad or m on joints; on the attitude's quaternion, where it is 4.1 arcsec)",
+    f"{BAND:g} rad or m on joints, and 4.1 arcsec of the attitude's error on each axis",
     "saturation": "ticks at which a torque was at the actuator's limit; of each wheel those at its "
     "largest torque and at its largest momentum",
     "latency": "from a state's sending to its command's, by the wall clock; in brackets in ticks",
     "commands": "ticks without an answer, and ticks after which the plant applied another torque "
     "than was commanded for them",
     "estimate error": "error N - N_hat of the time-delay estimate, from recorded motion and "
-    "torque; on the base in units of the generalised force of eps, about twice the torque",
+    "torque; on the base in units of the generalised force of eps_e, about twice the torque",
+    OF_BASE[0]: "angle between the true and the desired direction of the base's axis that points "
+    "(of the mission's first pointing segment, else z); band and window: base_pointing in JSON; "
+    "jitter is the difference from the mean in a window",
+    OF_BASE[1]: "the base's rotation about that axis from the desired attitude",
+    OF_BASE[2]: "angle of the one rotation between the base's desired and true attitude",
     "pointing": "angle between the measured and the desired direction of the end effector's z "
     "axis in the inertial frame",
     "rotation": "angle of the one rotation between the end effector's desired and measured frame",
@@ -69,6 +74,7 @@ def rms_table(report: Report) -> Table:
 
     Where the truth was recorded, the navigation error stands in the place of (64).
     """
+    report = with_angles(report)
     title = f"{flown(report)}: {analyzed(report)}"
     if report["truth_recorded"]:
         title += f"\n{seen_through(report)}"
@@ -93,7 +99,7 @@ def rms_table(report: Report) -> Table:
     for key, value in of_axes.items():
         has_exponent = is_wide or key not in torques
         rms = _rms(value, has_exponent), beside[key] and _rms(beside[key], has_exponent)
-        rows.append([key, unit_of(key), *rms, *(measure.get(key, "") for measure in rough)])
+        rows.append([named(key), unit_of(key), *rms, *(measure.get(key, "") for measure in rough)])
     return Table(title, columns, [Group(rows)], remarks(report))
 
 

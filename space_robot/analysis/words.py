@@ -146,6 +146,13 @@ def _beyond_limits(report: Report) -> list[str]:
 def notes(report: Report) -> list[str]:
     """Say of single metrics from where they count, or why there is none."""
     missing = [f"no {key.replace('_', ' ')}: {why}" for key, why in report["unavailable"].items()]
+    counted = []
     if settling := report["settling"]:
-        return [f"settling is counted from the waypoint at {settling['after_s']:g} s", *missing]
-    return missing
+        counted = [f"settling is counted from the waypoint at {settling['after_s']:g} s"]
+    if base := report["base_pointing"]:
+        axis = ", ".join(f"{value:.3g}" for value in base["axis"])
+        counted.append(
+            f"the base points its axis ({axis}): band {base['band_deg']:g} deg, jitter within "
+            f"{base['window_s']:g} s"
+        )
+    return [*counted, *missing]

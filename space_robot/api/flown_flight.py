@@ -106,11 +106,16 @@ class FlownFlight:
         """Metrics of the flight, as in ``space-robot analyze --json``.
 
         The columns of Table V have short names, too, for the mean-axis RMS:
-        ``metrics["attitude"]`` is ``metrics["rms"]["mean_axis"]["attitude"]``. Empty if the flight
-        has no complete tick.
+        ``metrics["attitude"]`` is ``metrics["rms"]["mean_axis"]["attitude"]``, of the vector part
+        of the error quaternion; ``metrics["attitude_deg"]`` is that of the angles. Empty if the
+        flight has no complete tick.
         """
         report = self._report
-        return {**report["rms"]["mean_axis"], **report} if report else {}
+        if not report:
+            return {}
+        angles = report["attitude_error_deg"]
+        named = {"attitude_deg": angles["mean_axis"]} if angles else {}
+        return {**report["rms"]["mean_axis"], **named, **report}
 
     def metric(self, function: MetricFunction | str) -> float:
         """Return a metric of your own.

@@ -17,6 +17,7 @@ from space_robot_msgs_py.config.validation import StrictModel, read_yaml, short,
 from space_robot_msgs_py.errors import InputError, explained_by
 
 from ..analysis.own_metric import check_names, text_of
+from ..analysis.pointing import PointingBudget
 from ..api.scenario import OF_THE_GRAPH
 from ..scenario.disturbances import as_disturbance
 from ..scenario.options import FlightPlan
@@ -119,6 +120,8 @@ class Study(StrictModel):
     """Distribution of each variable, by the variable's name."""
     metrics: dict[str, Any] = Field(default_factory=dict)
     """Function of each metric of the user's own, ``file.py:FUNCTION``, by the metric's name."""
+    pointing: PointingBudget = PointingBudget()
+    """Band and window of the metrics of the base's pointing."""
     require: dict[str, Requirement] = Field(default_factory=dict)
     keep: Keep = Keep()
     until: Until | None = None
@@ -207,6 +210,8 @@ class Study(StrictModel):
         del content["runs"]
         if not self.metrics:  # as in folders of earlier releases
             del content["metrics"]
+        if self.pointing == PointingBudget():
+            del content["pointing"]
         return content
 
     def named(self, where: str) -> Study:

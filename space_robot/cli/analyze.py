@@ -52,6 +52,20 @@ SECTION = "Results"
     metavar="NAME-or-FILE",
     help="Whether these would have what each flight asks of its base (default: those that flew).",
 )
+@click.option(
+    "--band",
+    "band_deg",
+    type=click.FloatRange(0.0, 180.0, min_open=True),
+    metavar="DEG",
+    help="Angle within which the base points well, degrees (default: 0.1).",
+)
+@click.option(
+    "--window",
+    "window_s",
+    type=click.FloatRange(0.0, 1e6, min_open=True),
+    metavar="S",
+    help="Window over which the base's jitter counts, s (default: 1).",
+)
 @click.option("--from", "from_s", type=float, metavar="T", help="Begin at T simulated seconds.")
 @click.option("--to", "to_s", type=float, metavar="T", help="End before T simulated seconds.")
 @REMAP
@@ -68,6 +82,8 @@ def analyze(
     html: Path | None,
     metrics: tuple[str, ...],
     actuators: str | None,
+    band_deg: float | None,
+    window_s: float | None,
     from_s: float | None,
     to_s: float | None,
     remap: dict[str, str],
@@ -78,8 +94,8 @@ def analyze(
     """Metrics of recorded flights: one bag, or several side by side.
 
     RMS, maxima, settling, chatter, saturation, latency, the error of the time-delay estimate,
-    end effector pointing, and the loads on the base. docs/manual/analysis.md explains each
-    metric. Modules and files that a bag names are not opened without --trust.
+    pointing of base and end effector, and the loads on the base. docs/manual/analysis.md explains
+    each metric. Modules and files that a bag names are not opened without --trust.
 
     \b
     Examples:
@@ -87,6 +103,7 @@ def analyze(
       space-robot analyze flights/one flights/two --plot figures --html flights.html
       space-robot analyze flights/one --from 14 --to 16 --json
       space-robot analyze flights/one --actuators wheels
+      space-robot analyze flights/one --band 0.05 --window 10
       space-robot analyze flights/one --metric my_metrics.py:overshoot
       space-robot analyze flights/one --parquet one.parquet
       space-robot analyze theirs --remap /arm/joint_states:=/joint_states
@@ -96,6 +113,7 @@ def analyze(
 
     from ..analysis import analyze, excerpt
     from ..analysis.export import check_parquet, write_csv, write_parquet
+    from ..analysis.pointing import PointingBudget
     from ..console.files import check_free, write_text
 
     if parquet:
@@ -112,16 +130,19 @@ def analyze(
         *([html] if html else []),
     ):
         check_free(path)
+    given = {"band_deg": band_deg, "window_s": window_s}
+    budget = PointingBudget.model_validate({k: v for k, v in given.items() if v is not None})
     figure_set = None
     if plot or html:
         from ..analysis.figures.figure_set import FigureSet
 
-        figure_set = FigureSet()
+        figure_set = FigureSet(budget)
     reports: dict[str, dict[str, Any]] = {}
     descriptions: dict[str, dict[str, Any]] = {}
     for name, bag in zip(names, bags, strict=True):
         log = excerpt(read_flight(bag, remap, trust, namespace), from_s, to_s)
-        reports[name], descriptions[name] = analyze(log, _set(log, actuators)), log.flight
+        reports[name] = analyze(log, _set(log, actuators), budget)
+        descriptions[name] = log.flight
         if own:
             reports[name]["own_metrics"] = {m.name: m.finite_value(log) for m in own}
         for write, paths in exports:

@@ -145,8 +145,8 @@ def _hostile(plan: FlightPlan, exported: Exported, laws: Sequence[str]) -> Answe
         shake(state, noise, random)
         wheels.measure(state, commanded, k)
         is_hostile = random.random() < SHARE and k % PHASE > QUIET_TICKS
-        spoil(state, wheels.count, random, is_hostile)
         reference = references[k : k + 1]
+        spoil(state, wheels.count, random, reference["quaternion"][0], is_hostile)
         if supervisor.answered < 0:
             reference = np.full_like(reference.view(np.float64), np.nan).view(reference.dtype)
         elif random.random() < REFERENCE_SHARE:

@@ -16,7 +16,13 @@ from space_robot_msgs_py.samples import SOURCES
 from ..analysis.attitude_drift import attitude_drift, controls_base
 from ..analysis.described import assumed_robot_of, captures_of, flown_actuators
 from ..analysis.figures.overlay import words
-from ..analysis.metrics import error_columns, torque_columns, tracking_error, unit_of
+from ..analysis.metrics import (
+    attitude_angles,
+    error_columns,
+    torque_columns,
+    tracking_error,
+    unit_of,
+)
 from ..analysis.tool_error import ToolError, leads_tool
 from .plotted_quantity import AXES, PlottedQuantity
 from .state_quantities import by_unit, estimates, momentum, motion
@@ -50,10 +56,17 @@ def _errors(log: FlightLog) -> Iterator[PlottedQuantity]:
     columns = error_columns(log.axes, controls_base(log), log.prismatic, log.branches)
     names, values = np.array([*AXES, *log.joint_names]), tracking_error(log)
     for name, axes in columns.items():
-        unit = unit_of(name).strip("-")
-        kind = "attitude" if name == "attitude" else "joints"
+        if name == "attitude":
+            angles = attitude_angles(log)
+            yield PlottedQuantity("attitude", "attitude error", "deg", AXES, angles, True)
+            continue
         yield PlottedQuantity(
-            kind, f"{words(name)} error", unit, names[axes].tolist(), values[:, axes], True
+            "joints",
+            f"{words(name)} error",
+            unit_of(name),
+            names[axes].tolist(),
+            values[:, axes],
+            True,
         )
 
 

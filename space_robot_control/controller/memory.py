@@ -31,8 +31,12 @@ class ControllerMemory(Record):
     """Scratch: rotation from the base to the desired frame."""
     omega_desired: Array = shaped(lambda n: (3,))
     """Desired angular velocity on the base's axes, rad/s; zero if that is not controlled."""
-    last_omega_desired: Array = shaped(lambda n: (3,))
-    """That of the reference of the last tick, on the desired frame's axes, rad/s."""
+    error: Array = shaped(lambda n: (4,))
+    """Scratch: q_e of the last tick, had the reference moved as it does now."""
+    turn: Array = shaped(lambda n: (4,))
+    """Scratch: the desired frame's turn back to the last tick."""
+    turned_jacobian: Array = shaped(lambda n: (3, 3))
+    """Scratch: J0 of ``error``."""
     pair_is_as_measured: float = shaped(lambda n: ())
     """1 if the time-delay pair has rates as they were measured, 0 if as navigation has them."""
     rate_as_measured: Array = shaped(lambda n: (n + 3,))

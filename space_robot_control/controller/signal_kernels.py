@@ -97,7 +97,9 @@ def compute_signals_for(
     if controls_base:
         attitude_error_into(desired, measured.quaternion, near)
         attitude_jacobian(near, memory.jacobian)
-        step_of_rate(memory, tick, reference, period)
+        steps_of_reference(memory, tick, reference, period)
+        rotation_matrix(near, memory.rotation)
+        rotate_back(memory.rotation, reference.omega_base, memory.omega_desired)
         if not follows(memory.pair, tick):  # whatever J0 was, this one's is nearer
             attitude_jacobian_inverse(near, memory.last_jacobian_inverse)
         # the applied torque acted from the last tick on, so that tick's J0 turns it into F_S
@@ -145,22 +147,41 @@ def compute_signals_for(
 
 
 @kernel
-def step_of_rate(memory: ControllerMemory, tick: int, reference: Reference, period: float) -> None:
-    """Write the desired angular velocity on the base's axes, and the step of rhodot by its own.
+def steps_of_reference(
+    memory: ControllerMemory, tick: int, reference: Reference, period: float
+) -> None:
+    """Write the steps of rho and rhodot since the last tick that the base's reference makes.
 
-    A reference that is held, or comes in steps, has a desired rate that changes without its
-    acceleration. This is no acceleration of the robot, so whoever differentiates rhodot leaves the
-    step out.
+    A reference that is held, comes back or comes in steps does not go on where it was. That is no
+    motion of the robot, so whoever compares with the last tick leaves it out: it is what rho and
+    rhodot would have been then, had the reference already moved as it does now, less what they
+    were. The signals but ``attitude_error`` are still those of the last tick.
     """
-    last, omega, alpha = memory.last_omega_desired, reference.omega_base, reference.alpha_base
-    step, elapsed = memory.omega, (tick - whole(memory.pair.tick)) * period
+    signals, error, turn, omega = memory.signals, memory.error, memory.turn, memory.omega
+    is_known, elapsed = follows(memory.pair, tick), (tick - whole(memory.pair.tick)) * period
+    squared = 0.0
     for k in range(3):
-        step[k] = last[k] - (omega[k] - elapsed * alpha[k])
-        last[k] = omega[k]
-    rotation_matrix(memory.signals.attitude_error, memory.rotation)
-    rotate_back(memory.rotation, step, memory.omega_desired)
-    rotate(memory.jacobian, memory.omega_desired, memory.signals.rate_step[:3])
-    rotate_back(memory.rotation, omega, memory.omega_desired)
+        omega[k] = reference.omega_base[k] - elapsed * reference.alpha_base[k]
+        turn[1 + k] = -0.25 * elapsed * (omega[k] + reference.omega_base[k])
+        squared += turn[1 + k] * turn[1 + k]
+    turn[0] = 1.0 - squared * (0.5 - squared / 24.0)  # of the turn since then, to its 5th power
+    for k in range(3):
+        turn[1 + k] *= 1.0 - squared / 6.0
+    error[:] = signals.attitude_error
+    attitude_error_into(reference.quaternion, signals.quaternion, error)
+    attitude_error_into(turn, error, error)
+    rotation_matrix(error, memory.rotation)
+    attitude_jacobian(error, memory.turned_jacobian)
+    rotate_back(memory.rotation, omega, turn[1:])
+    for k in range(3):
+        omega[k] = signals.omega_base[k] - turn[1 + k]
+    rotate(memory.turned_jacobian, omega, signals.rate_step[:3])
+    for k in range(3):
+        if is_known:
+            signals.rho_step[k] = error[1 + k] - signals.rho[k]
+            signals.rate_step[k] -= signals.rho_rate[k]
+        else:
+            signals.rho_step[k] = signals.rate_step[k] = 0.0
 
 
 @kernel

@@ -13,6 +13,8 @@ from numpy.typing import NDArray
 from space_robot_msgs_py.compiled.records import Block
 from space_robot_msgs_py.samples import Reference, RobotState
 
+from ..navigation.quaternions import multiply
+
 Array = NDArray[np.float64]
 
 VALUES = (
@@ -32,19 +34,26 @@ def shake(state: RobotState, size: float, random: np.random.Generator) -> None:
 
 
 def spoil(
-    state: RobotState, wheels: int, random: np.random.Generator, is_hostile: bool = True
+    state: RobotState,
+    wheels: int,
+    random: np.random.Generator,
+    desired: Array,
+    is_hostile: bool = True,
 ) -> None:
-    """Change some numbers of a state; those of wheels that the base does not have become zero."""
+    """Change some numbers of a state; those of wheels that the base does not have become zero.
+
+    ``desired`` (4,) is the quaternion that the reference of the state has, or should have.
+    """
     numbers = state.numbers
     way = random.integers(6) if is_hostile else -1
     if way == 0:  # any numbers
         places = random.integers(numbers.size, size=random.integers(1, 4))
         numbers[places] = random.choice(VALUES, size=places.size)
-    elif way == 1:  # an attitude near half a turn, or beyond
+    elif way == 1:  # an attitude near half a turn from the desired one, or beyond
         eta = random.choice([0.0, 1e-7, 0.01, 0.0199, 0.03, -0.04, 0.06])
         axis = random.normal(size=3)
         axis *= np.sqrt(1.0 - eta * eta) / np.sqrt(axis @ axis)
-        state.quaternion[:] = [eta, *axis]
+        multiply(desired, np.array([eta, *axis]), state.quaternion)
     elif way == 2:  # a quaternion of another norm
         state.quaternion[:] *= random.choice([0.0, 0.9, 0.9996, 1.0004, 1.1, -1.0])
     elif way == 3:  # everything the same number

@@ -52,7 +52,9 @@ def disturbance_rejection(signals: Signals, gains: Gains, memory: Memory, period
         away, by_force = 1.0 - beta, signals.applied_force[i] / inertia
         is_first = np.isnan(z_1[i])
         acceleration, last_rate = z_3[i] + by_force, z_2[i] + signals.rate_step[i]
-        predicted = z_1[i] + period * (last_rate + 0.5 * period * acceleration)
+        predicted = (
+            z_1[i] + signals.rho_step[i] + period * (last_rate + 0.5 * period * acceleration)
+        )
         innovation = rho[i] - predicted
         of_rate = 1.5 * away * away * (1.0 + beta) / period
         of_disturbance = away * away * away / (period * period)

@@ -62,8 +62,9 @@ class Signals(Record):
     joint_velocities: Array = shaped(lambda n: (n,), "rad/s, or m/s")
     rho: Array = per_axis("rho = [eps_e, theta]")
     rho_rate: Array = per_axis("rhodot")
-    rate_step: Array = per_axis("step of rhodot since the last tick by one of the desired rate")
-    """Zero while the desired angular velocity changes by its acceleration; no torque causes it."""
+    rho_step: Array = per_axis("step of rho since the last tick by one of the reference")
+    """Zero while the base's reference goes on where it was; no torque causes it."""
+    rate_step: Array = per_axis("step of rhodot by the same")
     applied_force: Array = per_axis("F_S applied over the last interval", "N m")
     paired_force: Array = per_axis("the same through the low-pass of the time-delay pair", "N m")
     paired_acceleration: Array = per_axis("mean rhodd of that interval, through the same low-pass")

@@ -13,7 +13,8 @@ from space_robot_model.hardware.thrusters import ThrusterSettings
 from space_robot_model.hardware.wheels import WheelSettings
 from space_robot_msgs_py.bag.flight_log import FlightLog
 
-from ..metrics import tracking_error
+from ..generalised_motion import relative_rate
+from ..metrics import attitude_angles
 from ..momentum import Momentum
 from ..plot_series import tick_times
 from .single_flight import BASE_AXES
@@ -132,8 +133,8 @@ def _draw_pulses(axes: Axes, time: Array, is_open: Array, period: float) -> None
 def _draw_cycle(axes: Axes, log: FlightLog) -> None:
     """Draw the base's rate error over its attitude error, both about the base's axes."""
     every = max(1, log.ticks // POINTS)
-    angle = 2.0 * tracking_error(log)[::every, :3]
-    rate = (log.reference_base[:, 4:7] - log.omega_base)[::every]
+    angle = np.radians(attitude_angles(log)[::every])
+    rate = -relative_rate(log)[::every]
     for i in range(3):
         look = LineStyle.of(i)
         axes.plot(

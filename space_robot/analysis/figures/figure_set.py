@@ -18,10 +18,11 @@ from space_robot_msgs_py.errors import InputError
 from ..described import captures_of, environment_of, flown_actuators, momentum_of
 from ..external_torques import torques_by_source
 from ..plot_series import PlotSeries
+from ..pointing import PointingBudget
 from ..words import flown
 from .base_actuators import momentum, thrusters, wheels
 from .base_torque import chatter, junctions
-from .overlay import errors_and_torques, latency_histogram, pointing
+from .overlay import base_pointing, errors_and_torques, latency_histogram, pointing
 from .ripple import ripple
 from .single_flight import control_results, desired_joints
 from .style import save_figure
@@ -74,7 +75,9 @@ class FigureSet:
     torques are overlaid as norms of the columns of Table V.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, budget: PointingBudget | None = None) -> None:
+        """``budget``: of the base's pointing; None: the default."""
+        self._budget = budget or PointingBudget()
         self._flights: dict[str, PlotSeries] = {}
         self._missions: dict[bytes, tuple[str, Figure]] = {}
         self._first: Figure | None = None
@@ -87,7 +90,7 @@ class FigureSet:
         self._missions.setdefault(reference.tobytes(), (name, desired_joints(log)))
         if not self._flights:
             self._first = control_results(log, title(name, log))
-        self._flights[name] = PlotSeries.of(log)
+        self._flights[name] = PlotSeries.of(log, self._budget)
         kinds = {
             _of_gears: bool(log.geared_names),
             _of_orbit: log.orbit_position.shape[1] > 0,
@@ -137,6 +140,10 @@ class FigureSet:
             suffix, of = (f"_{number}", f" of {name}") if len(flights) > 1 else ("", "")
             for stem, (caption, figure) in figures.items():
                 drawings[f"{stem}{suffix}"] = Drawing(f"{caption}{of}", partial(_drawn, figure))
+        if torques:
+            caption = "The base's pointing error; dotted: the band"
+            draw = partial(base_pointing, flights, self._budget.band_deg)
+            drawings["base_pointing"] = Drawing(caption, draw)
         caption = "The end effector's pointing error in the inertial frame"
         drawings["pointing"] = Drawing(caption, partial(pointing, flights))
         caption = "Time from a state's sending to its command's"

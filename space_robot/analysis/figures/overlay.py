@@ -10,10 +10,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from ..metrics import unit_of
+from ..metrics import UNITS, unit_of
 from ..plot_series import PlotSeries
 from ..pointing import ARCSEC
-from .style import LineStyle, house_style, legend_above, mark_events, page, plot_lines
+from .style import GREY, LineStyle, house_style, legend_above, mark_events, page, plot_lines
 
 Array = NDArray[np.float64]
 
@@ -28,6 +28,8 @@ class _Panel(NamedTuple):
     """Time, s, and values of each flight with data for a panel."""
     label: str
     is_logarithmic: bool
+    limit: float | None = None
+    """Drawn as a line across."""
 
 
 @house_style()
@@ -40,7 +42,7 @@ def errors_and_torques(flights: Mapping[str, PlotSeries]) -> Figure:
     errors = _panels(
         flights,
         lambda series: series.errors,
-        lambda key: f"|{words(key)} error|{'' if key == 'attitude' else f' ({unit_of(key)})'}",
+        lambda key: f"|{words(key)} error| ({unit_of(key)})",
         True,
     )
     torques = _panels(
@@ -69,6 +71,31 @@ def pointing(flights: Mapping[str, PlotSeries]) -> Figure:
             ("rotation", "rotation error (arcsec)", ARCSEC),
             ("position", "tool position error (m)", 1.0),
             ("base_drift", "base's drift (m)", 1.0),
+        )
+    ]
+    return _draw([panels], list(flights), _events(flights))
+
+
+@house_style()
+def base_pointing(flights: Mapping[str, PlotSeries], band_deg: float) -> Figure:
+    """Draw the base's errors of pointing: half cone, about the axis that points, and in all.
+
+    Args:
+        flights: by name.
+        band_deg: drawn as a line, degrees.
+    """
+    known = {n: s.base_pointing for n, s in flights.items() if s.base_pointing is not None}
+    if not known:
+        return page(12.0, "Nothing turned the base of these flights, so no pointing error.")
+    panels = [
+        _Panel(
+            {name: (flights[name].time, error.angles[:, i]) for name, error in known.items()},
+            label,
+            True,
+            3600.0 * band_deg,
+        )
+        for i, label in enumerate(
+            ("half cone (arcsec)", "about the axis (arcsec)", "rotation (arcsec)")
         )
     ]
     return _draw([panels], list(flights), _events(flights))
@@ -136,6 +163,9 @@ def _draw_panel(axes: Axes, panel: _Panel, names: list[str]) -> None:
         usual = [float(np.percentile(value, USUAL)) for value in known if len(value)]
         if usual:
             axes.set_ylim(bottom=0.5 * min(usual))
+    if panel.limit is not None:
+        axes.axhline(panel.limit, color=GREY, linewidth=0.8, linestyle=":")
+        axes.set_ylim(top=max(axes.get_ylim()[1], 2.0 * panel.limit))
     axes.set_ylabel(panel.label)
 
 
@@ -159,6 +189,9 @@ def _panels(
 
 def words(key: str) -> str:
     """Return the label of a column: "joints 1-3" for ``joints_1_3``."""
+    for column, unit in UNITS.items():  # a column may have its unit in its name
+        if column.endswith(f"_{unit}") and key.startswith(column):
+            key = key.replace(f"_{unit}", "", 1)
     word, _, axes = key.partition("_")
     if not axes or not axes[0].isdigit():
         return key.replace("_", " ")

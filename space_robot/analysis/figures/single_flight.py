@@ -12,7 +12,7 @@ from space_robot_msgs_py.bag.flight_log import FlightLog
 
 from ..attitude_drift import attitude_drift, controls_base
 from ..described import event_times
-from ..metrics import tracking_error
+from ..metrics import attitude_angles, tracking_error
 from ..plot_series import tick_times
 from ..waypoints import junction_ticks, waypoint_ticks
 from .style import (
@@ -78,9 +78,10 @@ def control_results(log: FlightLog, title: str) -> Figure:
         title: of the figure.
     """
     error, torque, time = tracking_error(log), log.applied_torque, tick_times(log)
-    of_base = "attitude error"
+    of_base, turned = "attitude error (deg)", attitude_angles
     if not controls_base(log):
-        error[:, :3], of_base = attitude_drift(log), "attitude drift (deg)"
+        of_base, turned = "attitude drift (deg)", attitude_drift
+    error[:, :3] = turned(log)
     moments = time[junction_ticks(log)[:MOST_JUNCTIONS]]
     rows = 3 if len(moments) else 2
     figure = page(22.0 + 46.0 * rows, title)

@@ -75,13 +75,13 @@ class Preparation:
         Raises:
             InputError: something cannot be flown, or a required metric does not exist.
         """
-        where, own = self.study.where, self.study.metrics
+        where, own, budget = self.study.where, self.study.metrics, self.study.pointing
         for flight in self.flights.values():
             self._check_metrics(flight)
-            check_requirements(flight, self.study.require, where, own=own)
+            check_requirements(flight, self.study.require, where, own=own, budget=budget)
         if self.study.require:
             for option, flight in self.flyer.draws.flights_of_options():
-                check_requirements(flight, self.study.require, where, option, own)
+                check_requirements(flight, self.study.require, where, option, own, budget)
         study = self.study.content
         return Manifest(
             seed=self.seed,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from ...analysis.metrics import unit_of
+from ...analysis.report_lines import in_angles, named
 from ...console.tables import Column, Table
 from .make import NewRobot
 
@@ -10,9 +11,10 @@ from .make import NewRobot
 def rms_table(made: NewRobot) -> Table:
     """Return the RMS of errors and torques under every law, mean over the axes."""
     flights = made.flights
-    keys = list(dict.fromkeys(key for flown in flights.values() for key in flown.rms))
-    columns = [Column("law", is_label=True), *(Column(k, unit_of(k), ".3g") for k in keys)]
-    rows = [[law, *(flown.rms.get(k, "ended") for k in keys)] for law, flown in flights.items()]
+    of_laws = {law: in_angles(flown.rms) for law, flown in flights.items()}
+    keys = list(dict.fromkeys(key for rms in of_laws.values() for key in rms))
+    columns = [Column("law", is_label=True), *(Column(named(k), unit_of(k), ".3g") for k in keys)]
+    rows = [[law, *(rms.get(k, "ended") for k in keys)] for law, rms in of_laws.items()]
     seconds = made.mission.waypoint_times[-1]
     title = f"{made.robot.name}, {made.robot.n} joints, {seconds:g} s: RMS, mean of axes"
     table = Table.of(title, columns, rows)

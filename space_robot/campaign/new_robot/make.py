@@ -131,7 +131,8 @@ class Outcome:
     """Result of a law's flight."""
 
     rms: dict[str, float]
-    """RMS of attitude and joint errors and torques, mean of the axes; empty if it failed."""
+    """RMS of attitude (also in degrees) and joint errors and torques, mean of the axes; empty if it
+    failed."""
     failure: str
     """Why the flight ended early; empty if it did not."""
     score: float
@@ -229,7 +230,10 @@ def _fly(folder: Path, law: str) -> Outcome:
         report = _report(plan)
     except FlightError as error:
         return Outcome({}, str(error), math.inf)
-    return Outcome(dict(report["rms"]["mean_axis"]), "", *_trial(plan.model_copy(update=TRIAL)))
+    rms = dict(report["rms"]["mean_axis"])
+    if angles := report["attitude_error_deg"]:
+        rms["attitude_deg"] = angles["mean_axis"]
+    return Outcome(rms, "", *_trial(plan.model_copy(update=TRIAL)))
 
 
 def _trial(plan: FlightPlan) -> tuple[float, str]:

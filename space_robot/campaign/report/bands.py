@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from ...analysis.figures.overlay import words
 from ...analysis.figures.style import COLOURS, GREY, LineStyle, grid, house_style, page, plain
 from ...analysis.metrics import unit_of
+from ..row.columns import ANGLE
 from ..study import short_names
 from ..verdicts.values import GridPoint, laws_of, of_law
 from .axes import law_legend, number_log_axis
@@ -32,7 +33,8 @@ DECADES = 2.0
 def series_of(table: DataFrame) -> list[str]:
     """Return the names of the series that have bands."""
     names = [c.removeprefix("band.") for c in map(str, table) if c.startswith("band.")]
-    return [name for name in names if table[f"band.{name}"].notna().any()]
+    names = [name for name in names if table[f"band.{name}"].notna().any()]
+    return [name for name in names if name != "attitude" or ANGLE not in names]
 
 
 def bands(rows: DataFrame, series: str) -> Array:

@@ -9,6 +9,7 @@ from space_robot_msgs_py.config.validation import one_of
 
 from ...analysis.figures.overlay import words
 from ...analysis.metrics import unit_of
+from ..row.columns import ANGLE
 from ..verdicts.values import metrics_of
 
 if TYPE_CHECKING:
@@ -99,6 +100,9 @@ def chosen(
         return [of_metric(one_of(name, known, "metric")) for name in dict.fromkeys(asked)]
     there = metrics_of(table)
     usual = [name for name in there if name.startswith(ERRORS) and name.endswith("_rms")]
+    if f"{ANGLE}_rms" in usual:
+        usual.remove("attitude_rms")
+        usual.insert(0, usual.pop(usual.index(f"{ANGLE}_rms")))
     usual += [name for name in there if name == f"{RIPPLE}base_torque"]
     usual += [name for name in own if name in there]
     usual += [r.metric for r in require.values() if r.metric in there]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import shlex
 from pathlib import Path
 
@@ -47,8 +48,12 @@ def demanded(quantity: Quantity) -> str:
     requirement = quantity.requirement
     assert requirement is not None
     way = "below" if requirement.above is None else "above"
+    angle = ""
+    if requirement.metric in ("attitude_rms", "attitude_max") and 0.0 <= requirement.bound <= 1.0:
+        angle = f" (an angle of {math.degrees(2.0 * math.asin(requirement.bound)):.3g} deg)"
     return (
         f"{quantity.heading} {way} {quantity.limit:g} {quantity.unit}".rstrip()
+        + angle
         + f" in {100.0 * requirement.share:g} % of the cases, "
         f"shown with {100.0 * requirement.confidence:g} % confidence"
     )

@@ -12,6 +12,7 @@ from space_robot_msgs_py.bag.flight_log import FlightLog
 
 from ...analysis.attitude_drift import controls_base
 from ...analysis.metrics import AxisIndex, error_columns, largest_of_columns, torque_columns
+from ...analysis.pointing import BASE_ANGLES, window_ticks
 from ...analysis.ripple import FAST, SHORTEST_S, SLOWEST
 from ...flight.plan import Flight
 
@@ -23,6 +24,12 @@ DRIFT = "attitude_drift"
 """Angle by which a base without attitude control has turned since the first tick, rad."""
 TOOL = ("tool", "tool_rotation")
 """Distance of the tool from its path, m, and angle to its orientation there, rad."""
+ANGLE = "attitude_deg"
+"""The attitude's error as angles, deg: RMS as of ``attitude``, magnitude of the whole rotation."""
+POINTING = BASE_ANGLES[:2]
+"""The base's half cone and its rotation about the axis that points, arcsec."""
+OUTSIDE, JITTER_RMS, JITTER_MAX = f"{POINTING[0]}_outside_band", "_jitter_rms", "_jitter_max"
+"""Share of time outside of the band; suffixes of the names of jitter metrics."""
 OF_BASE = ("attitude", "base_torque")
 """Vector columns: their magnitude is the norm; of joints it is the largest absolute value."""
 
@@ -36,6 +43,11 @@ class Columns(NamedTuple):
     """`DRIFT` if nothing controls the base's attitude."""
     tool: tuple[str, ...] = ()
     """`TOOL` if the mission has segments: the tool's error, see `ToolError`."""
+
+    @property
+    def angles(self) -> tuple[str, ...]:
+        """`ANGLE` and `POINTING` if something controls the base's attitude."""
+        return () if self.drift else (ANGLE, *POINTING)
 
     @classmethod
     def of_flight(cls, flight: Flight) -> Columns:
@@ -56,8 +68,8 @@ class Columns(NamedTuple):
 
     @property
     def names(self) -> tuple[str, ...]:
-        """All columns: errors, then torques, the drift, and those of the tool."""
-        return (*self.errors, *self.torques, *self.of_poses)
+        """All columns: errors, then torques, the drift, those of the tool, and angles."""
+        return (*self.errors, *self.torques, *self.of_poses, *self.angles)
 
     @property
     def of_poses(self) -> tuple[str, ...]:
@@ -70,14 +82,22 @@ class Columns(NamedTuple):
 
         ``<column>_rms``: mean over the axes of each axis' RMS, as in Table V.
         ``<column>_max``: the largest magnitude at any tick, see `sizes`. ``ripple_<torque column>``
-        and ``fast_ripple_<torque column>``: RMS of the ripple above 2 Hz, and above 25 Hz.
+        and ``fast_ripple_<torque column>``: RMS of the ripple above 2 Hz, and above 25 Hz. Of the
+        base's pointing also `OUTSIDE` and jitter, see `BasePointing`.
         """
         return (
             *(f"{name}_rms" for name in self.names),
             *(f"{name}_max" for name in self.names),
             *(f"{RIPPLE}{name}" for name in self.torques),
             *(f"{FAST_RIPPLE}{name}" for name in self.torques),
+            *self._of_pointing,
         )
+
+    @property
+    def _of_pointing(self) -> tuple[str, ...]:
+        if self.drift:
+            return ()
+        return OUTSIDE, *(f"{name}{kind}" for name in POINTING for kind in (JITTER_RMS, JITTER_MAX))
 
     def sizes(self, log: FlightLog, error: Array) -> dict[str, Array]:
         """Compute the magnitude of each column at every tick, (N,).
@@ -94,6 +114,21 @@ class Columns(NamedTuple):
             for values, columns in ((error, self.errors), (log.applied_torque, self.torques))
             for name, axes in columns.items()
         }
+
+
+def missing_for_jitter(metric: str, ticks: int, period: float, window_s: float) -> str:
+    """Return why a jitter metric cannot be computed; empty if it can.
+
+    Args:
+        metric: any metric's name.
+        ticks: of the flight, or of a window in it.
+        period: of the ticks, s.
+        window_s: of the budget.
+    """
+    is_one = metric.startswith(POINTING) and metric.endswith((JITTER_RMS, JITTER_MAX))
+    if not is_one or ticks >= window_ticks(window_s, period):
+        return ""
+    return f"needs {window_s:g} s of flight (pointing.window_s), got {ticks * period:g} s"
 
 
 def missing_for_ripple(metric: str, ticks: int, period: float) -> str:

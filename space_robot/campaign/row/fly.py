@@ -161,7 +161,8 @@ class RowFlyer:
         return self.row_of_log(task, flight, ending, log)
 
     def _measure(self, flight: Flight) -> Measure:
-        return Measure(flight, self.study.require, of_mapping(self.study.metrics))
+        study = self.study
+        return Measure(flight, study.require, of_mapping(study.metrics), study.pointing)
 
     def _fits(self, flight: Flight) -> bool:
         """Return True if flights like this one may be flown together."""

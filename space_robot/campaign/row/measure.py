@@ -18,11 +18,12 @@ from space_robot_sim.environment.payload import with_payload
 from ...analysis.attitude_drift import attitude_drift
 from ...analysis.metrics import tracking_error
 from ...analysis.own_metric import OwnMetric
+from ...analysis.pointing import PointingBudget, base_pointing_error
 from ...analysis.tool_error import ToolError
 from ...flight.plan import Flight
 from ..study import Requirement
 from .bands import Bands
-from .columns import DRIFT, Columns, missing_for_ripple
+from .columns import DRIFT, Columns, missing_for_jitter, missing_for_ripple
 from .window import Window, WindowMetrics
 
 
@@ -30,7 +31,11 @@ class Measure:
     """Accumulates metrics, requirements' metrics and bands of a flight block by block."""
 
     def __init__(
-        self, flight: Flight, require: Mapping[str, Requirement], own: Sequence[OwnMetric] = ()
+        self,
+        flight: Flight,
+        require: Mapping[str, Requirement],
+        own: Sequence[OwnMetric] = (),
+        budget: PointingBudget | None = None,
     ) -> None:
         """Prepare the sums for a flight.
 
@@ -38,6 +43,7 @@ class Measure:
             flight: not flown yet.
             require: the requirements by name.
             own: metrics of the user, which need `add_whole`.
+            budget: of the base's pointing; None: the default.
         """
         self._own, self._demands = own, require
         self._own_results: dict[str, float] = {}
@@ -50,9 +56,12 @@ class Measure:
         self._start: NDArray[np.float64] | None = None
         """(4,) attitude at the first tick."""
         self._tool: ToolError | None = None
-        self._whole = WindowMetrics(Window(), columns.metrics, columns)
+        mission = flight.mission_settings
+        budget = (budget or PointingBudget()).of(mission.written_segments, mission.base_point)
+        self._axis = np.array(budget.axis)
+        self._whole = WindowMetrics(Window(), columns.metrics, columns, budget)
         self._require = {
-            name: WindowMetrics(_window(demand), [demand.metric], columns)
+            name: WindowMetrics(_window(demand), [demand.metric], columns, budget)
             for name, demand in require.items()
             if not _is_whole(demand) and demand.metric not in names
         }
@@ -69,9 +78,14 @@ class Measure:
         if self._columns.tool:
             self._tool = self._tool or _tool_error(block, self._flight)
             sizes |= zip(self._columns.tool, self._tool.errors(block).T, strict=True)
+        pointing = None
+        if self._columns.angles:
+            pointing = base_pointing_error(block, self._axis)
+            angles = np.degrees(pointing.rotation), *pointing.angles.T
+            sizes |= zip(self._columns.angles, angles, strict=False)
         self._bands.add(block.first_tick, sizes)
         for metrics in (self._whole, *self._require.values()):
-            metrics.add(block, error, sizes, self._robot)
+            metrics.add(block, error, sizes, self._robot, pointing)
 
     def add_whole(self, log: FlightLog) -> None:
         """Evaluate the user's own metrics of a complete flight, and those that are required.
@@ -121,6 +135,7 @@ def check_requirements(
     where: str,
     context: str = "",
     own: Collection[str] = (),
+    budget: PointingBudget | None = None,
 ) -> None:
     """Check that a flight has the metrics of all requirements.
 
@@ -130,6 +145,7 @@ def check_requirements(
         where: the file, for errors.
         context: difference from the nominal flight, for errors.
         own: names of the user's own metrics.
+        budget: of the base's pointing; None: the default.
 
     Raises:
         InputError: an unknown metric, a window without ticks, or one too short for the metric.
@@ -153,7 +169,9 @@ def check_requirements(
                 f"{key}.to_s: no tick between {demand.from_s:g} and {demand.to_s:g} s, "
                 f"the period is {flight.period:g} s{context}"
             )
+        seconds = (budget or PointingBudget()).window_s
         lacking = missing_for_ripple(demand.metric, ticks, flight.period)
+        lacking = lacking or missing_for_jitter(demand.metric, ticks, flight.period, seconds)
         if lacking and demand.metric not in own:
             raise InputError(f"{key}.metric: {demand.metric} {lacking}{context}")
 

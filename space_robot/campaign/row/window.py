@@ -12,8 +12,19 @@ from space_robot_model.robot import Robot
 from space_robot_msgs_py.bag.flight_log import FlightLog
 
 from ...analysis.metrics import AxisRms
+from ...analysis.pointing import BasePointing, BasePointingError, PointingBudget
 from ...analysis.ripple import FAST, Ripple
-from .columns import FAST_RIPPLE, RIPPLE, Columns, missing_for_ripple
+from .columns import (
+    ANGLE,
+    FAST_RIPPLE,
+    JITTER_MAX,
+    JITTER_RMS,
+    OUTSIDE,
+    POINTING,
+    RIPPLE,
+    Columns,
+    missing_for_ripple,
+)
 
 Array = NDArray[np.float64]
 
@@ -47,24 +58,42 @@ class Window(NamedTuple):
 class WindowMetrics:
     """Accumulates selected metrics of a window of one flight."""
 
-    def __init__(self, window: Window, wanted: Collection[str], columns: Columns) -> None:
+    def __init__(
+        self,
+        window: Window,
+        wanted: Collection[str],
+        columns: Columns,
+        budget: PointingBudget | None = None,
+    ) -> None:
         """Start without rows.
 
         Args:
             window: of the flight.
             wanted: names of the selected metrics.
             columns: of the flight.
+            budget: of the base's pointing; None: the default.
         """
         self._window, self._wanted, self._columns = window, wanted, columns
         self._rms: tuple[AxisRms, AxisRms] | None = None
         self._of_poses = AxisRms(len(columns.of_poses))
         self._largest: dict[str, float] = {}
         self._ripple: Ripple | None = None
+        self._budget = budget
+        self._angles = AxisRms(3)
+        self._pointing: BasePointing | None = None
+        self._has_pointing = any(name.startswith((ANGLE, *POINTING)) for name in wanted)
         self._ticks, self._period = 0, 0.0
         self._has_ripple = any(name.startswith((RIPPLE, FAST_RIPPLE)) for name in wanted)
         self._has_rms = any(name.endswith("_rms") for name in wanted)
 
-    def add(self, log: FlightLog, error: Array, sizes: dict[str, Array], robot: Robot) -> None:
+    def add(
+        self,
+        log: FlightLog,
+        error: Array,
+        sizes: dict[str, Array],
+        robot: Robot,
+        pointing: BasePointingError | None = None,
+    ) -> None:
         """Add the next block.
 
         Args:
@@ -72,6 +101,7 @@ class WindowMetrics:
             error: (N, n+3) tracking error.
             sizes: magnitudes of its columns, see `Columns.sizes`.
             robot: of the flight.
+            pointing: of the base; None: nothing controls its attitude.
         """
         rows = self._window.rows(log)
         if rows.start >= rows.stop:
@@ -89,6 +119,11 @@ class WindowMetrics:
                 self._largest[name] = max(
                     self._largest.get(name, 0.0), float(np.max(size[rows], initial=0.0))
                 )
+        if self._has_pointing and pointing is not None:
+            within = BasePointingError(*(values[rows] for values in pointing))
+            self._angles.add(np.degrees(within.vector))
+            self._pointing = self._pointing or BasePointing(log, self._budget)
+            self._pointing.add_error(within)
         if self._has_ripple:
             self._ripple = self._ripple or Ripple(log, robot)
             self._ripple.add(log, error)
@@ -97,9 +132,11 @@ class WindowMetrics:
 
     def result(self) -> dict[str, float]:
         """Return the available metrics of the window, by name."""
-        values_by_name = {
-            f"{name}_max": value for name, value in self._largest.items()
-        } | self._ripples()
+        values_by_name = (
+            {f"{name}_max": value for name, value in self._largest.items()}
+            | self._ripples()
+            | self._of_pointing()
+        )
         if self._rms:
             both = self._columns.errors, self._columns.torques
             for rms, columns in zip(self._rms, both, strict=True):
@@ -114,6 +151,21 @@ class WindowMetrics:
             for name in self._wanted
             if np.isfinite(values_by_name.get(name, np.nan))
         }
+
+    def _of_pointing(self) -> dict[str, float]:
+        if self._pointing is None:
+            return {}
+        found = self._pointing.result()
+        values = {
+            f"{ANGLE}_rms": float(np.mean(self._angles.value)),
+            OUTSIDE: 1.0 - found[POINTING[0]]["within_band"],
+        }
+        for name in POINTING:
+            values[f"{name}_rms"] = found[name]["rms"]
+            for kind in (JITTER_RMS, JITTER_MAX):
+                if (jitter := found[name][kind[1:]]) is not None:
+                    values[f"{name}{kind}"] = jitter
+        return values
 
     def _ripples(self) -> dict[str, float]:
         if self._ripple is None or missing_for_ripple(RIPPLE, self._ticks, self._period):

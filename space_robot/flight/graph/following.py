@@ -251,7 +251,8 @@ def _remark(
     speed = f"{simulated_s / wall_s:.1f}x real time, " if wall_s > 0.5 else ""
     if errors is None:
         return speed
-    of_base = f"attitude {errors[0]:.1e}, " if errors[0] else ""  # the law of a free base sees none
+    # the law of a free base sees no error of its attitude
+    of_base = f"attitude {errors[0]:.1e} deg, " if errors[0] else ""
     return f"{speed}errors: {of_base}joints {errors[1]:.1e} {unit}"
 
 

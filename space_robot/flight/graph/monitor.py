@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from contextlib import suppress
 from typing import Any, NamedTuple
@@ -70,7 +71,7 @@ class Monitor:
         self.has_begun = False
         """True if the plant has sent a tick."""
         self.error: Array | None = None
-        """(n+3,) current tracking error as the law sees it: eps, then joints, rad or m."""
+        """(n+3,) current tracking error as the law sees it: -eps_e, then joints, rad or m."""
         self.modes: dict[str, str] = {}
         """The mode of each node, by its name in the namespace."""
         self._levels: dict[str, int] = {}
@@ -135,11 +136,11 @@ class Monitor:
 
     @property
     def errors(self) -> tuple[float, float] | None:
-        """Largest current attitude error (eps) and joint error (rad)."""
+        """Current angle of the attitude's error, deg, and the largest joint error (rad or m)."""
         if self.error is None:
             return None
-        size = abs(self.error)
-        return float(size[:3].max()), float(size[3:].max())
+        eps = min(1.0, math.hypot(*self.error[:3]))
+        return math.degrees(2.0 * math.asin(eps)), float(abs(self.error[3:]).max())
 
     @property
     def complaints(self) -> dict[str, str]:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from space_robot_model.robot import Robot
 
 from ...analysis.figures.overlay import words
-from ...analysis.metrics import error_columns, torque_columns, unit_of
+from ...analysis.metrics import angles_of, error_columns, torque_columns, unit_of
 from ..plotted_quantity import AXES
 
 if TYPE_CHECKING:
@@ -61,7 +61,8 @@ class Curves:
             for name, part in columns(len(labels), True, prismatic).items():
                 kind = "torques" if first else "attitude" if name == "attitude" else "joints"
                 shown = {labels[axis]: first + axis for axis in axes[part].tolist()}
-                curves.append((kind, words(name), unit_of(name).strip("-"), shown))
+                unit = "deg" if kind == "attitude" else unit_of(name)
+                curves.append((kind, words(name), unit, shown))
         if wheels:
             shown = {f"wheel_{k + 1}": 2 * len(labels) + k for k in range(wheels)}
             curves.append(("wheels", "wheel speed", "rad/s", shown))
@@ -81,7 +82,8 @@ class Curves:
         rows = self._rows
         if rows and sample.time < rows[-1][0] + LENGTH_S / POINTS:
             return
-        error = np.zeros_like(sample.torque) if sample.error is None else sample.error
+        error = np.zeros_like(sample.torque) if sample.error is None else sample.error.copy()
+        error[:3] = angles_of(error[np.newaxis, :3])[0]
         rows.append((sample.time, np.concatenate([error, sample.torque, sample.wheels[0]])))
         while rows[0][0] <= sample.time - LENGTH_S:
             rows.popleft()

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from closed_loop import GAINS, PERIOD, Loop, law_of
+from closed_loop import GAINS, H_BAR, PAPER_DEG, PERIOD, Loop, law_of
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
-from oracles import attitude_jacobian_base, attitude_jacobian_inertial, rotation_of, skew
+from numpy.typing import NDArray
+from oracles import RelativeMotion, attitude_jacobian_base, multiplied, quaternion_of, rotation_of
 from random_robots import Case, cases, random_quaternion
+from scipy.spatial.transform import Rotation
 
 from space_robot_control.controller.controller import TRANSFER_S, Controller
 from space_robot_control.controller.signal_kernels import LARGEST
@@ -19,6 +21,9 @@ from space_robot_model.robot.dynamics import forward_dynamics
 from space_robot_msgs_py.errors import SingularAttitudeError, UnusableStateError
 from space_robot_msgs_py.samples import Reference, ReferenceChunk, RobotState
 from space_robot_sim.environment.friction import FrictionSettings
+from space_robot_sim.plant.plant import Plant, PlantSettings
+
+Array = NDArray[np.float64]
 
 NO_FRICTION = FrictionSettings(coulomb=0.0, viscous=0.0)
 
@@ -41,12 +46,13 @@ def measured(case: Case) -> RobotState:
 def test_computed_torque_causes_the_acceleration_it_demands(case: Case) -> None:
     """F_S = J^-T tau at any attitude: the torque, in the base frame, makes rhodd = u_PD.
 
-    The reference turns and accelerates too; u_PD and rhodd are worked out here from SciPy.
+    The reference turns and accelerates too; u_PD and rhodd are worked out here by SciPy and the
+    product rule of quaternions.
     """
     robot, s, rng = case
-    assume(abs(s.quaternion[0]) > 0.05)
     axes = robot.n + 3
     base = np.concatenate([random_quaternion(rng), rng.normal(size=6)])
+    assume(abs(base[:4] @ s.quaternion) > 0.05)
     joints = rng.normal(size=(3, robot.n))
     k_p, k_d = rng.uniform(1.0, 50.0, axes), rng.uniform(1.0, 10.0, axes)
     controller = Controller(robot, find_law("ctc")({"k_p": k_p, "k_d": k_d}, PERIOD), PERIOD)
@@ -54,21 +60,15 @@ def test_computed_torque_causes_the_acceleration_it_demands(case: Case) -> None:
         measured(case), ReferenceChunk(0, joints[None], base[None]).references()
     ).torque
     # what is wanted
-    near = base[:4] if base[:4] @ s.quaternion >= 0.0 else -base[:4]
-    j0, j0_desired = attitude_jacobian_inertial(s.quaternion), attitude_jacobian_base(near)
-    epsilon_rate_desired = j0_desired @ base[4:7]
-    eta_rate = -0.5 * near[1:] @ base[4:7]
-    turning = 0.5 * (eta_rate * np.eye(3) + skew(epsilon_rate_desired)) @ base[4:7]
-    acceleration = np.concatenate([j0_desired @ base[7:] + turning, joints[2]])
-    error = np.concatenate([near[1:] - s.quaternion[1:], joints[0] - s.theta])
-    error_rate = np.concatenate([epsilon_rate_desired - j0 @ s.w0, joints[1] - s.rate])
-    u_pd = acceleration + k_d * error_rate + k_p * error
+    relative = RelativeMotion.of(base, s)
+    error = np.concatenate([-relative.error[1:], joints[0] - s.theta])
+    error_rate = np.concatenate([-relative.rate, joints[1] - s.rate])
+    u_pd = np.concatenate([np.zeros(3), joints[2]]) + k_d * error_rate + k_p * error
     np.testing.assert_allclose(controller.law.memory.u, u_pd, rtol=1e-9, atol=1e-9)
     # what happens
     force = np.concatenate([np.zeros(3), rotation_of(s.quaternion).apply(torque[:3]), torque[3:]])
     result = forward_dynamics(robot, s.quaternion, s.theta, s.w0, s.rate, force)[3:]
-    epsilon_rate, eta_rate = j0 @ s.w0, -0.5 * s.quaternion[1:] @ s.w0
-    result[:3] = j0 @ result[:3] + 0.5 * (eta_rate * np.eye(3) - skew(epsilon_rate)) @ s.w0
+    result[:3] = relative.second_rate(result[:3])
     np.testing.assert_allclose(result, u_pd, atol=1e-8 * np.abs(u_pd).max())
 
 
@@ -87,7 +87,7 @@ def test_both_signs_of_the_reference_give_the_same_torque(paper_robot: Robot) ->
 
 @pytest.mark.parametrize("name", ["ctc", "tde_smc", "tde_tsmc", "tde_stc"])
 def test_both_signs_of_the_measurement_give_the_same_torque(paper_robot: Robot, name: str) -> None:
-    """A sensor that reports -q all along."""
+    """A sensor that reports -q all along: the error's first eta is not negative in either case."""
     start = [0.9, 0.2, -0.3, 0.25]
     plain, other = (
         Loop(paper_robot, law_of(name), initial_quaternion=start, friction=NO_FRICTION)
@@ -97,7 +97,7 @@ def test_both_signs_of_the_measurement_give_the_same_torque(paper_robot: Robot, 
     errors, torques = plain.fly(300)
     errors_other, torques_other = other.fly(300)
     np.testing.assert_array_equal(torques_other, torques)
-    np.testing.assert_array_equal(errors_other * np.array([-1.0] * 3 + [1.0] * 6), errors)
+    np.testing.assert_array_equal(errors_other, errors)
 
 
 def test_measurement_that_changes_sign_in_flight_gives_no_jolt(paper_robot: Robot) -> None:
@@ -108,17 +108,81 @@ def test_measurement_that_changes_sign_in_flight_gives_no_jolt(paper_robot: Robo
     np.testing.assert_allclose(loop.fly(1)[1][0], before, atol=0.1)
 
 
+# References that do not go on where they were
+
+STEADY = {
+    "tde_smc": {"lambda": 5.0, "g": 0.1},
+    "tde_stc": {"lambda": 5.0, "k_1": 0.1, "k_2": 1e-3},
+    "tde_tsmc": {"k_p": 25.0, "k_d": 10.0, "k_1": 0.5},
+    "indi": {"k_p": 25.0, "k_d": 10.0},
+    "dob": {"bandwidth": 80.0, "k_p": 25.0, "k_d": 10.0},
+    "adrc": {"omega_c": 5.0, "omega_o": 200.0},
+}
+"""Laws that compare with the last tick, none with more than K_D = 10 and K_P = 25."""
+ALONG = np.array([0.6, -0.64, 0.48])
+
+
+def slew_at(time: float) -> tuple[Rotation, Array, Array]:
+    """Attitude, rate and acceleration of a base that turns faster and faster."""
+    acceleration = 0.05 * ALONG
+    return Rotation.from_rotvec(0.5 * time**2 * acceleration), time * acceleration, acceleration
+
+
+def broken_at(time: float, way: str) -> tuple[Rotation, Array, Array]:
+    """The same until 0.4 s, then held there; turned away; or held for 0.1 s alone."""
+    if time <= 0.4 or (way == "comes back" and time > 0.5):
+        return slew_at(time)
+    away = [0.02, 0.01, -0.01] if way == "is elsewhere" else np.zeros(3)
+    return slew_at(0.4)[0] * Rotation.from_rotvec(away), np.zeros(3), np.zeros(3)
+
+
+@pytest.mark.parametrize("way", ["is held", "is elsewhere", "comes back"])
+@pytest.mark.parametrize("name", STEADY)
+def test_a_step_of_the_reference_is_no_acceleration_of_the_robot(
+    paper_robot: Robot, name: str, way: str
+) -> None:
+    """The torque changes by the order of K_D times the step, not of the step in a tick."""
+    gains = {gain: np.full(9, value) for gain, value in STEADY[name].items()}
+    if name != "indi":
+        gains["inertia" if name in ("dob", "adrc") else "h_bar"] = np.array(H_BAR)
+    controller = Controller(paper_robot, find_law(name)(gains, PERIOD), PERIOD)
+    posture = PAPER_DEG[0]
+    plant = Plant(paper_robot, PlantSettings(initial_joints_deg=posture), PERIOD)
+    joints = np.zeros((1, 3, 6))
+    joints[0, 0] = np.radians(posture)
+    torques = []
+    for tick in range(1100):
+        attitude, omega, alpha = broken_at(tick * PERIOD, way)
+        base = np.concatenate([quaternion_of(attitude), omega, alpha])[None]
+        command = controller.update(plant.state, ReferenceChunk(tick, joints, base).references())
+        torques.append(command.torque[:3].copy())
+        plant.step(command)
+    of_base = H_BAR[0] if name != "indi" else controller.signals.nominal.inertia[:3, :3].max()
+    spike = 0.25 * of_base * 0.02 / PERIOD  # 1/4: J0 of rate and torque
+    changes = np.abs(np.diff(torques, axis=0)).max(axis=1)
+    assert changes.max() < 0.05 * spike
+    assert changes[800:].max() > 10.0 * changes[700:800].max()  # it is a step, all the same
+
+
 # Contract
 
 
-@pytest.mark.parametrize("quaternion", [[0.0, 1.0, 0.0, 0.0], [1e-9, 0.6, 0.0, 0.8]])
-def test_half_a_turn_is_an_error_not_a_nan(paper_robot: Robot, quaternion: list[float]) -> None:
+@pytest.mark.parametrize("desired", [[1.0, 0.0, 0.0, 0.0], [0.1, 0.7, -0.5, 0.5]])
+@pytest.mark.parametrize("error", [[0.0, 1.0, 0.0, 0.0], [1e-9, 0.6, 0.0, 0.8]])
+def test_an_error_of_half_a_turn_is_told_and_no_nan(
+    paper_robot: Robot, error: list[float], desired: list[float]
+) -> None:
+    """Of the error from the desired attitude, wherever that is; half a turn itself flies."""
     controller = Controller(paper_robot, law_of("tde_stc"), PERIOD)
-    state = RobotState.allocate(6)
-    state.tick, state.quaternion[:] = 321, quaternion
-    with pytest.raises(SingularAttitudeError, match=r"tick 321.*eta.*180 degrees") as caught:
-        controller.update(state, Reference.at_rest(6))
-    assert caught.value.tick == 321
+    state, reference = RobotState.allocate(6), Reference.at_rest(6)
+    reference["quaternion"][0] = desired
+    state.tick, state.quaternion[:] = 321, multiplied(np.array(desired), np.array(error))
+    with pytest.raises(SingularAttitudeError, match=r"tick 321.*180 degrees from its desired") as e:
+        controller.update(state, reference)
+    assert e.value.tick == 321
+    reference["quaternion"][0] = state.quaternion
+    command = controller.update(state, reference)
+    np.testing.assert_allclose(command.torque[:3], np.zeros(3), atol=1e-12)
 
 
 @pytest.mark.parametrize(
@@ -188,7 +252,7 @@ def test_on_a_turning_base_torque_becomes_force_with_the_attitude_it_began_at(
         controller = Controller(case.robot, law_of("tde_stc"), PERIOD)
         state = measured(case)
         controller.update(state, reference)
-        sign = np.sign(controller.block[0].quaternion @ state.quaternion)
+        sign = np.sign(controller.signals.attitude_error @ state.quaternion)
         state.tick, state.quaternion[:], state.applied_torque[:] = ticks, later, torque
         controller.update(state, reference)
         # either quaternion of an attitude will do, but the same one throughout

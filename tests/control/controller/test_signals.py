@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import copy
 import pickle
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
@@ -37,7 +37,7 @@ FREE = BaseActuatorSettings(base_actuation="none")
 TICKS = 6
 M_AXES = (
     *("error", "error_rate", "acceleration_desired", "n_hat", "rho", "rho_rate"),
-    *("applied_force", "paired_force", "paired_acceleration"),
+    *("applied_force", "paired_force", "paired_acceleration", "rho_step", "rate_step"),
 )
 """Signals with a value per axis."""
 LAWS = sorted(laws())
@@ -53,18 +53,16 @@ def law_with(name: str, n: int) -> ControlLaw:
 
 
 class Motion:
-    """A robot that turns and moves somehow, and a reference near it, tick by tick."""
+    """A robot that turns and moves somehow, and a reference that jumps about it, tick by tick."""
 
     def __init__(self, rng: np.random.Generator, n: int) -> None:
         self._rng, self._n = rng, n
-        attitude = random_quaternion(rng)
-        attitude[0] += 2.0  # away from half a turn
-        self._attitude = rotation_of(attitude / np.linalg.norm(attitude))
+        self._attitude = rotation_of(random_quaternion(rng))
         self._omega, self._theta, self._rate = (rng.normal(size=k) for k in (3, n, n))
         self.tick = int(rng.integers(0, 10**6))
 
     def step(self, ticks: int) -> tuple[RobotState, Any]:
-        """State and reference ``ticks`` later; the sensor's quaternion has any sign."""
+        """State and reference ``ticks`` later; their quaternions have any sign."""
         rng, duration = self._rng, ticks * PERIOD
         self._attitude *= Rotation.from_rotvec(self._omega * duration)
         self._theta = self._theta + duration * self._rate
@@ -77,9 +75,37 @@ class Motion:
         state.omega_base[:], state.joint_positions[:] = self._omega, self._theta
         state.joint_velocities[:] = self._rate
         state.applied_torque[:] = rng.normal(size=self._n + 3)
-        base = np.concatenate([random_quaternion(rng), rng.normal(size=6)])
+        error = random_quaternion(rng)
+        error[0] += 2.0  # away from half a turn
+        desired = self._attitude * rotation_of(error / np.linalg.norm(error)).inv()
+        quaternion = quaternion_of(desired) * rng.choice([-1.0, 1.0])
+        base = np.concatenate([quaternion, rng.normal(size=6)])
         joints = rng.normal(size=(3, self._n))
         return state, ReferenceChunk(self.tick, joints[None], base[None]).references()
+
+
+class Base(NamedTuple):
+    """The base at a tick."""
+
+    attitude: Rotation
+    omega: Array
+    error: Array
+    """q_e."""
+    rate: Array
+    """epsdot_e."""
+
+
+def near(quaternion: Array, other: Array) -> Array:
+    """The quaternion, or its negative, which is the same attitude."""
+    return quaternion if quaternion @ other >= 0.0 else -quaternion
+
+
+def base_of(attitude: Rotation, omega: Array, desired: Rotation, omega_d: Array, q: Array) -> Base:
+    """The base relative to a desired frame, on the side of ``q``."""
+    relative = desired.inv() * attitude
+    error = near(quaternion_of(relative), q)
+    rate = attitude_jacobian_base(error) @ (omega - relative.inv().apply(omega_d))
+    return Base(attitude, omega, error, rate)
 
 
 class Expected:
@@ -88,9 +114,8 @@ class Expected:
     def __init__(self, controls_base: bool, corner_hz: float = 0.0) -> None:
         self._controls_base = controls_base
         self._weight = low_pass_weight(corner_hz, PERIOD) or 1.0
-        self._quaternion: Array | None = None
+        self._base: Base | None = None
         self._tick = -1000
-        self._j0_before: Array = np.eye(3)
         self._of_last: tuple[Array, Array] = np.zeros(0), np.zeros(0)
         self._pair: tuple[Array, Array] = np.zeros(0), np.zeros(0)
 
@@ -102,59 +127,62 @@ class Expected:
         ``pair_of`` are base rate, joint rates and torque for the time-delay pair, if they are not
         those of the state.
         """
-        quaternion = state.quaternion.copy()
-        before = quaternion if self._quaternion is None else self._quaternion
-        if quaternion @ before < 0.0:
-            quaternion *= -1.0
-        j0 = attitude_jacobian_base(quaternion)
-        began = self._j0_before if self._follows(state.tick) else j0
-        desired, r = self._desired(reference, quaternion), reference[0]
+        r, last = reference[0], self._base
+        desired, attitude = rotation_of(r.quaternion), rotation_of(state.quaternion)
+        side = np.array([1.0, 0.0, 0.0, 0.0]) if last is None else last.error
+        base = base_of(attitude, state.omega_base.copy(), desired, r.omega_base, side)
+        j0, steps = attitude_jacobian_base(base.error), np.zeros((2, 3 + len(r.joint_positions)))
+        began = j0
+        if last is not None and self._follows(state.tick):
+            began = attitude_jacobian_base(last.error)
+            elapsed = (state.tick - self._tick) * PERIOD
+            before = r.omega_base - elapsed * r.alpha_base
+            turn = Rotation.from_rotvec(0.5 * elapsed * (before + r.omega_base))
+            there = base_of(last.attitude, last.omega, desired * turn.inv(), before, base.error)
+            steps[:, :3] = there.error[1:] - last.error[1:], there.rate - last.rate
         signals = {
-            "quaternion": quaternion,
+            "quaternion": state.quaternion.copy(),
             "omega_base": state.omega_base.copy(),
             "joint_positions": state.joint_positions.copy(),
             "joint_velocities": state.joint_velocities.copy(),
-            "rho": np.concatenate([quaternion[1:], state.joint_positions]),
-            "rho_rate": np.concatenate([j0 @ state.omega_base, state.joint_velocities]),
+            "attitude_error": base.error if self._controls_base else state.quaternion.copy(),
+            "rho": np.concatenate([base.error[1:], state.joint_positions]),
+            "rho_rate": np.concatenate([base.rate, state.joint_velocities]),
+            "rho_step": steps[0],
+            "rate_step": steps[1],
             "applied_force": force_of(began, state.applied_torque),
         }
-        signals["error"] = np.concatenate([desired[0], r.joint_positions]) - signals["rho"]
-        signals["error_rate"] = np.concatenate([desired[1], r.joint_velocities])
-        signals["error_rate"] -= signals["rho_rate"]
-        signals["acceleration_desired"] = np.concatenate([desired[2], r.joint_accelerations])
+        joints = [r.joint_positions, r.joint_velocities, r.joint_accelerations]
+        rho_d = [np.concatenate([np.zeros(3), row]) for row in joints]
+        signals["error"] = rho_d[0] - signals["rho"]
+        signals["error_rate"] = rho_d[1] - signals["rho_rate"]
+        signals["acceleration_desired"] = rho_d[2]
         rate, force = signals["rho_rate"], signals["applied_force"]
         if pair_of is not None:
-            rate = np.concatenate([j0 @ pair_of[0], pair_of[1]])
+            omega = pair_of[0] - attitude.inv().apply(desired.apply(r.omega_base))
+            rate = np.concatenate([j0 @ omega, pair_of[1]])
             force = force_of(began, pair_of[2])
         if not self._controls_base:
             rate, force = rate.copy(), force.copy()
             for column in (*(signals[n] for n in M_AXES if n in signals), rate, force):
                 column[:3] = 0.0
-        self._observe(state.tick, force, rate, signals["acceleration_desired"])
+        self._observe(state.tick, force, rate, signals)
         signals["paired_force"], signals["paired_acceleration"] = self._pair
-        self._quaternion, self._tick, self._j0_before = quaternion, state.tick, j0
+        self._base, self._tick = base, state.tick
         return signals
 
     def _follows(self, tick: int) -> bool:
         return 1 <= tick - self._tick <= LONGEST_GAP
 
-    @staticmethod
-    def _desired(reference: Any, quaternion: Array) -> tuple[Array, Array, Array]:
-        """eps_d and its derivatives, of the desired quaternion on the side of the measured one.
+    def _observe(self, tick: int, force: Array, rate: Array, signals: dict[str, Array]) -> None:
+        """The low-pass of both; at the first tick of a pair, the force and the desired motion.
 
-        ``epsdd = J0 alpha + J0dot omega``, with ``J0dot omega = -|omega|^2 eps / 4``.
+        What the reference's own step makes of the rate is no acceleration.
         """
-        r = reference[0]
-        desired = r.quaternion if r.quaternion @ quaternion >= 0.0 else -r.quaternion
-        j0, omega = attitude_jacobian_base(desired), r.omega_base
-        acceleration = j0 @ r.alpha_base - 0.25 * (omega @ omega) * desired[1:]
-        return desired[1:], j0 @ omega, acceleration
-
-    def _observe(self, tick: int, force: Array, rate: Array, desired: Array) -> None:
-        """The low-pass of both; at the first tick of a pair, the force and the desired motion."""
-        new = force.copy(), desired.copy()
+        new = force.copy(), signals["acceleration_desired"].copy()
         if self._follows(tick):
-            acceleration = (rate - self._of_last[1]) / ((tick - self._tick) * PERIOD)
+            change = rate - self._of_last[1] - signals["rate_step"]
+            acceleration = change / ((tick - self._tick) * PERIOD)
             old, w = self._pair, self._weight
             new = old[0] + w * (force - old[0]), old[1] + w * (acceleration - old[1])
         self._pair, self._of_last = new, (force.copy(), rate.copy())

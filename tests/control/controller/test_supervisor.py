@@ -18,6 +18,7 @@ from space_robot_control.controller.supervision import NOMINAL_FROM_ETA, SAFE_BE
 from space_robot_control.controller.supervisor import Mode, Supervisor
 from space_robot_control.controller.time_delay_estimation import LONGEST_GAP
 from space_robot_control.laws import ControlLaw, LawGains, Signals
+from space_robot_model.hardware.base_actuators import BaseActuatorSettings
 from space_robot_model.robot import Robot
 from space_robot_msgs_py.compiled.records import Block
 from space_robot_msgs_py.errors import MessageError
@@ -242,6 +243,43 @@ def test_a_single_bad_state_near_half_a_turn_is_held_over(paper_robot: Robot) ->
         supervisor.answer(state, REST)
         modes.append(supervisor.mode)
     assert modes == [Mode.NOMINAL, Mode.HOLDING, Mode.NOMINAL]
+
+
+def test_half_a_turn_is_that_of_the_error(paper_robot: Robot) -> None:
+    """A base half a turn from the inertial frame flies where it is desired there."""
+    supervisor, turned = supervisor_of(paper_robot), REST.copy()
+    turned["quaternion"][0] = state_at(0, 0.0).quaternion
+    other_sign = turned.copy()
+    other_sign["quaternion"] *= -1.0
+    for tick, (eta, reference, mode) in enumerate(
+        [
+            (0.0, turned, Mode.NOMINAL),
+            (SAFE_BELOW_ETA / 2, turned, Mode.NOMINAL),
+            (1.0, turned, Mode.SAFE),
+            (1.0, REST, Mode.NOMINAL),
+            (0.0, REST, Mode.SAFE),
+            (0.0, other_sign, Mode.NOMINAL),
+        ]
+    ):
+        command = supervisor.answer(state_at(tick, eta), reference)
+        assert supervisor.mode is mode, tick
+        assert np.isfinite(command.torque).all()
+    assert supervisor.rejected == {"attitude error near 180 degrees": 2}
+
+
+def test_a_free_base_has_no_singular_attitude(paper_robot: Robot) -> None:
+    """Nothing turns it, so no J0 is asked for, wherever it is."""
+    controller = Controller(
+        paper_robot,
+        law_of("tde_stc"),
+        PERIOD,
+        actuators=BaseActuatorSettings(base_actuation="none"),
+    )
+    supervisor = Supervisor(controller, HOLD)
+    for tick, eta in enumerate([1.0, 0.03, 1e-3, 0.0, -1e-9, -0.5]):
+        supervisor.answer(state_at(tick, eta), REST)
+        assert supervisor.mode is Mode.NOMINAL
+    assert not supervisor.rejected
 
 
 # Time

@@ -5,6 +5,7 @@ from __future__ import annotations
 from functools import cache
 
 import numpy as np
+import pytest
 from exported_kernels import needs_compiler
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
@@ -12,13 +13,20 @@ from hypothesis import strategies as st
 from space_robot.export.software import export
 from space_robot.flight.plan import Flight, FlightPlan, resolve
 from space_robot_control.controller.signal_kernels import USABLE
-from space_robot_control.controller.supervision import NEW, NO_REFERENCE, REFERENCE_HELD, STATUSES
+from space_robot_control.controller.supervision import (
+    NEW,
+    NO_REFERENCE,
+    NOMINAL_FROM_ETA,
+    REFERENCE_HELD,
+    SAFE_BELOW_ETA,
+    STATUSES,
+)
 from space_robot_control.controller.supervisor import Supervisor
 from space_robot_control.flight_code.folder import Exported
 from space_robot_control.flight_code.hostile import hostile_ticks, shake, spoil, spoiled_reference
 from space_robot_control.flight_code.library import CONDITION, FlightLibrary
 from space_robot_control.flight_code.supervisors import bits
-from space_robot_msgs_py.samples import Reference
+from space_robot_msgs_py.samples import Reference, RobotState
 
 pytestmark = needs_compiler
 TICKS = 150
@@ -51,7 +59,8 @@ def test_c_answers_like_python(seed: int, law: str, share: float) -> None:
             state, reference = flight.plant.state.copy(), references[k : k + 1]
             state.tick = tick
             shake(state, 10.0 ** random.uniform(-8, 0), random)
-            spoil(state, wheels, random, is_hostile=random.random() < share)
+            desired = reference["quaternion"][0]
+            spoil(state, wheels, random, desired, is_hostile=random.random() < share)
             if random.random() < share:
                 reference = spoiled_reference(reference, random)
             command, status = supervisor.answer(state, reference), code.answer(state, reference)
@@ -61,6 +70,41 @@ def test_c_answers_like_python(seed: int, law: str, share: float) -> None:
         assert condition["answered"] == supervisor.answered
         assert condition["last_stamp"] == supervisor.last_stamp
         assert code.condition[5:].sum() == supervisor.rejected.total()
+
+
+@pytest.mark.parametrize("desired", [[1.0, 0.0, 0.0, 0.0], [0.1, 0.7, -0.5, 0.5]])
+def test_spoiled_states_meet_half_a_turn_from_wherever_the_base_should_be(
+    desired: list[float],
+) -> None:
+    """Both sides of the limits of `supervision`, which look at the error."""
+    random, q_d, etas = np.random.default_rng(1), np.array(desired), []
+    for _ in range(400):
+        state = RobotState.allocate(6)
+        state.quaternion[:] = q_d
+        with np.errstate(all="ignore"):
+            spoil(state, 0, random, q_d)
+        if not (np.abs(state.quaternion) < 2.0).all():
+            continue
+        if abs(np.linalg.norm(state.quaternion) - 1.0) < 1e-12:
+            etas.append(abs(float(state.quaternion @ q_d)))
+    assert min(etas) < 1e-9
+    assert any(0.0 < eta < SAFE_BELOW_ETA for eta in etas)
+    assert any(SAFE_BELOW_ETA < eta < NOMINAL_FROM_ETA for eta in etas)
+
+
+def test_a_reference_whose_quaternion_is_not_unit_is_held() -> None:
+    """Small and large ones; what rounding makes of a unit one flies."""
+    flight, code = flight_of("ctc"), FlightLibrary(exported("ctc"))
+    supervisor = Supervisor(flight.controller, flight.controller_settings.hold_ticks)
+    references, state = flight.mission.chunk(0, 8).references(), flight.plant.state.copy()
+    for tick, scale in enumerate([1.0, 1.0001, 0.0, 0.9, 1.001, 1e20, -1.0]):
+        reference = references[tick : tick + 1].copy()
+        reference["quaternion"] *= scale
+        state.tick = tick
+        command = supervisor.answer(state, reference)
+        is_held = code.answer(state, reference) == REFERENCE_HELD
+        assert is_held == (supervisor.reason == "reference held") == (tick in (2, 3, 4, 5))
+        np.testing.assert_array_equal(bits(code.command), bits(command.torque))
 
 
 def test_a_bad_reference_is_held_and_told() -> None:

@@ -179,6 +179,7 @@ def test_goals_are_followed_superseded_and_cancelled(
         expected = (GoalStatus.STATUS_CANCELED, 0, "the reference is brought to rest")
         assert client.end(cancelled) == expected
     finally:
+        client.client.destroy()  # else the node stays as long
         client.node.leave()
     assert sim(free_domain, "resume") == 0
     output = flight.communicate(timeout=TIMEOUT_S)[0]

@@ -102,6 +102,7 @@ def signals_of(case: Case, scale: float = 1.0, is_free: bool = False) -> Any:
     signals.quaternion[:] = case.state.quaternion
     signals.quaternion[0] = abs(case.state.quaternion[0]) + 0.2
     signals.quaternion[:] /= np.linalg.norm(signals.quaternion)
+    signals.attitude_error[:] = signals.quaternion
     signals.joint_positions[:] = case.state.theta
     signals.omega_base[:] = rng.normal(size=3)
     return signals
@@ -313,6 +314,12 @@ class IdealPlant:
         quaternion = np.concatenate([[np.sqrt(1.0 - rho[:3] @ rho[:3])], rho[:3]])
         return quaternion, rate, s, s + rate, v_rate
 
+    def frame(self, t: float) -> tuple[Array, Array]:
+        """Rate and acceleration of the desired frame, which never comes to rest."""
+        frequencies, phases = np.array([0.9, 1.3, 0.7]), np.array([0.0, 1.0, 2.0])
+        angle = frequencies * t + phases
+        return 0.4 * np.sin(angle), 0.4 * frequencies * np.cos(angle)
+
     def estimate(self, x: Array) -> Array:
         return x[2 * self.axes : -1].reshape(self.size, self.size)
 
@@ -321,16 +328,17 @@ class IdealPlant:
         quaternion, rate, s, v, v_rate = self.motion(t, x)
         theta, work, force = x[3 : self.axes].copy(), self.work, np.zeros(self.axes)
         vectors_into(self.robot.model, quaternion, theta, work)
-        take_rho(quaternion, rate, s, v, v_rate, work)
+        take_rho(quaternion, *self.frame(t), rate, s, v, v_rate, work)
         motions_into(self.robot.model, work)
         forces = work.acceleration @ self.estimate(x)
         force_on_vectors_into(self.robot.model, forces, work, force)
         force_in_rho(work, force)
         force += self.gains["k_d"] * s
-        omega_base = np.asarray(
-            np.linalg.solve(attitude_jacobian_base(quaternion), rate[:3]), np.float64
-        )
-        rho_space_into(self.plant.model, quaternion, theta, omega_base, rate[3:].copy(), self.out)
+        omega, alpha = self.frame(t)
+        omega_base = np.linalg.solve(attitude_jacobian_base(quaternion), rate[:3])
+        omega_base += rotation_of(quaternion).inv().apply(omega)
+        moving = theta, omega_base, rate[3:].copy(), omega, alpha
+        rho_space_into(self.plant.model, quaternion, *moving, self.out)
         acceleration = np.linalg.solve(self.out.inertia, force - self.out.bias)
         product = self.form.metric @ work.sliding.T @ work.acceleration @ self.form.metric
         change = 0.5 * (product + product.T).ravel()
@@ -346,7 +354,10 @@ class IdealPlant:
 
 @pytest.mark.parametrize("off", [0.2, 0.5])
 def test_lyapunov_function_falls_by_the_damping_alone(off: float) -> None:
-    """V never rises, falls by ``s^T K_D s`` and nothing else, and the errors die out."""
+    """V never rises, falls by ``s^T K_D s`` and nothing else, and the errors die out.
+
+    The desired frame turns and accelerates, and the desired motion moves relative to it.
+    """
     ideal = IdealPlant(off)
     rho_d, rate_d, _ = desired(0.0, ideal.axes)
     nominal = second_moments(ideal.robot)

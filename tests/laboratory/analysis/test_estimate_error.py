@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from random_logs import random_log
+from scipy.spatial.transform import Rotation
 
 from space_robot.analysis import analyze, excerpt
 from space_robot.analysis.described_estimator import estimator
@@ -113,14 +114,23 @@ def test_it_is_that_of_a_plain_loop(n: int) -> None:
     log = random_log(n, 20, n)
     h_bar = np.array(log.flight["gains_used"]["h_bar"])
     period, before, neglected = log.timebase.period, None, []
-    quaternions: list[np.ndarray] = []
-    for q in log.quaternion:
-        quaternions.append(-q if quaternions and np.dot(q, quaternions[-1]) < 0.0 else q.copy())
+    log.reference_base[:, 4:7] = np.random.default_rng(n).normal(size=(20, 3))
+    last = None
     for k in range(20):
-        eta, (x, y, z) = quaternions[k][0], quaternions[k][1:]
+        desired, true = (
+            Rotation.from_quat(q, scalar_first=True)
+            for q in (log.reference_base[k, :4], log.quaternion[k])
+        )
+        turned = desired.inv() * true
+        eps, eta = np.split(turned.as_quat(canonical=last is None), [3])
+        if last is not None and np.dot([*eps, *eta], last) < 0.0:
+            eps, eta = -eps, -eta
+        last = np.array([*eps, *eta])
+        x, y, z = eps
         skew = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
         jacobian = 0.5 * (eta * np.eye(3) + skew)
-        rate = np.concatenate([jacobian @ log.omega_base[k], log.joint_velocities[k]])
+        omega = log.omega_base[k] - turned.inv().apply(log.reference_base[k, 4:7])
+        rate = np.concatenate([jacobian @ omega, log.joint_velocities[k]])
         if before is not None:
             old_jacobian, old_rate = before
             force = log.applied_torque[k].copy()
@@ -143,7 +153,8 @@ def test_it_is_that_of_a_plain_loop(n: int) -> None:
 def test_at_180_degrees_there_is_none() -> None:
     """J0 is singular there; it was NaN in JSON, and a warning on the terminal."""
     log = random_log(6, 20, 1)
-    log.quaternion[7] = [0.0, 0.6, 0.8, 0.0]
+    w, x, y, z = log.reference_base[7, :4]
+    log.quaternion[7] = [-x, w, z, -y]  # turned by 180 degrees about the desired x axis
     report = analyze(log)
     assert report["estimate_error"] is None
     assert "180 degrees" in report["unavailable"]["estimate_error"]

@@ -35,6 +35,7 @@ from space_robot.analysis.figures import (
 )
 from space_robot.analysis.figures.base_torque import common_limits, power_spectral_density
 from space_robot.analysis.figures.style import LineStyle, house_style, thinned
+from space_robot.analysis.metrics import attitude_angles
 from space_robot.analysis.plot_series import BaseTorque
 from space_robot.analysis.waypoints import junction_ticks, waypoint_ticks
 from space_robot.flight.plan import Flight, FlightPlan, resolve
@@ -241,7 +242,7 @@ class TestControlResults:
         log.applied_torque[41111, 1] = 7.0  # one tick
         figure = control_results(log, "TDE-STC, case 1")
         assert [axes.get_ylabel() for axes in figure.axes] == [
-            "attitude error",
+            "attitude error (deg)",
             "base torque (N m)",
             "base torque (N m)",
             "joint error (rad)",
@@ -251,7 +252,12 @@ class TestControlResults:
         assert figure.get_suptitle() == "TDE-STC, case 1"
         assert legend_names(figure) == [["base x", "base y", "base z"], list(log.joint_names)]
         error = tracking_error(log)
-        drawn = [error[:, :3], log.applied_torque[:, :3], error[:, 3:], log.applied_torque[:, 3:]]
+        drawn = [
+            attitude_angles(log),
+            log.applied_torque[:, :3],
+            error[:, 3:],
+            log.applied_torque[:, 3:],
+        ]
         for place, values in zip((0, 1, 3, 4), drawn, strict=True):
             axes = figure.axes[place]
             assert len(curves(axes)) == values.shape[1]

@@ -12,12 +12,15 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from random_logs import random_log
 from scipy.signal import periodogram, welch
+from scipy.spatial.transform import Rotation
 
 from space_robot.analysis import analyze, tracking_error
 from space_robot.analysis.metrics import (
     AxisMaximum,
     AxisRms,
     TotalVariation,
+    angles_of,
+    attitude_angles,
     axis_groups,
     eq64,
     error_columns,
@@ -82,6 +85,10 @@ def test_definitions_bound_each_other(values: np.ndarray) -> None:
     assert mean <= math.sqrt(3.0) * vector * (1.0 + 1e-12) + 1e-12
 
 
+def rotation(quaternion: np.ndarray) -> Rotation:
+    return Rotation.from_quat(quaternion, scalar_first=True)
+
+
 @pytest.mark.parametrize("n", JOINTS)
 def test_every_column_is_that_of_plain_loops(n: int) -> None:
     log = random_log(n, 50, n)
@@ -91,9 +98,8 @@ def test_every_column_is_that_of_plain_loops(n: int) -> None:
     report = analyze(log)
     error: list[list[float]] = []
     for k in range(log.ticks):
-        q, desired = log.quaternion[k], log.reference_base[k, :4]
-        side = -1.0 if math.fsum(q * desired) < 0.0 else 1.0
-        attitude = [side * float(desired[i]) - float(q[i]) for i in (1, 2, 3)]
+        turned = rotation(log.reference_base[k, :4]).inv() * rotation(log.quaternion[k])
+        attitude = (-turned.as_quat(canonical=True)[:3]).tolist()
         joints = (log.reference_joints[k, 0] - log.joint_positions[k]).tolist()
         error.append([*attitude, *joints])
     torque = log.applied_torque.tolist()
@@ -102,13 +108,14 @@ def test_every_column_is_that_of_plain_loops(n: int) -> None:
             name = base if group == "base" else f"{prefix}_{group}"
             columns = [[row[i] for row in values] for i in axes]
             rms = [root_mean_square(column) for column in columns]
-            close = {"rel": 1e-12}
+            close = {"rel": 1e-12, "abs": 1e-15}
             mean = math.fsum(rms) / len(axes)
             assert report["rms"]["mean_axis"][name] == pytest.approx(mean, **close)
             vector = [math.sqrt(math.fsum(row[i] ** 2 for i in axes)) for row in values]
             expected = root_mean_square(vector) / len(axes)
             assert report["rms"]["eq64"][name] == pytest.approx(expected, **close)
-            assert report["maxima"][name] == max(abs(x) for column in columns for x in column)
+            largest = max(abs(x) for column in columns for x in column)
+            assert report["maxima"][name] == pytest.approx(largest, **close)
             if values is torque:
                 steps = [math.fsum(abs(b - a) for a, b in itertools.pairwise(c)) for c in columns]
                 variation = math.fsum(steps) / len(axes) / (49 * PERIOD)
@@ -296,7 +303,49 @@ def test_error_is_measured_on_the_near_side_of_the_two_quaternions() -> None:
     log.joint_positions[:], log.reference_joints[:] = 0.25, 1.0
     error = tracking_error(log)
     np.testing.assert_allclose(error[0], [math.sin(angle), 0.0, 0.0, 0.75], atol=1e-15)
-    np.testing.assert_allclose(error[1], [-math.sin(angle), 0.0, 0.0, 0.75], atol=1e-15)
+    np.testing.assert_array_equal(error[1], error[0])  # Q and -Q are the same attitude
+
+
+ATTITUDES = arrays(np.float64, (2, 4), elements=st.floats(-1.0, 1.0)).filter(
+    lambda q: bool((np.linalg.norm(q, axis=1) > 0.1).all())
+)
+
+
+@given(ATTITUDES)
+def test_the_angles_are_those_of_the_rotation_from_the_desired_attitude(
+    attitudes: np.ndarray,
+) -> None:
+    """By SciPy, at any attitudes: also where the error is 180 degrees but for its sign."""
+    desired, true = attitudes / np.linalg.norm(attitudes, axis=1, keepdims=True)
+    log = FlightLog.allocate(1, ("j",), Timebase(500_000))
+    log.quaternion[:], log.reference_base[:, :4] = true, desired
+    turned = rotation(desired).inv() * rotation(true)
+    expected = turned.as_rotvec(degrees=True)
+    found, vector = attitude_angles(log)[0], tracking_error(log)[0, :3]
+    quaternion = turned.as_quat(canonical=True)
+    close = dict(atol=1e-12 if quaternion[3] < 1e-9 else 1e-11, rtol=0.0)
+    if quaternion[3] < 1e-12:  # +-180 degrees are the same
+        assert np.linalg.norm(found) == pytest.approx(180.0, rel=1e-12)
+    else:
+        np.testing.assert_allclose(found, -expected, **close)
+        np.testing.assert_allclose(vector, -quaternion[:3], atol=1e-15)
+        if np.linalg.norm(vector) < 0.9:
+            np.testing.assert_allclose(angles_of(vector[np.newaxis])[0], -expected, **close)
+
+
+def test_of_a_base_that_is_to_stay_at_the_identity_the_error_has_the_bits_of_the_attitude() -> None:
+    log = random_log(6, 100, 3)
+    log.quaternion *= np.sign(log.quaternion[:, :1])
+    log.reference_base[:, :4] = [1.0, 0.0, 0.0, 0.0]
+    np.testing.assert_array_equal(tracking_error(log)[:, :3], -log.quaternion[:, 1:])
+
+
+def test_the_reports_angles_are_those_of_its_columns() -> None:
+    report = analyze(random_log(6, 200, 5))
+    angles, unit = report["attitude_error_deg"], 2.0 * 180.0 / np.pi  # of small errors
+    for kind in ("mean_axis", "eq64"):
+        assert angles[kind] == pytest.approx(unit * report["rms"][kind]["attitude"], rel=1e-8)
+    assert angles["max"] == pytest.approx(unit * report["maxima"]["attitude"], rel=1e-8)
 
 
 def test_report_has_the_documented_keys() -> None:

@@ -81,7 +81,7 @@ def test_a_logarithmic_panel_shows_all_but_the_few_values_below_its_foot(
 
 
 def _attitude_errors(flights: dict[str, PlotSeries]) -> list[np.ndarray]:
-    return [series.errors["attitude"] for series in flights.values()]
+    return [series.errors["attitude_deg"] for series in flights.values()]
 
 
 @pytest.mark.parametrize(
@@ -90,6 +90,8 @@ def _attitude_errors(flights: dict[str, PlotSeries]) -> list[np.ndarray]:
         ("joints_1_3", "joints 1-3"),
         ("joints_4", "joints 4"),
         ("attitude", "attitude"),
+        ("attitude_deg", "attitude"),
+        ("half_cone_arcsec_jitter", "half cone jitter"),
         ("base_torque", "base torque"),
     ],
 )

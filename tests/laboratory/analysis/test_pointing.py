@@ -1,4 +1,4 @@
-"""The end effector's pointing error: SciPy's rotations, and what any error must fulfil."""
+"""Pointing errors of end effector and base: SciPy's rotations, and what any error must fulfil."""
 
 from __future__ import annotations
 
@@ -10,7 +10,19 @@ from oracles import quaternion_of, rotation_of
 from random_robots import random_quaternion, random_robot
 from scipy.spatial.transform import Rotation
 
-from space_robot.analysis.pointing import angle_between, pointing_error, rotation_angle
+from space_robot.analysis.metrics import tracking_error
+from space_robot.analysis.pointing import (
+    BASE_ANGLES,
+    BasePointing,
+    PointingBudget,
+    angle_between,
+    base_pointing_error,
+    pointed_axis,
+    pointing_error,
+    rotation_angle,
+)
+from space_robot.flight.plan import Flight, FlightPlan, resolve
+from space_robot.flight.simulate import simulate
 from space_robot_model.robot import Robot
 from space_robot_model.robot.tool import tool_pose
 from space_robot_msgs_py.bag.flight_log import FlightLog
@@ -108,3 +120,114 @@ def test_the_bases_drift_is_told_apart(paper_robot: Robot) -> None:
     error = pointing_error(log, paper_robot)
     np.testing.assert_array_equal(error.base_drift, [0.0, 0.0, 5.0, 2.0])
     np.testing.assert_allclose(error.position, 0.0, atol=1e-12)
+
+
+ARCSEC = np.pi / 180.0 / 3600.0
+MISSIONS = [
+    (['{"hold": 5}', "{base: {point: nadir, axis: [0, 3, 4]}, duration: 10}"], (0.0, 0.6, 0.8)),
+    (["{base: {point: sun}, hold: 9}", "{base: {point: nadir, axis: [1, 0, 0]}}"], (0, 0, 1)),
+    (["{base: {rpy_deg: [0, 0, 90]}, duration: 9}"], (0.0, 0.0, 1.0)),
+    (["{base: {point: nadir, axis: [0, 0, 0]}}", "{base: {point: x, axis: abc}}"], (0, 0, 1)),
+    (["{", "5", "base: free"], (0.0, 0.0, 1.0)),
+    ([], (0.0, 0.0, 1.0)),
+]
+
+
+@given(SEEDS, st.sampled_from([1e-9, 1e-4, 1.0]))
+def test_the_bases_angles_are_those_of_its_directions(seed: int, size: float) -> None:
+    """By SciPy: the axis' directions, and the twist left when the shortest turn aligned these."""
+    rng = np.random.default_rng(seed)
+    log, axis = log_of(random_robot(rng, 1), rng, size), rng.normal(size=3)
+    axis /= np.linalg.norm(axis)
+    found = base_pointing_error(log, axis)
+    for k in range(log.ticks):
+        turned = rotation_of(log.reference_base[k, :4]).inv() * rotation_of(log.quaternion[k])
+        away = turned.apply(axis)
+        across = np.cross(axis, away)
+        half_cone = np.arctan2(np.linalg.norm(across), axis @ away)
+        assert found.half_cone[k] == pytest.approx(half_cone, rel=1e-9, abs=1e-15)
+        swing = Rotation.from_rotvec(across / max(np.linalg.norm(across), 1e-300) * half_cone)
+        twist = (swing.inv() * turned).as_rotvec()
+        assert found.about[k] == pytest.approx(abs(twist @ axis), rel=1e-9, abs=1e-15)
+        np.testing.assert_allclose(np.cross(twist, axis), 0.0, atol=1e-12)
+        assert found.rotation[k] == pytest.approx(turned.magnitude(), rel=1e-12, abs=1e-15)
+        np.testing.assert_allclose(found.vector[k], turned.as_rotvec(), rtol=1e-9, atol=1e-15)
+
+
+def test_the_bases_figures_are_those_of_plain_loops() -> None:
+    """Band, windows that follow one another, and jitter as the difference from their means."""
+    rng, ticks, window = np.random.default_rng(1), 1030, 100
+    log = log_of(random_robot(rng, 1), rng, 1e-3, ticks)
+    axis = np.array([0.0, 0.6, 0.8])
+    budget = PointingBudget(band_deg=0.03, window_s=window * 5e-4, axis=[0.0, 3.0, 4.0])
+    metric, parts = BasePointing(log, budget), BasePointing(log, budget)
+    metric.add(log, np.empty(0))
+    for start, stop in ((0, 7), (7, 450), (450, 451), (451, ticks)):
+        parts.add(log.rows(start, stop), np.empty(0))
+    found, error = metric.result(), base_pointing_error(log, axis)
+    assert found["axis"] == pytest.approx(axis)
+    assert (found["band_deg"], found["window_s"]) == (0.03, 0.05)
+    away = []
+    for first in range(0, ticks - window + 1, window):
+        rows = error.vector[first : first + window]
+        away += [*(rows - rows.mean(axis=0))]
+    vectors = np.array(away)
+    assert len(vectors) == 1000
+    about = vectors @ axis
+    jitter = [
+        np.linalg.norm(vectors - np.outer(about, axis), axis=1),
+        np.abs(about),
+        np.linalg.norm(vectors, axis=1),
+    ]
+    for i, name in enumerate(BASE_ANGLES):
+        angle = error[i] / ARCSEC
+        expected = {
+            "rms": np.sqrt(np.mean(angle**2)),
+            "max": angle.max(),
+            "end": angle[-1],
+            "within_band": np.mean(angle <= 0.03 * 3600.0),
+            "jitter_rms": np.sqrt(np.mean(jitter[i] ** 2)) / ARCSEC,
+            "jitter_max": jitter[i].max() / ARCSEC,
+        }
+        assert 0.05 < expected["within_band"] < 0.95
+        assert found[name] == pytest.approx(expected, rel=1e-12)
+        assert parts.result()[name] == pytest.approx(expected, rel=1e-12)
+
+
+def test_a_flight_shorter_than_the_window_has_no_jitter() -> None:
+    rng = np.random.default_rng(1)
+    log = log_of(random_robot(rng, 1), rng, 1e-3, 10)
+    metric = BasePointing(log)
+    metric.add(log, np.empty(0))
+    assert metric.result()["half_cone_arcsec"]["jitter_rms"] is None
+
+
+@pytest.mark.parametrize(("segments", "axis"), MISSIONS)
+def test_the_axis_that_points_is_that_of_the_first_pointing_segment(
+    segments: list[str], axis: tuple[float, float, float]
+) -> None:
+    assert PointingBudget().of(segments).axis == pytest.approx(axis)
+    assert np.linalg.norm(pointed_axis(segments)) > 0.0
+
+
+def test_a_start_that_points_gives_the_axis_where_no_segment_does() -> None:
+    start = '{"point": "nadir", "axis": [0, 2, 0]}'
+    assert PointingBudget().of([], start).axis == [0.0, 1.0, 0.0]
+    assert PointingBudget().of(MISSIONS[0][0], start).axis == pytest.approx([0.0, 0.6, 0.8])
+    assert PointingBudget(axis=[5, 0, 0]).of(MISSIONS[0][0], start).axis == [1.0, 0.0, 0.0]
+    with pytest.raises(ValueError, match="axis must have a norm"):
+        PointingBudget(axis=[0, 0, 0])
+
+
+def test_the_error_of_a_log_is_that_which_the_law_saw() -> None:
+    """Also where the base is to stand at 180 degrees from the inertial frame."""
+    half_turn = [0.0, 0.6, 0.0, 0.8]
+    parameters = {
+        "mission": {"base_quaternion": half_turn},
+        "plant": {"initial_quaternion": [1e-3, 0.6, 1e-3, 0.8]},
+    }
+    log = simulate(Flight(resolve(FlightPlan(duration=0.1, parameters=parameters))))
+    assert log.telemetry is not None
+    seen = log.telemetry[:, 3]
+    assert np.abs(seen[0, :3]).max() > 1e-4
+    np.testing.assert_allclose(tracking_error(log), seen, rtol=0.0, atol=1e-15)

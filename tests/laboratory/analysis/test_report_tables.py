@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 import itertools
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -30,6 +31,18 @@ PATHS: dict[str, tuple[str, ...]] = {
     "navigation error": ("navigation_error", "rms"),
 }
 """Groups with a line for every key below."""
+ANGLES: dict[str, Callable[[dict[str, Any]], float]] = {
+    "RMS, mean of axes": lambda r: r["attitude_error_deg"]["mean_axis"],
+    "RMS, eq. (64)": lambda r: r["attitude_error_deg"]["eq64"],
+    "maximum": lambda r: r["attitude_error_deg"]["max"],
+    "navigation error": lambda r: r["navigation_error"]["attitude_deg"]["rms"],
+}
+"""The attitude's angle in degrees, in the place of the quaternion's vector part."""
+OF_BASE = {
+    "base, half cone": "half_cone_arcsec",
+    "base, about the axis": "about_arcsec",
+    "base, rotation": "rotation_arcsec",
+}
 POINTING = {
     "pointing": "boresight_rad",
     "rotation": "rotation_rad",
@@ -72,6 +85,8 @@ def test_every_line_is_its_figure(reports: list[dict[str, Any]]) -> None:
             values: Any = r
             for key in path:
                 values = values[key]
+            if group in ANGLES:
+                values = values | {"attitude": ANGLES[group](r)}
             texts |= {(group, key): f"{value:.4g}" for key, value in values.items()}
         for key, peak in r["ripple"]["peak"].items():
             text = f"{peak['frequency_hz']:.4g} Hz\n{peak['rms']:.2e} N m"
@@ -87,6 +102,12 @@ def test_every_line_is_its_figure(reports: list[dict[str, Any]]) -> None:
             for group, name in GROUPS.items():
                 value = r["estimate_error"][kind][group]
                 texts["estimate error", f"{name} {label}"] = f"{value:.4g}"
+        for group, key in OF_BASE.items():
+            for kind, value in r["base_pointing"][key].items():
+                within = kind == "within_band"
+                label = "time within the band" if within else kind.replace("_", ", ")
+                text = f"{value:.2%}" if within else f"{value:.3g} arcsec"
+                texts[group, label.replace("rms", "RMS")] = text
         for group, key in POINTING.items():
             for kind, label in (("rms", "RMS"), ("max", "max"), ("end", "end")):
                 value = r["pointing"][key][kind]
@@ -175,10 +196,25 @@ def test_gains_of_ones_own_stand_in_the_title() -> None:
 
 @pytest.mark.parametrize(
     ("column", "unit"),
-    [("attitude", "-"), ("joints_4_7", "rad"), ("base_torque", "N m"), ("torque_1_1", "N m")],
+    [
+        ("attitude", "-"),
+        ("attitude_deg", "deg"),
+        ("joints_4_7", "rad"),
+        ("base_torque", "N m"),
+        ("torque_1_1", "N m"),
+    ],
 )
 def test_units_of_columns(column: str, unit: str) -> None:
     assert unit_of(column) == unit
+
+
+def test_the_attitude_is_shown_in_degrees(reports: list[dict[str, Any]]) -> None:
+    report = copy.deepcopy(reports[0])
+    report["attitude_error_deg"] = {"mean_axis": 1.146e-3, "eq64": 6.6e-4, "max": 2e-3}
+    report["navigation_error"] = None
+    assert rms_table(report).groups[0].rows[0][:4] == ["attitude", "deg", "1.146e-03", "6.600e-04"]
+    maximum = by_label(lines([report]))["maximum", "attitude"]
+    assert (maximum.unit, maximum.texts) == ("deg", ["0.002"])
 
 
 def test_a_diverged_flight_has_all_torques_with_exponents(reports: list[dict[str, Any]]) -> None:

@@ -7,7 +7,6 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
 import yaml
 from click.testing import CliRunner, Result
@@ -116,9 +115,8 @@ def test_numbers_are_those_of_the_functions(motor: str) -> None:
     for k, name in enumerate(JOINTS):
         expected = {"lowest_hz": frequencies[:, k].min(), "highest_hz": frequencies[:, k].max()}
         assert report["gears"][name] == pytest.approx(expected, rel=1e-12)
-    quaternion = np.array([1.0, 0.0, 0.0, 0.0])
     corner = flight.controller_settings.acceleration_filter_hz
-    motions = FlexibleMotions(robot, positions, quaternion, flight.law.period, True)
+    motions = FlexibleMotions(robot, positions, flight.law.period, True)
     expected = check_flexible(flight.law, motions, corner)
     flexible = report["laws"]["tde_stc"]["flexible"]
     assert flexible["radius"] == pytest.approx(expected.radius, rel=1e-12)

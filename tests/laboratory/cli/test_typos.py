@@ -286,8 +286,8 @@ TYPOS = (
     ),
     Typo(
         "campaign run metric.yaml --out x",
-        "unknown metric 'atitude_max' in metric.yaml: require.pointing.metric: choose one of ... "
-        "(did you mean attitude_max, attitude_rms or base_torque_max?) "
+        "unknown metric 'atitude_max' in metric.yaml: require.pointing.metric: "
+        "did you mean attitude_max, attitude_deg_max or attitude_rms? (29 in all) "
         "(see: space-robot help campaign)",
     ),
     Typo(

@@ -29,7 +29,19 @@ from space_robot_msgs_py.errors import FlightError, InputError
 
 ROOT = Path(__file__).parents[3]
 TICKS = 400
+TURNING: dict[str, Any] = {
+    "start": {
+        "joints_deg": [0, 120, 220, 0, -10, 0],
+        "base": {"rpy_deg": [20, 60, 175], "rate_deg_s": [1, -2, 1]},
+    },
+    "segments": [
+        {"base": {"rpy_deg": [0, 0, -170]}, "joints_deg": [5, 120, 220, 0, 0, 0], "duration": 2}
+    ],
+    "limits": {"check_actuators": False},
+}
+"""A mission whose base starts with a rate, near 180 degrees, and turns."""
 HARD: dict[str, Any] = {
+    "mission": TURNING,
     "case": "3",
     "sensors": "fine",
     "navigation": "filtered",
@@ -37,7 +49,7 @@ HARD: dict[str, Any] = {
     "faults": ["nan_state@0.12-0.13:0.5", "drop_state@0.15-0.16:0.5", "stamp_jump@0.17-0.18:0.5"],
     "duration": TICKS * 5e-4,
 }
-"""Swaps, sensors and faults of messages."""
+"""A base that turns, swaps, sensors and faults of messages."""
 
 
 def flown(**options: Any) -> FlightLog:

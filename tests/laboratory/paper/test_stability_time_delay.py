@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from oracles import rho_space_inertia
 from random_robots import Case, cases
 
-from space_robot.analysis.generalised_motion import mean_acceleration
+from space_robot.analysis.generalised_motion import continuous_error, mean_acceleration
 from space_robot.flight.plan import Flight, FlightPlan, resolve
 from space_robot.flight.simulate import simulate
 from space_robot.paper.stability.lemma_1 import contraction
@@ -95,7 +95,7 @@ def test_error_is_what_the_paper_defines(law: str, robot: str) -> None:
     change = np.diff(n_hat, axis=0)
     np.testing.assert_allclose(gains["h_bar"] * error, change, atol=1e-9 * np.abs(change).max())
     if np.abs(log.applied_torque[:, :3]).max() < 50.0:  # else u is not what acted
-        wanted = u[:-1] - mean_acceleration(log)
+        wanted = u[:-1] - mean_acceleration(log, continuous_error(log))
         if law == "tde_smc":  # its switching term stands beside h_bar u
             wanted += gains["g"] * np.sign(s[:-1]) / gains["h_bar"]
         np.testing.assert_allclose(error, wanted, atol=1e-9 * np.abs(error).max())

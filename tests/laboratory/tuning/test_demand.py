@@ -36,13 +36,13 @@ def mission(turned: Rotation | None = None) -> MissionSettings:
 
 
 def force_of_torque(turned: Rotation, torque: Array) -> Array:
-    """The generalised force of a torque about inertial axes along the quaternion's vector part.
+    """The generalised force of a torque about inertial axes along eps_e of a base as desired.
 
-    By virtual work: ``f . d(eps) = torque . d(angle)``, the differences computed by SciPy.
+    By virtual work: ``f . d(eps_e) = torque . d(angle)``, the differences computed by SciPy.
     """
     step = 1e-6
     moved = [
-        ((Rotation.from_rotvec(side * step * axis) * turned).as_quat()[:3])
+        ((turned.inv() * Rotation.from_rotvec(side * step * axis) * turned).as_quat()[:3])
         for axis in np.eye(3)
         for side in (1.0, -1.0)
     ]

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
-from oracles import attitude_jacobian_base
+from oracles import attitude_jacobian_base, attitude_jacobian_inertial, rotation_of, skew
 from paths import ROOT
 from random_robots import Case, branched_cases, cases, random_state
 from second_moment_model import frames, jacobians, missing, second_moments, vectors
@@ -39,13 +39,18 @@ def near_zero(case: Case, least: float = SMALLEST_ETA) -> Array:
     return quaternion / np.linalg.norm(quaternion)
 
 
-def model_of(robot: Robot, quaternion: Array, theta: Array, rate: Array) -> tuple[Array, Array]:
-    """H_S and c_S of the project for ``rho = [eps, theta]`` with ``rhodot = rate``."""
-    out = RhoSpaceModel.allocate(robot.n)
-    omega_base = np.asarray(
-        np.linalg.solve(attitude_jacobian_base(quaternion), rate[:3]), np.float64
-    )
-    rho_space_into(robot.model, quaternion, theta, omega_base, rate[3:].copy(), out)
+STILL = np.zeros((2, 3))
+"""omega_d and alpha_d of a desired frame at rest."""
+
+
+def model_of(
+    robot: Robot, quaternion: Array, theta: Array, rate: Array, frame: Array = STILL
+) -> tuple[Array, Array]:
+    """H_S and c_S of the project for ``rho = [eps_e, theta]`` with ``rhodot = rate``."""
+    out, back = RhoSpaceModel.allocate(robot.n), rotation_of(quaternion).inv()
+    relative_omega = np.linalg.solve(attitude_jacobian_base(quaternion), rate[:3])
+    omega_base = relative_omega + back.apply(frame[0])
+    rho_space_into(robot.model, quaternion, theta, omega_base, rate[3:].copy(), *frame, out)
     return out.inertia.copy(), out.bias.copy()
 
 
@@ -54,13 +59,15 @@ def relative(actual: Array, expected: Array) -> float:
     return float(np.abs(actual - expected).max() / np.abs(expected).max())
 
 
-def by_sweep(case: Case, moments: Array, quaternion: Array, motion: Array) -> tuple[Array, Array]:
+def by_sweep(
+    case: Case, moments: Array, quaternion: Array, motion: Array, frame: Array = STILL
+) -> tuple[Array, Array]:
     """``Y pi`` and ``(J s)^T (J vdot + Jdot v)`` by the kernels, for rate, s, v and vdot."""
     robot, work = case.robot, Regressor.allocate(case.robot.n)
     force = np.zeros(robot.n + 3)
     vectors_into(robot.model, quaternion, case.state.theta, work)
     rate, s, v, v_rate = motion
-    take_rho(quaternion, rate, s, v, v_rate, work)
+    take_rho(quaternion, *frame, rate, s, v, v_rate, work)
     motions_into(robot.model, work)
     force_on_vectors_into(robot.model, np.array(work.acceleration) @ moments, work, force)
     force_in_rho(work, force)
@@ -104,6 +111,85 @@ def test_force_and_gradient_are_those_of_dense_jacobians(case: Case) -> None:
     change += change.T
     by_difference = s @ (dense.force(root @ root.T + change, v, v_rate) - force)
     assert np.sum(gradient * change) == pytest.approx(by_difference, rel=1e-7, abs=1e-9)
+
+
+def on_outer_axes(quaternion: Array, rate: Array, v: Array, v_rate: Array) -> tuple[Array, Array]:
+    """A velocity in rho and its rate as ``[w, thetadot]`` relative to the desired frame."""
+    jacobian, jacobian_rate = np.eye(rate.size), np.zeros((rate.size, rate.size))
+    j0 = jacobian[:3, :3] = attitude_jacobian_inertial(quaternion)
+    eta_rate = -0.5 * quaternion[1:] @ np.linalg.solve(j0, rate[:3])
+    jacobian_rate[:3, :3] = 0.5 * (eta_rate * np.eye(3) - skew(rate[:3]))
+    velocity = np.linalg.solve(jacobian, v)
+    return velocity, np.linalg.solve(jacobian, v_rate - jacobian_rate @ velocity)
+
+
+@FEW
+@given(cases() | branched_cases())
+def test_force_in_a_moving_frame_is_that_of_dense_jacobians_on_outer_axes(case: Case) -> None:
+    """``w0 = J0^-1 v + omega_d``; its rate, inertial but on the turning axes, adds
+    ``alpha_d + omega_d x (J0^-1 v)``. Also for velocities that the robot does not have."""
+    robot, rng = case.robot, case.rng
+    quaternion, size = near_zero(case), 2 * robot.n + 3
+    frame, motion = rng.normal(size=(2, 3)), rng.normal(size=(4, robot.n + 3))
+    rate, s, v, v_rate = motion
+    root = rng.normal(size=(size, size))
+    moments = root @ root.T
+    force, gradient = by_sweep(case, moments, quaternion, motion, frame)
+    w, _ = on_outer_axes(quaternion, rate, rate, v_rate)
+    wv, a = on_outer_axes(quaternion, rate, v, v_rate)
+    a[:3] += frame[1] + np.cross(frame[0], wv[:3])
+    for velocity in (w, wv):
+        velocity[:3] += frame[0]
+    dense = jacobians(robot, quaternion, case.state.theta, w, in_rho=False)
+    expected = dense.force(moments, wv, a)
+    j0 = attitude_jacobian_inertial(quaternion)
+    expected[:3] = np.linalg.solve(j0.T, expected[:3])
+    assert relative(force, expected) < 1e-11
+    slide = s.copy()
+    slide[:3] = np.linalg.solve(j0, s[:3])
+    assert relative(gradient, dense.gradient(slide, wv, a)) < 1e-11
+
+
+@FEW
+@given(cases() | branched_cases())
+def test_in_a_moving_frame_the_nominal_moments_give_the_model(case: Case) -> None:
+    """``Y pi = H_S rhodd + c_S`` for the robot's own motion, as `rho_space_into` has them."""
+    robot, rng = case.robot, case.rng
+    quaternion, moments = near_zero(case), second_moments(robot)
+    frame, (rate, acceleration) = rng.normal(size=(2, 3)), rng.normal(size=(2, robot.n + 3))
+    inertia, bias = model_of(robot, quaternion, case.state.theta, rate, frame)
+    motion = np.array([rate, rate, rate, acceleration])
+    force, _ = by_sweep(case, moments, quaternion, motion, frame)
+    assert relative(force, inertia @ acceleration + bias) < 1e-11
+    force, _ = by_sweep(case, moments, quaternion, motion)
+    assert relative(force, inertia @ acceleration + bias) > 1e-6
+
+
+@FEW
+@given(cases() | branched_cases())
+def test_what_v_adds_to_the_force_is_skew_symmetric_in_a_moving_frame(case: Case) -> None:
+    """``s^T (Y(v + s, vdot + sdot) - Y(v, vdot)) pi = s^T H sdot + s^T C s``, and
+    ``s^T C s = s^T Hdot s / 2``: the proof of the law needs no more than this of any frame.
+
+    Hdot is that of the model's own inertia along the motion.
+    """
+    robot, rng, h = case.robot, case.rng, 1e-4
+    quaternion, moments = near_zero(case, 1.0), second_moments(robot)
+    frame, (rate, s, s_rate, v, v_rate) = rng.normal(size=(2, 3)), rng.normal(size=(5, robot.n + 3))
+    with_s, _ = by_sweep(
+        case, moments, quaternion, np.array([rate, s, v + s, v_rate + s_rate]), frame
+    )
+    without, _ = by_sweep(case, moments, quaternion, np.array([rate, s, v, v_rate]), frame)
+    inertias = []
+    for t in (-2 * h, -h, h, 2 * h):
+        epsilon = quaternion[1:] + t * rate[:3]
+        at = np.concatenate([[np.sqrt(1.0 - epsilon @ epsilon)], epsilon])
+        inertias.append(model_of(robot, at, case.state.theta + t * rate[3:], rate)[0])
+    inertia_rate = (inertias[0] - 8 * inertias[1] + 8 * inertias[2] - inertias[3]) / (12 * h)
+    inertia, _ = model_of(robot, quaternion, case.state.theta, rate)
+    expected = s @ inertia @ s_rate + 0.5 * s @ inertia_rate @ s
+    scale = np.abs(inertias).max() * (1.0 + np.abs([s, s_rate]).max()) ** 2
+    assert abs(s @ (with_s - without) - expected) < 1e-8 * scale * (1.0 + np.abs(rate).max())
 
 
 @FEW

@@ -38,17 +38,18 @@ time.sleep(60)
 
 @pytest.fixture
 def make_node(domain: int) -> Iterator[Callable[..., rclpy.node.Node]]:
-    contexts = []
+    made = []
 
     def make(name: str, **options: object) -> rclpy.node.Node:
         context = rclpy.Context()
         rclpy.init(args=[], context=context, domain_id=domain)
-        contexts.append(context)
-        return rclpy.create_node(name, context=context, **options)
+        made.append(rclpy.create_node(name, context=context, **options))
+        return made[-1]
 
     yield make
-    for context in contexts:
-        context.try_shutdown()
+    for node in made:  # now, not by a collection of garbage in another test
+        node.destroy_node()
+        node.context.try_shutdown()
 
 
 @pytest.fixture

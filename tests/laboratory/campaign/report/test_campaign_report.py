@@ -146,7 +146,7 @@ def test_the_terminal_fits_eighty_columns() -> None:
     text = printed(found(made_table(60)), width=80)
     tables = [line for line in text.splitlines() if "rerun" not in line]
     assert max(len(line.rstrip()) for line in tables if "  " in line.strip()) <= 80
-    assert "pointing: attitude, largest, from 2 s below 4e-05 in 90 %" in text
+    assert "pointing: attitude, largest, from 2 s below 4e-05 (an angle of 0.00458 deg) in" in text
     assert "--law tde_tsmc=robust --bag flights/" in text
 
 

@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 from space_robot import FlownFlight, Scenario
 from space_robot.analysis import tracking_error
 from space_robot.analysis.attitude_drift import attitude_drift
+from space_robot.analysis.pointing import BasePointing, PointingBudget, base_pointing_error
 from space_robot.campaign.row.bands import Bands
 from space_robot.campaign.row.columns import Columns, missing_for_ripple
 from space_robot.campaign.row.measure import Measure, check_requirements
@@ -65,6 +66,37 @@ def test_maxima_are_norms_of_the_base_and_largest_values_of_joints(
     norms = np.linalg.norm(log.applied_torque[:, :3], axis=1)
     assert found["base_torque_max"] == pytest.approx(norms.max())
     assert found["joints_4_6_max"] == np.abs(error[:, 6:]).max()
+
+
+def test_the_bases_angles_are_those_of_the_report(flown: FlownFlight, measured: Measure) -> None:
+    found, report = measured.metrics(), flown.metrics
+    expected = {"attitude_deg_rms": report["attitude_error_deg"]["mean_axis"]}
+    base = report["base_pointing"]
+    expected |= {"attitude_deg_max": base["rotation_arcsec"]["max"] / 3600.0}
+    expected |= {"half_cone_arcsec_outside_band": 1.0 - base["half_cone_arcsec"]["within_band"]}
+    for name in ("half_cone_arcsec", "about_arcsec"):
+        kinds = ("rms", "max", "jitter_rms", "jitter_max")
+        expected |= {f"{name}_{kind}": base[name][kind] for kind in kinds}
+    assert {name: found[name] for name in expected} == pytest.approx(expected, rel=1e-9)
+    assert measured.bands()["half_cone_arcsec"].max() == np.float32(base["half_cone_arcsec"]["max"])
+
+
+def test_the_band_and_window_of_a_study_are_those_of_its_metrics(flown: FlownFlight) -> None:
+    angles = base_pointing_error(flown.log, np.array([1.0, 0.0, 0.0])).angles[:, 0]
+    demand = {"metric": "half_cone_arcsec_outside_band", "from_s": 0.2, "below": 1.0, "in": 0.9}
+    band = float(np.median(angles)) / 3600.0
+    budget = PointingBudget(band_deg=band, window_s=0.1, axis=[2.0, 0.0, 0.0])
+    measure = Measure(flown.flight, {"p": Requirement.model_validate(demand)}, (), budget)
+    for start in (0, 1000):
+        measure.add(flown.log.rows(start, min(start + 1000, 2400)))
+    measure.add(flown.log.rows(2000, 2400))
+    late = flown.log.time >= 0.2 - 1e-9
+    outside = float(np.mean(angles[late] > 3600.0 * band))
+    assert measure.require()["p"] == pytest.approx(outside, abs=1e-12)
+    jitter = BasePointing(flown.log, budget)
+    jitter.add(flown.log, np.empty(0))
+    expected = jitter.result()["half_cone_arcsec"]["jitter_max"]
+    assert measure.metrics()["half_cone_arcsec_jitter_max"] == pytest.approx(expected, rel=1e-9)
 
 
 def test_requirements_are_measured_in_their_windows(flown: FlownFlight, measured: Measure) -> None:
@@ -125,7 +157,7 @@ def test_bins_do_not_depend_on_blocks(case: tuple[int, list[int]]) -> None:
 @pytest.mark.parametrize(
     ("demand", "said"),
     [
-        ({"metric": "attitude_mx"}, "my.yaml: require.p.metric: choose one of attitude_rms"),
+        ({"metric": "attitude_mx"}, "in my.yaml: require.p.metric: did you mean attitude_max"),
         ({"metric": "attitude_max", "from_s": 1.2}, "from_s: must be before the end .*1.2 s"),
         (
             {"metric": "joints_1_3_rms", "from_s": 0.3001, "to_s": 0.3004},
@@ -138,6 +170,10 @@ def test_bins_do_not_depend_on_blocks(case: tuple[int, list[int]]) -> None:
         (
             {"metric": "fast_ripple_base_torque", "to_s": 0.9},
             "my.yaml: require.p.metric: fast_ripple_base_torque needs 1 s of flight",
+        ),
+        (
+            {"metric": "half_cone_arcsec_jitter_rms", "to_s": 0.5},
+            r"half_cone_arcsec_jitter_rms needs 1 s of flight \(pointing.window_s\), got 0.5005 s",
         ),
     ],
 )

@@ -148,12 +148,13 @@ def test_each_flight_of_any_batch_has_its_own_bits(
 
 @pytest.mark.parametrize("law", OWN_GAINS)
 def test_every_law_has_the_bits_of_a_flight_alone(law: str) -> None:
-    """Eight flights with gains, cases and faults of their own; all change to another law and
-    back."""
+    """Eight flights with gains, missions, cases and faults of their own; all change to another law
+    and back."""
     options: list[dict[str, Any]] = [
         {
             "controller": law,
             "gains": {law: {name: scaled(gain, lane) for name, gain in OWN_GAINS[law].items()}},
+            "mission": turning(lane),
             "sensors": "fine",
             "navigation": "filtered",
             "case": "3" if lane % 2 else "1",
@@ -167,6 +168,15 @@ def test_every_law_has_the_bits_of_a_flight_alone(law: str) -> None:
     flights = [Scenario(**option).check() for option in options]
     assert [len(group) for group in batches(enumerate(flights))] == [WIDTH]
     assert_same(flights, [Scenario(**option).check() for option in options])
+
+
+def turning(lane: int) -> dict[str, Any]:
+    """A mission whose base starts with a rate, near 180 degrees, and turns."""
+    base = {"rpy_deg": [0, 10 * lane, 172 + lane], "rate_deg_s": [1, -lane, 2]}
+    return {
+        "start": {"joints_deg": [0, 120, 220, 0, -10, 0], "base": base},
+        "segments": [{"base": {"rpy_deg": [0, 0, -170]}, "duration": 2}],
+    }
 
 
 def scaled(gain: Any, lane: int) -> Any:
