@@ -216,7 +216,7 @@ class BasePointing(Metric):
     def result(self) -> dict[str, Any]:
         """Return axis, band and window, and by `BASE_ANGLES` what was found of each angle."""
         jitter = self._jitter.value
-        found = {
+        figures = {
             "rms": self._rms.value,
             "max": self._maximum.value,
             "end": self._end,
@@ -229,7 +229,7 @@ class BasePointing(Metric):
             **{
                 name: {
                     kind: None if values is None else float(values[i])
-                    for kind, values in found.items()
+                    for kind, values in figures.items()
                 }
                 for i, name in enumerate(BASE_ANGLES)
             },

@@ -130,8 +130,8 @@ def analyze(
         *([html] if html else []),
     ):
         check_free(path)
-    given = {"band_deg": band_deg, "window_s": window_s}
-    budget = PointingBudget.model_validate({k: v for k, v in given.items() if v is not None})
+    settings = {"band_deg": band_deg, "window_s": window_s}
+    budget = PointingBudget.model_validate({k: v for k, v in settings.items() if v is not None})
     figure_set = None
     if plot or html:
         from ..analysis.figures.figure_set import FigureSet

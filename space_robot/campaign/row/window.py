@@ -155,15 +155,15 @@ class WindowMetrics:
     def _of_pointing(self) -> dict[str, float]:
         if self._pointing is None:
             return {}
-        found = self._pointing.result()
+        report = self._pointing.result()
         values = {
             f"{ANGLE}_rms": float(np.mean(self._angles.value)),
-            OUTSIDE: 1.0 - found[POINTING[0]]["within_band"],
+            OUTSIDE: 1.0 - report[POINTING[0]]["within_band"],
         }
         for name in POINTING:
-            values[f"{name}_rms"] = found[name]["rms"]
+            values[f"{name}_rms"] = report[name]["rms"]
             for kind in (JITTER_RMS, JITTER_MAX):
-                if (jitter := found[name][kind[1:]]) is not None:
+                if (jitter := report[name][kind[1:]]) is not None:
                     values[f"{name}{kind}"] = jitter
         return values
 

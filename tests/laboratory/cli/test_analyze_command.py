@@ -103,6 +103,7 @@ def test_pictures_are_pngs_and_renewed(
         assert result.code == 0
         pictures = {path.name: path for path in (tmp_path / "figures").glob("*.png")}
         assert set(pictures) == {
+            "base_pointing.png",
             "desired_joints.png",
             "control_results.png",
             "chatter.png",
@@ -212,3 +213,13 @@ def test_what_cannot_be_is_one_line(
     assert words in result.err
     assert "Traceback" not in result.err
     assert result.out == ""
+
+
+def test_band_and_window_are_those_of_the_options(analyze: Run, bags: tuple[Path, Path]) -> None:
+    result = analyze(bags[0], "--json", "--band", "1e-9", "--window", "0.01")
+    base = json.loads(result.out)["base_pointing"]
+    assert (base["band_deg"], base["window_s"]) == (1e-9, 0.01)
+    assert base["half_cone_arcsec"]["within_band"] < 1.0
+    assert 0.0 < base["half_cone_arcsec"]["jitter_rms"] < base["half_cone_arcsec"]["max"]
+    refused = analyze(bags[0], "--band", "0")
+    assert refused.code == 2
