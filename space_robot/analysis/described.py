@@ -62,7 +62,10 @@ def start_step_of(log: FlightLog) -> dict[str, Any] | None:
     """Return the `StartStep` that the flight began with; None: none is described."""
     step = log.flight.get("start_step")
     zero = StartStep(0.0, "", 0.0, "", "", "", 0.0, 0.0)._asdict()
-    if not isinstance(step, dict) or set(step) != set(zero):
+    if not isinstance(step, dict):
+        return None
+    step = {"rate_deg_s": 0.0, **step}  # bags of starts at rest do not say it
+    if set(step) != set(zero):
         return None
     return step if all(type(step[key]) is type(value) for key, value in zero.items()) else None
 

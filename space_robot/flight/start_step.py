@@ -55,6 +55,9 @@ class StartStep(NamedTuple):
     planned: float
     """Largest torque there of the mission alone, N m: inverse dynamics along its reference, and the
     joint's friction."""
+    rate_deg_s: float = 0.0
+    """Length of the base's angular velocity less the desired one; 0 of a base that floats freely.
+    """
 
 
 def sentence(step: Mapping[str, Any]) -> str:
@@ -67,13 +70,15 @@ def sentence(step: Mapping[str, Any]) -> str:
     places = []
     if step["attitude_deg"]:
         places.append(f"the base's attitude is {step['attitude_deg']:.3g} deg")
+    if step["rate_deg_s"]:
+        places.append(f"the base's rate is {step['rate_deg_s']:.3g} deg/s")
     if step["joint"]:
         places.append(f"{step['joint']} is {error:.3g} {unit}")
     return (
         f"start: {' and '.join(places)} from where the mission begins: {step['law']} commands "
         f"{step['demand']:.3g} N m on {step['axis']}, where the mission asks for "
         f"{step['planned']:.3g} N m at most; begin both at one place "
-        "(initial_quaternion, initial_joints_deg), or limit the torques"
+        "(initial_quaternion, initial_rate_deg_s, initial_joints_deg), or limit the torques"
     )
 
 
@@ -106,10 +111,13 @@ def start_step(
     angle = 2.0 * math.acos(cosine) if settings.controls_base else 0.0
     if angle <= ROUNDING:
         angle = 0.0
+    rate = norm(np.radians(settings.initial_rate_deg_s) - wanted["omega_base"][0])
+    if rate <= ROUNDING or not settings.controls_base:
+        rate = 0.0
     errors = robot.from_degrees(settings.initial_joints_deg) - wanted["joint_positions"][0]
     farthest = int(np.argmax(np.abs(errors)))
     is_elsewhere = bool(abs(errors[farthest]) > ROUNDING)
-    if law.name == NoLaw.name or not (angle or is_elsewhere):
+    if law.name == NoLaw.name or not (angle or rate or is_elsewhere):
         return None
     plant, controller = Plant(robot, settings, period), build_controller(copy.deepcopy(law))
     demand = _rehearse(plant, controller, mission, min(ticks, max(1, round(REHEARSAL_S / period))))
@@ -128,6 +136,7 @@ def start_step(
         robot.axis_names[axis],
         float(demand[axis]),
         float(planned[axis]),
+        math.degrees(rate),
     )
 
 

@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from contextlib import suppress
 from typing import Any, NamedTuple
+
+from pydantic import ValidationError
 
 from space_robot_control.controller.gains import gains_as_path, split_gains
 from space_robot_control.controller.settings import ControllerNodeSettings
@@ -11,7 +14,7 @@ from space_robot_control.guidance.mission import pointing_start
 from space_robot_control.guidance.settings import MissionNodeSettings
 from space_robot_control.laws import ControlLaw
 from space_robot_control.navigation.assumed_sensors import assumed_numbers
-from space_robot_model.orbit.ephemeris import AssumedOrbit
+from space_robot_model.orbit.ephemeris import AssumedOrbit, AssumedTarget
 from space_robot_msgs_py.bag.recorder_settings import RecorderNodeSettings
 from space_robot_msgs_py.config.files import GIVEN
 from space_robot_msgs_py.config.settings import NodeSettings
@@ -157,7 +160,8 @@ def with_assumed_orbit(
     for target in [target for target in targets if target.is_in_orbit][:1]:
         start = meet(target, plant, 0.0)
         place = {"position": start.position.tolist(), "velocity": start.motion.velocity}
-        known["target"] = {"name": target.name, **place}
+        with suppress(ValidationError):  # too far or too fast to be pointed at
+            known["target"] = AssumedTarget(name=target.name, **place).model_dump()
     own = mission.assumed_orbit.model_dump(exclude_unset=True)
     assumed = validate(AssumedOrbit, merge(known, own), "mission.assumed_orbit")
     return mission.model_copy(update={"assumed_orbit": assumed})

@@ -51,6 +51,20 @@ def test_places_and_torques_are_those_of_the_flight(vector: list[float], joint: 
     assert step["demand"] == np.abs(commanded[:200]).max()
 
 
+def test_a_rate_that_the_law_has_to_brake_is_told() -> None:
+    """Not one with which the first segment begins."""
+    start = {"joints_deg": JOINTS, "base": {"rate_deg_s": [0, 3.0, 4.0]}}
+    braked, led = (
+        Scenario(controller="ctc", duration=0.2, mission={"start": start, "segments": [segment]})
+        for segment in ({"hold": 5}, {"base": {"rpy_deg": [0, 0, 0]}, "duration": 60})
+    )
+    step = braked.check().start_step
+    assert step
+    assert step["rate_deg_s"] == pytest.approx(5.0)
+    assert "the base's rate is 5 deg/s from where the mission begins" in sentence(step)
+    assert led.check().start_step is None
+
+
 def test_the_plausible_torque_is_the_missions_own() -> None:
     flight = scenario(joints=[*JOINTS[:5], 5.0], friction=False, duration=30.0).check()
     step = flight.start_step
