@@ -70,7 +70,7 @@ def test_the_commands_print_what_is_shown(folder: Path, capsys: pytest.CaptureFi
         lost = missing(lines, printed)
         assert not lost, "\n".join([line, *lost, "", printed])
         seen += 1
-    assert seen == 15
+    assert seen == 18
 
 
 @pytest.mark.parametrize(

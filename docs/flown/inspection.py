@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import cache
+from typing import Any
 
 import numpy as np
 from flown_tables import Number, Options, Page, Table
@@ -22,7 +23,7 @@ PART_S = 300.0
 AT_400_KM = {"orbital_elements.height": 400e3}
 
 
-def _inspection(law: str = "tde_stc", **others: object) -> Options:
+def _inspection(law: str = "tde_stc", **others: Any) -> Options:
     return {
         "robot": "ets_vii",
         "mission": "ets_vii_inspection",
@@ -44,10 +45,11 @@ UNLOADED = _inspection()
 
 
 @cache
-def _plan() -> dict[str, dict[str, float]]:
+def _plan() -> dict[str, Any]:
     scenario = Scenario(**_inspection()).check().scenario
     robot = scenario.robots.controller
-    report = plan_report(robot, planned_segments(robot, scenario.reference, scenario.plant))
+    segments = planned_segments(robot, scenario.reference, scenario.plant)
+    report = plan_report(robot, segments, {"flown": scenario.assumed_actuators})
     return {**report["sources"], "all": report}
 
 
@@ -59,6 +61,18 @@ def planned(source: str) -> Callable[[FlownFlight], float]:
 
     momentum.__name__ = f"planned_{source}"
     return momentum
+
+
+def planned_share(_: FlownFlight) -> float:
+    """Return the share of its momentum to which `plan` fills a wheel."""
+    return float(_plan()["all"]["actuators"][0]["momentum"])
+
+
+def flown_share(flown: FlownFlight) -> float:
+    """Return the largest share of its momentum that a wheel had."""
+    wheels = base_actuators_of(flown.log).wheels
+    spin = np.abs(wheels.spin_momenta(flown.log.wheel_velocities)).max(axis=0)
+    return float(np.max(spin / wheels.values("max_momentum")))
 
 
 def given(flown: FlownFlight) -> float:
@@ -93,20 +107,25 @@ PAGE = Page(
     (
         Table(
             "plan",
-            ("momentum, N m s", "`plan`", "flown"),
+            ("", "`plan`", "flown"),
             [
                 *(
                     [
-                        label,
+                        f"{label}, N m s",
                         Number(LOADED, planned(source), ".3g"),
                         Number(LOADED, f"disturbance_by_source.{source}.impulse_n_m_s", ".3g"),
                     ]
                     for source, label in SOURCES.items()
                 ),
                 [
-                    "all with the motion, without unloading",
-                    Number(LOADED, planned("all"), ".3g"),
-                    Number(LOADED, given, ".3g"),
+                    "all and the motion, N m s",
+                    Number(LOADED, planned("all"), ".2f"),
+                    Number(LOADED, given, ".2f"),
+                ],
+                [
+                    "fullest wheel, % of 20 N m s",
+                    Number(LOADED, planned_share, ".1f", 100.0),
+                    Number(LOADED, flown_share, ".1f", 100.0),
                 ],
             ],
         ),

@@ -13,12 +13,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from space_robot_model.elementary.matrices import product
-from space_robot_model.hardware.capability import ThrusterTorques, wheel_loads
+from space_robot_model.hardware.capability import ThrusterTorques, carried_momentum, wheel_loads
 from space_robot_model.hardware.thrusters import ThrusterSettings
 from space_robot_model.hardware.wheels import WheelSettings
 from space_robot_msgs_py.bag.flight_log import FlightLog
 
-from .base_demand import Demand
+from .base_demand import Demand, axes_of
 from .wheel_saturation import ROUNDING, WheelMotion, WheelRows
 
 Array = NDArray[np.float64]
@@ -109,8 +109,14 @@ class WheelLoad(Load):
 class OtherWheelLoad(WheelLoad):
     """The same of wheels that did not fly, see `wheel_loads`."""
 
+    _start: Array | None = None
+    """(3, 3, 1) the base's axes at the first row."""
+
     def _series(self, log: FlightLog, demand: Demand) -> WheelRows:
-        return WheelRows(*wheel_loads(self._wheels, demand.torque, demand.momentum, demand.omega))
+        axes = axes_of(log)
+        self._start = axes[:, :, :1] if self._start is None else self._start
+        momentum = demand.momentum + carried_momentum(self._wheels, self._start, axes)
+        return WheelRows(*wheel_loads(self._wheels, demand.torque, momentum, demand.omega))
 
 
 class ThrusterLoad(Load):

@@ -18,7 +18,7 @@ from space_robot_control.guidance.demand import MotionDemand, demand
 from space_robot_control.guidance.segments import read_segments
 from space_robot_model.elementary.matrices import norms
 from space_robot_model.hardware.base_actuators import BaseActuatorSettings
-from space_robot_model.hardware.capability import actuator_load
+from space_robot_model.hardware.capability import actuator_load, carried_momentum
 from space_robot_model.orbit.ephemeris import AssumedOrbit, Ephemeris
 from space_robot_model.robot import Robot
 from space_robot_model.robot.base_axes import base_axes, to_base
@@ -174,10 +174,12 @@ class Excess(NamedTuple):
 
 def excess(hardware: BaseActuatorSettings, demands: Iterable[PieceDemand]) -> Excess:
     """Return what a mission asks of wheels or thrusters, without unloading by torquers."""
-    largest, complaint = np.zeros(2), ""
+    largest, complaint, start = np.zeros(2), "", None
     for number, (piece, asked, _) in enumerate(demands, 1):
-        momentum = asked.base_momentum
-        load = actuator_load(hardware, asked.torque[:, :3], momentum, asked.base[:, 4:7])
+        axes, momentum = base_axes(asked.base[:, :4].T), asked.base_momentum
+        start = axes[:, :, :1] if start is None else start
+        given = momentum - carried_momentum(hardware.wheels, start, axes)
+        load = actuator_load(hardware, asked.torque[:, :3], given, asked.base[:, 4:7])
         for i, (values, shares, unit, does) in enumerate(
             (
                 (load.torque, load.torque_share, "N m", "give"),

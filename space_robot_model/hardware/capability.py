@@ -15,6 +15,7 @@ from space_robot_model.elementary.matrices import product, unit_rows
 from space_robot_model.hardware.base_actuators import BaseActuatorSettings
 from space_robot_model.hardware.thrusters import ThrusterSettings
 from space_robot_model.hardware.wheels import WheelSettings
+from space_robot_model.robot.base_axes import to_base, to_inertial
 from space_robot_msgs_py.errors import InputError
 
 Array = NDArray[np.float64]
@@ -72,7 +73,7 @@ def actuator_load(
     Args:
         hardware: wheels, thrusters, or both.
         torque: (K, 3) N m, of the base.
-        momentum: (K, 3) N m s, that the base has been given.
+        momentum: (K, 3) N m s, that the base has been given, less `carried_momentum`.
         omega: (K, 3) rad/s, of the base. All on its axes.
     """
     wheels, nothing = hardware.wheels, np.zeros(len(torque))
@@ -99,7 +100,8 @@ def wheel_loads(
     Args:
         wheels: on the base.
         torque: (K, 3) tau, N m, on the base.
-        momentum: (K, 3) N m s, that the wheels together have got since their initial speeds.
+        momentum: (K, 3) N m s, that the wheels together have got since their initial speeds, see
+            `carried_momentum`.
         omega: (K, 3) w, rad/s, of the base. All on its axes.
     """
     shares = wheel_shares(wheels)
@@ -108,6 +110,23 @@ def wheel_loads(
     speed = held / wheels.values("rotor_inertia")
     friction = wheels.values("coulomb") * np.sign(speed) + wheels.values("viscous") * speed
     return -product(torque + turning, shares.T) + friction, held
+
+
+def carried_momentum(wheels: WheelSettings, start: Array, axes: Array) -> Array:
+    """Return what wheels must get to keep their first momentum on inertial axes, on the base's.
+
+    Args:
+        wheels: on the base, with their initial speeds.
+        start: (3, 3, 1) the base's axes at the start.
+        axes: (3, 3, K) those later, both of `base_axes`.
+
+    Returns:
+        (K, 3) N m s.
+    """
+    speeds = wheels.values("initial_speed")
+    spin = np.sum(wheels.spin_momenta(speeds)[:, None] * wheels.unit_axes, axis=0)
+    held: Array = to_base(axes, to_inertial(start, spin[:, None])).T - spin
+    return held
 
 
 def wheel_shares(wheels: WheelSettings) -> Array:

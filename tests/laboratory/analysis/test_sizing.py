@@ -171,7 +171,7 @@ class TestWheels:
             wheels={
                 "axes": PYRAMID,
                 "rotor_inertia": [0.1],
-                "initial_speed": [5.0],
+                "initial_speed": [5.0, 50.0, -30.0, 20.0],
                 "coulomb": [0.02],
                 "viscous": [1e-3],
             }
@@ -179,8 +179,11 @@ class TestWheels:
         log = turning_log(paper_robot, 2.0)
         demand = BaseDemand(BaseActuatorSettings()).add(log)
         torque, momentum = OtherWheelLoad(wheels)._series(log, demand)
-        shares = np.linalg.pinv(wheels.unit_axes.T)
-        np.testing.assert_allclose(momentum - 0.5, demand.momentum @ shares.T, atol=1e-12)
+        first = 0.1 * np.array([5.0, 50.0, -30.0, 20.0]) @ wheels.unit_axes
+        turned = Rotation.from_quat(log.quaternion, scalar_first=True).inv().apply(first)
+        np.testing.assert_allclose(
+            momentum @ wheels.unit_axes, demand.momentum + turned, rtol=0.0, atol=1e-12
+        )
         given = np.gradient(momentum, PERIOD, axis=0)
         friction = 0.02 * np.sign(momentum) + 1e-3 * momentum / 0.1
         inside = slice(2, -2)

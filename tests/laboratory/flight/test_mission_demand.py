@@ -19,12 +19,14 @@ from space_robot.flight.mission_demand import (
     MOTION,
     Surroundings,
     demand_remark,
+    excess,
     held_base_remark,
     mission_demand,
 )
 from space_robot.flight.plan import Flight, FlightPlan, resolve
 from space_robot.flight.simulate import simulate
 from space_robot_control.guidance.courses import Piece, QuinticLeg
+from space_robot_model.hardware.base_actuators import BaseActuatorSettings
 from space_robot_model.robot import Robot
 from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.samples import SOURCES
@@ -174,6 +176,28 @@ def test_the_momentum_is_that_which_a_flight_gives_its_base(paper_robot: Robot) 
     for name, impulse in zip(SOURCES, impulses, strict=True):
         assert sources[name].momentum_end == pytest.approx(np.linalg.norm(impulse), rel=1e-3)
         assert sources[name].base_torque > 0.0
+
+
+def test_wheels_keep_their_first_momentum_on_inertial_axes(paper_robot: Robot) -> None:
+    """A base that turns by 90 degrees about x finds what z held in its y wheel."""
+    wheels = {
+        "axes": np.eye(3).ravel().tolist(),
+        "max_torque": [10.0],
+        "max_momentum": [1e3, 20.0, 1e3],
+        "rotor_inertia": [0.1],
+        "initial_speed": [0.0, 0.0, 100.0],
+    }
+    turn = {"base": {"rpy_deg": [90, 0, 0]}, "duration": 600}
+    flown = flight(turn, "ideal")
+    pieces, orbit = flown.mission.pieces, OrbitSettings()
+    demands = list(mission_demand(paper_robot, pieces, orbit))
+    hardware = BaseActuatorSettings(base_actuation="hardware", wheels=wheels)
+    largest = excess(hardware, demands).momentum
+    (_, asked, _) = demands[0]
+    turned = Rotation.from_quat(asked.base[:, :4], scalar_first=True).inv()
+    held = turned.apply([0.0, 0.0, 10.0] - asked.momentum)
+    assert largest == pytest.approx(np.abs(held[:, 1]).max() / 20.0, rel=1e-9)
+    assert largest >= 0.5
 
 
 def test_samples_of_long_missions_are_bounded(paper_robot: Robot) -> None:

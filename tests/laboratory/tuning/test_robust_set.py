@@ -24,7 +24,8 @@ def files(folder: Path) -> dict[str, list[str]]:
 
 
 @pytest.mark.parametrize(
-    ("robot", "gains"), [*((robot, "robust") for robot in ROBOTS), ("paper", "nominal")]
+    ("robot", "gains"),
+    [*((robot, "robust") for robot in ROBOTS), ("ets_vii", "robust"), ("paper", "nominal")],
 )
 def test_the_command_in_the_files_makes_them(robot: str, gains: str, tmp_path: Path) -> None:
     shipped = files(CONFIG / "gains" / robot / gains)
