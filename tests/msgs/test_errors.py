@@ -25,7 +25,7 @@ from space_robot_msgs_py.ros.locks import HeldError, Holder
 MADE: dict[type[SpaceRobotError], SpaceRobotError] = {
     DivergedError: DivergedError(11, 0.0005, "why"),
     UnusableStateError: UnusableStateError(3, "is not finite", "not finite"),
-    SingularAttitudeError: SingularAttitudeError(4, 1e-9),
+    SingularAttitudeError: SingularAttitudeError(4),
     MessageError: MessageError("text", "late"),
     NotInSubsetError: NotInSubsetError("law.py", 12, "recursion", "write a loop"),
     HeldError: HeldError(Path("lock"), Holder("plant (pid 1)", 2)),

@@ -137,6 +137,7 @@ AREAS = {
     "processes": _room("laboratory/processes", marks="not ros"),
     "navigation": _room("control/navigation"),
     "allocation": _room("control/allocation"),
+    "orbit": _room("model/orbit"),
     "hardware": _room("model/hardware", "sim/actuators/test_*.py", "sim/sensors/test_*.py"),
     "tuning": _room("laboratory/tuning", "laboratory/cli/test_gains_command.py", marks="not ros"),
     "view": _room("laboratory/view", "laboratory/cli/test_view_command.py", marks="not ros"),

@@ -14,7 +14,6 @@ from random_robots import JOINTS, random_quaternion
 from scipy.spatial.transform import Rotation
 
 from space_robot_control.controller.tracking import (
-    attitude_error_into,
     force_from_torque,
     relative_rate,
     show_state,
@@ -22,7 +21,7 @@ from space_robot_control.controller.tracking import (
     tracking_errors,
 )
 from space_robot_control.laws import Signals
-from space_robot_model.dynamics.attitude import attitude_jacobian_inverse
+from space_robot_model.dynamics.attitude import attitude_error_into, attitude_jacobian_inverse
 from space_robot_msgs_py.samples import ReferenceChunk, State
 
 Array = NDArray[np.float64]

@@ -56,6 +56,6 @@ def test_the_lines_of_readme_fly_three_laws_and_show_them(
     exec(compile(code, "README.md", "exec"), {})
     rows = [line.split() for line in capsys.readouterr().out.splitlines()]
     assert [row[0] for row in rows[:3]] == ["tde_stc", "ctc", "ctc_smc"]
-    assert all(0.0 < float(error) < 1e-3 for row in rows[:3] for error in row[1:])
+    assert all(0.0 < float(error) < 1e-2 for row in rows[:3] for error in row[1:])
     assert {"tde_stc.png", "tde_stc.svg"} < {file.name for file in tmp_path.iterdir()}
     assert len(opened) == 1

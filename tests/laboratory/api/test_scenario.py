@@ -77,7 +77,8 @@ def test_a_scenario_flies_the_plan_of_its_options(named: FlownFlight) -> None:
     assert named.is_complete
     assert named.check() is named
     metrics = analyze(log)
-    assert named.metrics == {**metrics["rms"]["mean_axis"], **metrics}
+    attitude = {"attitude_deg": metrics["attitude_error_deg"]["mean_axis"]}
+    assert named.metrics == {**metrics["rms"]["mean_axis"], **attitude, **metrics}
     assert named.metrics["attitude"] == metrics["rms"]["mean_axis"]["attitude"]
     assert "tde_stc" in repr(named)
     assert "<table>" in named._repr_html_()

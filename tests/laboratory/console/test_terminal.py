@@ -37,7 +37,10 @@ def shown(width: int, *prints: Any) -> str:
 def test_every_number_is_shown_whole_on_any_width(report: dict[str, Any], width: int) -> None:
     text = shown(width, lambda console: print_table(rms_table(report), console))
     words = text.split()
-    for key, value in report["rms"]["mean_axis"].items():
+    shown_values = report["rms"]["mean_axis"] | {
+        "attitude": report["attitude_error_deg"]["mean_axis"]
+    }
+    for key, value in shown_values.items():
         assert f"{value:{'.4f' if 'torque' in key else '.3e'}}" in words
         assert key in words
     text = shown(
@@ -45,7 +48,8 @@ def test_every_number_is_shown_whole_on_any_width(report: dict[str, Any], width:
         lambda console: print_table(metrics_table(report), console),
         lambda console: print_comparison({"one": report, "two": report}, console),
     )
-    for value in report["maxima"].values():
+    maxima = report["maxima"] | {"attitude": report["attitude_error_deg"]["max"]}
+    for value in maxima.values():
         assert text.split().count(f"{value:.4g}") >= 3
 
 

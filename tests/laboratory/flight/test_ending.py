@@ -26,7 +26,7 @@ PERIOD = 5e-4
     [
         (DivergedError(11, PERIOD, "too fast"), DIVERGED, 11),
         (UnusableStateError(3, "is not finite", "not finite"), UNANSWERED, 3),
-        (SingularAttitudeError(0, 1e-9), UNANSWERED, 0),
+        (SingularAttitudeError(0), UNANSWERED, 0),
         (FlightError("plant: the flight diverged at tick 1204 (t = 0.6 s)"), DIVERGED, 1204),
         (FlightError("plant has ended at tick 5"), FAILED, None),
     ],

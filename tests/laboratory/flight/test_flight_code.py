@@ -208,7 +208,7 @@ def test_a_flight_computer_answers_with_the_same_bits(flight_computer: int) -> N
 def test_a_flight_computer_of_another_robot_is_told(flight_computer: int) -> None:
     code = f"udp:127.0.0.1:{flight_computer}"
     with pytest.raises(InputError, match="exported for another robot or other actuators"):
-        flown(controller_code=code, robot="seven_joint")
+        flown(controller_code=code, robot="seven_joint", mission="seven_joint")
 
 
 def test_no_flight_computer_is_told() -> None:

@@ -95,7 +95,7 @@ def test_errors_and_forces_are_told_by_kind(log: FlightLog) -> None:
     ]
     assert list(report["rms"]["mean_axis"]) == columns
     units = [row[:2] for group in rms_table(report).groups for row in group.rows]
-    assert [unit for _, unit in units] == ["-", "rad", "m", "N m", "N m", "N"]
+    assert [unit for _, unit in units] == ["deg", "rad", "m", "N m", "N m", "N"]
     error = log.reference_joints[:, 0] - log.joint_positions
     rms = np.sqrt(np.mean(error**2, axis=0))
     assert report["rms"]["mean_axis"]["joints_prismatic"] == pytest.approx(rms[1])

@@ -28,6 +28,7 @@ def desired(plan: FlightPlan, every: float) -> tuple[Flight, FlightLog]:
     rows = flight.mission.chunk(0, flight.ticks + 1)
     log = FlightLog.allocate(len(rows.base[::step]), flight.robot.joint_names, flight.timebase)
     log.quaternion[:] = rows.base[::step, :4]
+    log.reference_base[:] = rows.base[::step]
     log.omega_base[:] = rows.base[::step, 4:7]
     log.joint_positions[:] = rows.joints[::step, 0]
     log.joint_velocities[:] = rows.joints[::step, 1]
