@@ -96,6 +96,14 @@ def _pointing(options: Options) -> list[str | Number]:
     ]
 
 
+def _source(source: str) -> list[str | Number]:
+    return [
+        f"{SOURCES[source]}, N m s",
+        Number(LOADED, planned(source), ".3g"),
+        Number(LOADED, f"disturbance_by_source.{source}.impulse_n_m_s", ".3g"),
+    ]
+
+
 HEAD = (
     *("half cone: RMS, arcsec", "largest", "jitter in 1 s, RMS"),
     *("tool: RMS, mm", "largest", "base torque: RMS, N m", "largest"),
@@ -109,14 +117,7 @@ PAGE = Page(
             "plan",
             ("", "`plan`", "flown"),
             [
-                *(
-                    [
-                        f"{label}, N m s",
-                        Number(LOADED, planned(source), ".3g"),
-                        Number(LOADED, f"disturbance_by_source.{source}.impulse_n_m_s", ".3g"),
-                    ]
-                    for source, label in SOURCES.items()
-                ),
+                *map(_source, SOURCES),
                 [
                     "all and the motion, N m s",
                     Number(LOADED, planned("all"), ".2f"),

@@ -39,6 +39,9 @@ BASE_ANGLES = ("half_cone_arcsec", "about_arcsec", "rotation_arcsec")
 """Keys of the angles of a `BasePointingError`."""
 
 
+Z = (0.0, 0.0, 1.0)
+
+
 class PointingBudget(StrictModel):
     """What the base's pointing is measured against."""
 
@@ -68,11 +71,8 @@ class PointingBudget(StrictModel):
             segments: of the mission, as YAML texts.
             start: what the base points at from the start on, as YAML text; empty: nothing.
         """
-        axis = (
-            pointed_axis([*segments, f"base: {start}"])
-            if self.axis is None
-            else np.array(self.axis)
-        )
+        pointed = pointed_axis([*segments, f"base: {start}"])
+        axis = np.array(self.axis or (Z if pointed is None else pointed))
         unit = (axis / direction_norm(axis, "axis")).tolist()
         return self.model_copy(update={"axis": unit})
 
@@ -193,7 +193,9 @@ class BasePointing(Metric):
 
     def __init__(self, log: FlightLog, budget: PointingBudget | None = None) -> None:
         """``log``: the first rows; ``budget``: None for the default."""
-        self._budget = (budget or PointingBudget()).of(*pointing_of(log))
+        segments, start = pointing_of(log)
+        self._points = pointed_axis([*segments, f"base: {start}"]) is not None
+        self._budget = (budget or PointingBudget()).of(segments, start)
         self._axis = np.array(self._budget.axis)
         self._rms, self._maximum = AxisRms(3), AxisMaximum(3)
         self._within, self._end = np.zeros(3), np.zeros(3)
@@ -214,7 +216,7 @@ class BasePointing(Metric):
         self._jitter.add(error.vector)
 
     def result(self) -> dict[str, Any]:
-        """Return axis, band and window, and by `BASE_ANGLES` what was found of each angle."""
+        """Return whether the mission points the base, budget, and the numbers by `BASE_ANGLES`."""
         jitter = self._jitter.value
         figures = {
             "rms": self._rms.value,
@@ -225,6 +227,7 @@ class BasePointing(Metric):
             "jitter_max": jitter and jitter[1],
         }
         return {
+            "points": self._points,
             **self._budget.model_dump(),
             **{
                 name: {
@@ -241,8 +244,8 @@ def window_ticks(window_s: float, period: float) -> int:
     return max(2, round(window_s / period))
 
 
-def pointed_axis(segments: Sequence[str]) -> Array:
-    """Return the axis (3,) of the first segment of a mission that points the base; else z.
+def pointed_axis(segments: Sequence[str]) -> Array | None:
+    """Return the axis (3,) of the first segment of a mission that points the base; None: none does.
 
     Args:
         segments: as YAML texts.
@@ -250,11 +253,12 @@ def pointed_axis(segments: Sequence[str]) -> Array:
     for text in segments:
         with suppress(ValueError, TypeError, AttributeError):  # a bag may hold anything
             base = parse_yaml(text).get("base")
+            base = {"point": base} if base == "nadir" else base
             if isinstance(base, dict) and "point" in base:
-                axis = np.array(base.get("axis", (0.0, 0.0, 1.0)), dtype=np.float64)
+                axis = np.array(base.get("axis", Z), dtype=np.float64)
                 direction_norm(axis, "axis")
                 return axis
-    return np.array([0.0, 0.0, 1.0])
+    return None
 
 
 def pointing_of(log: FlightLog) -> tuple[list[str], str]:

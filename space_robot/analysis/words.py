@@ -83,6 +83,7 @@ def remarks(report: Report) -> list[str]:
             f"{FREE}: its attitude is no error but drift, {drift['max_deg']:.4g} deg at most and "
             f"{drift['end_deg']:.4g} deg at the end, which pointing includes"
         )
+    remarks += _pointing(report["base_pointing"])
     if full := report["wheel_saturation"]:
         remarks += _saturated_wheels(full)
     remarks += [*_limit_cycles(report), *_standing_joints(report), *_beyond_limits(report)]
@@ -96,6 +97,19 @@ def remarks(report: Report) -> list[str]:
             f"ticks without a usable state, shown as the one before: {report['filled_ticks']}"
         )
     return remarks
+
+
+def _pointing(base: dict[str, Any] | None) -> list[str]:
+    """Say how well a base points whose mission points it."""
+    if not base or not base["points"]:
+        return []
+    cone, about = base["half_cone_arcsec"], base["about_arcsec"]
+    jitter = cone["jitter_rms"]
+    within = "" if jitter is None else f", jitter {jitter:.3g} within {base['window_s']:g} s"
+    return [
+        f"the base points: half cone {cone['rms']:.3g} arcsec RMS, {cone['max']:.3g} at most"
+        f"{within}; about the axis {about['rms']:.3g} RMS, {about['max']:.3g} at most"
+    ]
 
 
 def _saturated_wheels(saturation: dict[str, Any]) -> list[str]:

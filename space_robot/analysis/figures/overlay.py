@@ -158,10 +158,10 @@ def _draw_panel(axes: Axes, panel: _Panel, names: list[str]) -> None:
         plot_lines(axes, time, value[:, np.newaxis], looks=[names.index(name)], dashed=True)
         axes.get_lines()[-1].set_zorder(2.0 + 0.01 * depth)
     if panel.is_logarithmic:
-        axes.set_yscale("log", nonpositive="mask")
         known = [value[value > 0.0] for _, value in panel.curves.values()]
         usual = [float(np.percentile(value, USUAL)) for value in known if len(value)]
         if usual:
+            axes.set_yscale("log", nonpositive="mask")
             axes.set_ylim(bottom=0.5 * min(usual))
     if panel.limit is not None:
         axes.axhline(panel.limit, color=GREY, linewidth=0.8, linestyle=":")

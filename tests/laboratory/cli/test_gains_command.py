@@ -138,6 +138,20 @@ def tune(folder: Path, *options: str) -> Result:
     return run("tune", *options, "-o", str(folder))
 
 
+def test_a_set_for_a_mission_that_points_needs_its_orbit_and_knows_the_tick(tmp_path: Path) -> None:
+    inspection = ("--robot", "ets_vii", "--mission", "ets_vii_inspection")
+    refused = tune(tmp_path, *inspection)
+    assert isinstance(refused.exception, InputError)
+    assert "choose one by --orbit NAME" in str(refused.exception)
+    sets = [tmp_path / name for name in ("fast", "slow")]
+    for folder, tick in zip(sets, ("0.0005", "0.005"), strict=True):
+        result = tune(folder, *inspection, "--orbit", "iss", "--period", tick)
+        assert result.exit_code == 0, result.exception
+        assert f"--orbit iss --period {tick}" in (folder / "ctc.yaml").read_text("utf-8")
+    filters = [(folder / "controller.yaml").read_text("utf-8").splitlines()[1:] for folder in sets]
+    assert filters[0] != filters[1]
+
+
 def test_a_mission_of_segments_is_tuned_for(tmp_path: Path) -> None:
     assert tune(tmp_path, "--mission", "line").exit_code == 0
     assert (tmp_path / "ctc.yaml").is_file()
