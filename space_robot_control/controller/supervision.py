@@ -80,6 +80,8 @@ class Supervision(Record):
     """Status of the last state; in nominal mode `USABLE` or `REFERENCE_HELD`."""
     last_tick: float = shaped(lambda n: ())
     """Last tick answered by the law; -1: none."""
+    has_reference: float = shaped(lambda n: ())
+    """1 once a reference has been usable, else 0."""
     held_since: float = shaped(lambda n: ())
     """Tick at which holding began."""
     rejected: Array = shaped(lambda n: (STATUSES,))
@@ -184,10 +186,8 @@ def admit_state(
         The status of the state.
     """
     desired = controller[0].signals.reference
-    status_with_reference: int = take_reference(reference[0], desired)
     quaternion = state[0].quaternion
-    if status_with_reference == NO_REFERENCE:
-        desired.quaternion[:] = quaternion
+    status_with_reference: int = take_reference(block[0], reference[0], quaternion, desired)
     least = NOMINAL_FROM_ETA if block[0].mode == SAFE else SAFE_BELOW_ETA
     is_near = abs(error_eta(desired.quaternion, quaternion)) < least
     if is_near and is_unit(quaternion) and controller[0].controls_base == 1.0:
@@ -195,15 +195,16 @@ def admit_state(
     status: int = compute_signals_for(
         controller, tick, state, desired, h_bar, estimate, uses_model, period
     )
-    if status_with_reference == NO_REFERENCE:
-        desired.quaternion[:] = 0.0
     return status_with_reference if status == USABLE else status
 
 
 @kernel
-def take_reference(reference: Reference, desired: Reference) -> int:
+def take_reference(
+    supervision: Supervision, reference: Reference, quaternion: Array, desired: Reference
+) -> int:
     """Copy a usable reference into ``desired``; of another one, make that rest where it was.
 
+    Until one is usable, the base is desired to be where it is, at ``quaternion`` (4,).
     Its quaternion is unit; the other conditions are those of a `ReferenceBuffer`, which holds the
     same.
 
@@ -225,13 +226,14 @@ def take_reference(reference: Reference, desired: Reference) -> int:
         desired.quaternion[:] = reference.quaternion
         desired.omega_base[:] = reference.omega_base
         desired.alpha_base[:] = reference.alpha_base
+        supervision.has_reference = 1.0
         return USABLE
     desired.joint_velocities[:] = desired.joint_accelerations[:] = 0.0
     desired.omega_base[:] = desired.alpha_base[:] = 0.0
-    is_first = True
-    for k in range(4):
-        is_first = is_first and desired.quaternion[k] == 0.0
-    return NO_REFERENCE if is_first else REFERENCE_HELD
+    if supervision.has_reference == 1.0:
+        return REFERENCE_HELD
+    desired.quaternion[:] = quaternion
+    return NO_REFERENCE
 
 
 @kernel
