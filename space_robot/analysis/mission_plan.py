@@ -70,7 +70,10 @@ class Feasibility(NamedTuple):
 
 
 def planned_segments(
-    robot: Robot, mission: Mission, orbit: OrbitSettings | None = None
+    robot: Robot,
+    mission: Mission,
+    orbit: OrbitSettings | None = None,
+    start_rate: Array | None = None,
 ) -> list[PlannedSegment]:
     """Return all pieces of a mission with their demands.
 
@@ -78,6 +81,7 @@ def planned_segments(
         robot: as the flight software knows it.
         mission: the plan.
         orbit: with the torques from outside; None: there are none.
+        start_rate: see `mission_demand`.
 
     Raises:
         InputError: it has a single waypoint.
@@ -85,7 +89,7 @@ def planned_segments(
     if not mission.duration:
         raise InputError("the mission has no motion to plan: a single waypoint")
     follower = ToolFollower(robot.nominal, None)
-    demands = mission_demand(robot, mission.pieces, orbit or OrbitSettings())
+    demands = mission_demand(robot, mission.pieces, orbit or OrbitSettings(), start_rate)
     return [_planned(asked, follower) for asked in demands]
 
 

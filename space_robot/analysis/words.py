@@ -107,7 +107,8 @@ def _pointing(base: dict[str, Any] | None) -> list[str]:
     jitter = cone["jitter_rms"]
     within = "" if jitter is None else f", jitter {jitter:.3g} within {base['window_s']:g} s"
     return [
-        f"the base points: half cone {cone['rms']:.3g} arcsec RMS, {cone['max']:.3g} at most"
+        f"the base points: half cone from the reference {cone['rms']:.3g} arcsec RMS, "
+        f"{cone['max']:.3g} at most"
         f"{within}; about the axis {about['rms']:.3g} RMS, {about['max']:.3g} at most"
     ]
 

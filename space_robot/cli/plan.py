@@ -60,6 +60,8 @@ def plan(
       space-robot plan line --orbit iss --actuators my_wheels.yaml
       space-robot plan --scenario flight.yaml
     """
+    import numpy as np
+
     from space_robot_control.guidance.limits import turn_remarks
     from space_robot_control.guidance.mission import Mission, MissionSettings
     from space_robot_model.robot.described import unit_remarks
@@ -74,22 +76,22 @@ def plan(
 
     scenario = resolve_options(mission=mission, controller=None, **options)
     robot, orbit, period = scenario.robots.controller, scenario.plant, scenario.plant.period
-    planned = scenario.reference
+    planned, rate = scenario.reference, np.radians(scenario.plant.initial_rate_deg_s)
     settings: MissionSettings = scenario.mission
     chosen = {scenario.plant.actuators: scenario.assumed_actuators}
     scenario.plant.check(scenario.robots.plant, scenario.plant.actuators)
     held = filter(None, [held_base_remark(scenario)])
     for remark in (*unit_remarks(robot), *turn_remarks(robot, planned.pieces), *held):
         click.echo(f"warning: {remark}", err=True)
-    segments = planned_segments(robot, planned, orbit)
+    segments = planned_segments(robot, planned, orbit, rate)
     report = plan_report(robot, segments, chosen)
     if base_torque is not None or momentum is not None:
         before = report
         settings = lightened_mission(robot, planned, settings, base_torque is not None)
         planned = Mission(robot, settings, period)
-        lightened = plan_report(robot, planned_segments(robot, planned, orbit))
+        lightened = plan_report(robot, planned_segments(robot, planned, orbit, rate))
         settings = stretched_mission(settings, lightened, base_torque, momentum)
-        segments = planned_segments(robot, Mission(robot, settings, period), orbit)
+        segments = planned_segments(robot, Mission(robot, settings, period), orbit, rate)
         report = plan_report(robot, segments, chosen)
         report |= {"before": before, "lightened": lightened}
     if out is not None:

@@ -22,6 +22,7 @@ from space_robot_model.hardware.capability import actuator_load, carried_momentu
 from space_robot_model.orbit.ephemeris import AssumedOrbit, Ephemeris
 from space_robot_model.robot import Robot
 from space_robot_model.robot.base_axes import base_axes, to_base
+from space_robot_model.robot.momentum import Motion, robot_momentum
 from space_robot_msgs_py.compiled.records import assign
 from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.samples import SOURCES, RobotState
@@ -66,16 +67,18 @@ class PieceDemand(NamedTuple):
 
 
 def mission_demand(
-    robot: Robot, pieces: Sequence[Piece], orbit: OrbitSettings
+    robot: Robot, pieces: Sequence[Piece], orbit: OrbitSettings, start_rate: Array | None = None
 ) -> Iterator[PieceDemand]:
     """Yield what the pieces of a mission ask for, one after the other, from t = 0.
 
-    The robot begins with the momentum of the reference there, and its wheels with none from it.
+    The robot begins with its momentum there, and its wheels with none from it.
 
     Args:
         robot: as the flight software knows it.
         pieces: of the mission.
         orbit: with the torques from outside; maybe none.
+        start_rate: (3,) rad/s, of the base at the start, base axes (None: that of the reference).
+            Where the reference has another one the momentum is asked for, no torque.
     """
     nominal = robot.nominal
     surroundings = Surroundings(nominal, orbit) if orbit.has_orbit else None
@@ -86,7 +89,8 @@ def mission_demand(
     for piece, count in zip(pieces, counts, strict=True):
         samples = max(FEWEST_KNOTS, int(share * count))
         asked = demand(nominal, piece.joints, piece.base, piece.begin, piece.end, samples)
-        start = asked.momentum[0] if start is None else start
+        if start is None:
+            start = asked.momentum[0] + _off_momentum(nominal, asked, start_rate)
         torque, momentum = asked.torque[:, :3], asked.momentum - start
         sources = {MOTION: _source_demand(torque, momentum)}
         asked = asked._replace(momentum=momentum)
@@ -101,6 +105,17 @@ def mission_demand(
                 asked.torque[:, :3] += countered
                 asked.momentum[:] -= of_source
         yield PieceDemand(piece, asked, sources)
+
+
+def _off_momentum(robot: Robot, asked: MotionDemand, rate: Array | None) -> Array:
+    """Return the momentum (3,) by which a start with ``rate`` differs from the reference's."""
+    if rate is None:
+        return np.zeros(3)
+    motion = Motion(asked.base[:1, :4], asked.base[:1, 4:7], *asked.joints[:1, :2].swapaxes(0, 1))
+    own = motion._replace(omega_base=rate[np.newaxis])
+    both = [robot_momentum(robot, one).angular[0] for one in (own, motion)]
+    difference: Array = both[0] - both[1]
+    return difference
 
 
 def _source_demand(torque: Array, momentum: Array) -> SourceDemand:
@@ -178,8 +193,8 @@ def excess(hardware: BaseActuatorSettings, demands: Iterable[PieceDemand]) -> Ex
     for number, (piece, asked, _) in enumerate(demands, 1):
         axes, momentum = base_axes(asked.base[:, :4].T), asked.base_momentum
         start = axes[:, :, :1] if start is None else start
-        given = momentum - carried_momentum(hardware.wheels, start, axes)
-        load = actuator_load(hardware, asked.torque[:, :3], given, asked.base[:, 4:7])
+        taken_up = momentum - carried_momentum(hardware.wheels, start, axes)
+        load = actuator_load(hardware, asked.torque[:, :3], taken_up, asked.base[:, 4:7])
         for i, (values, shares, unit, does) in enumerate(
             (
                 (load.torque, load.torque_share, "N m", "give"),
@@ -232,7 +247,8 @@ def demand_complaint(scenario: ResolvedScenario, end: float = math.inf) -> str:
         return ""
     flown = (piece for piece in scenario.reference.pieces if piece.begin < end)
     pieces = [piece._replace(end=min(piece.end, end)) for piece in flown]
-    return excess(hardware, mission_demand(robot, pieces, scenario.plant)).complaint
+    rate = np.radians(scenario.plant.initial_rate_deg_s)
+    return excess(hardware, mission_demand(robot, pieces, scenario.plant, rate)).complaint
 
 
 def held_base_remark(scenario: ResolvedScenario) -> str:
@@ -247,9 +263,10 @@ def held_base_remark(scenario: ResolvedScenario) -> str:
         times = np.linspace(piece.begin, piece.end, FEWEST_KNOTS)
         leads_tool = segment and segment.tool and segment.tool.frame != "base"
         if leads_tool or piece.base.at(times)[:, 4:7].any():
+            turns = any(scenario.plant.initial_rate_deg_s)
+            advice = "" if turns else ": base: free plans for that"
             return (
                 f"the mission's part {number} ({piece.motion}) is planned with a base "
-                "whose attitude is controlled, without actuators it floats freely: base: free "
-                "plans for that"
+                f"whose attitude is controlled, without actuators it floats freely{advice}"
             )
     return ""

@@ -32,6 +32,7 @@ class Flight:
         Raises:
             InputError: settings conflict.
         """
+        scenario.reference.check_until(scenario.ticks * scenario.plant.period)
         check_mission_demand(scenario)
         self.scenario = scenario
         self.plant_settings = scenario.plant

@@ -77,8 +77,9 @@ def sentence(step: Mapping[str, Any]) -> str:
     return (
         f"start: {' and '.join(places)} from where the mission begins: {step['law']} commands "
         f"{step['demand']:.3g} N m on {step['axis']}, where the mission asks for "
-        f"{step['planned']:.3g} N m at most; begin both at one place "
-        "(initial_quaternion, initial_rate_deg_s, initial_joints_deg), or limit the torques"
+        f"{step['planned']:.3g} N m at most; begin both at one place (the mission's start, or "
+        "initial_quaternion, initial_rate_deg_s, initial_joints_deg), let the first segment lead "
+        "the base, or limit the torques"
     )
 
 

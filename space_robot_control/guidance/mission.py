@@ -132,6 +132,8 @@ class Mission:
                 base = BaseMotion(self.pieces[-1].attitude, base.course, base.mode)
             planner = self._new_planner()
             self.pieces += planner.plan(float(times[-1]), waypoints[-1], base, segments)
+            base = planner.base
+        self._goes_on = base.course if base.mode else None
         self.duration = self.pieces[-1].end if self.pieces else 0.0
         """s, until the end of the last segment."""
         self.pieces = self.pieces or still
@@ -162,6 +164,20 @@ class Mission:
             return BaseMotion(quaternion, before=before)
         mode, course = _pointing(settings, self.ephemeris)
         return BaseMotion(course.at(np.zeros(1))[0, :4], course, mode)
+
+    def check_until(self, end: float) -> None:
+        """Check that what the base points at after the mission's end stays defined until ``end``.
+
+        Raises:
+            InputError: it does not; names key and time.
+        """
+        from .pointing import PointingCourse  # slow to import, and most missions need none
+
+        if isinstance(self._goes_on, PointingCourse) and end > self.duration:
+            try:
+                self._goes_on.check(self.duration, end)
+            except InputError as error:
+                raise InputError(f"after the mission's end: {error}") from None
 
     @property
     def times(self) -> Array:

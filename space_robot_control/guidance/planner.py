@@ -96,6 +96,11 @@ class Planner:
         self._origin = pose.position - pose.from_base
         """Origin of the inertial frame, that of the base's frame at t = 0, from the robot's CoM."""
 
+    @property
+    def base(self) -> BaseMotion:
+        """How the base goes on after the last planned segment."""
+        return self._base
+
     @np.errstate(all="ignore")  # numbers that overflow are refused, in one line
     def plan(
         self, begin: float, joints: Array, base: BaseMotion, segments: Sequence[Segment]

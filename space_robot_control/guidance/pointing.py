@@ -148,7 +148,10 @@ class PointingCourse:
                     "one by --orbit NAME"
                 )
             if name == "target" and not ephemeris.has_target:
-                raise InputError(f"base.{key}: target: flight software knows of no target in orbit")
+                raise InputError(
+                    f"base.{key}: target: flight software knows of no target in orbit: events of "
+                    "the mission name one, such as capture@15:neighbouring_satellite"
+                )
         self._goal, self._ephemeris, self._begin = goal, ephemeris, begin
         self._fixed, self._kinds = np.zeros((2, 3)), np.zeros(2, dtype=np.int64)
         second = goal.about or USUAL_ABOUT.get(goal.point)

@@ -241,3 +241,31 @@ def test_waypoints_beyond_the_wheels_are_warned_of_if_they_are_flown() -> None:
     assert "the mission's part 1 (joints) asks for " in remarks[0]
     assert "% of what the actuators give" in remarks[0]
     assert remarks[1:] == ["", ""]
+
+
+def test_a_rate_that_the_law_brakes_fills_the_wheels() -> None:
+    """What the robot's bodies have at the start, the wheels have once the base is at rest."""
+    start = {"joints_deg": [0, 90, 200, 20, 30, 10], "base": {"rate_deg_s": [3.0, 2.0, 1.0]}}
+    mission = {"start": start, "segments": [{"hold": 5.0}]}
+    with pytest.raises(InputError, match=r"asks for .* N m s about base_. at t = 0\.00 s, .* hold"):
+        Flight(resolve(FlightPlan(mission=mission, actuators="wheels")))
+    flight = Flight(resolve(FlightPlan(mission=mission)))
+    rate = np.radians([3.0, 2.0, 1.0])
+    upright = np.array([1.0, 0.0, 0.0, 0.0])
+    inertia = composite_inertia(flight.robot, upright, np.radians(start["joints_deg"]))
+    ((_, asked, _),) = mission_demand(flight.robot, flight.mission.pieces, OrbitSettings(), rate)
+    wanted = np.tile(-inertia @ rate, (len(asked.time), 1))
+    np.testing.assert_allclose(asked.momentum, wanted, rtol=1e-9)
+
+
+def test_what_is_pointed_at_after_the_missions_end_is_checked_to_the_flights_end() -> None:
+    """About a fixed axis nadir cannot be pointed at all around a polar orbit."""
+    base = {"point": "nadir", "about": [0.0, 0.0, 1.0]}
+    start = {"joints_deg": [0, 90, 200, 20, 30, 10], "base": base}
+    polar = {"plant": {"orbital_elements.inclination_deg": 90.0}}
+    options = {"mission": {"start": start, "segments": [{"hold": 5.0}]}, "orbit": "iss"}
+    Flight(resolve(FlightPlan(**options, parameters=polar)))
+    with pytest.raises(
+        InputError, match=r"^after the mission's end: base\.about: .* line of nadir"
+    ):
+        Flight(resolve(FlightPlan(**options, parameters=polar, duration=2000.0)))
