@@ -244,7 +244,8 @@ def test_a_flight_whose_mission_points_the_base_says_how_well(
     assert base["points"] is points
     assert len(said) == points
     for text in said:
-        assert f"half cone from the reference {base['half_cone_arcsec']['rms']:.3g} arcsec RMS" in text
+        rms = base["half_cone_arcsec"]["rms"]
+        assert f"half cone from the reference {rms:.3g} arcsec RMS" in text
         assert "jitter" not in text
 
 
