@@ -22,7 +22,7 @@ from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.samples import ReferenceChunk
 
 from .checks import check_piece
-from .courses import BaseMotion, Piece, QuinticLeg, Slew, SteadyTurn
+from .courses import BaseMotion, Piece, QuinticLeg, SteadyTurn
 from .limits import MissionLimits, check_positions
 from .segments import read_pointing, read_segments
 
@@ -291,11 +291,9 @@ class Mission:
 
 def _leg(begin: float, end: float, start: Array, goal: Array, base: BaseMotion) -> Piece:
     """Return a leg of the joints between two waypoints; the attitude or what points is held."""
-    span = float(end - begin)
-    held = base.course or Slew(begin, 1.0, base.quaternion, np.zeros(3), 0.0)
-    attitude = held.at(np.array([float(end)]))[0, :4] if base.course else base.quaternion
-    course = QuinticLeg(begin, span, start, goal - start)
-    return Piece(float(begin), float(end), course, held, goal, attitude, mode=base.mode)
+    attitude = base.held.at(np.array([float(end)]))[0, :4]
+    course = QuinticLeg(begin, float(end - begin), start, goal - start)
+    return Piece(float(begin), float(end), course, base.held, goal, attitude, mode=base.mode)
 
 
 def pointing_start(settings: MissionSettings) -> tuple[list[float], list[float]]:

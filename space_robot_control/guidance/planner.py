@@ -212,10 +212,8 @@ class Planner:
         quaternion, before = base.quaternion, base.before or base.course
         self._check_turning(segment, goal)
         if goal is None or goal == base.mode:
-            if (course := base.course) is not None:
-                return LedBase(lambda _: course, course, base.mode)
-            axis, angle = np.array([1.0, 0.0, 0.0]), 0.0
-        elif isinstance(goal, BaseTurn):
+            return LedBase(lambda _: base.held, base.course, base.mode)
+        if isinstance(goal, BaseTurn):
             axis, angle = np.array(goal.axis) / norm(goal.axis), math.radians(goal.turn_deg)
         elif isinstance(goal, PointingGoal):
             after = PointingCourse(goal, self._ephemeris(), begin, quaternion)
