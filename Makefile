@@ -25,14 +25,15 @@ export PYTHONPYCACHEPREFIX := $(CURDIR)/$(VENV)/pycache
 export ROS_AUTOMATIC_DISCOVERY_RANGE ?= LOCALHOST
 export FASTDDS_BUILTIN_TRANSPORTS ?= UDPv4
 
-.PHONY: help setup fly test check quick coverage hooks lint kernels docs dist bench mutation soak notebooks \
+.PHONY: help setup fly test test-docs check quick coverage hooks lint kernels docs dist bench mutation soak notebooks \
   newest constraints clean
 
 help:
 	@echo "make setup               .venv with the package and ROS 2 Jazzy"
 	@echo "make fly [ARGS=...]      fly case 1 under TDE-STC, e.g. make fly ARGS='--controller ctc'"
-	@echo "make test [ARGS=...]     all tests; ARGS go to pytest"
-	@echo "make check [ARGS=...]    style, types and all tests: what a change must pass"
+	@echo "make test [ARGS=...]     the tests; ARGS go to pytest"
+	@echo "make test-docs           pages, notebooks, examples, site and wheel: what they show is run"
+	@echo "make check [ARGS=...]    style, types and the tests: what a change must pass"
 	@echo "make quick [ARGS=...]    the tests that start no ROS and take little time"
 	@echo "make coverage            which lines the tests run; twice as long as make test"
 	@echo "make hooks               from then on a commit passes style, types and the quick tests"
@@ -55,21 +56,24 @@ fly: $(VENV)/.flies
 	@$(VENV)/bin/space-robot fly --controller tde_stc --case 1 $(ARGS)
 
 test: kernels $(VENV)/.tests
-	$(PYTEST) $(ARGS)
+	$(PYTEST) -m "not docs" $(ARGS)
+
+test-docs: kernels $(VENV)/.tests
+	$(PYTEST) -m docs $(ARGS)
 
 check:
 	@$(MAKE) --no-print-directory --jobs 2 lint kernels
 	@$(MAKE) --no-print-directory test
 
 quick: $(VENV)/.tests
-	$(PYTEST) -m "not ros and not slow" $(ARGS)
+	$(PYTEST) -m "not ros and not slow and not docs" $(ARGS)
 
 # The kernels' lines are seen where they run as plain Python: tests/interpreted_kernels.py.
 coverage: $(VENV)/.tests
 	rm -f .coverage .coverage.*
 	$(PYTEST) --cov --cov-report= $(ARGS)
 	PYTHONPATH=tests $(PYTEST) --cov --cov-append --cov-report= -p interpreted_kernels \
-	  -m "not ros" $(INTERPRETED)
+	  -m "not ros and not docs" $(INTERPRETED)
 	$(VENV)/bin/coverage report
 
 hooks: $(VENV)/.tests

@@ -92,10 +92,8 @@ WITH_ROS = (
     "control/controller/test_safe_modes.py",
     "laboratory/flight/graph/",
     "laboratory/flight/replay/",
-    "test_examples.py",
 )
 SLOW = (
-    "benchmarks/",
     "control/flight_code/",
     "laboratory/campaign/",
     "laboratory/export/",
@@ -108,16 +106,9 @@ SLOW = (
     "laboratory/flight/test_long_flights.py",
     "laboratory/flight/test_shipped_robots.py",
     "msgs/bag/test_bag_fuzz.py",
-    "test_notebooks.py",
-    "test_examples.py",
-    "test_tutorial.py",
     "msgs/bag/test_description_fuzz.py",
-    "soak/",
     "test_packaging.py",
-    "test_pages.py",
     "test_shown_outputs.py",
-    "test_site.py",
-    "test_wheel.py",
 )
 """Folders and files whose tests take seconds each."""
 FLYING_UNTIL = 0.7
@@ -139,6 +130,7 @@ def pytest_configure(config: pytest.Config) -> None:
     if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
         signal.signal(signal.SIGINT, signal.default_int_handler)
     config.addinivalue_line("markers", "ros: starts ROS processes; given by fixture and folder")
+    config.addinivalue_line("markers", "docs: runs what the documents show; `make test-docs`")
     config.addinivalue_line("markers", "slow: takes seconds; given by folder, or by the test")
     if not config.pluginmanager.hasplugin("timeout"):  # where `colcon test` runs, perhaps
         config.addinivalue_line("markers", "timeout(seconds): needs pytest-timeout")

@@ -1,4 +1,4 @@
-"""The wheel of `make dist`, installed away from any clone: its commands work from any folder.
+"""`make fly`, and the wheel of `make dist` away from any clone: its commands work from any folder.
 
 The environment has the wheel alone; what it requires comes from the environment of the tests, and
 kernels from their cache, for to compile them takes minutes. `CONTRIBUTING.md` has the check by hand
@@ -18,12 +18,16 @@ from typing import NamedTuple
 from zipfile import ZipFile
 
 import pytest
+from conftest import TOOLS
+from flights import ros_environment
 from import_graph import PACKAGES
 from pages import files
 from paths import CONFIG, DOCS, ROOT
 
+from space_robot_msgs_py import topics
 from space_robot_msgs_py.compiled.cache import cache_directory
 
+pytestmark = pytest.mark.docs
 pytest.importorskip("build")
 caching = pytest.importorskip("numba.core.caching")
 
@@ -145,15 +149,11 @@ def _take_kernels(environment: Environment, site: Path) -> None:
             shutil.copy(mark, theirs)
 
 
-def test_the_installed_packages_are_those_of_the_wheel(installed: Environment) -> None:
+def test_packages_and_their_version_are_those_of_the_wheel(installed: Environment) -> None:
     show = f"import {', '.join(PACKAGES)}; print(*(p.__file__ for p in ({', '.join(PACKAGES)})))"
     for file in installed.run("python", "-c", show).split():
         assert Path(file).is_relative_to(installed.folder), file
-
-
-def test_the_version_is_said_by_command_module_and_package(installed: Environment) -> None:
-    for words in (("space-robot",), ("python", "-m", "space_robot")):
-        assert installed.run(*words, "--version") == f"space-robot, version {VERSION}\n"
+    assert installed.run("space-robot", "--version") == f"space-robot, version {VERSION}\n"
     show = "import space_robot; print(space_robot.__version__)"
     assert installed.run("python", "-c", show) == f"{VERSION}\n"
 
@@ -168,44 +168,81 @@ def test_a_flight_its_view_and_its_analysis(installed: Environment) -> None:
 
 
 def test_a_graph_of_nodes(installed: Environment) -> None:
+    """And an executable where `ros2 run` looks for it, which reads the rest of its line."""
     pytest.importorskip("rclpy")
     said = installed.run("space-robot", "fly", "--duration", "0.1", "--bag", "flights/graph")
     assert "messages lost: none" in said
+    node = "../lib/space_robot/mission_node"
+    said = installed.run(node, "--ros-args", "-p", "no_such:=1", code=2)
+    assert "mission_node: error: " in said
+    assert "'no_such'" in said
 
 
-def test_examples_and_configuration_are_copied_and_fly(installed: Environment) -> None:
+def test_examples_robots_scenarios_and_campaigns(installed: Environment) -> None:
     installed.run("space-robot", "examples", "copy", "copies")
     flight = ("simulate", "--duration", "0.01")
     installed.run("space-robot", *flight, "--robot", "copies/config/robots/seven_joint.yaml")
-    installed.run("space-robot", "robot", "copies/examples/two_link_arm.urdf")
-    assert "joints at most" in installed.run("python", "copies/examples/own_robot.py")
-
-
-def test_a_scenario_of_the_docs(installed: Environment) -> None:
+    installed.run("space-robot", "new", "copies/examples/two_link_arm.urdf", "--out", "arm")
+    installed.run("space-robot", *flight, "--robot", "arm")
     content = files(DOCS / "manual/configuration.md")
     (installed.work / "plan.yaml").write_text(content["plan.yaml"])
-    said = installed.run("space-robot", "scenario", "--scenario", "plan.yaml")
-    assert "controller" in said
-
-
-def test_a_folder_for_a_robot_of_ones_own(installed: Environment) -> None:
-    urdf = ROOT / "examples/two_link_arm.urdf"
-    shutil.copy(urdf, installed.work / "arm.urdf")
-    installed.run("space-robot", "new", "arm.urdf", "--out", "arm")
-    installed.run("space-robot", "simulate", "--robot", "arm", "--duration", "0.01")
-
-
-def test_a_campaign(installed: Environment) -> None:
+    assert "controller" in installed.run("space-robot", "scenario", "--scenario", "plan.yaml")
     pytest.importorskip("pyarrow")
     words = ("campaign", "run", "first", "--runs", "1", "--workers", "0", "--out", "campaigns/a")
     assert "1 runs" in installed.run("space-robot", *words)
 
 
-def test_executables_for_ros_are_where_it_looks(installed: Environment) -> None:
+def test_what_ros_looks_for_is_where_it_looks(installed: Environment) -> None:
     for name in ("fly", "simulate", "plant_node"):
         assert os.access(installed.folder / "lib/space_robot" / name, os.X_OK)
-    assert installed.run("../lib/space_robot/simulate", "--help").startswith("Usage: space-robot")
     assert (installed.folder / "share/space_robot/launch/fly.launch.py").is_file()
     shipped = sum(1 for file in CONFIG.rglob("*.*") if file.is_file())
     share = installed.folder / "share/space_robot/config"
     assert sum(1 for file in share.rglob("*.*") if file.is_file()) == shipped
+
+
+@pytest.mark.skipif(shutil.which("make") is None, reason="make is not installed")
+def test_make_fly_flies_and_prints_the_table(free_domain: int, tmp_path: Path) -> None:
+    """In the tests' own environment: that of a new clone is set up before the tests run."""
+    pytest.importorskip("rclpy")
+    options = f"--duration 0.2 --domain {free_domain} --bag {tmp_path / 'bag'}"
+    command = ["make", "-o", f"{sys.prefix}/.flies", "fly", f"VENV={sys.prefix}", f"ARGS={options}"]
+    made = subprocess.run(
+        command, cwd=ROOT, env=ros_environment(), capture_output=True, text=True, check=False
+    )
+    assert made.returncode == 0, made.stderr
+    assert "tde_stc, case 1, gains default: 400 ticks, 0.2 s" in made.stdout
+    assert "messages lost: none" in made.stdout
+
+
+HIDE = """
+import importlib.machinery as machinery
+find = machinery.PathFinder.find_spec
+def hide(name, path=None, target=None):
+    return None if name in {names!r} else find(name, path, target)
+machinery.PathFinder.find_spec = hide
+"""
+
+
+def test_all_modules_are_collected_without_ros_and_the_tools_of_tests(tmp_path: Path) -> None:
+    """Where only pytest and what the package requires are installed, as for `colcon test`."""
+    ros = ("rclpy", *sorted({topic.type.split("/")[0] for topic in topics.ALL}))
+    (tmp_path / "hide.py").write_text(HIDE.format(names=(*TOOLS, *ros)))
+    command = "-m pytest -p hide -p no:cacheprovider --collect-only -rs"
+    environment = {
+        **os.environ,
+        "PYTHONPATH": os.pathsep.join([str(tmp_path), str(ROOT)]),
+        "PYTEST_DISABLE_PLUGIN_AUTOLOAD": "1",
+    }
+    done = subprocess.run(
+        [sys.executable, *command.split()],
+        cwd=ROOT,
+        text=True,
+        capture_output=True,
+        check=False,
+        env=environment,
+    )
+    assert done.returncode == 0, done.stdout[-2000:]
+    skipped = done.stdout.partition("short test summary")[2]
+    assert "hypothesis is not installed" in skipped
+    assert "could not import 'rclpy'" in skipped

@@ -20,6 +20,8 @@ from page_shell import (
 )
 from pages import FILE, PAGES, items, name
 
+pytestmark = pytest.mark.docs
+
 
 @pytest.fixture(scope="module")
 def shell(tmp_path_factory: pytest.TempPathFactory) -> PageShell:

@@ -17,6 +17,7 @@ import pytest
 from paths import DOCS, ROOT
 
 MarkdownIt = pytest.importorskip("markdown_it").MarkdownIt
+pytestmark = pytest.mark.docs
 for tool in ("material", "mermaidx", "mkdocstrings", "nbconvert", "pandas", "viser", "ziamath"):
     pytest.importorskip(tool)
 
