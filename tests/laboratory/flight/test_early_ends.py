@@ -1,7 +1,9 @@
-"""Flights that end before their time: every tick up to the one they end at is in log and bag."""
+"""How flights end, and where their bags are; one that ends early is in log and bag to its tick."""
 
 from __future__ import annotations
 
+import json
+import os
 from collections import Counter
 from collections.abc import Callable
 from pathlib import Path
@@ -12,6 +14,9 @@ import pytest
 from flights import space_robot_here
 
 from space_robot.analysis import analyze
+from space_robot.flight import compilation
+from space_robot.flight.bag_path import check_bag_path, default_bag
+from space_robot.flight.ending import COMPLETE, DIVERGED, FAILED, UNANSWERED, Ending
 from space_robot.flight.plan import Flight, FlightPlan, resolve
 from space_robot.flight.simulate import fly_blocks, simulate
 from space_robot_control.laws import ControlLaw, LawGains, Signals, per_axis
@@ -20,10 +25,16 @@ from space_robot_msgs_py import topics
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.bag.folder import open_bag
 from space_robot_msgs_py.bag.reader import read_flight
-from space_robot_msgs_py.errors import DivergedError, FlightError, SingularAttitudeError
+from space_robot_msgs_py.errors import (
+    DivergedError,
+    FlightError,
+    InputError,
+    SingularAttitudeError,
+    UnusableStateError,
+)
 from space_robot_msgs_py.samples import Command
 
-AXES = 9
+AXES, PERIOD = 9, 5e-4
 COLUMNS = (
     "base_position",
     "quaternion",
@@ -75,9 +86,9 @@ FLIGHTS: dict[str, tuple[Callable[[], Flight], int, int, type[Exception]]] = {
     # what is flown, states sent, states answered, how it ends
     "diverged": (lambda: flight_of(controller="ctc", gains="printed"), 11, 11, DivergedError),
     "diverged after a swap": (
-        lambda: flight_of(gains="printed", swaps=["1.2:ctc"]),
-        2410,
-        2410,
+        lambda: flight_of(gains="printed", swaps=["0.1:ctc"]),
+        209,
+        209,
         DivergedError,
     ),
     "not finite": (lambda: failing(130, lambda: np.nan), 131, 131, DivergedError),
@@ -160,28 +171,26 @@ def test_every_tick_is_in_the_bag(flown: tuple[str, list[FlightLog], Path]) -> N
         topics.LAW: 2 if "swap" in name else min(answered, 1),
     }
     assert messages == {topic.full_name: count for topic, count in counts.items() if count}
-
-
-def test_the_report_of_what_was_flown_is_that_of_its_bag(
-    flown: tuple[str, list[FlightLog], Path],
-) -> None:
-    _, (log,), bag = flown
-    here, there = analyze(log), analyze(read_flight(bag))
+    here, there = analyze(log), analyze(read)
     assert {**here, "lost": None} == {**there, "lost": None}
 
 
 def test_the_error_has_the_log() -> None:
     with pytest.raises(DivergedError) as caught:
-        simulate(flight_of(gains="printed", swaps=["1.2:ctc"]))
+        simulate(flight_of(gains="printed", swaps=["0.1:ctc"]))
     log = caught.value.log
     assert log is not None
-    assert log.ticks == caught.value.tick == 2410
-    assert log.commanded_torque is not None
+    assert log.ticks == caught.value.tick == 209
     assert np.isfinite(log.commanded_torque).all()
 
 
-def test_the_command_leaves_a_whole_bag(tmp_path: Path) -> None:
+def test_the_command_prints_what_its_bag_says(tmp_path: Path) -> None:
     bag = tmp_path / "bag"
+    result = space_robot_here("simulate", "--duration", "0.1", "--bag", str(bag), "--json")
+    assert result.returncode == 0, result.stderr
+    ended = {"outcome": "complete", "reason": "", "ended_at_s": 0.1}
+    assert json.loads(result.stdout) == analyze(read_flight(bag)) | ended
+    bag = tmp_path / "diverged"
     given = ("--controller", "ctc", "--gains", "printed", "--bag", str(bag))
     result = space_robot_here("simulate", *given)
     assert result.returncode == 1
@@ -189,23 +198,73 @@ def test_the_command_leaves_a_whole_bag(tmp_path: Path) -> None:
     assert read_flight(bag).ticks == 11
 
 
-@pytest.mark.ros
-def test_the_bag_is_that_of_the_graph(tmp_path: Path) -> None:
-    """The same states, commands, laws, and stamps of telemetry and clock, to the last byte."""
-    pytest.importorskip("rclpy")
-    options = ("--gains", "printed", "--swap", "0.1:ctc")
-    bags = {name: tmp_path / name for name in ("fly", "simulate")}
-    for command, bag in bags.items():
-        composed = ("--composed",) if command == "fly" else ()
-        result = space_robot_here(command, *options, *composed, "--bag", str(bag))
-        assert result.returncode == 1
-        assert "diverged at tick 209 (t = 0.1045 s)" in result.stderr
-    found: dict[str, dict[str, list[bytes]]] = {}
-    for name, bag in bags.items():
-        found[name] = {}
-        for topic, data in open_bag(bag).messages(*topics.ALL):
-            found[name].setdefault(topic, []).append(data)
-    for topic, messages in found["simulate"].items():
-        sent = found["fly"][topic]
-        # the mission sends ahead of need
-        assert messages == (sent[: len(messages)] if topic.startswith("/reference/") else sent)
+@pytest.mark.parametrize(
+    ("error", "outcome", "tick"),
+    [
+        (DivergedError(11, PERIOD, "too fast"), DIVERGED, 11),
+        (UnusableStateError(3, "is not finite", "not finite"), UNANSWERED, 3),
+        (SingularAttitudeError(0), UNANSWERED, 0),
+        (FlightError("plant: the flight diverged at tick 1204 (t = 0.6 s)"), DIVERGED, 1204),
+        (FlightError("plant has ended at tick 5"), FAILED, None),
+    ],
+)
+def test_an_early_end_is_told_by_its_error(
+    error: FlightError, outcome: str, tick: int | None
+) -> None:
+    end = Ending.early(error, PERIOD)
+    seconds = None if tick is None else round(tick * PERIOD, 9)
+    assert (end.outcome, end.tick, end.ended_at_s) == (outcome, tick, seconds)
+    assert end.as_record() == {"outcome": outcome, "reason": str(error), "ended_at_s": seconds}
+    with pytest.raises(FlightError) as caught:
+        end.check()
+    assert caught.value is error
+
+
+def test_a_flight_to_its_end_has_no_reason() -> None:
+    end = Ending.complete(3, 0.1)
+    end.check()
+    assert end == (COMPLETE, "", 3, 0.3, None), "as it is written, not 0.30000000000000004"
+
+
+def test_a_bag_is_named_after_robot_law_case_and_time() -> None:
+    plain = default_bag(Flight(resolve(FlightPlan(controller="ctc", case="4-1"))))
+    assert plain.parent == Path("flights")
+    assert plain.name.startswith("ctc_case4-1_")
+    law_case, date, time = plain.name.rpartition("_")[0], *plain.name[-15:].split("-")
+    assert law_case == "ctc_case4-1"
+    assert (len(date), len(time)) == (8, 6)
+    spaced = default_bag(Flight(resolve(FlightPlan(controller="ctc", namespace="/fleet/sat1"))))
+    assert spaced.name.startswith("fleet_sat1_ctc_case1_")
+
+
+def test_a_bag_is_never_overwritten_and_looking_leaves_nothing(tmp_path: Path) -> None:
+    check_bag_path(tmp_path / "a" / "b")
+    assert not list(tmp_path.iterdir())
+    file, link = tmp_path / "file", tmp_path / "link"
+    file.touch()
+    link.symlink_to(tmp_path / "nothing")
+    for taken in (tmp_path, file, link):
+        with pytest.raises(InputError) as caught:
+            check_bag_path(taken)
+        assert str(caught.value) == f"{taken}: exists already; a bag is never overwritten"
+    with pytest.raises(InputError) as caught:
+        check_bag_path(file / "bag")
+    assert str(caught.value).startswith(f"{file}/bag: no bag can be written there (")
+    assert str(caught.value).endswith(f": {os.strerror(20)})")
+    for name in ("a\0b", "a\ud800b"):
+        with pytest.raises(InputError) as caught:
+            check_bag_path(tmp_path / name)
+        assert ": no name of a folder (" in str(caught.value)
+        assert str(caught.value).isprintable()
+    with pytest.raises(InputError, match=r"no bag can be written there .*too long"):
+        check_bag_path(tmp_path / ("a" * 300))
+
+
+def test_the_output_of_a_command_that_compiles_stays_clean(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    with compilation.compiling("nothing"):
+        pass
+    captured = capsys.readouterr()
+    assert captured.out == ""
+    assert captured.err.startswith("compiling nothing (once an installation")

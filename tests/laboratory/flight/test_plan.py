@@ -1,9 +1,10 @@
-"""One resolved plan: what is set by any way is flown, sent to the nodes and told alike."""
+"""One resolved plan: what is set by any way is flown, sent to the nodes, and told in bags."""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
+import shutil
+import subprocess
 from operator import or_
 from pathlib import Path
 from typing import Any
@@ -11,9 +12,9 @@ from typing import Any
 import numpy as np
 import pytest
 import yaml
-from flights import Flown, space_robot_here
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
+from paths import ROOT
 
 from space_robot.analysis import analyze
 from space_robot.flight.bag_path import default_bag
@@ -21,6 +22,8 @@ from space_robot.flight.flown_log import empty_log
 from space_robot.flight.graph.orchestrator import flight_parameters
 from space_robot.flight.plan import Flight, FlightPlan, resolve
 from space_robot.flight.simulate import simulate
+from space_robot.processes import software
+from space_robot.processes.node_modules import MODULES
 from space_robot.scenario.node_settings import NODES, NOT_TO_BE_SET, SCHEMAS
 from space_robot_control.allocation.assumed_actuators import assumed_actuators
 from space_robot_control.controller.controller import Controller
@@ -31,6 +34,7 @@ from space_robot_control.guidance.settings import MissionNodeSettings
 from space_robot_control.laws import laws
 from space_robot_model.robot import Robot
 from space_robot_msgs_py.bag.message_accounting import topics_with_allowed_gaps
+from space_robot_msgs_py.bag.reader import read_flight
 from space_robot_msgs_py.config.directory import config_directory
 from space_robot_msgs_py.config.files import named_file
 from space_robot_msgs_py.config.settings import leaves
@@ -134,20 +138,19 @@ def test_every_parameter_that_is_refused_is_one() -> None:
     assert set(NOT_TO_BE_SET) <= known
 
 
-def test_one_period_for_all_is_flown() -> None:
+def test_one_period_for_all_is_flown(tmp_path: Path) -> None:
     flight = Flight(resolve(FlightPlan(duration=0.05, period=0.001, substeps=4)))
-    assert (flight.period, flight.ticks) == (0.001, 50)
+    assert (flight.period, flight.ticks, flight.plant.memory.substeps) == (0.001, 50, 4)
     assert flight.description["period"] == 0.001
     assert all(flight.scenario.parameters[node]["period"] == 0.001 for node in NODES)
-    assert flight.plant.memory.substeps == 4
-
-
-def test_files_that_give_nodes_different_periods_are_refused(tmp_path: Path) -> None:
     case = tmp_path / "slow.yaml"
     case.write_text("plant_node: {ros__parameters: {period: 0.001}}\n")
     with pytest.raises(InputError, match=r"got plant 0\.001, controller"):
         Flight(resolve(FlightPlan(case=str(case))))
     assert Flight(resolve(FlightPlan(case=str(case), period=0.0005, duration=1.0))).ticks == 2000
+    assert Flight(resolve(FlightPlan(duration=1e6))).ticks == 2 * 10**9
+    with pytest.raises(InputError, match="duration must be at most 100000 s"):
+        Flight(resolve(FlightPlan(duration=1e6, period=1e-5)))
 
 
 @pytest.mark.parametrize(
@@ -162,15 +165,9 @@ def test_simulate_refuses_what_needs_the_graph(parameters: Parameters, said: str
         simulate(flight_of(parameters))
 
 
-def test_longer_than_a_flight_may_last() -> None:
-    assert Flight(resolve(FlightPlan(duration=1e6))).ticks == 2 * 10**9
-    with pytest.raises(InputError, match="duration must be at most 100000 s"):
-        Flight(resolve(FlightPlan(duration=1e6, period=1e-5)))
-
-
-def test_a_heavy_plant_under_a_nominal_controller(tmp_path: Path) -> None:
-    path = heavy_robot(tmp_path)
-    nominal = flight_of({})
+def test_plant_and_controller_may_have_robots_of_their_own(tmp_path: Path) -> None:
+    """A heavy plant under a nominal controller, and a law with a model whose robot is heavier."""
+    path, nominal = heavy_robot(tmp_path), flight_of({})
     flight = flight_of({"plant": {"robot": str(path), "mission": "paper"}})
     log = simulate(flight)
     assert not np.array_equal(log.applied_torque, simulate(nominal).applied_torque)
@@ -180,21 +177,13 @@ def test_a_heavy_plant_under_a_nominal_controller(tmp_path: Path) -> None:
     assert said["controller_robot_file"] == nominal.description["robot_file"]
     assert "controller_robot_file" not in nominal.description
     assert analyze(log)["robot"] == "heavy"
-
-
-def test_a_controller_with_another_model(tmp_path: Path) -> None:
-    """Of the laws that use one: its robot is the controller's, not the plant's."""
-    path = str(heavy_robot(tmp_path))
     plan: dict[str, Any] = {"controller": "ctc", "gains": "tuned"}
-    wrong = flight_of({"controller": {"robot": path, "gains": _tuned()}}, **plan)
+    tuned = str(config_directory() / "gains" / "paper" / "tuned")
+    wrong = flight_of({"controller": {"robot": str(path), "gains": tuned}}, **plan)
     torque = simulate(wrong).applied_torque
     assert not np.array_equal(torque, simulate(flight_of({}, **plan)).applied_torque)
     assert wrong.plant.robot.name == "paper"
     assert wrong.description["controller_robot"] == "heavy"
-
-
-def _tuned() -> str:
-    return str(config_directory() / "gains" / "paper" / "tuned")
 
 
 _AXES = st.lists(st.floats(1e-3, 1e3) | st.integers(1, 100), min_size=9, max_size=9)
@@ -348,6 +337,7 @@ def _parameters(names: list[str], sets: list[str]) -> st.SearchStrategy[Paramete
     return st.fixed_dictionaries({}, optional=nodes)
 
 
+@settings(max_examples=40)
 @given(_any_parameters())
 def test_all_that_is_made_of_a_plan_agrees(parameters: Parameters) -> None:
     """Settings and objects as the nodes make them of what they are sent; labels; `simulate`."""
@@ -405,20 +395,47 @@ def test_lists_go_to_the_nodes_as_declared(tmp_path: Path) -> None:
     assert sent["case"] == "2"
 
 
-@pytest.mark.parametrize(
-    "options",
-    [
-        ("controller.controller=ctc", "controller.gains=tuned", "plant.case=3"),
-        ("controller.tde_stc.k_1=[0.5]", "plant.initial_quaternion=[0.9,0.1,0,0]"),
-    ],
-)
-def test_graph_and_process_fly_and_say_the_same(
-    fly: Callable[..., Flown], tmp_path: Path, options: tuple[str, ...]
-) -> None:
-    given = ["--duration", "0.2", *(word for text in options for word in ("--set", text))]
-    flown = fly(*given, "--composed")
-    result = space_robot_here("simulate", *given, "--json", "--bag", str(tmp_path / "bag"))
-    assert result.returncode == 0, result.stderr
-    report = json.loads(result.stdout)
-    for key in ("controller", "case", "gains", "robot", "rms", "chatter", "lost"):
-        assert flown.report[key] == report[key], key
+# What a bag says of its flight
+
+
+def test_a_bag_has_all_to_fly_its_flight_again(tmp_path: Path) -> None:
+    plan = FlightPlan(
+        controller="tde_smc",
+        case="3",
+        seed=7,
+        friction=False,
+        robot="seven_joint",
+        duration=0.02,
+        parameters={"plant": {"hold_ticks": 40}},
+    )
+    flight = Flight(resolve(plan))
+    simulate(flight, tmp_path / "bag")
+    said = read_flight(tmp_path / "bag").flight
+    assert said == flight.description
+    assert json.dumps(said) == json.dumps(Flight(resolve(plan)).description)
+    assert (said["seed"], Flight(resolve(FlightPlan())).description["seed"]) == (7, 0)
+    robot = Robot.from_dict(said["robot_file"], where="the bag")
+    np.testing.assert_array_equal(robot.inertia, flight.robot.inertia)
+    assert tuple(said["parameters"]) == NODES == tuple(MODULES)
+    told = said["parameters"]
+    assert PlantNodeSettings.resolve(told["plant"]) == flight.plant_settings
+    own, gains = split_gains(told["controller"])
+    assert ControllerNodeSettings.resolve(own) == flight.controller_settings
+    assert gains[said["controller"]] == said["gains_used"]
+
+
+def test_robot_is_told_though_its_file_is_gone(tmp_path: Path) -> None:
+    file = Path(shutil.copy(config_directory() / "robots" / "paper.yaml", tmp_path))
+    flight = Flight(resolve(FlightPlan(robot=str(file))))
+    file.unlink()
+    robot = Robot.from_dict(flight.description["robot_file"])
+    np.testing.assert_array_equal(robot.com, flight.robot.com)
+
+
+def test_versions_and_commit_are_those_installed() -> None:
+    assert software.versions()["numpy"] == np.__version__
+    command = ["git", "-C", str(ROOT), "rev-parse", "HEAD"]
+    done = subprocess.run(command, capture_output=True, text=True)
+    head = done.stdout.strip()
+    known = (head, f"{head}-dirty") if done.returncode == 0 else (None,)
+    assert software.commit() in known

@@ -17,8 +17,8 @@ from space_robot_control.laws import laws
 from space_robot_model.robot.find import robot_names
 
 OTHERS = sorted({*robot_names()} - {"paper", "seven_joint"})
-SECONDS = 3.0
-"""Of each flight: it starts from rest with joint friction, and is well into its first leg then."""
+SECONDS = 1.0
+"""Of each flight: it starts from rest with joint friction, which all joints have overcome then."""
 
 
 ATTITUDE = {("canadarm2", "adrc"): 2e-5}
@@ -35,7 +35,7 @@ def test_every_law_flies_it(robot: str, law: str) -> None:
         if name.startswith("joints"):
             assert value < 3e-4, name
     moved = abs(log.joint_positions[-1] - log.joint_positions[0])
-    assert moved.max() > 0.005, "it moves"
+    assert moved.max() > 1e-4, "it moves"
 
 
 @pytest.mark.parametrize("robot", OTHERS)

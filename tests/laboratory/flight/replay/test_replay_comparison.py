@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Iterable
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -41,14 +42,6 @@ def compare(recorded: Iterable[bytes], replayed: Iterable[bytes], played: int) -
     return Comparison(AXES, np.arange(played), commands(recorded), commands(replayed))
 
 
-def test_the_same_messages_are_identical() -> None:
-    sent = messages(range(20))
-    same = compare(sent.values(), sent.values(), 20)
-    assert same.is_identical
-    assert same.first_difference() is None
-    assert np.all(same.difference == 0.0)
-
-
 @given(tick=st.integers(0, 19), axis=st.integers(0, 4), bit=st.integers(0, 63))
 def test_one_bit_is_found_where_it_was_changed(tick: int, axis: int, bit: int) -> None:
     """Whatever bit: of the mantissa's end, of the sign of zero, or one that makes it a NaN."""
@@ -56,6 +49,7 @@ def test_one_bit_is_found_where_it_was_changed(tick: int, axis: int, bit: int) -
     torque = torque_of(tick)
     torque.view(np.uint64)[axis] ^= np.uint64(1 << bit)
     changed = {**sent, tick: CommandCodec(AXES, TIMEBASE).encode(Command(tick, torque))}
+    assert compare(sent.values(), sent.values(), 20).is_identical
     compared = compare(sent.values(), changed.values(), 20)
     assert not compared.is_identical
     assert np.count_nonzero(~compared.equal) == 1
@@ -201,7 +195,30 @@ def test_commands_of_bags_up_to_release_0_7_are_compared_by_their_numbers() -> N
     assert [difference.field for difference in found[1]] == ["effort[base_z]"]
 
 
-def test_forces_are_in_newtons_and_torques_in_newton_metres() -> None:
-    sent = commands(messages(range(3)).values())
-    compared = Comparison(AXES, np.arange(3), sent, sent, forces=AXES[3:4])
-    assert compared.units == ("N m", "N m", "N m", "N", "N m")
+@given(
+    st.sets(st.integers(0, 60), min_size=1),
+    st.sets(st.integers(0, 60)),
+    st.sets(st.integers(0, 60)),
+)
+def test_stretches_are_runs_of_ticks(
+    recorded: set[int], replayed: set[int], other: set[int]
+) -> None:
+    """Together they are all that was compared; none touches another."""
+
+    def commands(ticks: set[int], are_other: bool) -> ReplayedCommands:
+        torque = np.array([[float(are_other and tick in other)] for tick in sorted(ticks)])
+        return ReplayedCommands(
+            np.array(sorted(ticks), dtype=np.int64),
+            torque.reshape(-1, 1),
+            np.zeros(len(ticks), dtype=np.intp),
+            [Form("", "")],
+            0,
+        )
+
+    compared = Comparison(
+        ("base_x",), np.arange(61), commands(recorded, False), commands(replayed, True)
+    )
+    covered = [set(range(s.first, s.last + 1)) for s in compared.stretches]
+    assert set().union(*covered) == recorded & replayed
+    assert all(before.last + 1 < after.first for before, after in pairwise(compared.stretches))
+    assert [s.equal for s in compared.stretches] == [len(ticks - other) for ticks in covered]

@@ -1,23 +1,29 @@
-"""A bag as a replay reads it, and the controller it asks for."""
+"""A bag as a replay reads it, whole or damaged, and the controller it asks for."""
 
 from __future__ import annotations
 
 import json
+import math
+import shutil
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from rosbags.rosbag2 import StoragePlugin, Writer
 
 from space_robot.flight.plan import Flight, FlightPlan, resolve
 from space_robot.flight.replay.choice import ControllerChoice
-from space_robot.flight.replay.recording import Recording
+from space_robot.flight.replay.recording import COMPARED, Recording
 from space_robot.flight.simulate import simulate
 from space_robot_control.controller.gains import build_laws, split_gains
 from space_robot_control.controller.settings import ControllerNodeSettings
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.bag.folder import open_bag
+from space_robot_msgs_py.bag.reader import read_flight
 from space_robot_msgs_py.bag.recorder import BagRecorder
 from space_robot_msgs_py.config.files import named_file
 from space_robot_msgs_py.config.validation import read_yaml
@@ -34,40 +40,42 @@ def bag(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
-def test_states_come_as_recorded_each_with_both_halves(bag: Path) -> None:
+def copied(bag: Path, copy: Path, keeps: Callable[[str, int], bool], **flight: Any) -> Recording:
+    """Another recorder's bag of those messages that it ``keeps``, by topic and number from 1."""
+    recorder = BagRecorder(copy, flight, Recording(bag).timebase)
+    counts = dict.fromkeys(topics.BY_NAME, 0)
+    for name, data in open_bag(bag).messages(*topics.ALL):
+        counts[name] += 1
+        if keeps(name, counts[name]):
+            sender = b"participant " + b"0001"
+            recorder.record(topics.BY_NAME[name], data, 1, sender, counts[name])
+    recorder.close()
+    return Recording(copy)
+
+
+def test_states_come_as_recorded_each_with_both_halves(bag: Path, tmp_path: Path) -> None:
     recording = Recording(bag)
+    assert (recording.is_whole, recording.unfinished, recording.damage) == (True, "", ())
+    assert recording.first_gap == math.inf
     states = list(recording.states(STATES))
     assert [state.tick for state in states] == list(range(400))
     recorded = [data for _, data in open_bag(bag).messages(topics.BASE_STATE)]
     assert [state.messages[1] for state in states] == recorded
     assert [state.tick for state in recording.states(STATES, 100, 300)] == list(range(100, 300))
-
-
-def test_a_state_without_its_other_half_is_passed_over(bag: Path, tmp_path: Path) -> None:
-    recorder = BagRecorder(tmp_path / "holes", {}, Recording(bag).timebase)
-    counts = dict.fromkeys(topics.BY_NAME, 0)
-    for name, data in open_bag(bag).messages(*topics.ALL):
-        counts[name] += 1
-        lost = {"/joint_states": 11, "/base/state": 21}.get(name)
-        if counts[name] != lost:
-            recorder.record(topics.BY_NAME[name], data)
-    recorder.close()
-    ticks = [state.tick for state in Recording(tmp_path / "holes").states(STATES)]
+    lost = {("/joint_states", 11), ("/base/state", 21)}
+    halves = copied(bag, tmp_path / "holes", lambda name, number: (name, number) not in lost)
+    ticks = [state.tick for state in halves.states(STATES)]
     assert ticks == [tick for tick in range(400) if tick not in (10, 20)]
 
 
 def test_commands_that_the_recorder_missed_are_known(bag: Path, tmp_path: Path) -> None:
     """By what their sender says: where the controller died, ticks without an answer are none."""
     died = {"faults": ["kill_controller@0.05"], "restart_controller": True}
-    recorder = BagRecorder(tmp_path / "late", died, Recording(bag).timebase)
-    counts = dict.fromkeys(topics.BY_NAME, 0)
-    for name, data in open_bag(bag).messages(*topics.ALL):
-        counts[name] += 1
-        if name != topics.COMMAND.full_name or not 100 < counts[name] <= 130:
-            recorder.record(topics.BY_NAME[name], data, 1, b"participant " + b"0001", counts[name])
-    recorder.close()
+    late = copied(
+        bag, tmp_path / "late", lambda name, k: name != "/command" or not 100 < k <= 130, **died
+    )
     assert Recording(bag).lost_commands == 0
-    assert Recording(tmp_path / "late").lost_commands == 30
+    assert late.lost_commands == 30
 
 
 @pytest.mark.parametrize("topic", [topics.REFERENCE_JOINTS, topics.REFERENCE_BASE])
@@ -185,12 +193,53 @@ def test_what_cannot_be_is_named(
 
 
 def test_a_bag_without_references_is_refused(bag: Path, tmp_path: Path) -> None:
-    recorder = BagRecorder(tmp_path / "bag", {}, Recording(bag).timebase)
-    for name, data in open_bag(bag).messages(topics.JOINT_STATES, topics.BASE_STATE):
-        recorder.record(topics.BY_NAME[name], data)
-    recorder.close()
     with pytest.raises(InputError, match="no messages on /reference/joints"):
-        Recording(tmp_path / "bag")
+        copied(bag, tmp_path / "bag", lambda name, number: "reference" not in name)
     (tmp_path / "empty").mkdir()
     with pytest.raises(InputError, match="not a bag"):
         Recording(tmp_path / "empty")
+
+
+def hurt(bag: Path, name: str, flips: list[float], cut: float = 1.0) -> Path:
+    """Return a copy with a byte changed at each of these parts of its file, and cut off there."""
+    copied = bag.with_name(name)
+    shutil.rmtree(copied, ignore_errors=True)
+    shutil.copytree(bag, copied)
+    file = next(copied.glob("*.mcap"))
+    content = bytearray(file.read_bytes())
+    for part in flips:
+        content[int(part * (len(content) - 1))] ^= 0x10
+    file.write_bytes(content[: int(cut * len(content))])
+    return copied
+
+
+@settings(max_examples=5, deadline=None)
+@given(st.lists(st.floats(0.01, 1.0), max_size=4), st.one_of(st.just(1.0), st.floats(0.3, 1.0)))
+def test_what_is_damaged_is_told_as_analyze_does_and_what_is_whole_is_sent(
+    bag: Path, flips: list[float], cut: float
+) -> None:
+    """The states that are sent are those of ticks that are whole, byte by byte as recorded."""
+    copied = hurt(bag, "hurt", flips, cut)
+    try:
+        log = read_flight(copied)
+    except InputError:
+        with pytest.raises(InputError):
+            Recording(copied)
+        return
+    recording, whole = Recording(copied), Recording(bag)
+    assert (recording.unfinished, recording.damage) == (log.unfinished, log.damage)
+    counts = open_bag(copied).counts()
+    lost = any(counts.get(t.full_name, 0) < n for t, n in count_compared(bag).items())
+    assert recording.is_whole == (not log.unfinished and not lost)
+    sent = {state.tick: state for state in recording.states(STATES)}
+    assert list(sent) == np.flatnonzero(log.whole).tolist()
+    recorded = {state.tick: state for state in whole.states(STATES)}
+    assert all(state == recorded[tick] for tick, state in sent.items())
+    missing = sorted(set(range(log.ticks)) - set(sent))
+    if not recording.is_whole:
+        assert recording.first_gap == (missing[0] if missing else log.ticks)
+
+
+def count_compared(bag: Path) -> dict[topics.Topic, int]:
+    counts = open_bag(bag).counts()
+    return {topic: counts.get(topic.full_name, 0) for topic in COMPARED}
