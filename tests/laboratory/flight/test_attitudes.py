@@ -7,12 +7,13 @@ from typing import Any
 
 import numpy as np
 import pytest
+from flights import planned, simulated
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from space_robot.flight.plan import Flight, FlightPlan, resolve
+from space_robot.flight.plan import Flight
 from space_robot.flight.simulate import simulate
 from space_robot_control.laws import laws
 from space_robot_model.robot.dynamics import inverse_dynamics
@@ -36,21 +37,15 @@ TURNED = np.array([0.5, -0.3, 0.7, 0.4])
 def flown(law: str, sensors: str, start: Array, **options: Any) -> FlightLog:
     """Fly with the base held where it starts, (4,)."""
     quaternion = (start / np.linalg.norm(start)).tolist()
-    return simulate(
-        Flight(
-            resolve(
-                FlightPlan(
-                    controller=law,
-                    duration=0.2,
-                    parameters={
-                        "mission": {"base_quaternion": quaternion},
-                        "plant": {"initial_quaternion": quaternion},
-                    },
-                    **SENSORS[sensors],
-                    **options,
-                )
-            )
-        )
+    return simulated(
+        controller=law,
+        duration=0.2,
+        parameters={
+            "mission": {"base_quaternion": quaternion},
+            "plant": {"initial_quaternion": quaternion},
+        },
+        **SENSORS[sensors],
+        **options,
     )
 
 
@@ -115,10 +110,10 @@ def test_a_slew_leads_through_half_a_turn_to_almost_a_whole_one(law: str) -> Non
     """About a skew axis: the torque is that of the motion, the error as that of any other."""
     turn = {"turn_deg": 350.0, "axis": [1.0, 2.0, -1.5]}
     mission = {"start": {"joints_deg": JOINTS}, "segments": [{"base": turn, "duration": 20.0}]}
-    flight = Flight(resolve(FlightPlan(controller=law, mission=mission, friction=False)))
+    flight = planned(controller=law, mission=mission, friction=False)
     log = simulate(flight)
-    planned = inverse_dynamics(flight.robot, log.references(0, log.ticks))
-    largest = np.abs(planned[:, :3]).max()
+    wanted = inverse_dynamics(flight.robot, log.references(0, log.ticks))
+    largest = np.abs(wanted[:, :3]).max()
     assert np.abs(log.applied_torque[:, :3]).max() < 1.1 * largest
     error = np.degrees(np.abs(rotation_error(log)).max())
     assert error < (0.1 if law == "tde_stc" else 5e-3)  # its K_1 and K_2 are small for 88 N m
@@ -128,7 +123,7 @@ def test_a_slew_leads_through_half_a_turn_to_almost_a_whole_one(law: str) -> Non
 
 def flight_of(start: Any, *segments: dict[str, Any], **options: Any) -> Flight:
     mission = {"start": {"joints_deg": JOINTS, "base": start}, "segments": list(segments)}
-    return Flight(resolve(FlightPlan(mission=mission, controller="ctc", **options)))
+    return planned(mission=mission, controller="ctc", **options)
 
 
 def off_nadir(log: FlightLog) -> Array:

@@ -12,6 +12,7 @@ import pytest
 import yaml
 from command import Run
 from conservation import momentum
+from flights import planned
 from meeting_targets import held_place, meeting_target, target_of
 from numpy.typing import NDArray
 from orbiting_robots import centre_of_mass
@@ -23,7 +24,6 @@ from space_robot.analysis.described import captures_of
 from space_robot.analysis.figures.single_flight import control_results
 from space_robot.analysis.missed_captures import MissedCaptures
 from space_robot.analysis.words import remarks
-from space_robot.flight.plan import Flight, FlightPlan, resolve
 from space_robot.flight.simulate import simulate
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.bag.reader import read_flight
@@ -40,7 +40,7 @@ PLAN: dict[str, Any] = {"actuators": "wheels", "duration": 0.3}
 
 
 def flown(bag: Path | None = None, **options: Any) -> FlightLog:
-    return simulate(Flight(resolve(FlightPlan(**{**PLAN, **options}))), bag)
+    return simulate(planned(**{**PLAN, **options}), bag)
 
 
 # In orbit
@@ -66,7 +66,7 @@ def test_wheels_and_robot_together_get_what_the_torques_told_give(sensors: str) 
         "magnetism": {"strength": 2.98e-5, "residual_dipole": [1.0, -2.0, 3.0]},
     }
     ticks = 1201
-    flight = Flight(resolve(FlightPlan(**{**PLAN, "duration": 0.7}, orbit=orbit, sensors=sensors)))
+    flight = planned(**{**PLAN, "duration": 0.7}, orbit=orbit, sensors=sensors)
     log = simulate(flight)
     robot, wheels = flight.plant.robot, flight.plant_settings.wheels
 
@@ -142,12 +142,12 @@ def mission_of(folder: Path, events: list[str]) -> str:
 
 def test_a_mission_has_events_and_files_beside_it(tmp_path: Path) -> None:
     def events(**options: Any) -> Any:
-        return Flight(resolve(FlightPlan(**options))).description.get("events")
+        return planned(**options).description.get("events")
 
     mission = mission_of(tmp_path / "own", ["capture@0.1:mine.yaml"])
     assert events() is None
     assert events(mission=mission) == events(events=["capture@0.1:tumbling_satellite"])
-    assert Flight(resolve(FlightPlan(mission=mission))).plant.captures.next_tick(0) == 200
+    assert planned(mission=mission).plant.captures.next_tick(0) == 200
     (text,) = events(mission=mission, events=["capture@1:small_satellite"])
     assert text.startswith('capture@1:{"name": "small_satellite"')
     assert events(mission=mission, parameters={"plant": {"events": [""]}}) is None
@@ -179,7 +179,7 @@ def without() -> FlightLog:
 @pytest.fixture(scope="module")
 def target(without: FlightLog) -> Target:
     """One that the tool meets on the mission's way."""
-    robot = Flight(resolve(FlightPlan(**PLAN, orbit=ORBIT))).plant.robot
+    robot = planned(**PLAN, orbit=ORBIT).plant.robot
     place, _ = held_place(robot, without.state(CAPTURE), target_of())
     motion = {"velocity": [0.2, -0.1, 0.3], "angular_velocity": [0.2, -0.1, 0.15]}
     return meeting_target(ORBIT, 0.1, place, **motion)
@@ -261,11 +261,9 @@ def test_the_shipped_target_is_met_by_the_papers_mission(space_robot: Run) -> No
         assert list(report["missed_captures"]) == ([] if hits else [event])
 
 
-@pytest.mark.parametrize("orbit", [False, True])
-def test_a_bench_goes_back_behind_a_capture(target: Target, orbit: bool) -> None:
+def test_a_bench_goes_back_behind_a_capture(target: Target) -> None:
     """The robot that flies on is the bare one again."""
-    options = {"orbit": ORBIT, "events": events_of(target)} if orbit else {"events": EVENTS}
-    scenario = sr.Scenario(**PLAN, **options)
+    scenario = sr.Scenario(**PLAN, orbit=ORBIT, events=events_of(target))
     log, bench = scenario.fly().log, scenario.bench()
     while bench.tick < 150:
         bench.step()

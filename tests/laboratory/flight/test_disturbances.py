@@ -1,4 +1,4 @@
-"""A disturbance of the user's own: the same bits from file, numbers, function, and in lanes."""
+"""A disturbance of the user's own: one from file, numbers and function."""
 
 from __future__ import annotations
 
@@ -17,7 +17,6 @@ from command import Run
 
 import space_robot as sr
 from space_robot.scenario.comparison import recorded_scenario
-from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.errors import InputError
 
 DURATION = 0.3
@@ -41,64 +40,25 @@ def write(path: Path, table: dict[str, Sequence[float]]) -> str:
     return str(path)
 
 
-def assert_same(one: FlightLog, other: FlightLog) -> None:
-    for name, column in one.columns.items():
-        np.testing.assert_array_equal(other.columns[name], column, name)
-
-
-@pytest.fixture(scope="module")
-def expected() -> FlightLog:
-    """The flight under numbers."""
-    return sr.Scenario(disturbance=columns(), duration=DURATION).fly().log
-
-
-def test_file_function_and_numbers_fly_the_same_bits(tmp_path: Path, expected: FlightLog) -> None:
-    file = write(tmp_path / "wind.csv", columns())
+def test_file_function_and_numbers_are_one_disturbance(tmp_path: Path) -> None:
+    """Also as a mapping and in a bag, without the file that it was read from."""
+    file = Path(write(tmp_path / "wind.csv", columns()))
     given = [file, wind, lambda t: wind(t), {k: np.array(v) for k, v in columns().items()}]
-    resolved = sr.Scenario(disturbance=columns(), duration=DURATION).resolved()
+    expected = sr.Scenario(disturbance=columns(), duration=DURATION)
     for disturbance in given:
         scenario = sr.Scenario(disturbance=disturbance, duration=DURATION)
-        assert scenario.resolved() == resolved
-    assert_same(scenario.fly().log, expected)
-    undisturbed = sr.Scenario(duration=DURATION).fly().log
-    assert np.abs(undisturbed.applied_torque - expected.applied_torque).max() > 0.1
-
-
-def test_the_resolved_scenario_is_the_flight(tmp_path: Path, expected: FlightLog) -> None:
-    """As a mapping, as a file, and from a bag, without the file that it was read from."""
-    file = Path(write(tmp_path / "wind.csv", columns()))
-    scenario = sr.Scenario(disturbance=file, duration=DURATION)
-    scenario.fly(bag=tmp_path / "bag")
-    resolved = yaml.safe_load(yaml.safe_dump(scenario.resolved()))
+        assert scenario.resolved() == expected.resolved()
+    log = sr.Scenario(disturbance=file, duration=DURATION).fly(bag=tmp_path / "bag").log
     file.unlink()
-    assert_same(sr.Scenario(**resolved).fly().log, expected)
+    again = sr.Scenario(**yaml.safe_load(yaml.safe_dump(expected.resolved()))).fly().log
+    for name, column in log.columns.items():
+        np.testing.assert_array_equal(again.columns[name], column, name)
     assert recorded_scenario(tmp_path / "bag")["disturbance"] == columns()
     said = "base_force_y, base_torque_z, joint2 from 0 to 0.3 s"
     assert sr.load_bag(tmp_path / "bag").flight["disturbance"] == said
-    assert "disturbance" not in sr.Scenario().resolved()
-
-
-def test_lanes_and_benches_fly_the_same_bits() -> None:
-    """Each lane its own table, rows of their own, joints that stop and break away."""
-    tables = [
-        sr.sampled(wind, DURATION),
-        sr.sampled(wind, 0.1, period=0.0007),
-        sr.sampled(lambda t: {"joint1": 5.0 * math.sin(60.0 * t)}, 0.2, period=0.0005),
-        {"time": [0.1, 0.2], "base_force_x": [1.0, 1.0]},
-    ]
-    scenarios = [
-        sr.Scenario(case="2", controller="ctc", disturbance=table, duration=DURATION)
-        for table in tables
-    ]
-    for flight, scenario in zip(sr.fly_many(scenarios), scenarios, strict=True):
-        assert_same(flight.log, scenario.fly().log)
-    still = [scenario.replace(controller=None) for scenario in scenarios]
-    benches, alone = sr.bench_many(still), [scenario.bench() for scenario in still]
-    for _ in range(100):
-        states = benches.step(np.zeros((4, 9)))
-        for k, one in enumerate(alone):
-            one.step(np.zeros(9))
-            np.testing.assert_array_equal(states["quaternion"][k], one.state.quaternion)
+    undisturbed = sr.Scenario(duration=DURATION)
+    assert "disturbance" not in undisturbed.resolved()
+    assert np.abs(undisturbed.fly().log.applied_torque - log.applied_torque).max() > 0.1
 
 
 def test_the_command_says_under_what_it_flew(tmp_path: Path, space_robot: Run) -> None:

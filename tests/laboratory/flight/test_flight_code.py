@@ -15,13 +15,11 @@ import numpy as np
 import pytest
 from bags import COLUMNS
 from exported_kernels import needs_compiler
-from flights import Flown, space_robot_here
+from flights import Flown, planned, simulated, space_robot_here
 from paths import ROOT
 
 from space_robot.export.software import export
 from space_robot.flight.bench import check_for_bench
-from space_robot.flight.plan import Flight, FlightPlan, resolve
-from space_robot.flight.simulate import simulate
 from space_robot_control.flight_code.compiler import write_sources
 from space_robot_control.flight_code.library import FlightLibrary
 from space_robot_control.flight_code.remote import BEGIN, FlightComputer
@@ -41,7 +39,7 @@ HARD: dict[str, Any] = {
 
 
 def flown(**options: Any) -> FlightLog:
-    return simulate(Flight(resolve(FlightPlan(**{"duration": 0.06, **options}))))
+    return simulated(**{"duration": 0.06, **options})
 
 
 def assert_same(one: FlightLog, other: FlightLog) -> None:
@@ -109,7 +107,7 @@ def test_a_law_in_python_cannot_answer_in_c(tmp_path: Path) -> None:
 
 
 def test_the_bench_has_no_messages() -> None:
-    flight = Flight(resolve(FlightPlan(shadow="c")))
+    flight = planned(shadow="c")
     with pytest.raises(InputError, match="on the bench are no messages"):
         check_for_bench(flight)
 
@@ -148,7 +146,7 @@ def flight_computer(tmp_path_factory: pytest.TempPathFactory) -> Iterator[int]:
     """The example's program for `HARD`, running; its port."""
     if not shutil.which("cc"):
         pytest.skip("no C compiler is installed")
-    exported = export(Flight(resolve(FlightPlan(**HARD))), ["tde_smc"])
+    exported = export(planned(**HARD), ["tde_smc"])
     tmp_path = tmp_path_factory.mktemp("computer")
     sources = write_sources(tmp_path, exported.sources)
     program = tmp_path / "flight_computer"
@@ -192,7 +190,7 @@ def test_without_a_flight_computer_nothing_flies(command: str, tmp_path: Path) -
 
 def test_one_that_falls_silent_ends_the_flight(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("space_robot_control.flight_code.remote.TIMEOUT_S", 0.2)
-    exported = export(Flight(resolve(FlightPlan())))
+    exported = export(planned())
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as server:
         server.bind(("127.0.0.1", 0))
 

@@ -1,4 +1,4 @@
-"""Flights of arms with passive, prismatic and geared joints, and of two arms: logs and physics."""
+"""Flights of arms with passive, prismatic and geared joints: logs, reports and momentum."""
 
 from __future__ import annotations
 
@@ -6,10 +6,10 @@ import json
 from pathlib import Path
 from typing import Any
 
-import mujoco
 import numpy as np
 import pytest
 from conservation import momentum
+from flights import planned
 from geared_robots import geared_paper_arm, with_gears
 from numpy.typing import NDArray
 from passive_robot import PASSIVE_ROBOT
@@ -23,9 +23,8 @@ from space_robot.analysis.pointing import pointing_error
 from space_robot.analysis.report_lines import lines
 from space_robot.analysis.report_tables import rms_table
 from space_robot.flight.batch.sharing import batches
-from space_robot.flight.plan import Flight, FlightPlan, resolve
+from space_robot.flight.plan import Flight
 from space_robot.flight.simulate import simulate
-from space_robot_control.laws import laws
 from space_robot_model.robot import Robot
 from space_robot_model.robot.gears import motor_momentum
 from space_robot_model.robot.momentum import Motion, robot_momentum
@@ -41,7 +40,7 @@ Array = NDArray[np.float64]
 def passive_flight(law: str, **options: object) -> Flight:
     """1.2 s: the arm has begun to move, and the panel to bend."""
     given = {"robot": PASSIVE_ROBOT, "controller": law, "duration": 1.2, "friction": False}
-    return Flight(resolve(FlightPlan.model_validate({**given, **options})))
+    return planned(**{**given, **options})
 
 
 @pytest.fixture(scope="module")
@@ -58,8 +57,8 @@ def bent(tmp_path_factory: pytest.TempPathFactory) -> FlightLog:
     return log
 
 
-@pytest.mark.parametrize("law", sorted(laws()))
-def test_every_law_holds_attitude_and_moves_the_joints_with_motors(law: str) -> None:
+@pytest.mark.parametrize("law", ["tde_stc", "ctc", "pd", "adrc", "slotine_li"])
+def test_laws_hold_attitude_and_moves_the_joints_with_motors(law: str) -> None:
     """The springs are felt, not commanded; the model that the law has knows them locked."""
     flight = passive_flight(law)
     flown = simulate(flight)
@@ -105,38 +104,13 @@ def test_errors_and_forces_are_told_by_kind(bent: FlightLog) -> None:
     assert told["navigation error", "joints_prismatic"].unit == "m"
     assert told["ripple", "force_prismatic"].unit == "N"
     assert told["ripple's peak", "force_prismatic"].texts[0].endswith((" N", "-"))
-
-
-def test_columns_of_an_export_have_their_units(bent: FlightLog) -> None:
-    names = column_names(bent)
-    for name in (
-        "boom_position_m",
-        "boom_velocity_m_s",
-        "wrist_position_rad",
-        "panel_tip_position_rad",
-        "slosh_velocity_m_s",
-        "applied_torque_boom_n",
-        "applied_torque_wrist_n_m",
-        "applied_torque_base_x_n_m",
-        "commanded_torque_boom_n",
-        "reported_torque_boom_n",
-        "measured_position_boom_m",
-        "measured_velocity_shoulder_rad_s",
-        "error_boom_m",
-        "reference_boom_acceleration_m_s2",
-        "reference_wrist_position_rad",
-        "assumed_error_boom_m",
-    ):
-        assert name in names, name
-    assert len(set(names)) == len(names)
-
-
-def test_figures_have_a_panel_a_kind(bent: FlightLog) -> None:
+    names = {"boom_velocity_m_s", "panel_tip_position_rad", "slosh_velocity_m_s", "error_boom_m"}
+    names |= {"applied_torque_boom_n", "applied_torque_wrist_n_m", "assumed_error_boom_m"}
+    assert names <= set(column_names(bent))
     labels = [axes.get_ylabel() for axes in desired_joints(bent).axes]
     assert labels == ["desired joint angle (deg)", "desired joint position (m)"]
     labels = [axes.get_ylabel() for axes in control_results(bent, "").axes]
-    assert "joint error (rad; boom: m)" in labels
-    assert "joint torque (N m; boom: N)" in labels
+    assert {"joint error (rad; boom: m)", "joint torque (N m; boom: N)"} <= set(labels)
 
 
 def test_momentum_and_tool_are_those_of_the_whole_robot(bent: FlightLog) -> None:
@@ -252,61 +226,3 @@ def test_arms_with_other_gears_fly_apart_and_with_other_numbers_together(
         for name in MOTORS:
             alone = getattr(one.fly().log, name)
             np.testing.assert_array_equal(getattr(flight.log, name), alone)
-
-
-# Two arms in MuJoCo, whose model is written down here once more by hand
-
-PERIOD = 5e-4
-ARM = """
-<body pos="0.7 {y} 0">
-  <joint axis="0 0 1"/><inertial pos="0 0 0.04" mass="6" diaginertia="0.05 0.05 0.03"/>
-  <body pos="0.12 0 0">
-    <joint axis="0 1 0"/><inertial pos="0.4 0 0" mass="8" diaginertia="0.03 0.56 0.56"/>
-    <body pos="0.9 0 0">
-      <joint axis="0 1 0"/><inertial pos="0.36 0 0" mass="6" diaginertia="0.02 0.33 0.33"/>
-      <body pos="0.8 0 0">
-        <joint axis="1 0 0"/><inertial pos="0.1 -0.02 0" mass="3" diaginertia="0.02 0.03 0.03"/>
-      </body>
-    </body>
-  </body>
-</body>"""
-MODEL = f"""
-<mujoco><option gravity="0 0 0" integrator="RK4" timestep="{PERIOD}"/><worldbody>
-  <body name="base"><freejoint/>
-    <inertial pos="0 0 0" mass="500" diaginertia="120 142 142"/>
-    {ARM.format(y=0.45)}{ARM.format(y=-0.45)}
-  </body>
-</worldbody></mujoco>"""
-"""`config/robots/dual_arm.yaml`, all bodies on the axes of the base when the joints are at zero."""
-
-
-def test_they_move_as_in_mujoco_for_four_seconds() -> None:
-    """The first 4 s of its mission under CTC, its base left to itself: the same torques in both.
-
-    Both integrate by Runge and Kutta's fourth order; they agree to rounding.
-    """
-    plan = FlightPlan(
-        robot="dual_arm", controller="ctc", actuators="none", friction=False, duration=4.0
-    )
-    log = simulate(Flight(resolve(plan)))
-    assert log.commanded_torque is not None
-    model = mujoco.MjModel.from_xml_string(MODEL)
-    data = mujoco.MjData(model)
-    data.qpos[7:] = log.joint_positions[0]
-    largest = dict.fromkeys(("joints", "joint rates", "attitude", "place"), 0.0)
-    for tick in range(log.ticks):
-        found = (
-            log.joint_positions[tick] - data.qpos[7:],
-            log.joint_velocities[tick] - data.qvel[6:],
-            log.quaternion[tick] - data.qpos[3:7],
-            log.base_position[tick] - data.qpos[:3],
-        )
-        for name, difference in zip(largest, found, strict=True):
-            largest[name] = max(largest[name], float(np.abs(difference).max()))
-        data.qfrc_applied[6:] = log.commanded_torque[tick, 3:]
-        mujoco.mj_step(model, data)
-    moved = np.abs(log.joint_positions[-1] - log.joint_positions[0])
-    assert moved.min() > 0.05, "all joints move"
-    turned = 2.0 * np.linalg.norm(log.quaternion[-1, 1:])
-    assert turned > 0.005, "the base turns"
-    assert max(largest.values()) < 1e-13, largest

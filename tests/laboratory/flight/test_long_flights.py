@@ -10,7 +10,7 @@ from pathlib import Path
 
 import psutil
 import pytest
-from flights import COMMAND, ended, ros_environment, space_robot_here
+from flights import COMMAND, ended, ros_environment, simulated, space_robot_here
 
 from space_robot.flight.plan import Flight, FlightPlan, resolve
 from space_robot.flight.simulate import simulate
@@ -72,7 +72,7 @@ def test_the_longest_flight_flies_and_can_be_interrupted(tmp_path: Path) -> None
 def test_a_whole_flight_in_memory_that_does_not_fit_is_refused() -> None:
     """Of those who need it whole: `stability`, and Python."""
     with pytest.raises(InputError, match=r"duration 1e\+06 s: the whole flight .* GB are free"):
-        simulate(Flight(resolve(FlightPlan(duration=1e6))))
+        simulated(duration=1e6)
     result = space_robot_here("stability", "--duration", "1e6")
     assert result.returncode == 2
     assert result.stderr.splitlines()[-1].startswith("space-robot: error: duration 1e+06 s")

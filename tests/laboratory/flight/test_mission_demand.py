@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import json
-import math
-import warnings
 from typing import Any, NamedTuple
 
 import numpy as np
 import pinocchio as pin
 import pytest
 from command import Run
+from flights import planned
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
@@ -35,8 +34,6 @@ from space_robot.flight.start_step import sentence
 from space_robot_control.guidance.courses import Piece, QuinticLeg
 from space_robot_model.hardware.base_actuators import BaseActuatorSettings
 from space_robot_model.robot import Robot
-from space_robot_model.robot.dynamics import inverse_dynamics
-from space_robot_model.robot.find import find_robot
 from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.samples import SOURCES
 from space_robot_sim.environment.orbit_settings import OrbitSettings
@@ -54,7 +51,7 @@ def flight(segment: dict[str, Any], actuators: str, **limits: bool) -> Flight:
         "segments": [segment],
         **({"limits": limits} if limits else {}),
     }
-    return Flight(resolve(FlightPlan(actuators=actuators, mission=mission, controller="ctc")))
+    return planned(actuators=actuators, mission=mission, controller="ctc")
 
 
 def test_torque_and_momentum_are_named_with_axis_time_and_amounts() -> None:
@@ -254,8 +251,8 @@ def test_a_rate_that_the_law_brakes_fills_the_wheels() -> None:
     start = {"joints_deg": POSTURE, "base": {"rate_deg_s": [3.0, 2.0, 1.0]}}
     mission = {"start": start, "segments": [{"hold": 5.0}]}
     with pytest.raises(InputError, match=r"asks for .* N m s about base_. at t = 0\.00 s, .* hold"):
-        Flight(resolve(FlightPlan(mission=mission, actuators="wheels")))
-    flight = Flight(resolve(FlightPlan(mission=mission)))
+        planned(mission=mission, actuators="wheels")
+    flight = planned(mission=mission)
     rate = np.radians([3.0, 2.0, 1.0])
     upright = np.array([1.0, 0.0, 0.0, 0.0])
     inertia = composite_inertia(flight.robot, upright, np.radians(start["joints_deg"]))
@@ -270,11 +267,11 @@ def test_what_is_pointed_at_after_the_missions_end_is_checked_to_the_flights_end
     start = {"joints_deg": POSTURE, "base": base}
     polar = {"plant": {"orbital_elements.inclination_deg": 90.0}}
     options = {"mission": {"start": start, "segments": [{"hold": 5.0}]}, "orbit": "iss"}
-    Flight(resolve(FlightPlan(**options, parameters=polar)))
+    planned(**options, parameters=polar)
     with pytest.raises(
         InputError, match=r"^after the mission's end: base\.about: .* line of nadir"
     ):
-        Flight(resolve(FlightPlan(**options, parameters=polar, duration=2000.0)))
+        planned(**options, parameters=polar, duration=2000.0)
 
 
 # A start away from the mission's
@@ -285,64 +282,47 @@ JOINTS = [0.0, 120.0, 220.0, 0.0, -10.0, 0.0]
 def started(quaternion: Any = None, joints: Any = None, **options: Any) -> sr.Scenario:
     plant = {} if quaternion is None else {"initial_quaternion": list(quaternion)}
     plant |= {} if joints is None else {"initial_joints_deg": list(joints)}
-    return sr.Scenario(
-        **{"controller": "ctc", "duration": 0.2, "parameters": {"plant": plant}, **options}
-    )
+    given = {"controller": "ctc", "duration": 0.2, "parameters": {"plant": plant}}
+    return sr.Scenario(**{**given, **options})
 
 
 @settings(max_examples=3, deadline=None)
 @given(st.lists(st.floats(-1.0, 1.0), min_size=3, max_size=3), st.integers(0, 5))
-def test_places_and_torques_are_those_of_the_flight(vector: list[float], joint: int) -> None:
+def test_a_start_elsewhere_is_told_with_its_distance_and_torques(
+    vector: list[float], joint: int
+) -> None:
     """The angle is SciPy's; the demand is what the flight commands; the sign of q counts not."""
     turn = Rotation.from_rotvec(vector)
-    x, y, z, w = turn.as_quat()
     joints = [*JOINTS[:joint], JOINTS[joint] + 5.0, *JOINTS[joint + 1 :]]
-    flown = started(-np.array([w, x, y, z]), joints)
     with pytest.warns(UserWarning, match="^start: "):
-        flight = flown.fly()
+        flight = started(-turn.as_quat(scalar_first=True), joints).fly()
     step = flight.metrics["start_step"]
-    assert step["attitude_deg"] == pytest.approx(math.degrees(turn.magnitude()), abs=1e-4)
+    assert step["attitude_deg"] == pytest.approx(np.degrees(turn.magnitude()), abs=1e-4)
     assert (step["joint"], step["unit"]) == (f"joint{joint + 1}", "rad")
-    assert step["joint_error"] == pytest.approx(math.radians(5.0))
-    commanded = flight.log.commanded_torque
-    assert commanded is not None
+    assert step["joint_error"] == pytest.approx(np.radians(5.0))
     axis = flight.flight.robot.axis_names.index(step["axis"])
-    assert step["demand"] == np.abs(commanded[:200, axis]).max()
-    assert step["demand"] == np.abs(commanded[:200]).max()
+    commanded = np.abs(flight.log.commanded_torque[:200])
+    assert step["demand"] == commanded[:, axis].max() == commanded.max()
 
 
 def test_a_rate_that_the_law_has_to_brake_is_told() -> None:
     """Not one with which the first segment begins."""
     start = {"joints_deg": JOINTS, "base": {"rate_deg_s": [0, 3.0, 4.0]}}
     braked, led = (
-        sr.Scenario(controller="ctc", duration=0.2, mission={"start": start, "segments": [segment]})
+        started(mission={"start": start, "segments": [segment]}).check().start_step
         for segment in ({"hold": 5}, {"base": {"rpy_deg": [0, 0, 0]}, "duration": 60})
     )
-    step = braked.check().start_step
-    assert step
-    assert step["rate_deg_s"] == pytest.approx(5.0)
-    assert "the base's rate is 5 deg/s from where the mission begins" in sentence(step)
-    assert led.check().start_step is None
-
-
-def test_the_plausible_torque_is_the_missions_own() -> None:
-    flight = started(joints=[*JOINTS[:5], 5.0], friction=False, duration=30.0).check()
-    step = flight.start_step
-    assert step
-    references = flight.mission.chunk(0, 60_000).references()
-    torque = np.abs(inverse_dynamics(find_robot("paper"), references)).max(axis=0)
-    axis = flight.robot.axis_names.index(step["axis"])
-    torque[:3] = torque[:3].max()  # the base may be turned about any axis
-    assert step["planned"] == pytest.approx(torque[axis], rel=0.02)
-    assert step["demand"] > 100.0 * step["planned"]
+    assert braked
+    assert braked.rate_deg_s == pytest.approx(5.0)
+    assert "the base's rate is 5 deg/s from where the mission begins" in sentence(braked._asdict())
+    assert led is None
 
 
 @pytest.mark.parametrize(
     "options",
     [
         {},
-        {"quaternion": [-1.0, 0.0, 0.0, 0.0]},
-        {"quaternion": [2.0, 0.0, 0.0, 0.0]},
+        {"quaternion": [-2.0, 0.0, 0.0, 0.0]},
         {"quaternion": [0.9, 0.1, 0.0, 0.0], "actuators": "none"},
         {"joints": [*JOINTS[:5], 1e-5], "controller": "tde_stc"},
         {"quaternion": [0.9, 0.1, 0.0, 0.0], "controller": None},
@@ -353,17 +333,14 @@ def test_where_there_is_no_step_nothing_is_said(options: Any) -> None:
     flight = started(**options).check()
     assert flight.start_step is None
     assert "start_step" not in flight.description
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        if flight.law.name != "none":
-            assert started(**options).fly().metrics["start_step"] is None
 
 
 def test_simulate_and_analyze_tell_the_same(space_robot: Run, tmp_path: Any) -> None:
     joints = ",".join(map(str, [*JOINTS[:5], 5.0]))
     flight = ("--controller", "ctc", "--duration", "0.2", "--bag", tmp_path / "bag")
-    words = ("simulate", *flight, "--set", f"plant.initial_joints_deg=[{joints}]")
-    flown = space_robot(*words, "--json")
+    flown = space_robot(
+        "simulate", *flight, "--set", f"plant.initial_joints_deg=[{joints}]", "--json"
+    )
     told = json.loads(flown.out)["start_step"]
     assert f"warning: {sentence(told)}" in flown.err.splitlines()
     assert json.loads(space_robot("analyze", tmp_path / "bag", "--json").out)["start_step"] == told

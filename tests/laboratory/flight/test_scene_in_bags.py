@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
+from flights import planned
 from mcap.reader import make_reader
 from numpy.typing import NDArray
 from passive_robot import PASSIVE_ROBOT
@@ -111,7 +112,7 @@ def test_what_holds_for_the_flight_is_latched_and_no_row_of_a_log(tmp_path: Path
     own reader of URDF, it is the robot again. Players are told to latch it, as rosbag2 writes it;
     the recorder's account of the flight has each topic."""
     bag = tmp_path / "bag"
-    simulate(Flight(resolve(FlightPlan(duration=0.1, robot=PASSIVE_ROBOT))), bag)
+    simulate(planned(duration=0.1, robot=PASSIVE_ROBOT), bag)
     shown = shown_by(bag)
     (tmp_path / "robot.urdf").write_text(shown.descriptions[0], "utf-8")
     read = frame_names(Robot.from_urdf(tmp_path / "robot.urdf"))

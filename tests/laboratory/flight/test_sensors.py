@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 from attitude_sensors import attitude_error
+from flights import planned
 from numpy.typing import NDArray
 
 from space_robot.flight.closed_loop import close_loop
@@ -24,7 +25,7 @@ LOOK_TICKS = 100
 
 def flown(**plan: Any) -> tuple[Array, Array]:
     """True errors of attitude and joints now and then, (K, 9); commands (ticks, 9)."""
-    flight = Flight(resolve(FlightPlan(**plan)))
+    flight = planned(**plan)
     log, errors = empty_log(flight), []
     for start in range(0, log.ticks - LOOK_TICKS, LOOK_TICKS):
         stop, truth = start + LOOK_TICKS, flight.plant.truth
@@ -41,8 +42,8 @@ SIGMA = {"white_l1": (1e-5, 1e-6), "tactical": (2.6e-6, 1.3e-4), "coarse": (2.1e
 
 @pytest.mark.parametrize("sensors", SIGMA)
 def test_the_truth_under_the_same_torque_does_not_know_of_sensors(sensors: str) -> None:
-    ideal = Flight(resolve(FlightPlan())).plant
-    other = Flight(resolve(FlightPlan(sensors=sensors))).plant
+    ideal = planned().plant
+    other = planned(sensors=sensors).plant
     rng = np.random.default_rng(1)
     angles, turns = [], []
     for tick in range(600):
@@ -118,7 +119,7 @@ def test_a_delay_that_is_known_costs_nothing_and_one_that_is_not_does() -> None:
 
 
 def described(**plan: Any) -> dict[str, Any]:
-    return Flight(resolve(FlightPlan(duration=0.1, **plan))).description
+    return planned(duration=0.1, **plan).description
 
 
 def test_a_flight_tells_its_sensors_and_what_its_filter_assumes() -> None:
@@ -142,7 +143,7 @@ def test_a_flight_tells_its_sensors_and_what_its_filter_assumes() -> None:
 
 @pytest.mark.parametrize("fault", ["stop_controller@1", "kill_mission@1"])
 def test_what_fails_between_nodes_needs_them(fault: str) -> None:
-    flight = Flight(resolve(FlightPlan(faults=["noise_gyro@0:1e-6", fault], duration=0.01)))
+    flight = planned(faults=["noise_gyro@0:1e-6", fault], duration=0.01)
     with pytest.raises(InputError) as caught:
         simulate(flight)
     assert str(caught.value) == f"faults ['{fault}']: that needs the graph of nodes: use `fly`"

@@ -7,12 +7,11 @@ from pathlib import Path
 
 import pytest
 from click.testing import CliRunner
+from flights import simulated
 from paths import CONFIG
 
 from space_robot.analysis import analyze
 from space_robot.cli.main import cli
-from space_robot.flight.plan import Flight, FlightPlan, resolve
-from space_robot.flight.simulate import simulate
 from space_robot_control.laws import laws
 from space_robot_model.robot.find import robot_names
 
@@ -28,7 +27,7 @@ ATTITUDE = {("canadarm2", "adrc"): 2e-5}
 @pytest.mark.parametrize("law", sorted(laws()))
 @pytest.mark.parametrize("robot", robot_names())
 def test_every_law_flies_it(robot: str, law: str) -> None:
-    log = simulate(Flight(resolve(FlightPlan(robot=robot, controller=law, duration=SECONDS))))
+    log = simulated(robot=robot, controller=law, duration=SECONDS)
     rms = analyze(log)["rms"]["mean_axis"]
     assert rms.pop("attitude") < ATTITUDE.get((robot, law), 1e-6)
     for name, value in rms.items():

@@ -103,42 +103,47 @@ OWN_GAINS: dict[str, dict[str, Any]] = {
 """Gains for robots of any number of axes; those of the time-delay laws are not the default."""
 
 
+WIND: dict[str, list[float]] = {"time": [0.01, 0.03], "joint1": [5.0, 5.0]}
+SHARED = {
+    "controller": sorted(laws()),
+    "case": ["1", "2", "3"],
+    "sensors": ["ideal", "fine", "coarse", "tactical"],
+    "navigation": ["direct", "filtered"],
+    "command_latency_ticks": [0, 0, 3],
+    "substeps": [1, 1, 2],
+    "duration": [0.05, 0.1],
+    "swaps": [[], [], ["0.03:ctc"]],
+}
+"""Options that are those of most flights of a batch."""
+OF_ONE: dict[str, list[Any]] = {
+    "faults": [[], [], *([fault] for fault in FAULTS), [*FAULTS[3:5]]],
+    "case": ["1", "3"],
+    "friction": [False],
+    "disturbance": [WIND, {**WIND, "time": [0.0, 0.02]}],
+    "events": [["capture@0.02:tumbling_satellite", "release@0.04:0.01"]],
+}
+"""Options that a flight may have for itself."""
+
+
 @st.composite
 def scenarios(draw: st.DrawFn) -> list[dict[str, Any]]:
     """Options of flights, most of which can share a batch."""
     robot = draw(st.sampled_from(["paper", "paper", "paper", "dual_arm", "flexible_panels"]))
-    hardware = ["ideal", "none"]
-    if robot == "paper":
-        hardware += ["wheels", "thrusters", "wheels_and_thrusters"]
-    common = {
-        "robot": robot,
-        "controller": draw(st.sampled_from(sorted(laws()))),
-        "case": draw(st.sampled_from(["1", "2", "3"])),
-        "sensors": draw(st.sampled_from(["ideal", "fine", "coarse", "tactical"])),
-        "navigation": draw(st.sampled_from(["direct", "filtered"])),
-        "actuators": draw(st.sampled_from(hardware)),
-        "command_latency_ticks": draw(st.sampled_from([0, 0, 3])),
-        "substeps": draw(st.sampled_from([1, 1, 2])),
-        "duration": draw(st.sampled_from([0.05, 0.1])),
-        "swaps": draw(st.sampled_from([[], [], ["0.03:ctc"]])),
-    }
-    if robot != "paper" and common["actuators"] == "none":
+    hardware = ["ideal", "none", "wheels", "thrusters", "wheels_and_thrusters"]
+    common = {name: draw(st.sampled_from(values)) for name, values in SHARED.items()}
+    common |= {"robot": robot, "actuators": draw(st.sampled_from(hardware))}
+    if robot != "paper":
         common["actuators"] = "ideal"
     law = common["controller"]
     if law in OWN_GAINS and (not law.startswith("tde") or draw(st.booleans())):
         common["gains"] = {law: OWN_GAINS[law]}
     flights = []
     for seed in range(draw(st.integers(2, WIDTH + 2))):
-        own: dict[str, Any] = {"seed": seed}
-        if draw(st.booleans()):
-            own["faults"] = draw(st.lists(st.sampled_from(FAULTS), unique=True, max_size=2))
-        if draw(st.integers(0, 5)) == 0:
-            own["case"] = draw(st.sampled_from(["1", "3"]))
-        if draw(st.integers(0, 5)) == 0:
-            own["friction"] = False
-        if robot == "paper" and draw(st.integers(0, 5)) == 0:
-            own["events"] = ["capture@0.02:tumbling_satellite", "release@0.04:0.01"]
-        flights.append({**common, **own})
+        names = draw(st.lists(st.sampled_from(sorted(OF_ONE)), max_size=2, unique=True))
+        own = {name: draw(st.sampled_from(OF_ONE[name])) for name in names}
+        if robot != "paper":
+            own = {name: value for name, value in own.items() if name in ("case", "faults")}
+        flights.append({**common, "seed": seed, **own})
     return flights
 
 

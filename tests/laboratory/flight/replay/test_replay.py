@@ -12,15 +12,13 @@ import numpy as np
 import pytest
 from bags import entries_of, rosbags_bag
 from command import Run
-from driven_robots import driven_paper
-from flights import space_robot_here
+from flights import planned, space_robot_here
 
 from space_robot.flight.plan import Flight, FlightPlan, resolve
 from space_robot.flight.replay.outcome import Replay, ReplayOptions
 from space_robot.flight.replay.run import replay
 from space_robot.flight.simulate import simulate
 from space_robot_control.laws import laws
-from space_robot_model.robot import Robot
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.bag.folder import open_bag
 from space_robot_msgs_py.bag.reader import read_flight
@@ -31,7 +29,7 @@ from space_robot_msgs_py.wire.codecs import CommandCodec
 
 pytest.importorskip("rclpy")
 TICKS = 300
-FLIGHT = Flight(resolve(FlightPlan()))
+FLIGHT = planned()
 
 
 @pytest.fixture(scope="module")
@@ -76,11 +74,9 @@ def altered(bag: Path, copy: Path, change: Callable[[str, int, bytes], bytes | N
 def test_swaps_to_every_law_give_the_same_bits_again(
     recorded: Callable[..., Path], play: Callable[..., Replay]
 ) -> None:
-    """Of an arm with gears in an orbit: the controller gets what was measured on both sides."""
     first, *others = sorted(laws())
     swaps = [f"{0.01 * (k + 1):g}:{law}" for k, law in enumerate(others)]
-    options = {"robot": Robot.from_dict(driven_paper()), "orbit": "iss", "sensors": "fine"}
-    done = play(recorded(controller=first, swaps=swaps, **options))
+    done = play(recorded(controller=first, swaps=swaps, case="3"))
     report = done.report()
     assert (report["compared"], report["equal"]) == (TICKS, TICKS), report["first_difference"]
     assert report["identical"]
