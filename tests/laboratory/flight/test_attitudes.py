@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 from flights import planned, simulated
-from hypothesis import HealthCheck, given, settings
+from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
@@ -78,6 +78,7 @@ starts = st.tuples(*[st.floats(-1.0, 1.0)] * 4).map(np.array).filter(lambda q: q
     [*((law, "ideal") for law in laws()), *((law, "fine") for law in ("tde_stc", "pd", "ctc"))],
 )
 @settings(max_examples=2, deadline=None, suppress_health_check=list(HealthCheck))
+@example(start=np.array([0.0, 0.0, 0.0, 1.0]))
 @given(start=starts)
 def test_torques_and_errors_are_those_of_any_other_start(
     law: str, sensors: str, start: Array
@@ -93,16 +94,6 @@ def test_torques_and_errors_are_those_of_any_other_start(
     # a quaternion is rounded to 1e-16, and gains are as large as 1e8 N m
     largest = np.abs(log.applied_torque).max()
     assert torque < 1e-9 * max(1.0, largest) + 30.0 * by_rounding(law, sensors)
-
-
-@pytest.mark.parametrize("law", ["tde_stc", "pd", "ctc"])
-@pytest.mark.parametrize("yaw", [179.0, 180.0])
-def test_half_a_turn_of_yaw_is_an_attitude_as_any_other(law: str, yaw: float) -> None:
-    x, y, z, w = Rotation.from_euler("z", yaw, degrees=True).as_quat()
-    log = flown(law, "ideal", np.array([w, x, y, z]))
-    most = np.abs(rotation_error(log)).max()
-    assert most == pytest.approx(np.abs(rotation_error(unturned(law, "ideal"))).max(), rel=0.05)
-    assert most < np.radians(1e-4)
 
 
 @pytest.mark.parametrize("law", ["tde_stc", "indi", "ctc"])

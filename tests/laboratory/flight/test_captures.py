@@ -261,20 +261,6 @@ def test_the_shipped_target_is_met_by_the_papers_mission(space_robot: Run) -> No
         assert list(report["missed_captures"]) == ([] if hits else [event])
 
 
-def test_a_bench_goes_back_behind_a_capture(target: Target) -> None:
-    """The robot that flies on is the bare one again."""
-    scenario = sr.Scenario(**PLAN, orbit=ORBIT, events=events_of(target))
-    log, bench = scenario.fly().log, scenario.bench()
-    while bench.tick < 150:
-        bench.step()
-    snapshot = bench.save()
-    for _ in range(2):
-        bench.restore(snapshot)
-        while bench.tick < 450:
-            bench.step()
-            np.testing.assert_array_equal(bench.state.omega_base, log.omega_base[bench.tick])
-
-
 @pytest.mark.parametrize(
     ("motion", "said"),
     [

@@ -250,7 +250,7 @@ def tracks(start_s: float, stop_s: float, error: float) -> Check:
     return lambda seen: seen.error(start_s, stop_s) < error
 
 
-@pytest.mark.parametrize(("flight", "check"), rows())
+@pytest.mark.parametrize(("flight", "check"), list(rows()))
 def test_reaction(flight: str, check: Check) -> None:
     this = seen(flight)
     assert check(this), (this.expected, this.counts, this.modes)
