@@ -148,6 +148,7 @@ def test_a_parameter_that_no_command_line_can_hold_is_in_a_file(
 
 # Services are called once, when the answer will arrive
 
+AGAIN_S = 0.1
 UNHEARD = 2
 """So many answers are dropped, as to a client that has not been discovered."""
 
@@ -186,12 +187,15 @@ class Server:
 
     def _go(self, request: Any, response: Any) -> Any:
         self.triggers += 1
+        self._is_over.wait(4 * AGAIN_S)  # as a step of many ticks
         response.success, response.message = True, "goes on"
         return response
 
     def close(self) -> None:
         self._is_over.set()
         self._thread.join()
+        for _ in range(5):  # what was asked again waits still
+            self._executor.spin_once(timeout_sec=0.02)
         self._executor.shutdown()
         self._visitor.leave()
 
@@ -199,7 +203,7 @@ class Server:
 def test_an_answer_that_is_lost_to_a_new_caller_delays_the_call_and_no_more(
     domain: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(node_services, "ASK_AGAIN_S", 0.2)
+    monkeypatch.setattr(node_services, "ASK_AGAIN_S", AGAIN_S)
     server, caller = Server(domain), TemporaryNode("caller", domain)
     try:
         said = node_services.call_trigger(caller.node, f"{server.node.get_name()}/go", lambda: None)
