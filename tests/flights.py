@@ -11,13 +11,17 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager, redirect_stderr, redirect_stdout
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import pytest
 from forked import SPACE_ROBOT, Forked
 
 from space_robot_msgs_py.ros.locks import nodes_in
 from space_robot_msgs_py.ros.process_environment import DEFAULTS
+
+if TYPE_CHECKING:
+    from space_robot.flight.plan import Flight
+    from space_robot_msgs_py.bag.flight_log import FlightLog
 
 Start = Callable[..., Forked]
 """Starts a node with parameters."""
@@ -47,6 +51,20 @@ def space_robot(
         check=False,
         env=environment,
     )
+
+
+def planned(**options: Any) -> Flight:
+    """A flight of `simulate` with some options."""
+    from space_robot.flight.plan import Flight, FlightPlan, resolve
+
+    return Flight(resolve(FlightPlan.model_validate(options)))
+
+
+def simulated(bag: Path | None = None, **options: Any) -> FlightLog:
+    """The log of a flight in this process."""
+    from space_robot.flight.simulate import simulate
+
+    return simulate(planned(**options), bag)
 
 
 def forked_space_robot(*arguments: str) -> Forked:

@@ -31,15 +31,12 @@ def simulate(as_json: bool, bag: Path | None, **options: Any) -> None:
     from ..console.progress import flight_progress
     from ..flight.bag_path import check_bag_path
     from ..flight.compilation import compile_kernels
-    from ..flight.disk_space import disk_space_warning
     from .report_display import show_next_steps, show_report
 
     flight = plan_flight(**options)
     flight.check_in_process()
     if bag:
         check_bag_path(bag)
-        if remark := disk_space_warning(flight, bag):
-            click.echo(remark, err=True)
     for remark in remarks_on(flight):
         click.echo(remark, err=True)
     _ = flight.supervisor  # compiled, or refused, before anything is begun

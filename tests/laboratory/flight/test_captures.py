@@ -1,7 +1,8 @@
-"""Captures and releases: by option or mission, told by the bag, seen by the analysis."""
+"""Flights in orbit, with captures and releases: met, missed, told by bag and analysis."""
 
 from __future__ import annotations
 
+import json
 import shutil
 from pathlib import Path
 from typing import Any
@@ -9,95 +10,100 @@ from typing import Any
 import numpy as np
 import pytest
 import yaml
+from command import Run
+from conservation import momentum
+from flights import planned
+from meeting_targets import held_place, meeting_target, target_of
+from numpy.typing import NDArray
+from orbiting_robots import centre_of_mass
 from paths import CONFIG
 
-from space_robot import Scenario
+import space_robot as sr
 from space_robot.analysis import analyze
+from space_robot.analysis.described import captures_of
 from space_robot.analysis.figures.single_flight import control_results
+from space_robot.analysis.missed_captures import MissedCaptures
 from space_robot.analysis.words import remarks
-from space_robot.flight.plan import Flight, FlightPlan, resolve
 from space_robot.flight.simulate import simulate
-from space_robot.scenario.comparison import recorded_scenario
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.bag.reader import read_flight
 from space_robot_msgs_py.errors import InputError
-from space_robot_msgs_py.samples import Reference
+from space_robot_msgs_py.samples import ORBIT_FIELDS
+from space_robot_sim.environment.orbit_settings import OrbitSettings
+from space_robot_sim.environment.target import Target
+from space_robot_sim.plant.surroundings import REPORT_TICKS
+
+Array = NDArray[np.float64]
 
 EVENTS = ["capture@0.1:tumbling_satellite", "release@0.2:0.05", "capture@0.2001:small_satellite"]
-PLAN: dict[str, Any] = {"actuators": "wheels", "events": EVENTS, "duration": 0.3}
-COLUMNS = (
-    "quaternion",
-    "base_velocity",
-    "omega_base",
-    "joint_velocities",
-    "wheel_velocities",
-    "applied_torque",
-    "commanded_torque",
-)
+PLAN: dict[str, Any] = {"actuators": "wheels", "duration": 0.3}
+
+
+def flown(bag: Path | None = None, **options: Any) -> FlightLog:
+    return simulate(planned(**{**PLAN, **options}), bag)
+
+
+# In orbit
+
+
+def test_without_an_orbit_there_are_no_columns_of_one(tmp_path: Path) -> None:
+    log = flown(tmp_path / "bag", duration=0.01)
+    for name in ORBIT_FIELDS:
+        assert getattr(log, name).shape == (log.ticks, 0)
+        assert getattr(sr.load_bag(tmp_path / "bag"), name).shape == (log.ticks, 0)
+
+
+@pytest.mark.parametrize("sensors", ["ideal", "fine"])
+def test_wheels_and_robot_together_get_what_the_torques_told_give(sensors: str) -> None:
+    """The angular momentum about the centre of mass grows by the integral of the four columns.
+
+    Those of air, light and field are held over a tick, that of gravity changes all the time.
+    """
+    orbit = {
+        "orbital_elements": {"height": 420e3, "inclination_deg": 51.6, "anomaly_deg": 30.0},
+        "atmosphere": {"density": 3e-12, "at_height": 420e3},
+        "sunlight": {"pressure": 4.56e-6},
+        "magnetism": {"strength": 2.98e-5, "residual_dipole": [1.0, -2.0, 3.0]},
+    }
+    ticks = 1201
+    flight = planned(**{**PLAN, "duration": 0.7}, orbit=orbit, sensors=sensors)
+    log = simulate(flight)
+    robot, wheels = flight.plant.robot, flight.plant_settings.wheels
+
+    def about_com(tick: int) -> Array:
+        state = log.state(tick)
+        linear, angular = momentum(robot, state, wheels)
+        return np.asarray(angular - np.cross(centre_of_mass(robot, state), linear))
+
+    period = log.timebase.period
+    change = about_com(ticks - 1) - about_com(0)
+    gravity, *others = np.split(log.external_torques[:ticks], 4, axis=1)
+    impulses = [np.trapezoid(gravity[::REPORT_TICKS], dx=REPORT_TICKS * period, axis=0)]
+    impulses += [period * torque[: ticks - 1].sum(axis=0) for torque in others]
+    total = np.sum(impulses, axis=0)
+    for impulse in impulses:
+        assert np.linalg.norm(impulse) > 1e-3 * np.linalg.norm(total)
+    np.testing.assert_allclose(change, total, rtol=0, atol=1e-6 * np.linalg.norm(total))
+    travelled = np.linalg.norm(log.orbit_position[-1] - log.orbit_position[0])
+    speed = np.linalg.norm(log.orbit_velocity[0])
+    assert travelled == pytest.approx(speed * log.time[-1], rel=1e-6)
+
+
+# Captures by the tool, wherever it is
 
 
 @pytest.fixture(scope="module")
 def bag(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, FlightLog]:
     folder = tmp_path_factory.mktemp("captures") / "bag"
-    return folder, simulate(Flight(resolve(FlightPlan(**PLAN))), folder)
-
-
-def mission_of(folder: Path, events: list[str]) -> Path:
-    """The paper's mission with events, in a folder of its own."""
-    folder.mkdir()
-    content = yaml.safe_load((CONFIG / "missions/paper.yaml").read_text("utf-8"))
-    content["plant_node"]["ros__parameters"]["events"] = events
-    path = folder / "mission.yaml"
-    path.write_text(yaml.safe_dump(content), "utf-8")
-    shutil.copy(CONFIG / "targets/tumbling_satellite.yaml", folder / "mine.yaml")
-    return path
-
-
-def test_a_bag_tells_the_targets_numbers_and_flies_again(bag: tuple[Path, FlightLog]) -> None:
-    """To the same bits, and without the targets' files."""
-    described = read_flight(bag[0]).flight
-    assert [text.partition("@")[0] for text in described["events"]] == [
-        "capture",
-        "release",
-        "capture",
-    ]
-    assert all("_satellite" not in text.partition("{")[0] for text in described["events"])
-    again = Flight(resolve(FlightPlan.model_validate(recorded_scenario(bag[0]))))
-    assert again.description["events"] == described["events"]
-    log = simulate(again)
-    for column in COLUMNS:
-        np.testing.assert_array_equal(getattr(log, column), getattr(bag[1], column), column)
-
-
-def test_compiled_stretches_fly_as_single_ticks_do(bag: tuple[Path, FlightLog]) -> None:
-    flight, log = Flight(resolve(FlightPlan(**PLAN))), bag[1]
-    assert log.commanded_torque is not None
-    reference, chunk = Reference.at_rest(flight.robot.n), flight.mission.chunk(0, flight.ticks)
-    joints, base = Reference.parts(reference)
-    for tick in range(flight.ticks):
-        joints[0], base[0] = chunk.joints[tick], chunk.base[tick]
-        np.testing.assert_array_equal(flight.plant.state.omega_base, log.omega_base[tick])
-        command = flight.controller.update(flight.plant.state, reference)
-        np.testing.assert_array_equal(command.torque[:9], log.commanded_torque[tick])
-        flight.plant.step(command)
-
-
-def test_a_bench_goes_back_behind_a_capture(bag: tuple[Path, FlightLog]) -> None:
-    """The robot that flies on is the bare one again."""
-    bench, bare = Scenario(**PLAN).bench(), bag[1].omega_base
-    while bench.tick < 150:
-        bench.step()
-    snapshot = bench.save()
-    for _ in range(2):
-        bench.restore(snapshot)
-        while bench.tick < 450:
-            bench.step()
-            np.testing.assert_array_equal(bench.state.omega_base, bare[bench.tick])
+    return folder, flown(folder, events=EVENTS)
 
 
 def test_the_analysis_counts_what_the_targets_bring(bag: tuple[Path, FlightLog]) -> None:
     """Of a bag that is not trusted, too; the momentum after is that before and the targets'."""
     for log in (bag[1], read_flight(bag[0])):
+        texts = log.flight["events"]
+        assert [text.partition("@")[0] for text in texts] == ["capture", "release", "capture"]
+        assert all("_satellite" not in text.partition("{")[0] for text in texts)
         report = analyze(log)
         budget = report["momentum"]
         assert budget["peak_n_m_s"]["outside"] > 1.0
@@ -124,23 +130,160 @@ def test_a_file_that_a_bag_names_is_opened_only_if_it_is_trusted(
     assert "the bag refers to a file as its target" in report["unavailable"]["momentum"]
 
 
+def mission_of(folder: Path, events: list[str]) -> str:
+    """The paper's mission with events, in a folder of its own."""
+    folder.mkdir()
+    content = yaml.safe_load((CONFIG / "missions/paper.yaml").read_text("utf-8"))
+    content["plant_node"]["ros__parameters"]["events"] = events
+    (folder / "mission.yaml").write_text(yaml.safe_dump(content), "utf-8")
+    shutil.copy(CONFIG / "targets/tumbling_satellite.yaml", folder / "mine.yaml")
+    return str(folder / "mission.yaml")
+
+
 def test_a_mission_has_events_and_files_beside_it(tmp_path: Path) -> None:
+    def events(**options: Any) -> Any:
+        return planned(**options).description.get("events")
+
     mission = mission_of(tmp_path / "own", ["capture@0.1:mine.yaml"])
-    flight = Flight(resolve(FlightPlan(mission=str(mission))))
-    expected = Flight(resolve(FlightPlan(events=["capture@0.1:tumbling_satellite"])))
-    assert flight.description["events"] == expected.description["events"]
-    assert flight.plant.captures.next_tick(0) == 200
-    other = Flight(resolve(FlightPlan(mission=str(mission), events=["capture@1:small_satellite"])))
-    (text,) = other.description["events"]
+    assert events() is None
+    assert events(mission=mission) == events(events=["capture@0.1:tumbling_satellite"])
+    assert planned(mission=mission).plant.captures.next_tick(0) == 200
+    (text,) = events(mission=mission, events=["capture@1:small_satellite"])
     assert text.startswith('capture@1:{"name": "small_satellite"')
-    without = Flight(
-        resolve(FlightPlan(mission=str(mission), parameters={"plant": {"events": [""]}}))
-    )
-    assert "events" not in without.description
+    assert events(mission=mission, parameters={"plant": {"events": [""]}}) is None
     lost = mission_of(tmp_path / "lost", ["capture@0.1:yours.yaml"])
     with pytest.raises(InputError, match=r"event 'capture@0.1:yours.yaml': yours.yaml: "):
-        Flight(resolve(FlightPlan(mission=str(lost))))
+        events(mission=lost)
 
 
-def test_no_event_changes_nothing() -> None:
-    assert "events" not in Flight(resolve(FlightPlan())).description
+# Targets on orbits of their own, which are met or missed
+
+ORBIT = OrbitSettings.model_validate(
+    {
+        "orbital_elements": {"height": 420e3, "inclination_deg": 51.6, "anomaly_deg": 30.0},
+        "gravity": {"gradient": False},
+    }
+)
+"""Nothing turns the robot from outside."""
+CAPTURE = 200
+"""Tick."""
+MISS = 0.25
+"""m, of what is meant to be missed."""
+
+
+@pytest.fixture(scope="module")
+def without() -> FlightLog:
+    return flown(orbit=ORBIT)
+
+
+@pytest.fixture(scope="module")
+def target(without: FlightLog) -> Target:
+    """One that the tool meets on the mission's way."""
+    robot = planned(**PLAN, orbit=ORBIT).plant.robot
+    place, _ = held_place(robot, without.state(CAPTURE), target_of())
+    motion = {"velocity": [0.2, -0.1, 0.3], "angular_velocity": [0.2, -0.1, 0.15]}
+    return meeting_target(ORBIT, 0.1, place, **motion)
+
+
+def events_of(target: Target, distance: float = 0.0) -> list[str]:
+    """Capture of a target that passes the given one at a distance, m, and its release."""
+    start = np.array(target.motion.position) + distance * np.array([2.0, -1.0, 2.0]) / 3.0
+    motion = target.motion.model_copy(update={"position": start.tolist()})
+    return [
+        f"capture@0.1:{target.model_copy(update={'motion': motion}).inline}",
+        "release@0.2:0.05",
+    ]
+
+
+def assert_same_bits(found: FlightLog, expected: FlightLog) -> None:
+    for name, column in expected.columns.items():
+        assert found.columns[name].tobytes() == column.tobytes(), name
+
+
+def test_what_is_met_changes_the_flight_from_its_tick_on(
+    without: FlightLog, target: Target, tmp_path: Path
+) -> None:
+    """The analysis counts what the target brought: nothing else is left of the momentum."""
+    log = flown(tmp_path / "bag", orbit=ORBIT, events=events_of(target))
+    assert_same_bits(log.rows(0, CAPTURE), without.rows(0, CAPTURE))
+    assert np.abs(log.omega_base[CAPTURE] - without.omega_base[CAPTURE]).max() > 1e-3
+    np.testing.assert_array_equal(log.base_position[CAPTURE], without.base_position[CAPTURE])
+    recorded = read_flight(tmp_path / "bag")
+    for flight in (log, recorded):
+        report = analyze(flight)
+        assert report["missed_captures"] == {}
+        assert not [text for text in remarks(report) if "did not happen" in text]
+        assert report["momentum"]["peak_n_m_s"]["outside"] > 1.0
+        assert report["momentum"]["drift"]["relative"] < 1e-11
+    faster = target.motion.model_copy(update={"velocity": [0.2, -0.1, 0.2]})
+    recorded.flight["events"] = events_of(target.model_copy(update={"motion": faster}))
+    wrong = analyze(recorded)
+    assert wrong["missed_captures"] == {}
+    assert wrong["momentum"]["drift"]["relative"] > 1e-3
+
+
+def test_what_is_missed_leaves_every_bit_and_is_reported(
+    without: FlightLog, target: Target, tmp_path: Path
+) -> None:
+    log = flown(tmp_path / "bag", orbit=ORBIT, events=events_of(target, MISS))
+    assert_same_bits(log, without)
+    recorded = read_flight(tmp_path / "bag")
+    assert not recorded.trusted
+    for flight in (log, recorded):
+        report = analyze(flight)
+        assert report["missed_captures"] == {"capture@0.1:drifter": pytest.approx(MISS, rel=1e-6)}
+        assert (
+            "capture@0.1:drifter did not happen: the target was 0.25 m from where the tool holds it"
+        ) in remarks(report)
+        assert report["momentum"]["peak_n_m_s"]["outside"] == 0.0
+    plain = analyze(without)
+    assert plain["missed_captures"] is None
+    same = ("rms", "maxima", "momentum", "pointing", "tool", "sizing")
+    assert [report[key] for key in same] == [plain[key] for key in same]
+    for cuts in ((CAPTURE,), (CAPTURE + 1,), (1, 150, 300, 599)):  # whatever the blocks
+        metric = MissedCaptures(captures_of(log))
+        for start, stop in zip((0, *cuts), (*cuts, log.ticks), strict=True):
+            metric.add(log.rows(start, stop), np.empty(0))
+        assert metric.result() == report["missed_captures"]
+    short = flown(orbit=ORBIT, events=events_of(target, MISS), duration=0.05)
+    assert analyze(short)["missed_captures"] == {}
+
+
+def test_the_shipped_target_is_met_by_the_papers_mission(space_robot: Run) -> None:
+    """As the manual says; three seconds earlier the tool is elsewhere."""
+    for time, hits in (("15", True), ("12", False)):
+        event = f"capture@{time}:neighbouring_satellite"
+        words = ["--orbit", "iss", "--event", event, "--duration", f"{time}.1", "--json"]
+        ran = space_robot("simulate", *words)
+        assert ran.code == 0, ran.err
+        report = json.loads(ran.out)
+        assert report["events"] == [event]
+        assert list(report["missed_captures"]) == ([] if hits else [event])
+
+
+@pytest.mark.parametrize(
+    ("motion", "said"),
+    [
+        ("{relative_to: tool, reach: 0.1}", "reach are for relative_to orbit, got 'tool'"),
+        ("{relative_to: inertial, position: [1, 2, 3]}", "position are for relative_to orbit"),
+        (
+            "{position: [1, 2, 3], quaternion: [1, 0, 0, 0]}",
+            "target.motion: position, quaternion are for relative_to orbit, got 'tool'",
+        ),
+        ("{relative_to: orbit, reach: 0}", "target.motion.reach: "),
+        ("{relative_to: orbit, position: [1, 2]}", "target.motion.position: "),
+        ("{relative_to: orbit}", "target 'drifter': motion.relative_to orbit needs an orbit: "),
+    ],
+)
+def test_what_cannot_be_is_one_line(
+    space_robot: Run, tmp_path: Path, motion: str, said: str
+) -> None:
+    """From a file: its name is in the line, unless all of the file is well."""
+    file = tmp_path / "mine.yaml"
+    inertia = "mass: 1.0, inertia: [1, 1, 1, 0, 0, 0]"
+    file.write_text(f"target: {{name: drifter, {inertia}, motion: {motion}}}")
+    ran = space_robot("simulate", "--duration", "0.1", "--event", f"capture@0.05:{file}")
+    assert ran.code == 2
+    assert said in ran.err
+    assert ("mine.yaml" in ran.err) is ("needs an orbit" not in said)
+    assert len(ran.err.strip().splitlines()) == 1

@@ -1,17 +1,24 @@
-"""Flights that end before their time: every tick up to the one they end at is in log and bag."""
+"""How flights end, and where their bags are; one that ends early is in log and bag to its tick."""
 
 from __future__ import annotations
 
+import json
+import os
+import re
 from collections import Counter
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from flights import space_robot_here
+from flights import planned, space_robot_here
 
 from space_robot.analysis import analyze
+from space_robot.flight import compilation
+from space_robot.flight.bag_path import check_bag_path, default_bag
+from space_robot.flight.ending import COMPLETE, DIVERGED, FAILED, UNANSWERED, Ending
 from space_robot.flight.plan import Flight, FlightPlan, resolve
 from space_robot.flight.simulate import fly_blocks, simulate
 from space_robot_control.laws import ControlLaw, LawGains, Signals, per_axis
@@ -20,10 +27,16 @@ from space_robot_msgs_py import topics
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.bag.folder import open_bag
 from space_robot_msgs_py.bag.reader import read_flight
-from space_robot_msgs_py.errors import DivergedError, FlightError, SingularAttitudeError
+from space_robot_msgs_py.errors import (
+    DivergedError,
+    FlightError,
+    InputError,
+    SingularAttitudeError,
+    UnusableStateError,
+)
 from space_robot_msgs_py.samples import Command
 
-AXES = 9
+AXES, PERIOD = 9, 5e-4
 COLUMNS = (
     "base_position",
     "quaternion",
@@ -32,9 +45,6 @@ COLUMNS = (
     "joint_positions",
     "joint_velocities",
     "applied_torque",
-    "commanded_torque",
-    "reference_joints",
-    "reference_base",
 )
 
 
@@ -75,9 +85,9 @@ FLIGHTS: dict[str, tuple[Callable[[], Flight], int, int, type[Exception]]] = {
     # what is flown, states sent, states answered, how it ends
     "diverged": (lambda: flight_of(controller="ctc", gains="printed"), 11, 11, DivergedError),
     "diverged after a swap": (
-        lambda: flight_of(gains="printed", swaps=["1.2:ctc"]),
-        2410,
-        2410,
+        lambda: flight_of(gains="printed", swaps=["0.1:ctc"]),
+        209,
+        209,
         DivergedError,
     ),
     "not finite": (lambda: failing(130, lambda: np.nan), 131, 131, DivergedError),
@@ -91,64 +101,39 @@ FLIGHTS: dict[str, tuple[Callable[[], Flight], int, int, type[Exception]]] = {
 }
 
 
-def stepped(flight: Flight) -> list[list[np.ndarray]]:
-    """The numbers of all states and commands, tick by tick, by classes that know no log."""
-    found: list[list[np.ndarray]] = []
-    swaps = dict(flight.swaps)
-    try:
+@pytest.mark.parametrize("name", FLIGHTS)
+def test_every_tick_is_in_log_and_bag(name: str, tmp_path: Path) -> None:
+    """As classes have it that know no log, tick by tick; the report is that of the bag."""
+    make, sent, answered, kind = FLIGHTS[name]
+    blocks: list[FlightLog] = []
+    with pytest.raises(kind):
+        blocks.extend(fly_blocks(make(), tmp_path / "bag"))
+    (log,), read = blocks, read_flight(tmp_path / "bag")
+    assert (log.ticks, log.unanswered) == (sent, sent - answered)
+    assert np.isnan(log.commanded_torque[answered:]).all()
+    assert np.isnan(log.telemetry[answered:]).all()
+    flight = make()
+    swaps, controller = dict(flight.swaps), flight.controller
+    with suppress(FlightError, LawError):
         for tick in range(flight.ticks):
-            state, controller = flight.plant.state, flight.controller
-            row = [getattr(state, name).copy() for name in COLUMNS[:7]]
-            found.append(row)
+            state = flight.plant.state
+            for column in COLUMNS:
+                values = getattr(state, column)
+                np.testing.assert_array_equal(getattr(log, column)[tick], values, column)
             if tick in swaps:
                 controller.law = swaps[tick]
             command = controller.update(state, flight.mission.chunk(tick, 1).references())
-            row.append(command.torque.copy())
+            np.testing.assert_array_equal(log.commanded_torque[tick], command.torque)
             flight.plant.step(Command(tick, command.torque))
-    except (FlightError, LawError):
-        pass
-    return found
-
-
-@pytest.fixture(scope="module", params=list(FLIGHTS))
-def flown(
-    request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
-) -> tuple[str, list[FlightLog], Path]:
-    make, *_, error = FLIGHTS[request.param]
-    bag = tmp_path_factory.mktemp("bags") / "bag"
-    blocks: list[FlightLog] = []
-    with pytest.raises(error):
-        blocks.extend(fly_blocks(make(), bag))
-    return request.param, blocks, bag
-
-
-def test_every_tick_is_in_the_log(flown: tuple[str, list[FlightLog], Path]) -> None:
-    name, (log,), _ = flown
-    make, sent, answered, _ = FLIGHTS[name]
-    assert (log.ticks, log.unanswered) == (sent, sent - answered)
-    rows = stepped(make())
-    assert len(rows) == sent
-    for tick, row in enumerate(rows):
-        for column, values in zip(COLUMNS, row, strict=False):
-            np.testing.assert_array_equal(getattr(log, column)[tick], values)
-    assert log.commanded_torque is not None
-    assert log.telemetry is not None
-    assert np.isnan(log.commanded_torque[answered:]).all()
-    assert np.isnan(log.telemetry[answered:]).all()
-
-
-def test_every_tick_is_in_the_bag(flown: tuple[str, list[FlightLog], Path]) -> None:
-    name, (log,), bag = flown
-    _, sent, answered, _ = FLIGHTS[name]
-    read = read_flight(bag)
+    assert tick + 1 == sent
     if not answered:  # of commands that never came there is no column
         assert read.commanded_torque is None
         read.commanded_torque = np.full_like(read.applied_torque, np.nan)
-    for column in COLUMNS:
+    for column in (*COLUMNS, "commanded_torque", "reference_joints", "reference_base"):
         np.testing.assert_array_equal(getattr(read, column), getattr(log, column))
     assert read.laws == log.laws
     assert (read.unfinished, read.damage, read.unanswered) == ("", (), log.unanswered)
-    messages = Counter(topic for topic, _ in open_bag(bag).messages(*topics.ALL))
+    messages = Counter(topic for topic, _ in open_bag(tmp_path / "bag").messages(*topics.ALL))
     counts = {
         topics.JOINT_STATES: sent,
         topics.BASE_STATE: sent,
@@ -160,28 +145,24 @@ def test_every_tick_is_in_the_bag(flown: tuple[str, list[FlightLog], Path]) -> N
         topics.LAW: 2 if "swap" in name else min(answered, 1),
     }
     assert messages == {topic.full_name: count for topic, count in counts.items() if count}
-
-
-def test_the_report_of_what_was_flown_is_that_of_its_bag(
-    flown: tuple[str, list[FlightLog], Path],
-) -> None:
-    _, (log,), bag = flown
-    here, there = analyze(log), analyze(read_flight(bag))
-    assert {**here, "lost": None} == {**there, "lost": None}
+    assert {**analyze(log), "lost": None} == {**analyze(read), "lost": None}
 
 
 def test_the_error_has_the_log() -> None:
     with pytest.raises(DivergedError) as caught:
-        simulate(flight_of(gains="printed", swaps=["1.2:ctc"]))
-    log = caught.value.log
-    assert log is not None
-    assert log.ticks == caught.value.tick == 2410
-    assert log.commanded_torque is not None
-    assert np.isfinite(log.commanded_torque).all()
+        simulate(flight_of(gains="printed", swaps=["0.1:ctc"]))
+    assert caught.value.log is not None
+    assert caught.value.log.ticks == caught.value.tick == 209
+    assert np.isfinite(caught.value.log.commanded_torque).all()
 
 
-def test_the_command_leaves_a_whole_bag(tmp_path: Path) -> None:
+def test_the_command_prints_what_its_bag_says(tmp_path: Path) -> None:
     bag = tmp_path / "bag"
+    result = space_robot_here("simulate", "--duration", "0.1", "--bag", str(bag), "--json")
+    assert result.returncode == 0, result.stderr
+    ended = {"outcome": "complete", "reason": "", "ended_at_s": 0.1}
+    assert json.loads(result.stdout) == analyze(read_flight(bag)) | ended
+    bag = tmp_path / "diverged"
     given = ("--controller", "ctc", "--gains", "printed", "--bag", str(bag))
     result = space_robot_here("simulate", *given)
     assert result.returncode == 1
@@ -189,23 +170,67 @@ def test_the_command_leaves_a_whole_bag(tmp_path: Path) -> None:
     assert read_flight(bag).ticks == 11
 
 
-@pytest.mark.ros
-def test_the_bag_is_that_of_the_graph(tmp_path: Path) -> None:
-    """The same states, commands, laws, and stamps of telemetry and clock, to the last byte."""
-    pytest.importorskip("rclpy")
-    options = ("--gains", "printed", "--swap", "0.1:ctc")
-    bags = {name: tmp_path / name for name in ("fly", "simulate")}
-    for command, bag in bags.items():
-        composed = ("--composed",) if command == "fly" else ()
-        result = space_robot_here(command, *options, *composed, "--bag", str(bag))
-        assert result.returncode == 1
-        assert "diverged at tick 209 (t = 0.1045 s)" in result.stderr
-    found: dict[str, dict[str, list[bytes]]] = {}
-    for name, bag in bags.items():
-        found[name] = {}
-        for topic, data in open_bag(bag).messages(*topics.ALL):
-            found[name].setdefault(topic, []).append(data)
-    for topic, messages in found["simulate"].items():
-        sent = found["fly"][topic]
-        # the mission sends ahead of need
-        assert messages == (sent[: len(messages)] if topic.startswith("/reference/") else sent)
+@pytest.mark.parametrize(
+    ("error", "outcome", "tick"),
+    [
+        (DivergedError(11, PERIOD, "too fast"), DIVERGED, 11),
+        (UnusableStateError(3, "is not finite", "not finite"), UNANSWERED, 3),
+        (SingularAttitudeError(0), UNANSWERED, 0),
+        (FlightError("plant: the flight diverged at tick 1204 (t = 0.6 s)"), DIVERGED, 1204),
+        (FlightError("plant has ended at tick 5"), FAILED, None),
+    ],
+)
+def test_an_early_end_is_told_by_its_error(
+    error: FlightError, outcome: str, tick: int | None
+) -> None:
+    end = Ending.early(error, PERIOD)
+    seconds = None if tick is None else round(tick * PERIOD, 9)
+    assert (end.outcome, end.tick, end.ended_at_s) == (outcome, tick, seconds)
+    assert end.as_record() == {"outcome": outcome, "reason": str(error), "ended_at_s": seconds}
+    with pytest.raises(FlightError) as caught:
+        end.check()
+    assert caught.value is error
+
+
+def test_a_flight_to_its_end_has_no_reason() -> None:
+    end = Ending.complete(3, 0.1)
+    end.check()
+    assert end == (COMPLETE, "", 3, 0.3, None), "as it is written, not 0.30000000000000004"
+
+
+def test_a_bag_is_named_after_robot_law_case_and_time() -> None:
+    plain = default_bag(planned(controller="ctc", case="4-1"))
+    assert plain.parent == Path("flights")
+    assert re.fullmatch(r"ctc_case4-1_\d{8}-\d{6}", plain.name)
+    spaced = default_bag(planned(controller="ctc", namespace="/fleet/sat1"))
+    assert spaced.name.startswith("fleet_sat1_ctc_case1_")
+
+
+def test_a_bag_is_never_overwritten_and_looking_leaves_nothing(tmp_path: Path) -> None:
+    check_bag_path(tmp_path / "a" / "b")
+    assert not list(tmp_path.iterdir())
+    file, link = tmp_path / "file", tmp_path / "link"
+    file.touch()
+    link.symlink_to(tmp_path / "nothing")
+    for taken, said in (
+        (tmp_path, "exists already; a bag is never overwritten"),
+        (file, "exists already; a bag is never overwritten"),
+        (link, "exists already; a bag is never overwritten"),
+        (file / "bag", rf"no bag can be written there \(.*: {os.strerror(20)}\)"),
+        (tmp_path / "a\0b", r"no name of a folder \("),
+        (tmp_path / "a\ud800b", r"no name of a folder \("),
+        (tmp_path / ("a" * 300), "no bag can be written there .*too long"),
+    ):
+        with pytest.raises(InputError, match=f": {said}") as caught:
+            check_bag_path(taken)
+        assert str(caught.value).isprintable()
+
+
+def test_the_output_of_a_command_that_compiles_stays_clean(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    with compilation.compiling("nothing"):
+        pass
+    captured = capsys.readouterr()
+    assert captured.out == ""
+    assert captured.err.startswith("compiling nothing (once an installation")

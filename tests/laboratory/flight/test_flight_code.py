@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import re
 import shutil
 import socket
 import subprocess
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -14,99 +15,37 @@ import numpy as np
 import pytest
 from bags import COLUMNS
 from exported_kernels import needs_compiler
+from flights import Flown, planned, simulated, space_robot_here
+from paths import ROOT
 
 from space_robot.export.software import export
 from space_robot.flight.bench import check_for_bench
-from space_robot.flight.plan import Flight, FlightPlan, resolve
-from space_robot.flight.simulate import simulate
 from space_robot_control.flight_code.compiler import write_sources
 from space_robot_control.flight_code.library import FlightLibrary
 from space_robot_control.flight_code.remote import BEGIN, FlightComputer
 from space_robot_control.flight_code.supervisors import ShadowError, bits
-from space_robot_control.laws import laws
 from space_robot_msgs_py.bag.flight_log import FlightLog
+from space_robot_msgs_py.bag.reader import read_flight
 from space_robot_msgs_py.errors import FlightError, InputError
 
-ROOT = Path(__file__).parents[3]
-TICKS = 400
-TURNING: dict[str, Any] = {
-    "start": {
-        "joints_deg": [0, 120, 220, 0, -10, 0],
-        "base": {"rpy_deg": [20, 60, 175], "rate_deg_s": [1, -2, 1]},
-    },
-    "segments": [
-        {"base": {"rpy_deg": [0, 0, -170]}, "joints_deg": [5, 120, 220, 0, 0, 0], "duration": 2}
-    ],
-    "limits": {"check_actuators": False},
-}
-"""A mission whose base starts with a rate, near 180 degrees, and turns."""
 HARD: dict[str, Any] = {
-    "mission": TURNING,
     "case": "3",
     "sensors": "fine",
     "navigation": "filtered",
-    "swaps": ["0.05:ctc", "0.1:tde_tsmc"],
-    "faults": ["nan_state@0.12-0.13:0.5", "drop_state@0.15-0.16:0.5", "stamp_jump@0.17-0.18:0.5"],
-    "duration": TICKS * 5e-4,
+    "swaps": ["0.05:ctc"],
+    "faults": ["nan_state@0.07-0.08:0.5", "drop_state@0.08-0.09:0.5"],
+    "duration": 0.1,
 }
-"""A base that turns, swaps, sensors and faults of messages."""
 
 
 def flown(**options: Any) -> FlightLog:
-    return simulate(Flight(resolve(FlightPlan(**{**HARD, **options}))))
+    return simulated(**{"duration": 0.06, **options})
 
 
 def assert_same(one: FlightLog, other: FlightLog) -> None:
     for name in COLUMNS:
         np.testing.assert_array_equal(getattr(one, name), getattr(other, name), name)
     assert one.laws == other.laws
-
-
-@needs_compiler
-@pytest.mark.parametrize("actuators", ["ideal", "wheels", "thrusters"])
-def test_a_flight_under_c_has_the_same_bits(actuators: str) -> None:
-    python = flown(actuators=actuators)
-    assert_same(flown(actuators=actuators, controller_code="c"), python)
-    assert_same(flown(actuators=actuators, shadow="c"), python)
-
-
-LAWS = sorted(laws())
-ONE_AFTER_ANOTHER = [f"{0.01 * (k + 1):g}:{name}" for k, name in enumerate(LAWS * 2)]
-"""Swaps every 20 ticks, each law twice: it takes over with a memory that it has used."""
-NOMINAL = {
-    name: {"h_bar": "nominal"} for name in LAWS if "h_bar" in laws()[name].gain_descriptions()
-}
-
-
-@needs_compiler
-@pytest.mark.parametrize(
-    ("gains", "navigation", "actuators"),
-    [({}, "filtered", "wheels"), (NOMINAL, "filtered", "wheels"), (NOMINAL, "direct", "none")],
-    ids=["constant", "nominal", "nominal_free"],
-)
-def test_every_law_under_c_has_the_same_bits(
-    gains: dict[str, Any], navigation: str, actuators: str
-) -> None:
-    """One after the other, with states that are lost, and with constant and nominal inertia."""
-    options: dict[str, Any] = {
-        "gains": gains,
-        "navigation": navigation,
-        "actuators": actuators,
-        "swaps": ONE_AFTER_ANOTHER,
-        "duration": 0.01 * (len(ONE_AFTER_ANOTHER) + 1),
-    }
-    python = flown(**options)
-    assert {law.name for law in python.laws} == set(LAWS)
-    assert_same(flown(**options, controller_code="c"), python)
-
-
-@needs_compiler
-def test_gains_may_be_others_than_the_default_ones() -> None:
-    gains = {"tde_stc": {"k_1": [0.5], "k_2": [0.01]}}
-    python = flown(gains=gains, swaps=[])
-    assert_same(flown(gains=gains, swaps=[], controller_code="c"), python)
-    with pytest.raises(AssertionError):
-        assert_same(flown(swaps=[], controller_code="c"), python)
 
 
 @needs_compiler
@@ -122,7 +61,7 @@ def test_a_difference_ends_the_flight_and_is_named(monkeypatch: pytest.MonkeyPat
 
     monkeypatch.setattr(FlightLibrary, "answer", wrong)
     with pytest.raises(ShadowError) as error:
-        flown(shadow="c", faults=[])
+        flown(shadow="c")
     assert "at tick 77 the command of joint2 is " in str(error.value)
     assert " in Python and " in str(error.value)
     assert error.value.exit_code == 1
@@ -136,7 +75,7 @@ def test_a_judgement_that_differs_is_named(monkeypatch: pytest.MonkeyPatch) -> N
     judge = FlightLibrary.judge
     monkeypatch.setattr(FlightLibrary, "judge", lambda self, tick: judge(self, tick) + (tick == 9))
     with pytest.raises(ShadowError, match="at tick 9 Python judges the stamp as 1, C as 2"):
-        flown(shadow="c", faults=[])
+        flown(shadow="c")
 
 
 def test_all_nan_are_one() -> None:
@@ -168,20 +107,50 @@ def test_a_law_in_python_cannot_answer_in_c(tmp_path: Path) -> None:
 
 
 def test_the_bench_has_no_messages() -> None:
-    flight = Flight(resolve(FlightPlan(shadow="c")))
+    flight = planned(shadow="c")
     with pytest.raises(InputError, match="on the bench are no messages"):
         check_for_bench(flight)
 
 
-@pytest.fixture
-def flight_computer(tmp_path: Path) -> Iterator[int]:
+@needs_compiler
+def test_the_node_answers_in_c_and_compares(fly: Callable[..., Flown]) -> None:
+    """The graph's flight, from one law to another, is the one in this process."""
+    options = ("--duration", "0.1", "--swap", "0.05:ctc", "--shadow", "c", "--composed")
+    assert_same(read_flight(fly(*options).bag), flown(duration=0.1, swaps=["0.05:ctc"]))
+
+
+def test_a_compiler_that_fuses_products_and_sums_is_found_out(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Flags and a pragma forbid it; here they are taken out."""
+    cpu = Path("/proc/cpuinfo")
+    if not shutil.which("gcc") or not cpu.exists() or " fma" not in cpu.read_text():
+        pytest.skip("no gcc, or no processor with fused multiply-add")
+    compiler = tmp_path / "fusing"
+    compiler.write_text(
+        "#!/bin/sh\nfor word; do case $word in */src/*.c) "
+        'sed -i "/#pragma GCC/d" "${word%/*}/kernels.h";; esac; done\n'
+        'exec gcc "$@" -mfma -ffp-contract=fast\n'
+    )
+    compiler.chmod(0o755)
+    monkeypatch.setenv("CC", str(compiler))
+    bag = tmp_path / "bag"
+    ran = space_robot_here("simulate", "--shadow", "c", "--duration", "0.2", "--bag", str(bag))
+    assert ran.returncode == 1
+    assert re.search(r"at tick \d+ the command of \w+ is \S+ in Python and \S+ in C", ran.stderr)
+    assert read_flight(bag, trust=True).ticks < 400
+
+
+@pytest.fixture(scope="module")
+def flight_computer(tmp_path_factory: pytest.TempPathFactory) -> Iterator[int]:
     """The example's program for `HARD`, running; its port."""
     if not shutil.which("cc"):
         pytest.skip("no C compiler is installed")
-    exported = export(Flight(resolve(FlightPlan(**HARD))), ["ctc_smc", "tde_smc"])
+    exported = export(planned(**HARD), ["tde_smc"])
+    tmp_path = tmp_path_factory.mktemp("computer")
     sources = write_sources(tmp_path, exported.sources)
     program = tmp_path / "flight_computer"
-    flags = ["-std=c99", "-O2", "-ffp-contract=off", "-Wall", "-Wextra", "-Wpedantic", "-Werror"]
+    flags = ["-std=c99", "-O1", "-ffp-contract=off", "-Wall", "-Wextra", "-Wpedantic", "-Werror"]
     own = str(ROOT / "examples" / "flight_computer" / "flight_computer.c")
     includes = [f"-I{tmp_path / 'include'}", f"-I{tmp_path}"]
     subprocess.run(["cc", *flags, *includes, "-o", str(program), own, *sources, "-lm"], check=True)
@@ -200,9 +169,9 @@ def flight_computer(tmp_path: Path) -> Iterator[int]:
 
 def test_a_flight_computer_answers_with_the_same_bits(flight_computer: int) -> None:
     """Twice: it begins anew with every flight. The laws of the swaps are the node's choice."""
-    python = flown()
+    python = flown(**HARD)
     for _ in range(2):
-        assert_same(flown(controller_code=f"udp:127.0.0.1:{flight_computer}"), python)
+        assert_same(flown(**HARD, controller_code=f"udp:127.0.0.1:{flight_computer}"), python)
 
 
 def test_a_flight_computer_of_another_robot_is_told(flight_computer: int) -> None:
@@ -211,14 +180,17 @@ def test_a_flight_computer_of_another_robot_is_told(flight_computer: int) -> Non
         flown(controller_code=code, robot="seven_joint", mission="seven_joint")
 
 
-def test_no_flight_computer_is_told() -> None:
-    with pytest.raises(InputError, match=r"udp:127\.0\.0\.1:9: .*start the flight computer first"):
-        flown(controller_code="udp:127.0.0.1:9")
+@pytest.mark.parametrize("command", ["simulate", "fly"])
+def test_without_a_flight_computer_nothing_flies(command: str, tmp_path: Path) -> None:
+    code = ("--controller-code", "udp:127.0.0.1:9", "--bag", str(tmp_path / "bag"))
+    ran = space_robot_here(command, *code)
+    assert ran.returncode == 2
+    assert re.search(r"udp:127\.0\.0\.1:9: .*start the flight computer first", ran.stderr)
 
 
 def test_one_that_falls_silent_ends_the_flight(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("space_robot_control.flight_code.remote.TIMEOUT_S", 0.2)
-    exported = export(Flight(resolve(FlightPlan())))
+    exported = export(planned())
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as server:
         server.bind(("127.0.0.1", 0))
 

@@ -1,12 +1,17 @@
-"""What missions ask of the base's actuators, in an orbit, too; too much is refused or remarked."""
+"""What missions ask of the base's actuators, and what a start away from the mission's asks."""
 
 from __future__ import annotations
 
+import json
 from typing import Any, NamedTuple
 
 import numpy as np
 import pinocchio as pin
 import pytest
+from command import Run
+from flights import planned
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from numpy.typing import NDArray
 from oracles import pinocchio_model
 from orbiting_robots import EARTH_RADIUS, MU
@@ -25,6 +30,7 @@ from space_robot.flight.mission_demand import (
 )
 from space_robot.flight.plan import Flight, FlightPlan, resolve
 from space_robot.flight.simulate import simulate
+from space_robot.flight.start_step import sentence
 from space_robot_control.guidance.courses import Piece, QuinticLeg
 from space_robot_model.hardware.base_actuators import BaseActuatorSettings
 from space_robot_model.robot import Robot
@@ -34,17 +40,18 @@ from space_robot_sim.environment.orbit_settings import OrbitSettings
 
 Array = NDArray[np.float64]
 
+POSTURE = [0, 90, 200, 20, 30, 10]
 LINE = {"tool": {"xyz": [0.3, 0.0, -0.4]}}
 SLOW_TURN = {"base": {"rpy_deg": [0, 0, 30]}, "duration": 60}
 
 
 def flight(segment: dict[str, Any], actuators: str, **limits: bool) -> Flight:
     mission = {
-        "start": {"joints_deg": [0, 90, 200, 20, 30, 10]},
+        "start": {"joints_deg": POSTURE},
         "segments": [segment],
         **({"limits": limits} if limits else {}),
     }
-    return Flight(resolve(FlightPlan(actuators=actuators, mission=mission, controller="ctc")))
+    return planned(actuators=actuators, mission=mission, controller="ctc")
 
 
 def test_torque_and_momentum_are_named_with_axis_time_and_amounts() -> None:
@@ -74,10 +81,6 @@ def test_what_they_can_give_is_flown(
     assert flight(segment, actuators, **limits).mission.duration == segment["duration"]
 
 
-def test_missions_of_waypoints_are_flown_as_ever() -> None:
-    assert sr.Scenario(actuators="small_wheels", controller="ctc", duration=0.05).fly().log.ticks
-
-
 TURN = {"base": {"rpy_deg": [10, 40, -20]}, "duration": 60}
 WORLD = {
     "orbital_elements": {"height": 400e3, "inclination_deg": 51.6, "anomaly_deg": 30.0},
@@ -102,7 +105,7 @@ class Spin(NamedTuple):
 
 
 def spinning(rate: Array, span: float) -> Piece:
-    joints = np.radians([0, 90, 200, 20, 30, 10])
+    joints = np.radians(POSTURE)
     course = QuinticLeg(0.0, 1.0, joints, np.zeros(6))
     base = Spin(rate)
     return Piece(0.0, span, course, base, joints, base.at(np.array([span]))[0, :4])
@@ -154,7 +157,7 @@ def test_a_base_that_turns_steadily_needs_the_gyroscopic_torque(paper_robot: Rob
 def test_the_momentum_is_that_which_a_flight_gives_its_base(paper_robot: Robot) -> None:
     """Under the exact model, with all torques of an orbit, while arm and base move."""
     mission = {
-        "start": {"joints_deg": [0, 90, 200, 20, 30, 10]},
+        "start": {"joints_deg": POSTURE},
         "segments": [{**TURN, "joints_deg": [30, 60, 170, 40, 20, 40]}, {"hold": 90}],
     }
     plan = FlightPlan(controller="ctc", mission=mission, orbit=WORLD, period=0.005, friction=False)
@@ -245,11 +248,11 @@ def test_waypoints_beyond_the_wheels_are_warned_of_if_they_are_flown() -> None:
 
 def test_a_rate_that_the_law_brakes_fills_the_wheels() -> None:
     """What the robot's bodies have at the start, the wheels have once the base is at rest."""
-    start = {"joints_deg": [0, 90, 200, 20, 30, 10], "base": {"rate_deg_s": [3.0, 2.0, 1.0]}}
+    start = {"joints_deg": POSTURE, "base": {"rate_deg_s": [3.0, 2.0, 1.0]}}
     mission = {"start": start, "segments": [{"hold": 5.0}]}
     with pytest.raises(InputError, match=r"asks for .* N m s about base_. at t = 0\.00 s, .* hold"):
-        Flight(resolve(FlightPlan(mission=mission, actuators="wheels")))
-    flight = Flight(resolve(FlightPlan(mission=mission)))
+        planned(mission=mission, actuators="wheels")
+    flight = planned(mission=mission)
     rate = np.radians([3.0, 2.0, 1.0])
     upright = np.array([1.0, 0.0, 0.0, 0.0])
     inertia = composite_inertia(flight.robot, upright, np.radians(start["joints_deg"]))
@@ -261,11 +264,85 @@ def test_a_rate_that_the_law_brakes_fills_the_wheels() -> None:
 def test_what_is_pointed_at_after_the_missions_end_is_checked_to_the_flights_end() -> None:
     """About a fixed axis nadir cannot be pointed at all around a polar orbit."""
     base = {"point": "nadir", "about": [0.0, 0.0, 1.0]}
-    start = {"joints_deg": [0, 90, 200, 20, 30, 10], "base": base}
+    start = {"joints_deg": POSTURE, "base": base}
     polar = {"plant": {"orbital_elements.inclination_deg": 90.0}}
     options = {"mission": {"start": start, "segments": [{"hold": 5.0}]}, "orbit": "iss"}
-    Flight(resolve(FlightPlan(**options, parameters=polar)))
+    planned(**options, parameters=polar)
     with pytest.raises(
         InputError, match=r"^after the mission's end: base\.about: .* line of nadir"
     ):
-        Flight(resolve(FlightPlan(**options, parameters=polar, duration=2000.0)))
+        planned(**options, parameters=polar, duration=2000.0)
+
+
+# A start away from the mission's
+
+JOINTS = [0.0, 120.0, 220.0, 0.0, -10.0, 0.0]
+
+
+def started(quaternion: Any = None, joints: Any = None, **options: Any) -> sr.Scenario:
+    plant = {} if quaternion is None else {"initial_quaternion": list(quaternion)}
+    plant |= {} if joints is None else {"initial_joints_deg": list(joints)}
+    given = {"controller": "ctc", "duration": 0.2, "parameters": {"plant": plant}}
+    return sr.Scenario(**{**given, **options})
+
+
+@settings(max_examples=3, deadline=None)
+@given(st.lists(st.floats(-1.0, 1.0), min_size=3, max_size=3), st.integers(0, 5))
+def test_a_start_elsewhere_is_told_with_its_distance_and_torques(
+    vector: list[float], joint: int
+) -> None:
+    """The angle is SciPy's; the demand is what the flight commands; the sign of q counts not."""
+    turn = Rotation.from_rotvec(vector)
+    joints = [*JOINTS[:joint], JOINTS[joint] + 5.0, *JOINTS[joint + 1 :]]
+    with pytest.warns(UserWarning, match="^start: "):
+        flight = started(-turn.as_quat(scalar_first=True), joints).fly()
+    step = flight.metrics["start_step"]
+    assert step["attitude_deg"] == pytest.approx(np.degrees(turn.magnitude()), abs=1e-4)
+    assert (step["joint"], step["unit"]) == (f"joint{joint + 1}", "rad")
+    assert step["joint_error"] == pytest.approx(np.radians(5.0))
+    axis = flight.flight.robot.axis_names.index(step["axis"])
+    commanded = np.abs(flight.log.commanded_torque[:200])
+    assert step["demand"] == commanded[:, axis].max() == commanded.max()
+
+
+def test_a_rate_that_the_law_has_to_brake_is_told() -> None:
+    """Not one with which the first segment begins."""
+    start = {"joints_deg": JOINTS, "base": {"rate_deg_s": [0, 3.0, 4.0]}}
+    braked, led = (
+        started(mission={"start": start, "segments": [segment]}).check().start_step
+        for segment in ({"hold": 5}, {"base": {"rpy_deg": [0, 0, 0]}, "duration": 60})
+    )
+    assert braked
+    assert braked.rate_deg_s == pytest.approx(5.0)
+    assert "the base's rate is 5 deg/s from where the mission begins" in sentence(braked._asdict())
+    assert led is None
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        {},
+        {"quaternion": [-2.0, 0.0, 0.0, 0.0]},
+        {"quaternion": [0.9, 0.1, 0.0, 0.0], "actuators": "none"},
+        {"joints": [*JOINTS[:5], 1e-5], "controller": "tde_stc"},
+        {"quaternion": [0.9, 0.1, 0.0, 0.0], "controller": None},
+    ],
+)
+def test_where_there_is_no_step_nothing_is_said(options: Any) -> None:
+    """Also of a base that nothing turns, and of a flight that no law flies."""
+    flight = started(**options).check()
+    assert flight.start_step is None
+    assert "start_step" not in flight.description
+
+
+def test_simulate_and_analyze_tell_the_same(space_robot: Run, tmp_path: Any) -> None:
+    joints = ",".join(map(str, [*JOINTS[:5], 5.0]))
+    flight = ("--controller", "ctc", "--duration", "0.2", "--bag", tmp_path / "bag")
+    flown = space_robot(
+        "simulate", *flight, "--set", f"plant.initial_joints_deg=[{joints}]", "--json"
+    )
+    told = json.loads(flown.out)["start_step"]
+    assert f"warning: {sentence(told)}" in flown.err.splitlines()
+    assert json.loads(space_robot("analyze", tmp_path / "bag", "--json").out)["start_step"] == told
+    shown = space_robot("analyze", tmp_path / "bag").out
+    assert " ".join(sentence(told).split()) in " ".join(shown.split())

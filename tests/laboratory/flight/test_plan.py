@@ -1,9 +1,10 @@
-"""One resolved plan: what is set by any way is flown, sent to the nodes and told alike."""
+"""One resolved plan: what is set by any way is flown, sent to the nodes, and told in bags."""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
+import shutil
+import subprocess
 from operator import or_
 from pathlib import Path
 from typing import Any
@@ -11,9 +12,10 @@ from typing import Any
 import numpy as np
 import pytest
 import yaml
-from flights import Flown, space_robot_here
-from hypothesis import given
+from flights import planned
+from hypothesis import given, settings
 from hypothesis import strategies as st
+from paths import ROOT
 
 from space_robot.analysis import analyze
 from space_robot.flight.bag_path import default_bag
@@ -21,6 +23,8 @@ from space_robot.flight.flown_log import empty_log
 from space_robot.flight.graph.orchestrator import flight_parameters
 from space_robot.flight.plan import Flight, FlightPlan, resolve
 from space_robot.flight.simulate import simulate
+from space_robot.processes import software
+from space_robot.processes.node_modules import MODULES
 from space_robot.scenario.node_settings import NODES, NOT_TO_BE_SET, SCHEMAS
 from space_robot_control.allocation.assumed_actuators import assumed_actuators
 from space_robot_control.controller.controller import Controller
@@ -31,6 +35,7 @@ from space_robot_control.guidance.settings import MissionNodeSettings
 from space_robot_control.laws import laws
 from space_robot_model.robot import Robot
 from space_robot_msgs_py.bag.message_accounting import topics_with_allowed_gaps
+from space_robot_msgs_py.bag.reader import read_flight
 from space_robot_msgs_py.config.directory import config_directory
 from space_robot_msgs_py.config.files import named_file
 from space_robot_msgs_py.config.settings import leaves
@@ -53,7 +58,7 @@ def heavy_robot(folder: Path) -> Path:
 
 
 def flight_of(parameters: Parameters, **options: Any) -> Flight:
-    return Flight(resolve(FlightPlan(duration=0.05, parameters=parameters, **options)))
+    return planned(duration=0.05, parameters=parameters, **options)
 
 
 def test_a_parameter_is_the_same_as_its_option() -> None:
@@ -134,20 +139,19 @@ def test_every_parameter_that_is_refused_is_one() -> None:
     assert set(NOT_TO_BE_SET) <= known
 
 
-def test_one_period_for_all_is_flown() -> None:
-    flight = Flight(resolve(FlightPlan(duration=0.05, period=0.001, substeps=4)))
-    assert (flight.period, flight.ticks) == (0.001, 50)
+def test_one_period_for_all_is_flown(tmp_path: Path) -> None:
+    flight = planned(duration=0.05, period=0.001, substeps=4)
+    assert (flight.period, flight.ticks, flight.plant.memory.substeps) == (0.001, 50, 4)
     assert flight.description["period"] == 0.001
     assert all(flight.scenario.parameters[node]["period"] == 0.001 for node in NODES)
-    assert flight.plant.memory.substeps == 4
-
-
-def test_files_that_give_nodes_different_periods_are_refused(tmp_path: Path) -> None:
     case = tmp_path / "slow.yaml"
     case.write_text("plant_node: {ros__parameters: {period: 0.001}}\n")
     with pytest.raises(InputError, match=r"got plant 0\.001, controller"):
-        Flight(resolve(FlightPlan(case=str(case))))
-    assert Flight(resolve(FlightPlan(case=str(case), period=0.0005, duration=1.0))).ticks == 2000
+        planned(case=str(case))
+    assert planned(case=str(case), period=0.0005, duration=1.0).ticks == 2000
+    assert planned(duration=1e6).ticks == 2 * 10**9
+    with pytest.raises(InputError, match="duration must be at most 100000 s"):
+        planned(duration=1e6, period=1e-5)
 
 
 @pytest.mark.parametrize(
@@ -162,15 +166,9 @@ def test_simulate_refuses_what_needs_the_graph(parameters: Parameters, said: str
         simulate(flight_of(parameters))
 
 
-def test_longer_than_a_flight_may_last() -> None:
-    assert Flight(resolve(FlightPlan(duration=1e6))).ticks == 2 * 10**9
-    with pytest.raises(InputError, match="duration must be at most 100000 s"):
-        Flight(resolve(FlightPlan(duration=1e6, period=1e-5)))
-
-
-def test_a_heavy_plant_under_a_nominal_controller(tmp_path: Path) -> None:
-    path = heavy_robot(tmp_path)
-    nominal = flight_of({})
+def test_plant_and_controller_may_have_robots_of_their_own(tmp_path: Path) -> None:
+    """A heavy plant under a nominal controller, and a law with a model whose robot is heavier."""
+    path, nominal = heavy_robot(tmp_path), flight_of({})
     flight = flight_of({"plant": {"robot": str(path), "mission": "paper"}})
     log = simulate(flight)
     assert not np.array_equal(log.applied_torque, simulate(nominal).applied_torque)
@@ -180,115 +178,91 @@ def test_a_heavy_plant_under_a_nominal_controller(tmp_path: Path) -> None:
     assert said["controller_robot_file"] == nominal.description["robot_file"]
     assert "controller_robot_file" not in nominal.description
     assert analyze(log)["robot"] == "heavy"
-
-
-def test_a_controller_with_another_model(tmp_path: Path) -> None:
-    """Of the laws that use one: its robot is the controller's, not the plant's."""
-    path = str(heavy_robot(tmp_path))
     plan: dict[str, Any] = {"controller": "ctc", "gains": "tuned"}
-    wrong = flight_of({"controller": {"robot": path, "gains": _tuned()}}, **plan)
+    tuned = str(config_directory() / "gains" / "paper" / "tuned")
+    wrong = flight_of({"controller": {"robot": str(path), "gains": tuned}}, **plan)
     torque = simulate(wrong).applied_torque
     assert not np.array_equal(torque, simulate(flight_of({}, **plan)).applied_torque)
     assert wrong.plant.robot.name == "paper"
     assert wrong.description["controller_robot"] == "heavy"
 
 
-def _tuned() -> str:
-    return str(config_directory() / "gains" / "paper" / "tuned")
+def _numbers(low: float, high: float) -> st.SearchStrategy[Any]:
+    """Decimal and whole ones, as a user may write them."""
+    first, last = int(np.ceil(low)), int(np.floor(high))
+    return st.floats(low, high) | (st.integers(first, last) if first <= last else st.nothing())
 
 
-_AXES = st.lists(st.floats(1e-3, 1e3) | st.integers(1, 100), min_size=9, max_size=9)
-_FRACTIONS = st.lists(st.floats(1e-3, 0.9), min_size=9, max_size=9)
-_QUATERNION = st.lists(st.integers(1, 3) | st.floats(0.1, 1.0), min_size=4, max_size=4)
-_AXIS = st.lists(st.integers(1, 3) | st.floats(0.1, 1.0), min_size=3, max_size=3)
-_SPECIAL: dict[str, st.SearchStrategy[Any]] = {
-    "robot": st.just("paper"),
-    "mission": st.sampled_from(["", "paper"]),
-    "case": st.sampled_from(["1", 2, "4-1"]),
-    "faults": st.lists(st.sampled_from(["nan_state@1", "drop_command@2-3:0.5"]), max_size=1),
-    "events": st.lists(st.sampled_from(["", "capture@0.1:small_satellite"]), max_size=1),
-    "segments": st.sampled_from([[""], ["{hold: 1}"]]),
-    "payload.inertia": st.just([1, 1, 1.5, 0, 0, 0]),
-    "initial_joints_deg": st.lists(st.integers(-90, 90) | st.floats(-9, 9), min_size=6, max_size=6),
-    "initial_quaternion": _QUATERNION,
-    "base_quaternion": _QUATERNION,
-    "star_tracker.boresight": _AXIS,
-    "star_tracker.rate": st.sampled_from([0, 2.5, 100]),
-    "star_tracker.delay": st.floats(0.0, 0.03),
-    "gyro.initial_bias": _AXIS,
-    "gyro.scale_factor_error": _AXIS,
-    **dict.fromkeys(
-        (
-            "drive_scale",
-            "drive_bias",
-            "drive_lag",
-            "drive_step",
-            "drive_dead_band",
-            "echo_scale",
-            "echo_bias",
-        ),
-        st.lists(st.integers(0, 3) | st.floats(0.0, 1.0), min_size=1, max_size=1),
-    ),
-    "orbit": st.sampled_from(["iss", "sso_700"]),
-    "orbital_elements.height": st.integers(400_000, 10**9) | st.floats(4e5, 1e9),
-    "orbital_elements.eccentricity": st.just(0) | st.floats(0.0, 0.05),
-    "assumed_orbit.orbital_elements.height": st.integers(400_000, 10**9) | st.floats(4e5, 1e9),
-    "assumed_orbit.orbital_elements.eccentricity": st.just(0) | st.floats(0.0, 0.05),
-    "assumed_orbit.target.name": st.just(""),
-    "assumed_orbit.target.position": _AXIS,
-    "assumed_orbit.target.velocity": _AXIS,
-    "base_point": st.just(""),
-    "base_rate_deg_s": _AXIS,
-    "initial_rate_deg_s": _AXIS,
+def _vector(length: int, low: float, high: float) -> st.SearchStrategy[Any]:
+    return st.lists(_numbers(low, high), min_size=length, max_size=length)
+
+
+_VECTORS: dict[tuple[int, float, float], str] = {
+    (4, 0.1, 3.0): "initial_quaternion base_quaternion",
+    (3, 0.1, 3.0): "star_tracker.boresight gyro.initial_bias gyro.scale_factor_error "
+    "assumed_orbit.target.position assumed_orbit.target.velocity base_rate_deg_s "
+    "initial_rate_deg_s magnetism.residual_dipole",
+    (1, 0.0, 3.0): "drive_scale drive_bias drive_lag drive_step drive_dead_band echo_scale "
+    "echo_bias",
+    (1, 0.01, 1.0): "wheels.rotor_inertia wheels.max_torque wheels.coulomb wheels.viscous "
+    "thrusters.force thrusters.shortest_pulse thrusters.delay thrusters.specific_impulse",
+    (1, 0.5, 5.0): "magnetic_torquers.max_dipole",
+    (4, 2, 30): "wheels.max_momentum",
+    (4, -1.0, 1.0): "wheels.initial_speed",
+    (6, -90.0, 90.0): "initial_joints_deg",
+    (18, -90.0, 90.0): "waypoints_deg",
+}
+_RANGES: dict[tuple[float, float], str] = {
+    (4e5, 1e9): "orbital_elements.height assumed_orbit.orbital_elements.height",
+    (0.0, 0.05): "orbital_elements.eccentricity assumed_orbit.orbital_elements.eccentricity",
     # wheels can give what these ask for
-    "atmosphere.density": st.just(0) | st.floats(0.0, 1e-11),
-    "sunlight.pressure": st.just(0) | st.floats(0.0, 1e-5),
-    "magnetism.strength": st.just(0) | st.floats(0.0, 1e-4),
-    "magnetism.residual_dipole": _AXIS,
-    "torque_echo": st.sampled_from(["command", "given"]),
-    "actuators": st.just("wheels"),
-    "base_actuation": st.just("hardware"),
-    "base_torque_limit": st.just(0),
-    "wheels.axes": st.just([1, 0, 0, 0, 1.5, 0, 0, 0, 1, 1, 1, 1]),
-    "magnetic_torquers.axes": st.just([0.0]),
-    "magnetic_torquers.max_dipole": st.lists(
-        st.just(1) | st.floats(0.5, 5.0), min_size=1, max_size=1
-    ),
-    "allocation.dump": st.sampled_from(["all", "none", "thrusters", "magnetic"]),
-    "thrusters.positions": st.just([0.0]),
-    "thrusters.directions": st.just([0.0]),
-    **dict.fromkeys(
-        (
-            "wheels.rotor_inertia",
-            "wheels.max_torque",
-            "wheels.coulomb",
-            "wheels.viscous",
-            "thrusters.force",
-            "thrusters.shortest_pulse",
-            "thrusters.delay",
-            "thrusters.specific_impulse",
-        ),
-        st.lists(st.just(1) | st.floats(0.01, 1.0), min_size=1, max_size=1),
-    ),
-    "wheels.max_momentum": st.lists(st.integers(2, 30), min_size=4, max_size=4),
-    "wheels.initial_speed": st.lists(st.floats(-1, 1), min_size=4, max_size=4),
-    "allocation.wheels": st.sampled_from(["pseudo_inverse", "least_largest"]),
-    "allocation.modulation": st.sampled_from(["pwm", "sigma_delta", "schmitt"]),
-    "allocation.schmitt_on": st.just(1) | st.floats(1.0, 5.0),
-    "allocation.schmitt_off": st.just(0) | st.floats(-1.0, 0.5),
-    "allocation.unload_above": st.just(1) | st.floats(0.7, 1.0),
-    "allocation.unload_to": st.just(0) | st.floats(0.0, 0.2),
-    "waypoint_times": st.just([0, 1.5, 3]),
-    "waypoints_deg": st.lists(st.integers(-90, 90), min_size=18, max_size=18),
-    "controller_code": st.sampled_from(["python", "c"]),
-    "shadow": st.sampled_from(["none", "c"]),
-    "disturbance.table": st.sampled_from(["", '{"time":[0,1],"base_force_x":[0,2.5]}']),
-    "compression": st.sampled_from(["none", "lz4", "zstd"]),
-    "split_size": st.sampled_from([0, 100_000, "2M"]),
-    "sensors": st.sampled_from(["ideal", "white_l1"]),
-    "navigation_sensors": st.sampled_from(["ideal", "coarse"]),
-    "navigation": st.sampled_from(["direct", "filtered"]),
-    "navigation_filter.tracker_boresight": st.sampled_from([[0, 0, 0], [1, 0, 2.5]]),
+    (0.0, 1e-11): "atmosphere.density",
+    (0.0, 1e-5): "sunlight.pressure",
+    (0.0, 1e-4): "magnetism.strength",
+    (0.0, 0.03): "star_tracker.delay",
+    (1.0, 5.0): "allocation.schmitt_on",
+    (-1.0, 0.5): "allocation.schmitt_off",
+    (0.7, 1.0): "allocation.unload_above",
+    (0.0, 0.2): "allocation.unload_to",
+}
+_CHOICES: dict[str, list[Any]] = {
+    "robot": ["paper"],
+    "mission": ["", "paper"],
+    "case": ["1", 2, "4-1"],
+    "faults": [[], ["nan_state@1"], ["drop_command@2-3:0.5"]],
+    "events": [[""], ["capture@0.1:small_satellite"]],
+    "segments": [[""], ["{hold: 1}"]],
+    "payload.inertia": [[1, 1, 1.5, 0, 0, 0]],
+    "star_tracker.rate": [0, 2.5, 100],
+    "orbit": ["iss", "sso_700"],
+    "assumed_orbit.target.name": [""],
+    "base_point": [""],
+    "torque_echo": ["command", "given"],
+    "actuators": ["wheels"],
+    "base_actuation": ["hardware"],
+    "base_torque_limit": [0],
+    "wheels.axes": [[1, 0, 0, 0, 1.5, 0, 0, 0, 1, 1, 1, 1]],
+    "magnetic_torquers.axes": [[0.0]],
+    "thrusters.positions": [[0.0]],
+    "thrusters.directions": [[0.0]],
+    "allocation.dump": ["all", "none", "thrusters", "magnetic"],
+    "allocation.wheels": ["pseudo_inverse", "least_largest"],
+    "allocation.modulation": ["pwm", "sigma_delta", "schmitt"],
+    "waypoint_times": [[0, 1.5, 3]],
+    "controller_code": ["python", "c"],
+    "shadow": ["none", "c"],
+    "disturbance.table": ["", '{"time":[0,1],"base_force_x":[0,2.5]}'],
+    "compression": ["none", "lz4", "zstd"],
+    "split_size": [0, 100_000, "2M"],
+    "sensors": ["ideal", "white_l1"],
+    "navigation_sensors": ["ideal", "coarse"],
+    "navigation": ["direct", "filtered"],
+    "navigation_filter.tracker_boresight": [[0, 0, 0], [1, 0, 2.5]],
+}
+_SPECIAL = {
+    **{name: _vector(*key) for key, names in _VECTORS.items() for name in names.split()},
+    **{name: _numbers(*key) for key, names in _RANGES.items() for name in names.split()},
+    **{name: st.sampled_from(values) for name, values in _CHOICES.items()},
 }
 _NOT_ALONE = {"waypoint_times", "waypoints_deg"}
 _OF_ORBIT = {name for name, _ in leaves(OrbitSettings)}
@@ -305,9 +279,8 @@ def _values(name: str, field: Any) -> st.SearchStrategy[Any]:
     if field.annotation is int:
         return st.integers(low, high)
     if field.annotation is float:
-        whole = st.integers(int(np.ceil(low)), int(high)) if high >= 1 else st.nothing()
-        return st.floats(low, high) | whole
-    return st.lists(st.integers(0, 5) | st.floats(0, 5), min_size=2, max_size=2)  # frequencies
+        return _numbers(low, high)
+    return _vector(2, 0.0, 5.0)  # frequencies
 
 
 def _any_parameters() -> st.SearchStrategy[Parameters]:
@@ -323,7 +296,7 @@ def _of_laws(names: list[str], sets: list[str]) -> dict[str, st.SearchStrategy[A
         "gains": st.sampled_from(sets),
         "swaps": st.lists(st.builds("0.0{}:{}".format, st.integers(1, 9), law), max_size=1),
         **{
-            f"{name}.{gain}": _FRACTIONS if gain in FRACTIONS else _AXES
+            f"{name}.{gain}": _vector(9, 1e-3, 0.9 if gain in FRACTIONS else 1e3)
             for name in names
             for gain in laws()[name].gain_descriptions()
         },
@@ -348,6 +321,7 @@ def _parameters(names: list[str], sets: list[str]) -> st.SearchStrategy[Paramete
     return st.fixed_dictionaries({}, optional=nodes)
 
 
+@settings(max_examples=40)
 @given(_any_parameters())
 def test_all_that_is_made_of_a_plan_agrees(parameters: Parameters) -> None:
     """Settings and objects as the nodes make them of what they are sent; labels; `simulate`."""
@@ -405,20 +379,47 @@ def test_lists_go_to_the_nodes_as_declared(tmp_path: Path) -> None:
     assert sent["case"] == "2"
 
 
-@pytest.mark.parametrize(
-    "options",
-    [
-        ("controller.controller=ctc", "controller.gains=tuned", "plant.case=3"),
-        ("controller.tde_stc.k_1=[0.5]", "plant.initial_quaternion=[0.9,0.1,0,0]"),
-    ],
-)
-def test_graph_and_process_fly_and_say_the_same(
-    fly: Callable[..., Flown], tmp_path: Path, options: tuple[str, ...]
-) -> None:
-    given = ["--duration", "0.2", *(word for text in options for word in ("--set", text))]
-    flown = fly(*given, "--composed")
-    result = space_robot_here("simulate", *given, "--json", "--bag", str(tmp_path / "bag"))
-    assert result.returncode == 0, result.stderr
-    report = json.loads(result.stdout)
-    for key in ("controller", "case", "gains", "robot", "rms", "chatter", "lost"):
-        assert flown.report[key] == report[key], key
+# What a bag says of its flight
+
+
+def test_a_bag_has_all_to_fly_its_flight_again(tmp_path: Path) -> None:
+    plan = FlightPlan(
+        controller="tde_smc",
+        case="3",
+        seed=7,
+        friction=False,
+        robot="seven_joint",
+        duration=0.02,
+        parameters={"plant": {"hold_ticks": 40}},
+    )
+    flight = Flight(resolve(plan))
+    simulate(flight, tmp_path / "bag")
+    said = read_flight(tmp_path / "bag").flight
+    assert said == flight.description
+    assert json.dumps(said) == json.dumps(Flight(resolve(plan)).description)
+    assert (said["seed"], planned().description["seed"]) == (7, 0)
+    robot = Robot.from_dict(said["robot_file"], where="the bag")
+    np.testing.assert_array_equal(robot.inertia, flight.robot.inertia)
+    assert tuple(said["parameters"]) == NODES == tuple(MODULES)
+    told = said["parameters"]
+    assert PlantNodeSettings.resolve(told["plant"]) == flight.plant_settings
+    own, gains = split_gains(told["controller"])
+    assert ControllerNodeSettings.resolve(own) == flight.controller_settings
+    assert gains[said["controller"]] == said["gains_used"]
+
+
+def test_robot_is_told_though_its_file_is_gone(tmp_path: Path) -> None:
+    file = Path(shutil.copy(config_directory() / "robots" / "paper.yaml", tmp_path))
+    flight = planned(robot=str(file))
+    file.unlink()
+    robot = Robot.from_dict(flight.description["robot_file"])
+    np.testing.assert_array_equal(robot.com, flight.robot.com)
+
+
+def test_versions_and_commit_are_those_installed() -> None:
+    assert software.versions()["numpy"] == np.__version__
+    command = ["git", "-C", str(ROOT), "rev-parse", "HEAD"]
+    done = subprocess.run(command, capture_output=True, text=True)
+    head = done.stdout.strip()
+    known = (head, f"{head}-dirty") if done.returncode == 0 else (None,)
+    assert software.commit() in known

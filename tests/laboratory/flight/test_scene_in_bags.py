@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
+from flights import planned
 from mcap.reader import make_reader
 from numpy.typing import NDArray
 from passive_robot import PASSIVE_ROBOT
@@ -106,29 +107,22 @@ def test_bags_show_where_the_robot_truly_is(
     assert_poses_are_true(shown, log, flight.robot)
 
 
-def test_the_description_names_the_frames_of_the_transforms(tmp_path: Path) -> None:
-    """So viewers find the links: read by our own reader of URDF, it is the robot again."""
-    simulate(Flight(resolve(FlightPlan(duration=0.01, robot=PASSIVE_ROBOT))), tmp_path / "bag")
-    shown = shown_by(tmp_path / "bag")
+def test_what_holds_for_the_flight_is_latched_and_no_row_of_a_log(tmp_path: Path) -> None:
+    """The description names the frames of the transforms, so viewers find the links: read by our
+    own reader of URDF, it is the robot again. Players are told to latch it, as rosbag2 writes it;
+    the recorder's account of the flight has each topic."""
+    bag = tmp_path / "bag"
+    simulate(planned(duration=0.1, robot=PASSIVE_ROBOT), bag)
+    shown = shown_by(bag)
     (tmp_path / "robot.urdf").write_text(shown.descriptions[0], "utf-8")
     read = frame_names(Robot.from_urdf(tmp_path / "robot.urdf"))
     assert set(shown.poses[0]) == set(read.bodies)
-
-
-def test_nothing_of_it_changes_what_is_read(tmp_path: Path) -> None:
-    """Flight logs have no such topic; the recorder's account of the flight has each."""
-    simulate(Flight(resolve(FlightPlan(duration=0.1))), tmp_path / "bag")
-    assert set(read_flight(tmp_path / "bag").lost) == {t.full_name for t in topics.ALL}
-    accounts = noted_accounts(open_bag(tmp_path / "bag").custom_data())
+    assert set(read_flight(bag).lost) == {t.full_name for t in topics.ALL}
+    accounts = noted_accounts(open_bag(bag).custom_data())
     counts = {name: (accounts[name].received, accounts[name].missing) for name in accounts}
     assert counts["/tf"] == (10, 0)
     assert counts["/tf_static"] == counts["/robot_description"] == (1, 0)
-
-
-def test_players_are_told_to_latch_what_holds_for_the_flight(tmp_path: Path) -> None:
-    """In the channels' metadata, as rosbag2 writes it."""
-    simulate(Flight(resolve(FlightPlan(duration=0.01))), tmp_path / "bag")
-    (file,) = (tmp_path / "bag").glob("*.mcap")
+    (file,) = bag.glob("*.mcap")
     with file.open("rb") as stream:
         summary = make_reader(stream).get_summary()
     assert summary is not None

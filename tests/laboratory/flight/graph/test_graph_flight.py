@@ -1,202 +1,190 @@
-"""The real graph: processes, DDS, a bag; against the in-process flight and physics.
+"""The real graph: four processes, or one, on the middleware; against the flight in this process.
 
-One flight of each kind has its four processes; the others are composed, which gives the same bits
-(`test_composed`) in half the time.
+One flight is flown once and looked at from all sides.
 """
 
 from __future__ import annotations
 
 import json
 import time
+from collections import defaultdict
 from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
-from conservation import kinetic_energy, momentum
-from flights import Flown, space_robot_here
+import yaml
+from bags import messages_of
+from driven_robots import driven_paper
+from flights import Flown, planned, simulated, space_robot_here
 from mcap.reader import make_reader
+from paths import CONFIG
 from rosbags.rosbag2 import Reader
 
 from space_robot.analysis import analyze
-from space_robot.flight.plan import Flight, FlightPlan, resolve
-from space_robot.flight.simulate import simulate
-from space_robot_model.dynamics.attitude import rotation_matrix
+from space_robot.flight.graph.launched import launched_parameters
+from space_robot_model.robot.find import find_robot
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.bag.flight_log import FlightLog
-from space_robot_msgs_py.bag.folder import open_bag
 from space_robot_msgs_py.bag.reader import read_flight
+from space_robot_msgs_py.config.settings import leaves
 from space_robot_msgs_py.wire.definitions import jazzy
+from space_robot_sim.plant.settings import PlantNodeSettings
 
-SHORT = ("--duration", "0.5")
-LONG = ("--duration", "3")
-COMPOSED = "--composed"
-STATE_COLUMNS = (
-    "base_position",
-    "quaternion",
-    "base_velocity",
-    "omega_base",
-    "joint_positions",
-    "joint_velocities",
-    "applied_torque",
-    "reference_joints",
-    "reference_base",
+pytest.importorskip("rclpy")
+
+NODES = {"recorder_node", "mission_node", "controller_node", "plant_node"}
+TICKS = 600
+SWAPS = ["0.1:ctc", "0.2:tde_smc"]
+FAULTS = ["noise_gyro@0.05-0.2:1e-6", "drive_bias@0.1:base_y=0.001", "nan_state@0.2-0.25:0.1"]
+WORDS = (
+    *("--case", "3", "--sensors", "fine", "--seed", "5", "--duration", "0.3"),
+    *(word for text in SWAPS for word in ("--swap", text)),
+    *(word for text in FAULTS for word in ("--fault", text)),
 )
+AHEAD = {topics.REFERENCE_JOINTS.full_name, topics.REFERENCE_BASE.full_name}
+"""The mission of a graph sends its reference beyond the flight's end."""
+OF_THE_CLOCK = ("latency", "unavailable")
 
 
-@pytest.mark.parametrize(("law", "how"), [("ctc", (COMPOSED,)), ("tde_stc", ())])
-def test_graph_and_in_process_flights_agree_to_the_last_bit(
-    fly: Callable[..., Flown], law: str, how: tuple[str, ...]
+@pytest.fixture(scope="module")
+def graph(fly: Callable[..., Flown]) -> Flown:
+    """A flight of four processes with sensors, swaps, and faults of drives and messages."""
+    return fly(*WORDS)
+
+
+@pytest.fixture(scope="module")
+def here(tmp_path_factory: pytest.TempPathFactory) -> tuple[FlightLog, Path]:
+    bag = tmp_path_factory.mktemp("here") / "bag"
+    options = {"case": "3", "sensors": "fine", "seed": 5, "duration": 0.3}
+    return simulated(bag, **options, swaps=SWAPS, faults=FAULTS), bag
+
+
+def messages_by_topic(bag: Path) -> dict[str, list[bytes]]:
+    found = defaultdict(list)
+    for topic, message in messages_of(bag):
+        found[topic.full_name].append(message)
+    return found
+
+
+def test_the_graph_sends_what_one_process_sends(graph: Flown, here: tuple[FlightLog, Path]) -> None:
+    """Byte by byte: states, the truth, commands, telemetry, laws, transforms and clock."""
+    theirs, own = messages_by_topic(graph.bag), messages_by_topic(here[1])
+    assert own.keys() == theirs.keys()
+    for topic in own.keys() - AHEAD:
+        assert own[topic] == theirs[topic], topic
+
+
+def test_its_report_is_that_of_the_flight_and_of_the_bag(
+    graph: Flown, here: tuple[FlightLog, Path]
 ) -> None:
-    flown = fly("--controller", law, "--case", "3", *SHORT, *how)
-    log = simulate(Flight(resolve(FlightPlan(controller=law, case="3", duration=0.5))))
-    recorded = read_flight(flown.bag)
-    for column in STATE_COLUMNS:
-        np.testing.assert_array_equal(getattr(recorded, column), getattr(log, column), column)
-    here, there = json.loads(json.dumps(analyze(log))), flown.bag_report
-    for key in ("latency", "unavailable"):  # of the wall clock; the simulated flight has none
-        assert here.pop(key) != there.pop(key)
-    assert here == there
+    ours, theirs = json.loads(json.dumps(analyze(here[0]))), graph.bag_report
+    result = space_robot_here("analyze", str(graph.bag), "--json")
+    assert json.loads(result.stdout) == theirs
+    for report in (ours, theirs):
+        for key in OF_THE_CLOCK:
+            report.pop(key)
+    assert ours == theirs
 
 
-def test_all_laws_are_swapped_at_the_same_ticks_in_both(
-    fly: Callable[..., Flown], tmp_path: Path
-) -> None:
-    swaps = ["0.1:ctc", "0.2:ctc_smc", "0.3:tde_smc", "0.4:tde_tsmc"]
-    flown = fly(*SHORT, *(word for swap in swaps for word in ("--swap", swap)), COMPOSED)
-    log = simulate(Flight(resolve(FlightPlan(swaps=swaps, duration=0.5))), tmp_path / "bag")
-    recorded = read_flight(flown.bag)
-    for column in STATE_COLUMNS:
-        np.testing.assert_array_equal(getattr(recorded, column), getattr(log, column), column)
-    assert recorded.laws == log.laws == read_flight(tmp_path / "bag").laws
-    in_order = ["tde_stc", "ctc", "ctc_smc", "tde_smc", "tde_tsmc"]
-    assert [(law.tick, law.name) for law in log.laws] == [
-        (200 * i, name) for i, name in enumerate(in_order)
-    ]
-    for topic in (topics.LAW, topics.TF, topics.TF_STATIC, topics.ROBOT_DESCRIPTION):
-        graph, here = (
-            [data for _, data in open_bag(bag).messages(topic)]
-            for bag in (flown.bag, tmp_path / "bag")
-        )
-        assert len(here) == {topics.LAW: 5, topics.TF: 50}.get(topic, 1)
-        assert graph == here, topic
-
-
-def test_nothing_is_lost_and_every_tick_is_in_the_bag(fly: Callable[..., Flown]) -> None:
-    flown = fly(*LONG)
-    assert flown.report["lost"] == {topic.full_name: 0 for topic in topics.ALL}
-    assert flown.report["ticks"] == 6000
-    with Reader(flown.bag) as reader:
+def test_the_report_tells_of_all_nodes_and_nothing_is_lost(graph: Flown) -> None:
+    report, told = graph.report, graph.report["graph"]
+    assert set(told["nodes"]) == NODES
+    assert told["nodes"]["plant_node"]["tick"] == str(TICKS)
+    rejected = int(told["nodes"]["controller_node"]["rejected: state not finite"])
+    assert 0 < rejected < 20
+    assert (told["failures"], told["warnings"], told["restarts"]) == ([], [], 0)
+    assert report["lost"] == {topic.full_name: 0 for topic in topics.ALL}
+    assert report["ticks"] == TICKS
+    with Reader(graph.bag) as reader:
         counts = {c.topic: c.msgcount for c in reader.connections}
-    assert counts["/joint_states"] == counts["/base/state"] == counts["/command"] == 6000
-    assert counts["/clock"] == counts["/controller/telemetry"] == 300
+    assert counts["/joint_states"] == counts["/base/state"] == counts["/command"] == TICKS
+    assert counts["/clock"] == counts["/controller/telemetry"] == TICKS // 20
 
 
-def test_command_answers_the_state_it_is_stamped_with(fly: Callable[..., Flown]) -> None:
-    """Torque sent at tick k is reported as applied with the state of tick k+1."""
-    flown = fly("--controller", "tde_stc", "--case", "3", *SHORT)
-    log, commands = read_flight(flown.bag), {}
-    with Reader(flown.bag) as reader:
-        wanted = [c for c in reader.connections if c.topic == "/command"]
-        for _, stamp, raw in reader.messages(wanted):
-            message = jazzy().deserialize_cdr(raw, "sensor_msgs/msg/JointState")
-            assert message.name[:3] == ["base_x", "base_y", "base_z"]
-            commands[stamp // 500_000] = message.effort
-    sent = np.array([commands[k] for k in range(log.ticks - 1)])
-    np.testing.assert_array_equal(log.applied_torque[1:], sent)
-
-
-def test_publish_times_are_the_senders(fly: Callable[..., Flown]) -> None:
-    """A command is sent after the state it answers; log times are simulated ones."""
-    (file,) = fly(*LONG).bag.glob("*.mcap")
+def test_commands_answer_the_state_of_their_stamp_and_are_sent_after_it(graph: Flown) -> None:
+    """Log times are simulated ones, publish times the senders'."""
+    (file,) = graph.bag.glob("*.mcap")
     sent: dict[str, dict[int, int]] = {}
+    commands = {}
     with file.open("rb") as stream:
         for _, channel, message in make_reader(stream).iter_messages(log_time_order=False):
             sent.setdefault(channel.topic, {})[message.log_time] = message.publish_time
-    states, commands = sent["/base/state"], sent["/command"]
-    assert states.keys() == commands.keys() == {tick * 500_000 for tick in range(6000)}
-    latencies = [commands[stamp] - states[stamp] for stamp in states]
-    assert min(latencies) > 0
-    for times in (states, commands):
+            if channel.topic == "/command":
+                read = jazzy().deserialize_cdr(message.data, "sensor_msgs/msg/JointState")
+                assert read.name[:3] == ["base_x", "base_y", "base_z"]
+                commands[message.log_time // 500_000] = read.effort
+    states, answers = sent["/base/state"], sent["/command"]
+    assert states.keys() == answers.keys() == {tick * 500_000 for tick in range(TICKS)}
+    assert min(answers[stamp] - states[stamp] for stamp in states) > 0
+    for times in (states, answers):
         assert list(times.values()) == sorted(times.values())
         assert abs(max(times.values()) - time.time_ns()) < 3600e9  # since 1970
+    log = read_flight(graph.bag)
+    asked = np.array([commands[k] for k in range(200)])  # as long as no drive fails
+    np.testing.assert_array_equal(log.as_measured().applied_torque[1:201], asked)
 
 
-def _rotations(log: FlightLog) -> np.ndarray:
-    out = np.empty((log.ticks, 3, 3))
-    for k in range(log.ticks):
-        rotation_matrix(log.quaternion[k].copy(), out[k])
-    return out
-
-
-def test_momentum_on_the_bag(fly: Callable[..., Flown]) -> None:
-    """No force acts on the whole: P stays zero, L is the impulse of the base torque alone."""
-    log = read_flight(fly(*LONG).bag)
-    robot = Flight(resolve(FlightPlan())).robot
-    rotation, period = _rotations(log), log.timebase.period
-    mean_rotation = 0.5 * (rotation[:-1] + rotation[1:])
-    impulse = period * np.einsum("kij,kj->ki", mean_rotation, log.applied_torque[1:, :3])
-    gained = np.vstack([np.zeros(3), np.cumsum(impulse, axis=0)])
-    for k in (0, 1500, 3000, 4500, 5999):
-        linear, angular = momentum(robot, log.state(k))
-        np.testing.assert_allclose(linear, 0.0, atol=1e-9)
-        np.testing.assert_allclose(angular, gained[k], atol=1e-9)
-    assert np.abs(gained[-1]).max() > 0.5  # the test is not vacuous
-
-
-def test_energy_on_the_bag(fly: Callable[..., Flown]) -> None:
-    """Kinetic energy is the actuators' work less what friction took."""
-    log = read_flight(fly(*LONG).bag)
-    flight = Flight(resolve(FlightPlan()))
-    friction, period = flight.plant_settings.friction, log.timebase.period
-    torque, rate = log.applied_torque[1:], log.joint_velocities
-    mean_omega = 0.5 * (log.omega_base[:-1] + log.omega_base[1:])
-    work = np.sum(torque[:, :3] * mean_omega) * period
-    work += np.sum(torque[:, 3:] * np.diff(log.joint_positions, axis=0))
-    power = np.sum(friction.coulomb * np.abs(rate) + friction.viscous * rate**2, axis=1)
-    heat = np.sum(0.5 * (power[:-1] + power[1:])) * period
-    gained = kinetic_energy(flight.robot, log.state(log.ticks - 1))
-    gained -= kinetic_energy(flight.robot, log.state(0))
-    assert gained == pytest.approx(work - heat, abs=1e-6)
-    assert gained > 0.05
-
-
-def test_late_commands_are_applied_late_in_the_graph(fly: Callable[..., Flown]) -> None:
-    flown = fly(*SHORT, "--command-latency-ticks", "2", COMPOSED)
-    log = read_flight(flown.bag)
-    assert np.all(log.applied_torque[:3] == 0.0)
-    assert flown.report["rms"]["mean_axis"]["attitude"] < 1e-6
-    in_process = simulate(Flight(resolve(FlightPlan(duration=0.5, command_latency_ticks=2))))
-    np.testing.assert_array_equal(log.joint_positions, in_process.joint_positions)
-
-
-def test_wall_clock_flight_flies_every_tick(fly: Callable[..., Flown]) -> None:
-    flown = fly("--duration", "1", "--realtime")
-    assert flown.report["ticks"] == 2000
+def test_by_the_wall_clock_every_tick_is_flown(fly: Callable[..., Flown]) -> None:
+    flown = fly("--duration", "0.5", "--realtime")
+    assert flown.report["ticks"] == 1000
     assert not any(flown.report["lost"].values())
-    assert 0 <= flown.report["unanswered_ticks"] < 2000
+    assert 0 <= flown.report["unanswered_ticks"] < 1000
     assert flown.report["rms"]["mean_axis"]["attitude"] < 1e-3
 
 
-def test_analyze_prints_the_same_report(fly: Callable[..., Flown]) -> None:
-    flown = fly(*LONG)
-    result = space_robot_here("analyze", str(flown.bag), "--json")
-    assert result.returncode == 0
-    assert json.loads(result.stdout) == flown.bag_report
+@pytest.fixture(scope="module")
+def files(tmp_path_factory: pytest.TempPathFactory) -> tuple[str, str]:
+    """The paper's robot with gears, and the wheels with rotors that are heavier by a tenth."""
+    folder = tmp_path_factory.mktemp("files")
+    robot, wheels = folder / "geared.yaml", folder / "heavier.yaml"
+    robot.write_text(yaml.safe_dump(driven_paper()), "utf-8")
+    content = yaml.safe_load((CONFIG / "actuators" / "wheels.yaml").read_text("utf-8"))
+    of_wheels = content["plant_node"]["ros__parameters"]["wheels"]
+    of_wheels["rotor_inertia"] = [1.1 * value for value in of_wheels["rotor_inertia"]]
+    wheels.write_text(yaml.safe_dump(content), "utf-8")
+    return str(robot), str(wheels)
 
 
-def test_seven_joint_robot_flies_in_the_graph(fly: Callable[..., Flown]) -> None:
-    flown = fly(
-        *SHORT, "--robot", "seven_joint", "--split-size", "200K", "--compression", "zstd", COMPOSED
-    )
-    report = flown.report
+def test_the_plant_of_a_composed_graph_is_that_of_the_options(
+    fly: Callable[..., Flown], files: tuple[str, str]
+) -> None:
+    """With gears and wheels, which the controller knows otherwise, a latency, a bag in parts: as
+    `simulate` flies it, to the bit."""
+    robot, wheels = files
+    given = {"plant_robot": robot, "actuators": "wheels", "assumed_actuators": wheels}
+    given |= {"compression": "zstd", "split_size": "66K"}
+    words = [word for name, value in given.items() for word in (f"--{name}", value)]
+    words = [word.replace("_", "-") if word.startswith("--") else word for word in words]
+    flown = fly(*words, "--command-latency-ticks", "2", "--duration", "0.3", "--composed")
     assert len(list(flown.bag.glob("*.mcap"))) > 1
-    assert set(report["rms"]["eq64"]) == {
-        "attitude",
-        "joints_1_3",
-        "joints_4_7",
-        "base_torque",
-        "torque_1_3",
-        "torque_4_7",
-    }
-    assert report["rms"]["mean_axis"]["attitude"] < 1e-6
+    log = read_flight(flown.bag)
+    expected = simulated(**given, command_latency_ticks=2, duration=0.3)
+    assert log.geared_names == expected.geared_names == ("joint2", "joint3", "joint5")
+    for name, column in expected.columns.items():
+        if name != "telemetry":  # a bag has that of some ticks
+            np.testing.assert_array_equal(getattr(log, name), column, name)
+    assert np.all(log.applied_torque[:3] == 0.0)
+
+
+def test_launched_nodes_get_files_of_their_own(tmp_path: Path, files: tuple[str, str]) -> None:
+    robot, wheels = files
+    flight = planned(plant_robot=robot, actuators="wheels", assumed_actuators=wheels, duration=0.2)
+    of_ros = {"mission": {"use_sim_time": True}}
+    file = launched_parameters(flight, tmp_path / "bag", False, tmp_path, of_ros)
+    content = yaml.safe_load(file.read_text("utf-8"))
+    plant, controller, mission = (
+        content[f"/**/{node}_node"]["ros__parameters"]
+        for node in ("plant", "controller", "mission")
+    )
+    assert (plant["autostart"], mission["autostart"]) == (False, False)
+    assert mission["use_sim_time"] is True
+    assert "use_sim_time" not in plant
+    assert find_robot(plant["robot"]).geared_names == ("joint2", "joint3", "joint5")
+    assert find_robot(controller["robot"]).geared_names == ()
+    assumed = yaml.safe_load(Path(controller["actuators"]).read_text())
+    expected = flight.scenario.assumed_actuators.wheels.rotor_inertia
+    assert assumed["plant_node"]["ros__parameters"]["wheels"]["rotor_inertia"] == expected
+    # a plant that is told all this accepts it
+    known = {name for name, _ in leaves(PlantNodeSettings)}
+    PlantNodeSettings.resolve({key: plant[key] for key in known & plant.keys()})

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 from command import Run
-from flights import Start, forked_space_robot, ros_environment, space_robot_here
+from flights import forked_space_robot, ros_environment, space_robot_here, wait_for_nodes
 from forked import END_S, Forked
 from paths import ROOT
 
@@ -18,7 +18,6 @@ from space_robot.processes.node_modules import MODULES
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.bag.folder import open_bag
 from space_robot_msgs_py.bag.reader import read_flight
-from space_robot_msgs_py.ros.locks import nodes_in
 
 pytest.importorskip("rclpy")
 LAW_OF_THE_EXAMPLE = "pd"
@@ -81,8 +80,8 @@ def test_one_that_dies_in_flight_ends_it_as_a_killed_controller_does(
 ) -> None:
     process, bag = begin(), tmp_path / "bag"
     flight = forked_space_robot(
-        *("fly", "--without", "controller", "--domain", str(free_domain), "--duration", "60"),
-        *("--set", "plant.silence_timeout=1", "--bag", str(bag), "--json"),
+        *("fly", "--without", "controller", "--domain", str(free_domain), "--duration", "20"),
+        *("--set", "plant.silence_timeout=0.5", "--bag", str(bag), "--json"),
     )
     file, until = bag / "bag_0.mcap", time.monotonic() + 100.0
     while not (file.exists() and file.stat().st_size > 200_000):
@@ -94,7 +93,7 @@ def test_one_that_dies_in_flight_ends_it_as_a_killed_controller_does(
     assert flight.returncode == 1, errors
     report = json.loads(output)
     assert report["outcome"] == "failed"
-    assert "no command for 1 s (silence_timeout)" in report["reason"]
+    assert "no command for 0.5 s (silence_timeout)" in report["reason"]
     assert "the controller is silent" in errors
     log = read_flight(bag)
     assert 0 < log.ticks < 100_000
@@ -104,24 +103,21 @@ def test_one_that_dies_in_flight_ends_it_as_a_killed_controller_does(
 def test_one_that_never_comes_ends_the_flight_in_time(
     space_robot: Run, free_domain: int, tmp_path: Path
 ) -> None:
-    options = ("--domain", free_domain, "--join-timeout", 1, "--bag", tmp_path / "bag")
+    options = ("--domain", free_domain, "--join-timeout", 0.3, "--bag", tmp_path / "bag")
     ended = space_robot("fly", "--without", "controller", *options)
     assert ended.code == 1
-    assert "no good command for tick 0 within 1 s (join_timeout)" in ended.err
+    assert "no good command for tick 0 within 0.3 s (join_timeout)" in ended.err
     assert "publishers of /command in ROS domain" in ended.err
     assert not (tmp_path / "bag").exists()
     ended = space_robot("fly", "--without", "mission", *options)
     assert ended.code == 1
-    assert "no reference for tick 0 within 1 s (join_timeout)" in ended.err
+    assert "no reference for tick 0 within 0.3 s (join_timeout)" in ended.err
 
 
 def test_both_may_be_ones_own(begin: Begin, free_domain: int, tmp_path: Path) -> None:
     """Here nodes of this project, started by hand, before the flight and after it."""
     mission, bag = begin("mission"), tmp_path / "bag"
-    until = time.monotonic() + 60.0
-    while not nodes_in(free_domain):
-        assert time.monotonic() < until
-        time.sleep(0.05)
+    wait_for_nodes(free_domain)
     flight = forked_space_robot(
         *("fly", "--without", "controller", "--without", "mission", "--duration", "0.1"),
         *("--domain", str(free_domain), "--bag", str(bag), "--json"),
@@ -155,21 +151,3 @@ def test_what_a_node_that_is_not_started_would_do_is_refused(
     ended = space_robot("fly", "--without", *options.split())
     assert ended.code == 2
     assert said in ended.err
-
-
-def test_nodes_by_hand_wait_for_a_recorder_that_comes_last(start: Start, tmp_path: Path) -> None:
-    """The recipe of docs/manual/namespaces.md: its bag has the flight from the first tick."""
-    plant = start("plant", wait_for="[recorder_node]", ticks=300)
-    controller = start("controller", wait_for="[recorder_node]")
-    start("mission")
-    time.sleep(1.0)
-    recorder = start("recorder", bag=tmp_path / "bag")
-    output, _ = plant.communicate(timeout=100)
-    assert plant.returncode == 0, output
-    controller.terminate()
-    controller.wait(60)
-    recorder.terminate()
-    recorder.wait(60)
-    log = read_flight(tmp_path / "bag")
-    assert (log.ticks, log.first_tick) == (300, 0)
-    assert not any(log.lost.values())

@@ -1,0 +1,239 @@
+"""Flights on wheels, thrusters and torquers: errors, limit cycles, failures, stored momentum."""
+
+from __future__ import annotations
+
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from flights import planned
+from numpy.typing import NDArray
+from scipy.integrate import solve_ivp
+from scipy.interpolate import CubicSpline
+from scipy.spatial.transform import Rotation
+
+from space_robot.analysis import tracking_error
+from space_robot.flight.plan import Flight
+from space_robot.flight.simulate import simulate
+from space_robot_msgs_py import topics
+from space_robot_msgs_py.bag.flight_log import FlightLog
+from space_robot_msgs_py.bag.folder import open_bag
+from space_robot_msgs_py.bag.reader import read_flight
+from space_robot_msgs_py.errors import SingularAttitudeError
+from space_robot_sim.plant.surroundings import REPORT_TICKS
+
+Array = NDArray[np.float64]
+
+
+def fly(bag: Path | None = None, **options: Any) -> tuple[Flight, FlightLog]:
+    """``allocation``: settings of it, by their names in the group."""
+    allocation = {f"allocation.{k}": v for k, v in options.pop("allocation", {}).items()}
+    parameters = {"controller": allocation, **options.pop("parameters", {})}
+    flight = planned(**{"duration": 0.1, "parameters": parameters, **options})
+    return flight, simulate(flight, bag)
+
+
+def attitude_error(log: FlightLog) -> Array:
+    return tracking_error(log)[:, :3]
+
+
+def rms(values: Array) -> float:
+    return float(np.sqrt(np.mean(values**2)))
+
+
+@pytest.mark.parametrize("wheels", ["pseudo_inverse", "least_largest"])
+def test_wheels_fly_as_well_as_ideal_torque(wheels: str) -> None:
+    _, ideal = fly(duration=3.0)
+    _, log = fly(duration=3.0, actuators="wheels", allocation={"wheels": wheels})
+    assert rms(attitude_error(log)) < 1.2 * rms(attitude_error(ideal))
+
+
+def test_wheel_that_fails_is_left_out() -> None:
+    flight, log = fly(duration=4.0, actuators="wheels", faults=["wheel_fail@1:3"])
+    assert flight.controller.allocation.failed == ("wheel_3",)
+    assert np.abs(attitude_error(log)).max() < 2e-5
+    assert np.abs(attitude_error(log)[-1000:]).max() < 1e-7
+    assert not log.actuator_commands[2400:, 2].any()
+
+
+@pytest.mark.parametrize(
+    ("law", "modulation"),
+    [
+        ("tde_stc", "schmitt"),
+        ("tde_stc", "sigma_delta"),
+        ("tde_tsmc", "schmitt"),
+        ("ctc", "schmitt"),
+    ],
+)
+def test_thrusters_hold_a_limit_cycle_under_robust_gains(law: str, modulation: str) -> None:
+    options = {"actuators": "thrusters", "gains": "robust", "controller": law}
+    flight, log = fly(duration=6.0, allocation={"modulation": modulation}, **options)
+    assert np.abs(attitude_error(log)[4000:]).max() < 1e-4
+    command = log.actuator_commands
+    assert set(np.unique(command)) == {0.0, 4.5}
+    edges = np.diff(command > 0.0, axis=0)
+    for column in edges.T:
+        lengths = np.diff(np.flatnonzero(column))[::2]  # from an opening to its closing
+        assert lengths.size == 0 or lengths.min() >= 40
+    assert flight.controller.allocation.values["pulses"] > 10
+
+
+def test_thrusters_unload_wheels_in_flight() -> None:
+    settings = {"unload_above": 0.45, "unload_to": 0.2, "unload_time": 5.0, "modulation": "pwm"}
+    _, log = fly(duration=6.0, actuators="wheels_and_thrusters", allocation=settings)
+    stored = np.abs(log.wheel_velocities[[0, -1]].sum(axis=1))
+    assert stored[1] < 0.5 * stored[0]
+    assert np.abs(attitude_error(log)).max() < 1e-6
+
+
+# Messages of all parts
+
+
+@pytest.mark.parametrize("actuators", ["wheels_and_thrusters", "wheels_and_torquers"])
+def test_faults_of_messages_strike_all_parts_of_a_state_alike(
+    actuators: str, tmp_path: Path
+) -> None:
+    faults = ["drop_state@0.01-0.06:0.2", "delay_state@0.06-0.07:3", "repeat_state@0.08-0.09"]
+    orbit = {"orbit": "iss"} if "torquers" in actuators else {}
+    flight, log = fly(tmp_path / "bag", actuators=actuators, faults=faults, seed=3, **orbit)
+    assert log.filled > 0
+    assert set(log.lost.values()) == {0}
+    assert np.isfinite(log.wheel_velocities).all()
+    sent = {t: [*open_bag(tmp_path / "bag").messages(t)] for t in topics.STATES}
+    stamps = {topic: [data[4:12] for _, data in found] for topic, found in sent.items() if found}
+    assert 0 < len(stamps[topics.BASE_STATE]) < 200
+    assert all(found == stamps[topics.BASE_STATE] for found in stamps.values())
+    names = flight.plant.names
+    assert (topics.WHEELS_STATE in stamps) is bool(names.wheels)
+    assert (topics.THRUSTERS_STATE in stamps) is bool(names.thrusters)
+    assert (topics.MAGNETOMETER in stamps) is bool(names.torquers)
+
+
+@pytest.mark.parametrize("actuators", ["wheels_and_thrusters", "wheels_and_torquers"])
+def test_late_commands_of_actuators_are_a_plant_that_applies_them_late(actuators: str) -> None:
+    """All numbers of a command come late as one."""
+    orbit = {"orbit": "iss"} if "torquers" in actuators else {}
+    _, late = fly(actuators=actuators, faults=["delay_command@0:2"], **orbit)
+    _, slow = fly(actuators=actuators, command_latency_ticks=2, **orbit)
+    for name in ("quaternion", "wheel_velocities", "thrusts", "actuator_commands"):
+        np.testing.assert_array_equal(getattr(late, name), getattr(slow, name), name)
+
+
+def test_a_state_without_an_answer_has_no_command_to_any_actuator(tmp_path: Path) -> None:
+    singular = {"plant": {"initial_quaternion": [0.0, 0.0, 1.0, 0.0]}}
+    with pytest.raises(SingularAttitudeError) as caught:
+        fly(tmp_path / "bag", actuators="wheels_and_thrusters", parameters=singular)
+    log = caught.value.log
+    assert log
+    assert log.actuator_commands.shape == (1, 16)
+    assert np.isnan(log.actuator_commands).all()
+    assert read_flight(tmp_path / "bag").wheel_velocities.tolist() == log.wheel_velocities.tolist()
+
+
+def test_while_a_state_is_not_usable_no_dipole_is_commanded() -> None:
+    """The wheels' torques are held; a dipole would turn a base whose attitude is not known."""
+    faults = ["scaled_quaternion@0.05-0.06:1"]
+    _, log = fly(actuators="wheels_and_torquers", orbit="iss", faults=faults)
+    bad = slice(101, 119)
+    np.testing.assert_array_equal(log.actuator_commands[bad, 4:], 0.0)
+    assert (log.actuator_commands[bad, :4] == log.actuator_commands[99, :4]).all()
+    assert log.actuator_commands[121:, 4:].all()
+
+
+# Wheels that are unloaded by torquers
+
+AXES = np.array([[1, 1, 1], [-1, 1, 1], [-1, -1, 1], [1, -1, 1]]) / np.sqrt(3.0)
+SPIN = 0.0318
+"""Of the wheels in config/actuators/wheels_and_torquers.yaml: axes, and inertia, kg m2."""
+GAIN, PERIOD = 0.005, 0.005
+"""1/s; s."""
+REST_S = 40.0
+"""The mission is over by then, and the arm stands."""
+OVER_THE_POLE = {"orbital_elements.inclination_deg": 80.0, "orbital_elements.anomaly_deg": 50.0}
+"""The magnetic field turns away from the momentum that the wheels have at the start, along z."""
+
+
+@cache
+def dumped(dump: str) -> FlightLog:
+    """Fly with wheels that store 2.3 N m s about z at the start."""
+    _, log = fly(
+        controller="ctc",
+        actuators="wheels_and_torquers",
+        orbit="iss",
+        period=PERIOD,
+        duration=160.0,
+        allocation={"dump": dump, "magnetic_gain": GAIN},
+        parameters={"plant": {"wheels.initial_speed": [31.4], **OVER_THE_POLE}},
+    )
+    return log
+
+
+def stored(log: FlightLog) -> Array:
+    """Return the momentum (N, 3) of the wheels on base axes, N m s."""
+    return np.asarray(SPIN * log.wheel_velocities @ AXES)
+
+
+def on_inertial_axes(log: FlightLog, vectors: Array) -> Array:
+    return np.asarray(Rotation.from_quat(np.roll(log.quaternion, -1, axis=1)).apply(vectors))
+
+
+def test_momentum_goes_as_the_law_says() -> None:
+    """``dh/dt = -k (h - (h . b) b) + T`` by SciPy, with the field and the torques T in the log.
+
+    The dipoles are held over a tick, which takes ``1 - k period`` of the momentum, not an
+    exponential's share. The base is held still and no dipole is at its limit.
+    """
+    log, first = dumped("magnetic"), round(REST_S / PERIOD)
+    rows = log.rows(first, log.ticks)
+    assert np.abs(rows.actuator_commands[:, 4:]).max() < 400.0
+    momentum = on_inertial_axes(rows, stored(rows))
+    told = slice(None, None, REPORT_TICKS)  # the torque of gravity is computed so often
+    fields = on_inertial_axes(rows, rows.magnetic_field)[told]
+    torques = rows.external_torques[told].reshape(-1, 4, 3).sum(axis=1)
+    numbers = CubicSpline(rows.time[told], np.hstack([fields, torques]))
+    k = -np.log1p(-GAIN * PERIOD) / PERIOD
+
+    def rate(t: float, h: Array) -> Array:
+        b, torque = np.split(numbers(t), 2)
+        return np.asarray(-k * (h - (h @ b) * b / (b @ b)) + torque)
+
+    times = rows.time[told][::10]  # 1 s
+    expected = solve_ivp(
+        rate, (times[0], times[-1]), momentum[0], t_eval=times, max_step=1.0, rtol=1e-9, atol=1e-12
+    ).y.T
+    assert np.linalg.norm(momentum[-1] - momentum[0]) > 0.3
+    # the field is that at the begin of each tick, half a tick old: 2.5e-6 rad of its turning
+    np.testing.assert_allclose(momentum[told][::10], expected, rtol=0.0, atol=1e-5)
+
+
+def test_torquers_unload_the_wheels_and_the_law_notices_nothing() -> None:
+    """Wheels hold against the torquers to rounding. What remains of the errors is the wheels'
+    gyroscopic torque, which a law feels: it is that of the momentum that they have left."""
+    logs = [dumped("magnetic"), dumped("none")]
+    unloaded, loaded = (np.linalg.norm(stored(log), axis=1) for log in logs)
+    assert loaded[-1] > loaded[round(REST_S / PERIOD)] - 0.01
+    assert unloaded[-1] < 0.9 * loaded[-1]
+    assert not logs[1].actuator_commands[:, 4:].any()
+    one, other = map(tracking_error, logs)
+    largest = np.abs(other).max()
+    assert largest > 1e-6
+    assert np.abs(one - other).max() < 1e-3 * largest
+    assert rms(one - other) < 1e-4 * rms(other)
+
+
+@pytest.mark.parametrize("sensors", ["ideal", "fine"])
+def test_the_base_gets_what_the_law_demands(sensors: str) -> None:
+    """From torquers and wheels together, tick by tick, as it is commanded and applied."""
+    options = {"actuators": "wheels_and_torquers", "orbit": "sso_700", "sensors": sensors}
+    flight, log = fly(duration=0.2, **options)
+    assert flight.plant.names.torquers == ("torquer_1", "torquer_2", "torquer_3")
+    assert log.flight["base_actuators"]["magnetic_torquers"]["max_dipole"] == [400.0]
+    motors, dipoles = log.actuator_commands[:, :4], log.actuator_commands[:, 4:]
+    assert np.abs(dipoles).max() > 1.0
+    of_torquers = np.cross(dipoles, log.magnetic_field)
+    demand = log.commanded_torque[:, :3]
+    np.testing.assert_allclose(of_torquers - motors @ AXES, demand, rtol=0.0, atol=1e-13)
+    np.testing.assert_allclose(log.applied_torque[1:, :3], demand[:-1], rtol=0.0, atol=1e-13)
+    np.testing.assert_array_equal(log.applied_torque[1:, 3:], log.commanded_torque[:-1, 3:])

@@ -1,0 +1,224 @@
+"""Flights of arms with passive, prismatic and geared joints: logs, reports and momentum."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from conservation import momentum
+from flights import planned
+from geared_robots import geared_paper_arm, with_gears
+from numpy.typing import NDArray
+from passive_robot import PASSIVE_ROBOT
+
+import space_robot as sr
+from space_robot.analysis import analyze
+from space_robot.analysis.columns import column_names
+from space_robot.analysis.described import momentum_of, robot_of
+from space_robot.analysis.figures.single_flight import control_results, desired_joints
+from space_robot.analysis.pointing import pointing_error
+from space_robot.analysis.report_lines import lines
+from space_robot.analysis.report_tables import rms_table
+from space_robot.flight.batch.sharing import batches
+from space_robot.flight.plan import Flight
+from space_robot.flight.simulate import simulate
+from space_robot_model.robot import Robot
+from space_robot_model.robot.gears import motor_momentum
+from space_robot_model.robot.momentum import Motion, robot_momentum
+from space_robot_model.robot.tree import Encoder
+from space_robot_msgs_py.bag.flight_log import FlightLog
+from space_robot_msgs_py.bag.reader import read_flight
+
+Array = NDArray[np.float64]
+
+# Passive and prismatic joints
+
+
+def passive_flight(law: str, **options: object) -> Flight:
+    """1.2 s: the arm has begun to move, and the panel to bend."""
+    given = {"robot": PASSIVE_ROBOT, "controller": law, "duration": 1.2, "friction": False}
+    return planned(**{**given, **options})
+
+
+@pytest.fixture(scope="module")
+def bent(tmp_path_factory: pytest.TempPathFactory) -> FlightLog:
+    """With sensors and a filter, so that truth and measurement differ; its bag was read back."""
+    bag = tmp_path_factory.mktemp("passive") / "bag"
+    flight = passive_flight("tde_stc", sensors="fine", navigation="filtered", friction=True)
+    log = simulate(flight, bag)
+    recorded = read_flight(bag)
+    assert recorded.passive_names == ("panel_root", "panel_tip", "slosh")
+    assert recorded.prismatic == log.prismatic == (*[False, True], *[False] * 6, True)
+    assert robot_of(recorded).nominal.joint_names == log.joint_names
+    assert json.loads(json.dumps(analyze(recorded))) == json.loads(json.dumps(analyze(log)))
+    return log
+
+
+@pytest.mark.parametrize("law", ["tde_stc", "ctc", "pd", "adrc", "slotine_li"])
+def test_laws_hold_attitude_and_moves_the_joints_with_motors(law: str) -> None:
+    """The springs are felt, not commanded; the model that the law has knows them locked."""
+    flight = passive_flight(law)
+    flown = simulate(flight)
+    assert flight.controller.block[0].signals.model.joint_count == 6
+    assert flight.plant.memory.model.joint_count == 9
+    report = analyze(flown)
+    found = report["maxima"]
+    slack = 10.0 if law.startswith("pd") else 1.0  # which knows no springs and observes nothing
+    assert found["attitude"] < slack * 1e-6
+    assert max(found["joints_revolute"], found["joints_prismatic"]) < slack * 1e-4
+    assert (np.ptp(flown.joint_positions, axis=0) > 0.01).all()
+    assert (np.ptp(flown.passive_positions, axis=0) > 1e-5).all()
+    estimates = {x.name: x.unit for x in lines([report]) if x.group == "estimate error"}
+    assert bool(estimates) == law.startswith("tde")
+    if estimates:
+        assert estimates["joints_prismatic RMS"] == "N"
+        assert estimates["joints_revolute max"] == "N m"
+    linear, _ = momentum(flight.plant.robot, flight.plant.truth)
+    assert np.abs(linear).max() < 1e-10, "torques push nothing away"
+
+
+def test_errors_and_forces_are_told_by_kind(bent: FlightLog) -> None:
+    """No number is of rad and of m, and each has its unit."""
+    report = analyze(bent)
+    columns = [
+        "attitude",
+        "joints_revolute",
+        "joints_prismatic",
+        "base_torque",
+        "torque_revolute",
+        "force_prismatic",
+    ]
+    assert list(report["rms"]["mean_axis"]) == columns
+    units = [row[:2] for group in rms_table(report).groups for row in group.rows]
+    assert [unit for _, unit in units] == ["deg", "rad", "m", "N m", "N m", "N"]
+    error = bent.reference_joints[:, 0] - bent.joint_positions
+    rms = np.sqrt(np.mean(error**2, axis=0))
+    assert report["rms"]["mean_axis"]["joints_prismatic"] == pytest.approx(rms[1])
+    assert report["rms"]["mean_axis"]["joints_revolute"] == pytest.approx(np.delete(rms, 1).mean())
+    told = {(line.group, line.name): line for line in lines([report])}
+    assert told["maximum", "force_prismatic"].unit == "N"
+    assert told["variation per s", "force_prismatic"].unit == "N/s"
+    assert told["navigation error", "joints_prismatic"].unit == "m"
+    assert told["ripple", "force_prismatic"].unit == "N"
+    assert told["ripple's peak", "force_prismatic"].texts[0].endswith((" N", "-"))
+    names = {"boom_velocity_m_s", "panel_tip_position_rad", "slosh_velocity_m_s", "error_boom_m"}
+    names |= {"applied_torque_boom_n", "applied_torque_wrist_n_m", "assumed_error_boom_m"}
+    assert names <= set(column_names(bent))
+    labels = [axes.get_ylabel() for axes in desired_joints(bent).axes]
+    assert labels == ["desired joint angle (deg)", "desired joint position (m)"]
+    labels = [axes.get_ylabel() for axes in control_results(bent, "").axes]
+    assert {"joint error (rad; boom: m)", "joint torque (N m; boom: N)"} <= set(labels)
+
+
+def test_momentum_and_tool_are_those_of_the_whole_robot(bent: FlightLog) -> None:
+    """As the inertia matrix has the momentum; a panel that bends moves what the base carries."""
+    robot, tick = robot_of(bent), bent.ticks - 1
+    row = slice(tick, tick + 1)
+    motion = Motion(
+        bent.quaternion[row],
+        bent.omega_base[row],
+        bent.all_positions[row],
+        bent.all_velocities[row],
+    )
+    found = robot_momentum(robot, motion)
+    linear, about_origin = momentum(robot, bent.state(tick))
+    centre = bent.base_position[tick] + found.centre_of_mass[0]
+    angular = about_origin - np.cross(centre, linear)
+    np.testing.assert_allclose(found.angular[0], angular, rtol=0.0, atol=1e-10)
+    error = pointing_error(bent, robot)
+    assert np.isfinite(error.boresight).all()
+    assert error.position.max() < 1e-2
+
+
+# Gears
+
+MOTORS = ("motor_positions", "motor_velocities")
+
+
+@pytest.fixture(scope="module")
+def robot(paper_robot: Robot) -> Robot:
+    """All kinds of encoders, and two rigid joints."""
+    gears = geared_paper_arm(paper_robot).gears
+    sides: tuple[Encoder | None, ...] = ("motor", None, "link", "both", None, "motor")
+    chosen = [
+        gear._replace(encoder=side) if gear and side else None
+        for gear, side in zip(gears, sides, strict=True)
+    ]
+    return with_gears(paper_robot, chosen)
+
+
+def scenario(robot: Robot, **options: Any) -> sr.Scenario:
+    """Return a flight under computed torque."""
+    return sr.Scenario(**{"robot": robot, "controller": "ctc", "duration": 0.3, **options})
+
+
+def test_a_log_has_motors_and_what_is_measured_of_them(robot: Robot, tmp_path: Path) -> None:
+    """In the order of their joints; the encoders' noise of the fine sensors is some 1e-6 rad."""
+    log = simulate(scenario(robot, sensors="fine").check(), tmp_path / "bag")
+    assert log.geared_names == ("joint1", "joint3", "joint4", "joint6")
+    assert log.motor_positions.shape == log.motor_velocities.shape == (log.ticks, 4)
+    joints = [robot.joint_names.index(name) for name in log.geared_names]
+    deflection = log.motor_positions - log.joint_positions[:, joints]
+    assert (deflection[0] == 0.0).all()
+    assert (np.abs(deflection).max(axis=0) > 1e-7).all()
+    # the mean rate over a tick is the difference of two angles
+    middle = 0.5 * (log.motor_velocities[1:] + log.motor_velocities[:-1])
+    rates = np.diff(log.motor_positions, axis=0) / log.timebase.period
+    np.testing.assert_allclose(rates, middle, rtol=0.0, atol=1e-3 * np.abs(middle).max())
+    assert log.measured is not None
+    error = log.measured.joint_positions - log.joint_positions
+    motors = log.measured.joint_positions[:, [0, 5]] - log.motor_positions[:, [0, 3]]
+    noise = error[:, 1:5].std(axis=0).max()
+    assert motors.std(axis=0).max() < 1.5 * noise
+    assert np.abs(motors.mean(axis=0)).max() < noise
+    recorded = read_flight(tmp_path / "bag", trust=True)
+    assert not recorded.damage
+    assert robot_of(recorded).gears == robot.gears
+    assert analyze(recorded) == analyze(log)
+
+
+@pytest.mark.parametrize(
+    "options",
+    [{"actuators": "none", "sensors": "fine", "friction": False}, {"actuators": "wheels"}],
+)
+def test_the_analysis_counts_the_motors_and_finds_momentum_conserved(
+    robot: Robot, options: dict[str, Any]
+) -> None:
+    """On a base that nothing pushes from outside, to 1e-12 of what base and motors exchange.
+
+    With steps of 125 us: the integrator's error falls with their fourth power,
+    and is 5e-11 with those of 500 us.
+    """
+    log = simulate(scenario(robot, substeps=4, **options).check())
+    momentum = momentum_of(log).add(log)
+    expected = motor_momentum(robot, log.quaternion, log.joint_positions, log.motor_velocities)
+    np.testing.assert_array_equal(momentum.motors, expected)
+    exchanged = np.linalg.norm(momentum.base, axis=1).max()
+    assert np.linalg.norm(momentum.motors, axis=1).max() > 1e-3 * exchanged
+    assert np.abs(momentum.total).max() < 1e-12 * exchanged
+    without = momentum.robot + momentum.wheels
+    assert np.abs(without).max() > 1e-3 * exchanged, "the motors' part must not be left out"
+    assert analyze(log)["momentum"]["drift"]["n_m_s"] < 1e-12 * exchanged
+
+
+def test_arms_with_other_gears_fly_apart_and_with_other_numbers_together(
+    robot: Robot, paper_robot: Robot
+) -> None:
+    """A rigid joint is another robot in the lanes' eyes; so is an encoder on the other side."""
+    gears = robot.gears
+    other_side = [gear and gear._replace(encoder="link") for gear in gears]
+    stiffer = [gear and gear._replace(stiffness=3.0 * gear.stiffness) for gear in gears]
+    rigid = [*gears[:5], None]
+    robots = [paper_robot, robot, with_gears(robot, rigid), with_gears(robot, other_side)]
+    robots += [*robots[:1], with_gears(robot, stiffer), *robots[2:]]
+    scenarios = [scenario(r, duration=0.05, seed=k) for k, r in enumerate(robots)]
+    flights = [one.check() for one in scenarios]
+    groups = [[number for number, _ in group] for group in batches(enumerate(flights))]
+    assert sorted(groups) == [[0, 4], [1, 5], [2, 6], [3, 7]]
+    for flight, one in zip(sr.fly_many(scenarios), scenarios, strict=True):
+        for name in MOTORS:
+            alone = getattr(one.fly().log, name)
+            np.testing.assert_array_equal(getattr(flight.log, name), alone)
