@@ -13,7 +13,7 @@ from closed_loop import PERIOD
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
-from oracles import pinocchio_forward_dynamics, rotation_of
+from oracles import rotation_of
 from random_robots import Case, State, cases
 
 from space_robot_control.controller.controller import Controller
@@ -24,8 +24,13 @@ from space_robot_msgs_py.samples import ReferenceChunk, RobotState
 
 Array = NDArray[np.float64]
 
+
 FREE = BaseActuatorSettings(base_actuation="none")
+
+
 LAWS = sorted(laws())
+
+
 HALF_TURN = [0.0, 0.6, 0.0, 0.8]
 
 
@@ -73,7 +78,7 @@ def near(s: State, rng: np.random.Generator) -> Any:
 
 
 @pytest.mark.parametrize("name", [*LAWS, "inverting"])
-@settings(max_examples=15)
+@settings(max_examples=8)
 @given(case=cases(joints=[6]), half_turned=st.booleans())
 def test_no_law_sees_the_base_nor_turns_it(name: str, case: Case, half_turned: bool) -> None:
     robot, s, rng = case
@@ -100,23 +105,6 @@ def test_no_law_sees_the_base_nor_turns_it(name: str, case: Case, half_turned: b
                 assert (getattr(controller.law.memory, output)[:3] == 0.0).all()
 
 
-@settings(max_examples=40)
-@given(case=cases(joints=[6]), half_turned=st.booleans())
-def test_computed_torque_causes_the_acceleration_it_demands(case: Case, half_turned: bool) -> None:
-    """By Pinocchio's articulated bodies, with any momentum: a perfect model is perfect."""
-    robot, s, rng = case
-    if half_turned:
-        s = s._replace(quaternion=np.array(HALF_TURN))
-    controller = Controller(robot, law_with("ctc", rng, 9), PERIOD, actuators=FREE)
-    torque = controller.update(measured(robot, s, np.zeros(9), 0), near(s, rng)).torque
-    found = pinocchio_forward_dynamics(robot, s, np.concatenate([np.zeros(3), torque]))[6:]
-    wanted = controller.law.memory.u[3:]
-    size = 1.0 + np.abs(torque).max() * np.linalg.norm(
-        np.linalg.inv(controller.signals.nominal.inertia), 2
-    )
-    np.testing.assert_allclose(found, wanted, rtol=0, atol=1e-11 * size)
-
-
 @settings(max_examples=15)
 @given(case=cases(joints=[6]))
 def test_the_attitude_of_the_base_does_not_matter(case: Case) -> None:
@@ -132,17 +120,3 @@ def test_the_attitude_of_the_base_does_not_matter(case: Case) -> None:
         torques.append(controller.update(state, reference).torque.copy())
     size = np.abs(torques[0]).max()
     np.testing.assert_allclose(torques[1:], [torques[0]] * 2, rtol=0, atol=1e-10 * size)
-
-
-@pytest.mark.parametrize("name", LAWS)
-@settings(max_examples=10)
-@given(case=cases(joints=[6]))
-def test_a_law_takes_over_from_the_torque_of_the_joints(name: str, case: Case) -> None:
-    """Also at half a turn; what is reported of the base is nothing to it."""
-    robot, s, rng = case
-    controller = Controller(robot, law_with(name, rng, 9), PERIOD, actuators=FREE)
-    s = s._replace(quaternion=np.array(HALF_TURN))
-    applied = rng.normal(size=9)
-    torque = controller.update(measured(robot, s, applied, 100), near(s, rng)).torque
-    np.testing.assert_allclose(torque[3:], applied[3:], rtol=1e-9, atol=1e-9)
-    assert (torque[:3] == 0.0).all()
