@@ -16,12 +16,15 @@ from space_robot.export.software import export
 from space_robot.flight.plan import Flight, FlightPlan, resolve
 from space_robot_control.flight_code.c99 import language as lang
 from space_robot_control.flight_code.c99.functions import Function
-from space_robot_control.laws import laws
 from space_robot_msgs_py.compiled.record_type import record_type
 
-FURTHER = [name for name in laws() if name != FlightPlan().controller]
+FURTHER = ["ctc", "adrc"]
 JOINTS = 6
+
+
 DECLARED = re.compile(r"(?:const )?(double|int64_t|bool|sr_\w+) (\(?\*?)(\w+)\)?(?:\[\d+\])* ?[=;]")
+
+
 ANNOTATED = re.compile(r"^\s*#\s+([A-Za-z_]\w*)(?:\.\d+)? = .*  :: (.+?)\s*$", re.MULTILINE)
 
 
