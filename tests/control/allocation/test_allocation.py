@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from allocation_bench import INERTIA, PERIOD, PYRAMID, AllocationBench, couples
+from allocation_bench import INERTIA, PERIOD, AllocationBench, couples
 from numpy.typing import NDArray
 
 from space_robot_control.allocation.allocation import Allocation
@@ -14,16 +14,6 @@ from space_robot_control.allocation.settings import AllocationSettings
 from space_robot_model.hardware.base_actuators import BaseActuatorSettings
 
 Array = NDArray[np.float64]
-
-
-@pytest.mark.parametrize("sharing", ["pseudo_inverse", "least_largest"])
-def test_wheels_give_the_torque(sharing: str) -> None:
-    rng = np.random.default_rng(1)
-    for axes in (PYRAMID, np.eye(3), rng.normal(size=(8, 3))):
-        bench = AllocationBench(axes, sharing=sharing, null_gain=0.0)
-        for _ in range(10):
-            demand = rng.normal(size=3) * 0.1
-            np.testing.assert_allclose(bench.step(demand), demand, atol=1e-13)
 
 
 def test_null_motion_balances_and_the_base_feels_nothing() -> None:
@@ -70,12 +60,6 @@ def test_null_motion_leaves_the_demand_what_it_needs() -> None:
     given = bench.fly([0.9, 0.0, 0.0], 5)
     np.testing.assert_allclose(given, np.tile([0.9, 0.0, 0.0], (5, 1)), atol=1e-12)
     assert np.abs(bench.command).max() <= 1.0 + 1e-12
-
-
-def test_three_wheels_have_no_null_motion() -> None:
-    bench = AllocationBench(np.eye(3), momenta=[5.0, 4.0, 3.0], null_gain=10.0, least_speed=100.0)
-    bench.step(np.zeros(3))
-    np.testing.assert_array_equal(bench.command, 0.0)
 
 
 def test_thrusters_take_the_axis_that_wheels_cannot_give() -> None:
@@ -173,19 +157,6 @@ def test_unloading_asks_what_half_of_the_wheels_torque_can_hold(count: int) -> N
         np.testing.assert_allclose(bench.allocation.of_thrusters, wanted / excess, atol=1e-9)
         cut += excess > 1.0
     assert 0 < cut < 20
-
-
-@pytest.mark.parametrize("seed", range(3))
-def test_thrusters_are_asked_for_what_the_axes_left_cannot_give(seed: int) -> None:
-    """Any two wheels: the part of the demand that is across both; the wheels get all of it."""
-    rng = np.random.default_rng(seed)
-    bench = AllocationBench(rng.normal(size=(4, 3)), couples(), failure_ticks=5, null_gain=0.0)
-    bench.failed = set(rng.permutation(4)[:2].tolist())
-    demand = rng.normal(size=3) * 0.1
-    bench.fly(demand, 20)
-    left = bench.axes[sorted({0, 1, 2, 3} - bench.failed)]
-    across = demand - np.linalg.pinv(left) @ (left @ demand)
-    np.testing.assert_allclose(bench.allocation.of_thrusters, across, atol=1e-9)
 
 
 def test_wheels_hold_against_pulses_when_these_come() -> None:

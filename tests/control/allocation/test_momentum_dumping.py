@@ -6,12 +6,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-from allocation_bench import PERIOD, AllocationBench, couples, unit
+from allocation_bench import AllocationBench, couples, unit
 from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from space_robot_control.allocation.diagnosis import diagnose
 from space_robot_control.allocation.magnetic_torquers import AssumedTorquers, dump_momentum
 from space_robot_control.allocation.settings import AllocationSettings
 from space_robot_model.hardware.magnetic_torquers import MagneticTorquerSettings
@@ -184,30 +183,9 @@ def test_who_unloads_is_chosen(dump: str | None, magnetic: bool, by_thrusters: b
     assert bool(np.any(bench.allocation.of_thrusters)) is by_thrusters
 
 
-@pytest.mark.parametrize("gain", [0.0, 0.5])
-def test_the_gain_is_a_rate(gain: float) -> None:
-    """``h exp(-k t)`` across a field that does not turn; what is along it stays."""
-    bench = bench_of(magnetic_gain=gain, momenta=(0.8, -0.5, 0.3, 0.1))
-    start, ticks = bench.momenta @ bench.axes, 1000
-    for _ in range(ticks):
-        bench.step(np.zeros(3), [0.0, 0.0, 3e-5])
-    left = (1.0 - gain * PERIOD) ** ticks
-    np.testing.assert_allclose(
-        bench.momenta @ bench.axes, start * [left, left, 1.0], rtol=0.0, atol=1e-11
-    )
-
-
 def test_the_wheels_are_asked_for_no_more_than_they_have() -> None:
     """A demand and an unloading that together exceed the motors' torques keep their direction."""
     bench, demand = bench_of(magnetic_gain=10.0), np.array([0.3, 0.0, 0.0])
     of_wheels = bench.step(demand, [0.0, 0.0, 3e-5]) - bench.of_torquers
     assert np.abs(bench.command[:4]).max() == 1.0
     np.testing.assert_allclose(np.cross(of_wheels, demand - bench.of_torquers), 0.0, atol=1e-12)
-
-
-def test_the_diagnosis_tells_the_largest_dipole() -> None:
-    bench = bench_of(25.0)
-    assert diagnose(bench.allocation).values["largest_dipole"] == 0.0
-    bench.step(np.zeros(3), [0.0, 1e-5, 3e-5])
-    assert diagnose(bench.allocation).values["largest_dipole"] == pytest.approx(25.0)
-    assert "largest_dipole" not in diagnose(AllocationBench().allocation).values

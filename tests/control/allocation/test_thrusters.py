@@ -59,16 +59,6 @@ def test_as_good_as_scipys(count: int) -> None:
             assert np.count_nonzero(x) <= 6
 
 
-@pytest.mark.parametrize("scale", [1e-6, 1.0, 1e6])
-def test_scale_of_the_demand_does_not_matter(scale: float) -> None:
-    rng = np.random.default_rng(2)
-    columns, wanted = rng.normal(size=(6, MOST_THRUSTERS)), rng.normal(size=6)
-    np.testing.assert_allclose(
-        solution(columns, scale * wanted), scale * solution(columns, wanted), rtol=1e-9
-    )
-    np.testing.assert_array_equal(solution(columns, 0.0 * wanted), 0.0)
-
-
 # Pulses
 
 
@@ -129,15 +119,6 @@ def test_no_pulse_is_shorter_than_allowed(kind: str, layout: Any) -> None:
     assert pulses.size > 5
     assert pulses.min() >= 40
     assert bench.modulation.pulses.sum() >= pulses.size
-
-
-@pytest.mark.parametrize("kind", KINDS)
-def test_impulses_follow_a_demand_that_varies(kind: str) -> None:
-    bench, t = Bench(kind), np.arange(12000) * PERIOD
-    demands = np.stack([2.0 * np.sin(t), 1.5 * np.cos(0.7 * t), 0.3 * np.sin(3.0 * t)], axis=1)
-    opened = bench.fly(demands)
-    lacking = np.cumsum(demands - opened @ bench.torques, axis=0) * PERIOD
-    assert np.abs(lacking).max() < {"pwm": 1.1, "sigma_delta": 0.15, "schmitt": 0.25}[kind]
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -247,13 +228,3 @@ def test_schmitt_trigger_has_hysteresis() -> None:
     assert 0 < few < 0.5 * many
     longest = max(lengths(row).max(initial=0) for row in wide.T)
     assert longest > 2 * max(lengths(row).max(initial=0) for row in narrow.T)
-
-
-def test_pure_couples_where_the_layout_has_them() -> None:
-    bench, rng = Bench("pwm"), np.random.default_rng(3)
-    for _ in range(20):
-        impulse = rng.normal(size=3)
-        find_times(bench.thrusters, np.append(impulse, np.zeros(3)))
-        times = bench.thrusters.problem.x[: bench.count]
-        np.testing.assert_allclose(times @ bench.torques, impulse, atol=1e-9)
-        np.testing.assert_allclose(times @ bench.forces, 0.0, atol=1e-7)

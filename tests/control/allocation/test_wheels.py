@@ -119,16 +119,6 @@ def test_layouts_of_wheels(name: str) -> None:
             check(axes, full, np.asarray(one, dtype=float))
 
 
-def test_nearly_parallel_wheels_give_the_torque() -> None:
-    rng = np.random.default_rng(5)
-    for tilt in (1e-4, 1e-7, 1e-10, 1e-13):
-        axes = np.vstack([CUBE, CUBE + tilt * rng.normal(size=(3, 3))])
-        for wanted in rng.normal(size=(10, 3)):
-            loads = loads_of(axes, np.ones(6), wanted)
-            np.testing.assert_allclose(unit(axes).T @ loads, wanted, atol=1e-12)
-            assert np.abs(loads).max() == pytest.approx(least(axes, np.ones(6), wanted), rel=1e-5)
-
-
 def test_a_wheel_that_is_out_and_no_demand_have_no_load() -> None:
     np.testing.assert_array_equal(loads_of(PYRAMID, np.ones(4), np.zeros(3)), 0.0)
     loads = loads_of(np.vstack([PYRAMID, [[0, 0, 1]]]), np.ones(5), np.ones(3), out=(2,))
@@ -139,63 +129,16 @@ def test_a_wheel_that_is_out_and_no_demand_have_no_load() -> None:
 # Limits of torque and momentum
 
 
-def largest_share(axes: Array, most: Array, demand: Array, sharing: str) -> float:
-    """The largest s <= 1 for which the wheels give s times the demand, by SciPy."""
-    if sharing == "pseudo_inverse":
-        torque = np.diag(most) @ np.linalg.lstsq(axes.T * most, demand)[0]
-        return min(1.0, 1.0 / float(np.max(np.abs(torque) / most)))
-    found = linprog(
-        [*np.zeros(len(axes)), -1.0],
-        A_eq=np.column_stack([axes.T, demand]),
-        b_eq=np.zeros(3),
-        bounds=[*((-m, m) for m in most), (0.0, 1.0)],
-        method="highs",
-    )
-    return float(found.x[-1])
-
-
 @pytest.mark.parametrize("sharing", SHARINGS)
-@pytest.mark.parametrize("count", [3, 4, 5, 8])
-def test_demand_beyond_the_motors_keeps_its_direction(sharing: str, count: int) -> None:
-    """No motor is asked for more than it has, one for all of it, and no wheel counts as full."""
-    rng = np.random.default_rng(count)
-    axes, most = rng.normal(size=(count, 3)), rng.uniform(0.05, 5.0, count)
-    wheels = {"max_torque": most.tolist(), "max_momentum": [1e6]}
-    bench = AllocationBench(axes, wheels=wheels, sharing=sharing, null_gain=0.0)
-    scaled = 0
-    for k in range(36):
-        demand = rng.normal(size=3) * most.max() * 10.0 ** rng.uniform(-1.0, 5.0)
-        given = bench.step(demand)
-        share = given @ demand / (demand @ demand)
-        assert np.abs(given - share * demand).max() < 1e-13 * most.max()
-        loads = np.abs(bench.command) / most
-        assert np.all(np.abs(bench.command) <= most)
-        assert share > 1.0 - 1e-12 or np.max(loads) == 1.0
-        scaled += share < 1.0 - 1e-12
-        if k % 9 == 0:
-            expected = largest_share(bench.axes, most, demand, sharing)
-            assert share == pytest.approx(expected, rel=1e-9)
+def test_demand_beyond_the_motors_keeps_its_direction(sharing: str) -> None:
+    """A wheel without a limit is scaled with the others, none counts as full."""
+    most = [0.0, 0.2, 0.3, 0.2]
+    bench = AllocationBench(wheels={"max_torque": most}, sharing=sharing, null_gain=0.0)
+    demand = [30.0, -10.0, 5.0]
+    np.testing.assert_allclose(np.cross(bench.step(demand), demand), 0.0, atol=1e-11)
+    assert np.max(np.abs(bench.command[1:]) / most[1:]) == 1.0
     values = diagnose(bench.allocation).values
-    assert values["demand_scaled_ticks"] == scaled > 18
-    assert values["wheel_full_ticks"] == 0
-
-
-def test_a_demand_beyond_the_motors_leaves_the_null_motion_nothing() -> None:
-    """So a motor that is asked for all it has is told as saturated."""
-    momenta = [8.0, -5.0, 8.0, -5.0]
-    bench = AllocationBench(momenta=momenta, null_gain=1.0, null_share=1.0)
-    alone = AllocationBench(momenta=momenta, null_gain=0.0)
-    for demand in ([30.0, -10.0, 5.0], [0.3, -0.1, 0.2], [-30.0, 10.0, -5.0]):
-        bench.step(demand)
-        alone.step(demand)
-        assert np.array_equal(bench.command, alone.command) is (demand[0] != 0.3)
-
-
-def test_a_wheel_without_a_limit_is_scaled_with_the_others() -> None:
-    bench = AllocationBench(wheels={"max_torque": [0.0, 0.2, 0.3, 0.2]}, null_gain=0.0)
-    given = bench.step([30.0, -10.0, 5.0])
-    np.testing.assert_allclose(np.cross(given, [30.0, -10.0, 5.0]), 0.0, atol=1e-12)
-    assert np.max(np.abs(bench.command[1:]) / [0.2, 0.3, 0.2]) == 1.0
+    assert (values["demand_scaled_ticks"], values["wheel_full_ticks"]) == (1, 0)
 
 
 def headroom(momentum: Array, most: Array, torque: Array) -> Array:
@@ -262,26 +205,6 @@ def test_full_wheel_leaves_its_axis_alone(k: int, sharing: str) -> None:
     np.testing.assert_allclose(bench.step(demand), np.where(np.arange(3) == k, 0.0, demand))
     np.testing.assert_allclose(bench.step(-demand), -demand, atol=1e-12)
     assert bench.allocation.wheels.full_ticks == 1.0
-
-
-def test_what_is_told_of_wheels_is_what_they_do() -> None:
-    """Momentum as a share of each one's own limit; failed ones by their numbers."""
-    wheels: dict[str, Any] = {"max_momentum": [20.0, 5.0, 10.0, 40.0]}
-    bench = AllocationBench(momenta=[4.0, -4.0, 3.0, 10.0], wheels=wheels, failure_ticks=20)
-    bench.step(np.zeros(3))
-    found = diagnose(bench.allocation)
-    assert (found.failed, found.summary) == ((), "")
-    assert found.values["fullest_wheel"] == pytest.approx(0.8)
-    assert found.values["wheel_axes"] == 3
-    assert "failed" not in found.values
-    bench.failed = {1, 3}
-    bench.fly([0.3, 0.2, 0.1], 30)
-    found = diagnose(bench.allocation)
-    assert found.failed == ("wheel_2", "wheel_4")
-    assert found.values["fullest_wheel"] == pytest.approx(abs(bench.momenta[2]) / 10.0, rel=1e-3)
-    assert found.values["wheel_axes"] == 2
-    assert found.values["failed"] == "wheel_2, wheel_4"
-    assert "pulses" not in found.values
 
 
 # Failures
@@ -375,13 +298,6 @@ def test_a_gap_in_the_ticks_is_no_silence() -> None:
         bench.step(DEMAND)
         bench.state.wheel_torques[1] = 0.0
         bench.tick += 5
-    assert sound(bench) == [0, 1, 2, 3]
-
-
-def test_demand_that_alternates_blames_no_late_wheel() -> None:
-    bench, rng = AllocationBench(latency=5, failure_ticks=50), np.random.default_rng(4)
-    for _ in range(1000):
-        bench.step(rng.normal(size=3) * 0.3)
     assert sound(bench) == [0, 1, 2, 3]
 
 

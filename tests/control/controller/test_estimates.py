@@ -11,7 +11,6 @@ import yaml
 from closed_loop import PERIOD
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
-from hypothesis.extra.numpy import arrays
 from law_equations import random_gains
 from numpy.typing import NDArray
 from oracles import (
@@ -21,7 +20,7 @@ from oracles import (
     rotation_of,
     skew,
 )
-from random_robots import JOINTS, Case, cases
+from random_robots import Case, cases
 
 from space_robot_control.controller.controller import Controller
 from space_robot_control.controller.gains import NOMINAL, check_gains, read_gains
@@ -58,29 +57,6 @@ class Estimator:
         n_hat = np.full_like(h_bar, np.nan)
         time_delay_estimate(self.pair, h_bar, n_hat)
         return n_hat
-
-
-def vectors(size: int, low: float = -100.0, high: float = 100.0) -> st.SearchStrategy[Array]:
-    return arrays(np.float64, size, elements=st.floats(low, high, width=32))
-
-
-@st.composite
-def pairs(draw: st.DrawFn) -> tuple[Array, ...]:
-    """h_bar, N, rate at a tick, and the acceleration until the next."""
-    axes = 3 + draw(st.sampled_from(JOINTS))
-    h_bar = draw(vectors(axes, 0.125, 100.0))
-    return h_bar, draw(vectors(axes)), draw(vectors(axes, -5.0, 5.0)), draw(vectors(axes))
-
-
-@given(pairs(), st.integers(0, 10**7))
-def test_estimate_recovers_n_of_a_consistent_pair(pair: tuple[Array, ...], tick: int) -> None:
-    """With F = h_bar rhodd + N over the interval, N_hat = N to rounding."""
-    h_bar, n, rate, acceleration = pair
-    estimator = Estimator(len(n))
-    estimator.observe(tick, np.zeros(len(n)), rate)
-    estimator.observe(tick + 1, h_bar * acceleration + n, rate + acceleration * PERIOD)
-    np.testing.assert_allclose(estimator.pair.acceleration, acceleration, atol=1e-9)
-    np.testing.assert_allclose(estimator.estimate(h_bar), n, atol=1e-9 * h_bar.max() + 1e-12)
 
 
 @given(st.floats(1.0, 900.0), st.floats(-50.0, 50.0))

@@ -342,14 +342,6 @@ def test_what_is_put_aside_is_bounded() -> None:
     assert_holds(buffer, 4)
 
 
-def test_the_longest_lead_and_chunk_of_a_mission_find_place() -> None:
-    buffer, length = ReferenceBuffer(1), 10_000
-    buffer.begin(70_000)
-    for start in range(70_000, 90_000, length):
-        buffer.add(chunk(start, length, n=1))
-    assert all(buffer.covers(tick) for tick in range(70_000, 90_000))
-
-
 @given(
     st.lists(st.tuples(st.integers(0, 3 * CAPACITY), st.integers(1, 8)), max_size=6),
     st.lists(st.tuples(st.integers(0, 3 * CAPACITY), st.integers(1, 8)), max_size=6),

@@ -253,15 +253,6 @@ def test_near_half_a_turn_it_is_safe_until_well_away(paper_robot: Robot) -> None
     assert supervisor.rejected == {"attitude error near 180 degrees": 2}
 
 
-def test_a_single_bad_state_near_half_a_turn_is_held_over(paper_robot: Robot) -> None:
-    supervisor, between = supervisor_of(paper_robot), 0.5 * (SAFE_BELOW_ETA + NOMINAL_FROM_ETA)
-    modes = []
-    for state in (state_at(0, between), with_nan(state_at(1, between)), state_at(2, between)):
-        supervisor.answer(state, REST)
-        modes.append(supervisor.mode)
-    assert modes == [Mode.NOMINAL, Mode.HOLDING, Mode.NOMINAL]
-
-
 def test_half_a_turn_is_that_of_the_error(paper_robot: Robot) -> None:
     """A base half a turn from the inertial frame flies where it is desired there."""
     supervisor, turned = supervisor_of(paper_robot), REST.copy()
@@ -284,17 +275,17 @@ def test_half_a_turn_is_that_of_the_error(paper_robot: Robot) -> None:
     assert supervisor.rejected == {"attitude error near 180 degrees": 2}
 
 
-def test_a_free_base_has_no_singular_attitude(paper_robot: Robot) -> None:
-    """Nothing turns it, so no J0 is asked for, wherever it is."""
-    controller = Controller(
-        paper_robot,
-        law_of("tde_stc"),
-        PERIOD,
-        actuators=BaseActuatorSettings(base_actuation="none"),
-    )
-    supervisor = Supervisor(controller, HOLD)
+@pytest.mark.parametrize("law", [law_of("tde_stc"), Held({}, PERIOD, AXES)])
+def test_a_free_base_has_no_singular_attitude_and_gets_no_torque(
+    paper_robot: Robot, law: ControlLaw
+) -> None:
+    """Nothing turns it, so no J0 is asked for, wherever it is, whatever the law asks for."""
+    free = BaseActuatorSettings(base_actuation="none")
+    supervisor = Supervisor(Controller(paper_robot, law, PERIOD, actuators=free), HOLD)
     for tick, eta in enumerate([1.0, 0.03, 1e-3, 0.0, -1e-9, -0.5]):
-        supervisor.answer(state_at(tick, eta), REST)
+        torque = supervisor.answer(state_at(tick, eta), REST).torque
+        np.testing.assert_array_equal(torque[:3], 0.0)
+        assert torque[3:].all()
         assert supervisor.mode is Mode.NOMINAL
     assert not supervisor.rejected
 

@@ -34,9 +34,6 @@ GTO = {"height": 18e6, "eccentricity": 0.72, "inclination_deg": 7.0, "anomaly_de
 TARGET = {"name": "target", "position": [30.0, -50.0, 20.0], "velocity": [0.01, 0.03, -0.02]}
 
 
-MEAN_MOTION = float(np.sqrt(MU / (EARTH_RADIUS + ISS["height"]) ** 3))
-
-
 AXIS = st.tuples(*[st.floats(-1.0, 1.0)] * 3).map(list).filter(lambda a: np.linalg.norm(a) > 0.1)
 
 
@@ -138,15 +135,6 @@ def test_attitudes_are_those_of_two_directions(
     directions = [v / np.linalg.norm(v) for v in (first, second)]
     aligned, _ = Rotation.align_vectors(directions, [a, b], weights=[np.inf, 1.0])
     assert (rotations(row)[0] * turn.inv() * aligned.inv()).magnitude() < 1e-7
-
-
-def test_nadir_on_a_circular_orbit_turns_with_the_mean_motion() -> None:
-    """About the normal, at a constant rate; z points down and x ahead, so -y is the normal."""
-    known = orbit(j2=False)
-    rows = course(known, point="nadir").at(np.linspace(0.0, 5560.0, 5001))
-    np.testing.assert_allclose(rows[:, 5], -MEAN_MOTION, rtol=1e-12)
-    np.testing.assert_allclose(rows[:, [4, 6]], 0.0, rtol=0, atol=1e-12 * MEAN_MOTION)
-    np.testing.assert_allclose(rows[:, 7:], 0.0, rtol=0, atol=1e-15)
 
 
 @pytest.mark.parametrize("elements", [ISS, GTO])

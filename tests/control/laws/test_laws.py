@@ -177,19 +177,6 @@ def test_saturation_is_odd_bounded_and_linear_inside_the_layer(s: float, delta: 
     assert value == (np.sign(s) if abs(s) > delta else s / delta)
 
 
-@given(st.floats(-5.0, 5.0), st.floats(-5.0, 5.0), st.floats(1e-3, 1.0))
-def test_saturation_never_falls_and_has_no_step(a: float, b: float, delta: float) -> None:
-    """Lipschitz with 1/Delta, so continuous at the layer's edge."""
-    low, high = min(a, b), max(a, b)
-    rise = saturation(high, delta) - saturation(low, delta)
-    assert 0.0 <= rise <= (high - low) / delta + 1e-12
-
-
-def test_a_missing_gain_is_an_error() -> None:
-    with pytest.raises(KeyError, match="k_d"):
-        find_law("ctc")({"k_p": np.ones(9)}, PERIOD)
-
-
 def test_the_law_of_ones_own_in_the_manual_flies(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -202,32 +202,6 @@ def test_no_error_makes_the_estimate_unphysical(case: Case, scale: float, gamma:
     assert np.linalg.eigvalsh(inertia)[0] > 0.0
 
 
-@pytest.mark.parametrize("thickness", [0.0, -1e-9], ids=["none", "rounded to less than none"])
-@pytest.mark.parametrize("angle", [0.0, 0.7])
-def test_a_plate_in_the_plane_of_its_hinge_has_a_definite_estimate(
-    angle: float, thickness: float
-) -> None:
-    """Its thickness is along a vector to which no other body contributes."""
-    rng = np.random.default_rng(4)
-    case = Case(random_robot(rng, 3), random_state(rng, 3), rng)
-    com, inertia = case.robot.com.copy(), case.robot.inertia.copy()
-    normal, across, along = np.array(
-        [[np.cos(angle), np.sin(angle), 0.0], [-np.sin(angle), np.cos(angle), 0.0], [0.0, 0.0, 1.0]]
-    )
-    moments = sum(
-        moment * np.outer(axis, axis)
-        for moment, axis in ((7.2 * thickness, normal), (7.2, across), (1.5, along))
-    )
-    com[-1], inertia[-1] = 1.3 * across, np.trace(moments) * np.eye(3) - moments
-    case = case._replace(robot=replace(case.robot, com=com, inertia=inertia))
-    law = SlotineLi(random_gains(rng, 6, 1.0), PERIOD)
-    signals = signals_of(case)
-    for _ in range(4):
-        renew(signals, case, 1.0)
-        assert np.all(np.isfinite(law.force(signals)))
-        assert np.linalg.eigvalsh(law.memory.estimate)[0] > 0.0
-
-
 def test_the_estimate_starts_at_the_nominal_robot_and_outlives_changes_of_gains() -> None:
     rng = np.random.default_rng(3)
     case = Case(random_robot(rng, 6), random_state(rng, 6), rng)

@@ -165,12 +165,3 @@ def test_torque_and_differenced_rate_of_the_base_stay_a_pair() -> None:
         np.testing.assert_allclose(
             inertia * (found.rate - before) / PERIOD, found.torque, rtol=1e-7, atol=1e-7
         )
-
-
-def test_without_a_corner_there_is_none() -> None:
-    found, rng = low_pass(0.0), np.random.default_rng(2)
-    for _ in range(3):
-        rate, torque = rng.normal(size=(2, 9))
-        pass_low(found, rate, torque)
-        np.testing.assert_array_equal(found.rate, rate[:3])
-        np.testing.assert_array_equal(found.torque, torque[:3])
