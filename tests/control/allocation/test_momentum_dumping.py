@@ -17,20 +17,11 @@ from space_robot_model.hardware.magnetic_torquers import MagneticTorquerSettings
 from space_robot_msgs_py.samples import MOST_TORQUERS
 
 Array = NDArray[np.float64]
-
 SEEDS = st.integers(0, 2**31 - 1)
-
-
 COUNTS = st.integers(3, MOST_TORQUERS)
-
-
 FIELDS = st.floats(1e-6, 1.0)
 """Sizes of a magnetic field, T; that of the Earth is some 3e-5."""
-
-
 GAINS = st.floats(1e-4, 10.0)
-
-
 UNBOUNDED = 1e9
 """A m2: no dipole reaches it."""
 

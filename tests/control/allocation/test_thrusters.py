@@ -23,7 +23,6 @@ from space_robot_model.hardware.thrusters import ThrusterSettings
 from space_robot_msgs_py.samples import MOST_THRUSTERS
 
 Array = NDArray[np.float64]
-
 KINDS = ["pwm", "sigma_delta", "schmitt"]
 
 # Non-negative least squares

@@ -16,10 +16,7 @@ from space_robot_control.allocation.wheels import FULL
 from space_robot_msgs_py.samples import MOST_WHEELS
 
 Array = NDArray[np.float64]
-
 CUBE = np.eye(3)
-
-
 LAYOUTS = {
     "orthogonal": CUBE,
     "orthogonal and one": np.vstack([CUBE, [[1, 1, 1]]]),
@@ -35,11 +32,7 @@ LAYOUTS = {
     "eight anyhow": np.random.default_rng(8).normal(size=(8, 3)),
     "eight": np.vstack([PYRAMID, CUBE, [[1, 1, 1]]]),
 }
-
-
 SHARINGS = ("pseudo_inverse", "least_largest")
-
-
 DEMAND = np.array([0.3, 0.2, 0.1])
 
 

@@ -23,7 +23,6 @@ from space_robot_msgs_py.errors import SingularAttitudeError, UnusableStateError
 from space_robot_msgs_py.samples import Reference, ReferenceChunk, RobotState
 
 Array = NDArray[np.float64]
-
 FREE = BaseActuatorSettings(base_actuation="none")
 REST = Reference.at_rest(6)
 
@@ -171,16 +170,12 @@ def test_telemetry_is_of_the_last_tick(paper_robot: Robot) -> None:
 
 
 CORNERS = [1.0, 1.0, 1.0, -1.0, 1.0, 1.0, -1.0, -1.0, 1.0, 1.0, -1.0, 1.0]
-
-
 WHEELS: dict[str, Any] = {
     "axes": CORNERS,
     "rotor_inertia": [0.05],
     "max_torque": [50.0],
     "max_momentum": [100.0],
 }
-
-
 THRUSTERS = couples(10.0)
 TORQUERS: dict[str, Any] = {"axes": np.eye(3).ravel().tolist(), "max_dipole": [400.0]}
 FIELD = np.array([1e-5, -2e-5, 3e-5])

@@ -87,11 +87,7 @@ def test_low_pass_reaches_63_per_cent_in_its_time_constant() -> None:
 
 
 WITH_H_BAR = sorted(name for name, law in laws().items() if "h_bar" in law.gain_descriptions())
-
-
 ESTIMATING = [*WITH_H_BAR, "indi"]
-
-
 FREE = BaseActuatorSettings(base_actuation="none")
 
 
@@ -259,53 +255,35 @@ def test_wrong_gains_are_refused_in_one_line(law: str, gain: str, value: Any, sa
     assert "\n" not in str(caught.value)
 
 
-class ParameterNode:
-    """What `LawSet` asks of its node."""
-
-    def __init__(self, **given_values: Any) -> None:
-        from rclpy.parameter import Parameter
-
-        make: Any = Parameter
-        parameters = [make(k.replace("__", "."), value=v) for k, v in given_values.items()]
-        self._parameter_overrides = {p.name: p for p in parameters}
-        self.on_set: Any = None
-
-    def add_on_set_parameters_callback(self, callback: Any) -> None:
-        self.on_set = callback
-
-    def __getattr__(self, name: str) -> Any:
-        """Anything else is done without effect."""
-        from rcl_interfaces.msg import ParameterDescriptor
-
-        return lambda *_, **__: ParameterDescriptor()
-
-    def set(self, **values: Any) -> str:
-        """Set parameters; why not, if they are refused."""
-        from rclpy.parameter import Parameter
-
-        make: Any = Parameter
-        result = self.on_set([make(k.replace("__", "."), value=v) for k, v in values.items()])
-        assert result.successful == (not result.reason)
-        return str(result.reason)
-
-
-def test_a_parameter_does_not_change_the_kind_of_estimate() -> None:
+def test_a_parameter_does_not_change_the_kind_of_estimate(domain: int) -> None:
     """The compiled code is that of one of the two; a value of the same kind is taken."""
-    pytest.importorskip("rclpy")
-    settings_of = ControllerNodeSettings.resolve({"controller": "tde_stc"})
-    node = ParameterNode(tde_smc__h_bar=[0.0])
-    law_set = LawSet(node, settings_of, 9)  # type: ignore[arg-type]
-    by_name = {law.name: law for law in law_set.laws}
+    rclpy = pytest.importorskip("rclpy")
+    from rclpy.parameter import Parameter
+
+    def parameter(name: str, value: list[float]) -> Any:
+        return Parameter(f"{name}.h_bar", value=value)
+
+    context = rclpy.Context()
+    rclpy.init(args=[], context=context, domain_id=domain)
+    node = rclpy.create_node(
+        "laws", context=context, parameter_overrides=[parameter("tde_smc", [0.0])]
+    )
+    node.declare_parameter("controller", "tde_stc")
+    laws_of_node = LawSet(node, ControllerNodeSettings.resolve({"controller": "tde_stc"}), 9)
+    by_name = {law.name: law for law in laws_of_node.laws}
     assert (by_name["tde_stc"].needs_model, by_name["tde_smc"].needs_model) == (False, True)
-    assert node.set(tde_stc__h_bar=[2.0]) == node.set(tde_smc__h_bar=[0.0] * 9) == ""
-    np.testing.assert_array_equal(by_name["tde_stc"].h_bar, np.full(9, 2.0))
-    for values, said in (
-        ({"tde_stc__h_bar": [0.0]}, "tde_stc.h_bar cannot be changed from a constant to nominal"),
-        ({"tde_smc__h_bar": [1.0]}, "tde_smc.h_bar cannot be changed from nominal to a constant"),
-        ({"tde_smc__h_bar": [0.0] * 8 + [1.0]}, "tde_smc.h_bar: finite values above 0 (or nominal"),
+    for name, value, said in (
+        ("tde_stc", [2.0], ""),
+        ("tde_smc", [0.0] * 9, ""),
+        ("tde_stc", [0.0], "tde_stc.h_bar cannot be changed from a constant to nominal"),
+        ("tde_smc", [1.0], "tde_smc.h_bar cannot be changed from nominal to a constant"),
+        ("tde_smc", [0.0] * 8 + [1.0], "tde_smc.h_bar: finite values above 0 (or nominal"),
     ):
-        reason = node.set(**values)
-        assert said in reason
-        assert "\n" not in reason
+        (result,) = node.set_parameters([parameter(name, value)])
+        assert result.successful is not bool(said)
+        assert said in result.reason
+        assert "\n" not in result.reason
     np.testing.assert_array_equal(by_name["tde_stc"].h_bar, np.full(9, 2.0))
     np.testing.assert_array_equal(by_name["tde_smc"].h_bar, np.zeros(9))
+    node.destroy_node()
+    context.try_shutdown()

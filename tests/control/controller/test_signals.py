@@ -33,20 +33,13 @@ from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.samples import Reference, ReferenceChunk, RobotState
 
 Array = NDArray[np.float64]
-
 FREE = BaseActuatorSettings(base_actuation="none")
-
-
 TICKS = 6
-
-
 M_AXES = (
     *("error", "error_rate", "acceleration_desired", "n_hat", "rho", "rho_rate"),
     *("applied_force", "paired_force", "paired_acceleration", "rho_step", "rate_step"),
 )
 """Signals with a value per axis."""
-
-
 LAWS = sorted(laws())
 
 

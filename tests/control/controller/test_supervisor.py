@@ -26,11 +26,7 @@ from space_robot_msgs_py.errors import MessageError, UnusableStateError
 from space_robot_msgs_py.samples import STATE_FIELDS, Reference, RobotState
 
 Array = NDArray[np.float64]
-
-
 AXES, HOLD = 9, 5
-
-
 REST = Reference.at_rest(6)
 """The reference that asks for rest at zero."""
 
@@ -117,16 +113,10 @@ def test_before_the_first_reference_no_law_answers(paper_robot: Robot, law: Cont
 
 
 numbers = st.lists(st.floats(width=64) | st.floats(-2.0, 2.0), min_size=31, max_size=31)
-
-
 unit = st.lists(st.floats(-1.0, 1.0), min_size=4, max_size=4).filter(
     lambda q: np.hypot(*q[:2]) > 1e-3
 )
-
-
 ticks = st.integers(1, 3) | st.integers(-100, 10_000)
-
-
 streams = st.lists(st.tuples(ticks, numbers, st.none() | unit), min_size=1, max_size=30)
 """Step in ticks, all the measured numbers, and a unit quaternion in place of any."""
 

@@ -22,7 +22,6 @@ from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.errors import InputError
 
 Array = NDArray[np.float64]
-
 PERIOD = 5e-4
 
 
@@ -71,11 +70,7 @@ def test_a_wrong_swap_is_refused_before_the_flight(texts: list[str], said: str) 
 
 
 NOMINAL = [f"{name} nominal" for name, law in laws().items() if "h_bar" in law.gain_descriptions()]
-
-
 LAWS = sorted([*laws(), *NOMINAL])
-
-
 TAKEOVER, STOP = 2000, 2060
 """Ticks: at 1 s the arm moves on all its joints; flown until 1.03 s."""
 TRANSFER = round(TRANSFER_S / PERIOD)

@@ -30,8 +30,6 @@ from space_robot_msgs_py.samples import Reference, RobotState
 
 pytestmark = needs_compiler
 TICKS = 150
-
-
 SETTINGS = {"navigation": "filtered", "sensors": "fine", "actuators": "wheels_and_thrusters"}
 
 

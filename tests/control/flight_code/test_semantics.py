@@ -21,7 +21,6 @@ from space_robot_msgs_py.compiled.lanes import uniform, where, whole
 
 Array = NDArray[np.float64]
 pytestmark = needs_compiler
-
 SPECIAL = [0.0, -0.0, 1.0, -1.0, math.nan, math.inf, -math.inf, 5e-324, 1.7e308]
 floats = st.one_of(st.sampled_from(SPECIAL), st.floats())
 integers = st.integers(-(2**52), 2**52)

@@ -20,14 +20,8 @@ from space_robot_model.robot.find import find_robot
 from space_robot_msgs_py.errors import InputError
 
 PERIOD = 5e-4
-
-
 ROBOT = find_robot("paper")
-
-
 START = [0.0, 120.0, 220.0, 0.0, -10.0, 0.0]
-
-
 GOAL = [15.0, 110.0, 185.0, 45.0, 10.0, -25.0]
 
 

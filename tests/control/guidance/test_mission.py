@@ -20,13 +20,8 @@ from space_robot_control.guidance.mission import Mission, MissionSettings
 from space_robot_model.robot import Robot
 
 Array = NDArray[np.float64]
-
 PERIOD = 5e-4
-
-
 ROBOTS = {n: random_robot(np.random.default_rng(n), n) for n in range(1, 10)}
-
-
 PAPER_DEG = np.array(
     [[0, 120, 220, 0, -10, 0], [15, 110, 185, 45, 10, -25], [30, 100, 150, 90, 30, -50]], float
 )

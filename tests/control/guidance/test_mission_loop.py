@@ -27,11 +27,7 @@ from space_robot_control.guidance.mission import Mission
 from space_robot_control.guidance.mission_changes import TOLD_S
 
 CHUNK, LEAD = 10, 35
-
-
 NO_TRAJECTORIES = {"trajectories accepted": 0, "trajectories refused": 0}
-
-
 PERIOD_NS = 500_000
 
 

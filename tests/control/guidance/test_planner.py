@@ -19,8 +19,6 @@ from space_robot_model.robot.find import find_robot
 from space_robot_model.robot.kinematics import tool_state
 
 PERIOD = 5e-4
-
-
 STARTS = {
     "paper": [0.0, 120.0, 220.0, 0.0, -10.0, 0.0],
     "seven_joint": [10.0, 30.0, 40.0, 50.0, 60.0, 70.0, 80.0],

@@ -20,26 +20,12 @@ from space_robot_msgs_py.config.validation import validate
 from space_robot_msgs_py.errors import InputError
 
 Array = NDArray[np.float64]
-
-
 IDENTITY = np.array([1.0, 0.0, 0.0, 0.0])
-
-
 ISS = {"height": 420e3, "inclination_deg": 51.6, "raan_deg": 30.0, "anomaly_deg": 200.0}
-
-
 GTO = {"height": 18e6, "eccentricity": 0.72, "inclination_deg": 7.0, "anomaly_deg": -10.0}
-
-
 TARGET = {"name": "target", "position": [30.0, -50.0, 20.0], "velocity": [0.01, 0.03, -0.02]}
-
-
 AXIS = st.tuples(*[st.floats(-1.0, 1.0)] * 3).map(list).filter(lambda a: np.linalg.norm(a) > 0.1)
-
-
 ANGLE = st.floats(-180.0, 180.0)
-
-
 PAIRS = [
     ("nadir", "velocity"),
     ("nadir", "sun"),
@@ -207,8 +193,6 @@ def test_a_target_at_the_robot_is_refused() -> None:
 
 
 BEGIN, SPAN = 50.0, 60.0
-
-
 QUATERNION = (
     st.tuples(*[st.floats(-1.0, 1.0)] * 4)
     .filter(lambda q: np.linalg.norm(q) > 0.1)

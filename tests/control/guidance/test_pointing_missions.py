@@ -24,29 +24,13 @@ from space_robot_model.robot.kinematics import tool_state
 from space_robot_msgs_py.errors import InputError
 
 Array = NDArray[np.float64]
-
-
 PERIOD = 5e-3
-
-
 ROBOT = find_robot("paper")
-
-
 START = [0.0, 90.0, 200.0, 20.0, 30.0, 10.0]
-
-
 NEAR = [10.0, 80.0, 190.0, 20.0, 30.0, 10.0]
-
-
 ISS = {"orbital_elements": {"height": 420e3, "eccentricity": 0.0005, "inclination_deg": 51.64}}
-
-
 NADIR = json.dumps({"point": "nadir"})
-
-
 SMALL = {"xyz": [0.1, -0.1, -0.1], "rpy_deg": [0.0, 0.0, 10.0]}
-
-
 RATE = [0.3, -0.2, 0.5]
 IDENTITY = np.array([1.0, 0.0, 0.0, 0.0])
 

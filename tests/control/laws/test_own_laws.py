@@ -207,11 +207,7 @@ def test_a_campaign_keeps_the_digest_of_a_laws_file(folder: Path) -> None:
 
 
 MODULE = "law_of_a_stranger"
-
-
 LAW = f"{MODULE}:Stranger"
-
-
 STRANGER = CODE.format(name="stranger").replace("Mine", "Stranger")
 
 

@@ -31,10 +31,7 @@ from space_robot_model.robot import Robot
 from space_robot_msgs_py.compiled.records import assign
 
 Array = NDArray[np.float64]
-
 PERIOD = 5e-4
-
-
 FEW = settings(max_examples=12, deadline=None)
 
 

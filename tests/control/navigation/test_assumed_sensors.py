@@ -24,8 +24,6 @@ from space_robot_model.hardware.sensors import SensorSettings
 from space_robot_msgs_py.errors import InputError
 
 PERIOD = 5e-4
-
-
 FILE = """
 plant_node:
   ros__parameters:

@@ -25,7 +25,6 @@ from space_robot_control.navigation.low_pass import (
 from space_robot_msgs_py.compiled.records import assign
 
 Array = NDArray[np.float64]
-
 PERIOD = 5e-4
 
 

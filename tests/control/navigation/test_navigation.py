@@ -21,14 +21,8 @@ from space_robot_msgs_py.errors import InputError, UnusableStateError
 from space_robot_msgs_py.samples import RobotState
 
 Array = NDArray[np.float64]
-
-
 OMEGA = np.array([0.02, -0.03, 0.01])
-
-
 N = 6
-
-
 SETTINGS = NAVIGATION.model_copy(update={"tracker_delay": 0.01, "rate_filter_hz": 0.0})
 
 
