@@ -55,13 +55,6 @@ def test_wheel_that_must_cross_zero_does_so_at_once() -> None:
     assert np.sum(np.abs(momenta[1:]) < 0.9 * 30.0 * INERTIA) < 0.02 * 4 * ticks
 
 
-def test_null_motion_leaves_the_demand_what_it_needs() -> None:
-    bench = AllocationBench(momenta=[15.0, -15.0, 15.0, -15.0], null_gain=1e3, null_share=1.0)
-    given = bench.fly([0.9, 0.0, 0.0], 5)
-    np.testing.assert_allclose(given, np.tile([0.9, 0.0, 0.0], (5, 1)), atol=1e-12)
-    assert np.abs(bench.command).max() <= 1.0 + 1e-12
-
-
 def test_thrusters_take_the_axis_that_wheels_cannot_give() -> None:
     """Two failed wheels of four leave two axes."""
     demand = [0.3, 0.2, 0.1]

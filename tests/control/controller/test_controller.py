@@ -144,14 +144,6 @@ def test_a_transfer_lasts_20_ms_and_fades_evenly(
     assert shares[ticks:] == [0.0] * 3
 
 
-def test_at_tick_0_nothing_is_taken_over(paper_robot: Robot) -> None:
-    """The law's own torque from the beginning."""
-    loop = Loop(paper_robot, law_of("ctc"), initial_quaternion=[0.99, 0.1, 0.05, 0.05])
-    loop.fly(1)
-    own = loop.controller.law.force(loop.controller.signals)
-    np.testing.assert_array_equal(loop.controller.block[0].force, own)
-
-
 def test_telemetry_is_of_the_last_tick(paper_robot: Robot) -> None:
     """s, u, N_hat, e."""
     loop = Loop(paper_robot, law_of("tde_stc"))
@@ -226,12 +218,6 @@ def test_wheels_and_torquers_are_asked_for_the_torque_of_the_base(
         np.testing.assert_array_equal(without_law, dipoles)
     torque = np.cross(dipoles, FIELD) - command.torque[9:13] @ axes
     np.testing.assert_allclose(torque, ideal[:3], atol=1e-9)
-
-
-def test_thrusters_are_open_or_closed(paper_robot: Robot) -> None:
-    controller = controller_of(paper_robot, thrusters=THRUSTERS)
-    forces = np.array([controller.update(state_at(k), REST).torque[9:] for k in range(100)])
-    assert set(forces.ravel()) == {0.0, 10.0}
 
 
 @pytest.mark.parametrize(

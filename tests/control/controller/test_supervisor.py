@@ -214,7 +214,7 @@ def test_a_bad_state_is_counted_held_over_and_leaves_no_trace(
 ) -> None:
     """Wherever the bad number stands; an attitude of zeros is a broken sensor, not half a turn."""
     shown, spared = (Supervised(paper_robot, "tde_stc", HOLD) for _ in range(2))
-    before, _ = (loop.fly_supervised(20)[1][-1] for loop in (shown, spared))
+    before, _ = (loop.fly(20)[1][-1] for loop in (shown, spared))
     state, reference = shown.plant.state.copy(), shown.references.at(20)
     getattr(state, field)[place] = number
     held = shown.supervisor.answer(state, reference).torque
@@ -224,8 +224,8 @@ def test_a_bad_state_is_counted_held_over_and_leaves_no_trace(
     with pytest.raises(UnusableStateError, match="at tick 20 the") as caught:
         shown.controller.update(state, reference)
     assert (caught.value.tick, caught.value.kind) == (20, kind)
-    torques = shown.fly_supervised(20)[1]
-    np.testing.assert_array_equal(torques, spared.fly_supervised(20)[1])
+    torques = shown.fly(20)[1]
+    np.testing.assert_array_equal(torques, spared.fly(20)[1])
 
 
 # Near half a turn
@@ -323,23 +323,7 @@ class Supervised(Loop):
     def __init__(self, robot: Robot, name: str, hold_ticks: int) -> None:
         super().__init__(robot, law_of(name))
         self.supervisor = Supervisor(self.controller, hold_ticks)
-
-    def fly_supervised(self, ticks: int, blind: bool = False) -> tuple[Array, Array]:
-        """Errors and torques, as `fly`; the errors while blind are the last ones."""
-        errors, torques = [], []
-        for _ in range(ticks):
-            tick, state = self.plant.tick, self.plant.state
-            if not self.references.covers(tick):
-                self.references.add(self.mission.chunk(tick, 100))
-            seen = state
-            if blind:
-                seen = RobotState.allocate(6)
-                seen.tick, seen.quaternion[:] = tick, np.nan
-            command = self.supervisor.answer(seen, self.references.at(tick))
-            errors.append(self.controller.signals.error.copy())
-            torques.append(command.torque.copy())
-            self.plant.step(command)
-        return np.array(errors), np.array(torques)
+        self.answer = self.supervisor.answer
 
 
 @pytest.mark.parametrize("name", ["ctc", "tde_stc"])
@@ -349,13 +333,13 @@ def test_a_blind_flight_finds_back_without_a_jolt(
 ) -> None:
     """Over a blink it holds; over 150 ms (100 of them without torque) it falls behind a little."""
     loop = Supervised(paper_robot, name, hold_ticks=100)
-    loop.fly_supervised(2000)
-    before = loop.fly_supervised(1)[1][-1]
-    _, torques = loop.fly_supervised(blind_ticks, blind=True)
+    loop.fly(2000)
+    before = loop.fly(1)[1][-1]
+    _, torques = loop.fly(blind_ticks, is_blind=True)
     np.testing.assert_array_equal(torques[:100], np.broadcast_to(before, torques[:100].shape))
     assert not torques[100:].any()
     applied = loop.plant.state.applied_torque.copy()
-    errors, torques = loop.fly_supervised(4000)
+    errors, torques = loop.fly(4000)
     assert loop.supervisor.mode is Mode.NOMINAL
     if blind_ticks > LONGEST_GAP:  # it takes over from what is applied
         np.testing.assert_allclose(torques[0], applied, atol=1e-9)

@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from space_robot_control.guidance.courses import MOST_KNOTS, knots, sample_times
 from space_robot_control.guidance.demand import MotionDemand, demand
 from space_robot_control.guidance.mission import Mission, MissionSettings
 from space_robot_control.guidance.trajectory_file import with_columns
@@ -213,16 +212,6 @@ def test_trajectories_of_files(tmp_path: Path) -> None:
     joints, _ = whole(mission)
     assert_consistent(joints, 1.0)
     np.testing.assert_allclose(joints[::200, 0], rows, atol=1e-12)
-
-
-@pytest.mark.parametrize("base", ["free", {"rpy_deg": [0, 0, 5]}], ids=["free", "led"])
-def test_a_long_segment_is_the_same_path_with_no_more_knots(base: Any) -> None:
-    segments = [{"tool": {"xyz": [0.1, 0.0, -0.1]}, "base": base, "duration": d} for d in (9, 9e5)]
-    (short,), (long,) = (planned(segment).pieces for segment in segments)
-    # where joints are left over, their share depends on the knots a little
-    np.testing.assert_allclose(long.goal, short.goal, atol=1e-5)
-    np.testing.assert_allclose(long.attitude, short.attitude, atol=1e-6)
-    assert len(knots(long.end)) == len(sample_times(long.begin, long.end)) == MOST_KNOTS
 
 
 def test_a_day_of_hold_is_planned() -> None:

@@ -111,27 +111,6 @@ def test_the_filter_is_consistent(delay: int) -> None:
     assert low < nees[:, ::2].mean() < high
 
 
-def test_the_present_attitude_is_as_good_as_it_can_be() -> None:
-    """Its error: that of k - D, the gyro's noise since, and the bias's since; over 40 seeds.
-
-    A filter that took late measurements for present ones would be wrong by the whole turn.
-    """
-    case = Case(arw=1e-5, rrw=1e-8, bias=1e-5, period=0.01, interval=10, delay=25)
-    omega = np.radians(10.0) * np.array([0.6, 0.0, 0.8])
-    ticks = 4000
-    attitudes = exponential(np.arange(ticks)[:, None] * case.period * omega)
-    rates = np.tile(omega, (ticks, 1))
-    squares, expected = [], []
-    for seed in range(20):
-        found = filtered(case, measure(case, attitudes, rates, np.random.default_rng(seed)))
-        error = attitude_error(found.present, attitudes)[1500:]
-        squares.append((error**2).mean())
-        expected.append(np.trace(found.covariance[2000:2010, :3, :3].mean(0)) / 3.0)
-    since = case.arw**2 * case.delay * case.period
-    assert np.mean(squares) == pytest.approx(np.mean(expected) + since, rel=0.1)
-    assert np.sqrt(np.mean(squares)) < 1e-3 * np.linalg.norm(omega) * case.delay * case.period * 2
-
-
 # A single step
 
 
@@ -139,42 +118,6 @@ def random_covariance(rng: np.random.Generator, sigmas: Array) -> Array:
     root = rng.normal(size=(6, 6)) * sigmas[:, np.newaxis]
     covariance: Array = root @ root.T
     return covariance
-
-
-@given(st.integers(0, 2**32 - 1), st.sampled_from([5e-4, 0.1]))
-@settings(max_examples=40)
-def test_a_propagated_covariance_is_van_loans(seed: int, period: float) -> None:
-    """Of turns of 0.01 rad, and noise and covariance that weigh alike, to third order in the turn.
-
-    Q is Farrenkopf's, of axes at rest: that is to first order, in a term of its own.
-    """
-    rng = np.random.default_rng(seed)
-    arw, turn = 1e-5, 0.01 * rng.normal(size=3)
-    rrw = arw / period * 10.0 ** rng.uniform(-0.5, 0.5)
-    case = Case(arw=arw, rrw=rrw, period=period)
-    sigmas = np.repeat([arw * period**0.5, arw / period**0.5], 3)
-    before = random_covariance(rng, sigmas)
-    drift = np.zeros((6, 6))
-    drift[:3, :3], drift[:3, 3:] = -skew(turn / period), -np.eye(3)
-    transition = expm(drift * period)
-
-    def propagated(covariance: Array) -> Array:
-        filter = case.filter()
-        filter.covariance[:], filter.scratch.rotation[:] = covariance, turn
-        propagate_covariance(filter, period)
-        found: Array = filter.covariance.copy()
-        return found
-
-    scale = np.outer(sigmas, sigmas)
-    noise = propagated(np.zeros((6, 6)))
-    still = np.zeros((6, 6))
-    still[:3, 3:] = -np.eye(3)
-    density = np.diag([arw**2] * 3 + [rrw**2] * 3)
-    both = expm(np.block([[-still, density], [np.zeros((6, 6)), still.T]]) * period)
-    np.testing.assert_allclose(noise / scale, both[6:, 6:].T @ both[:6, 6:] / scale, atol=1e-12)
-    expected = transition @ before @ transition.T + noise
-    error = np.abs(propagated(before) - expected) / scale
-    assert error.max() < 3.0 * np.linalg.norm(turn) ** 3 * np.abs(expected / scale).max()
 
 
 @given(st.integers(0, 2**32 - 1), st.floats(0.5, 20.0), st.sampled_from([0.9, 0.999, 1.001, 1.1]))
