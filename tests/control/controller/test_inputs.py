@@ -255,19 +255,6 @@ def assert_holds(buffer: ReferenceBuffer, tick: int) -> None:
     np.testing.assert_array_equal(buffer.at(tick), expected.references())
 
 
-def test_a_tick_is_covered_when_both_parts_are_there() -> None:
-    """They come as two messages."""
-    for first, second in (("add_joints", "add_base"), ("add_base", "add_joints")):
-        buffer, whole = ReferenceBuffer(2, CAPACITY), chunk(5, 4)
-        assert not any(buffer.covers(tick) for tick in range(-1, 3 * CAPACITY))
-        rows = {"add_joints": whole.joints, "add_base": whole.base}
-        getattr(buffer, first)(5, rows[first])
-        assert not buffer.covers(6)
-        getattr(buffer, second)(5, rows[second][:2])
-        assert_holds(buffer, 6)
-        assert not buffer.covers(7)
-
-
 def test_a_tick_sent_again_is_overwritten() -> None:
     """A changed plan: the last word counts."""
     buffer = ReferenceBuffer(2, CAPACITY)

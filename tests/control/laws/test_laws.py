@@ -177,27 +177,6 @@ def test_saturation_is_odd_bounded_and_linear_inside_the_layer(s: float, delta: 
     assert value == (np.sign(s) if abs(s) > delta else s / delta)
 
 
-def test_the_law_of_ones_own_in_the_manual_flies(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Its two files to the letter."""
-    manual = (ROOT / "docs/manual/control_laws.md").read_text("utf-8")
-    module, gains = (
-        re.search(rf"```{language}\n(# {name}.*?)```", manual, re.DOTALL)
-        for language, name in (("python", "my_laws.py"), ("yaml", "gains/tde.yaml"))
-    )
-    assert module
-    assert gains
-    (tmp_path / "my_laws.py").write_text(module[1])
-    (tmp_path / "gains").mkdir()
-    (tmp_path / "gains/tde.yaml").write_text(gains[1])
-    monkeypatch.syspath_prepend(tmp_path)
-    own = "my_laws:TimeDelayControl"
-    flight = Flight(resolve(FlightPlan(controller=own, gains=f"{tmp_path}/gains", duration=0.05)))
-    errors = simulate(flight).telemetry[:, 3]  # type: ignore[index]
-    assert np.abs(errors).max() < 1e-6
-
-
 def test_the_integral_in_the_manual_is_kept_and_begins_at_zero(tmp_path: Path) -> None:
     """At the start, and when the law takes over again."""
     manual = (ROOT / "docs/manual/control_laws.md").read_text("utf-8")
