@@ -187,13 +187,15 @@ def test_without_mission_the_last_point_is_held_and_without_recorder_the_exit_co
     tmp_path: Path,
 ) -> None:
     limits = ["--set", "controller.reference_timeout=0.2", "--set", "mission.lead_ticks=200"]
-    faults = ["--duration", "2", "--fault", "kill_mission@0.2", "--fault", "kill_recorder@0.6"]
+    kinds = "stop_controller@0.05:0.1", "kill_mission@0.2", "kill_recorder@0.6"
+    faults = ["--duration", "2", *(word for kind in kinds for word in ("--fault", kind))]
     result = space_robot_here("fly", "--bag", str(tmp_path / "bag"), "--json", *limits, *faults)
     assert result.returncode == 1
     assert "Traceback" not in result.stderr
     assert "recorder ended by signal 9" in result.stderr
     flown = Flown(tmp_path / "bag", result.stdout, result.stderr)
     flown.time_of("controller", "holding the reference: the mission is silent", after=0.2)
+    flown.time_of("controller", "goes on (SIGCONT)")
     assert flown.report["unfinished"]
     nodes = flown.report["graph"]["nodes"]
     assert int(nodes["controller_node"]["references_held"]) > 100

@@ -14,7 +14,7 @@ from random_robots import random_quaternion
 from scipy.spatial.transform import Rotation
 
 from space_robot_control.navigation.navigation import LONGEST_BRIDGE, Navigation, navigate
-from space_robot_control.navigation.quaternions import multiply, small_angle
+from space_robot_control.navigation.quaternions import multiply, small_angle, turn
 from space_robot_control.navigation.settings import NavigationFilterSettings
 from space_robot_model.robot import Robot
 from space_robot_msgs_py.errors import InputError, UnusableStateError
@@ -190,6 +190,16 @@ seeds = st.integers(0, 2**32 - 1).map(np.random.default_rng)
 def vector(rng: np.random.Generator, size: float) -> Array:
     direction = rng.normal(size=3)
     return size * direction / np.linalg.norm(direction)
+
+
+@given(seeds, st.sampled_from([1e-9, 1e-3, 0.03, 0.1]))
+def test_a_turn_is_exact_to_1e_12_of_its_angle(rng: np.random.Generator, angle: float) -> None:
+    rotation, out = vector(rng, angle), np.empty(4)
+    turn(rotation, out)
+    found = rotation_of(out / np.linalg.norm(out)).as_rotvec()
+    np.testing.assert_allclose(found, rotation, rtol=0.0, atol=1.2e-12 * angle)
+    turn(rotation * 1e6, out)
+    assert np.isfinite(out).all()
 
 
 @given(seeds)
