@@ -140,11 +140,15 @@ def headroom(momentum: Array, most: Array, torque: Array) -> Array:
     return room
 
 
-def shared(axes: Array, most: Array, momentum: Array, holds: Array, demand: Array) -> Array:
-    """What each motor is asked for, as the manual says: written down with SciPy's least squares."""
+def shared(
+    axes: Array, most: Array, momentum: Array, holds: Array, demand: Array
+) -> tuple[Array, bool]:
+    """What each motor is asked for, as the manual says, and whether it is scaled down."""
+    factors: list[float] = []
 
     def scaled(torque: Array) -> Array:
-        return np.asarray(torque / max(1.0, np.max(np.abs(torque) / most)))
+        factors.append(max(1.0, float(np.max(np.abs(torque) / most))))
+        return np.asarray(torque / factors[-1])
 
     def squares(free: NDArray[np.bool_], wanted: Array) -> Array:
         columns = axes[free].T * most[free]
@@ -158,7 +162,7 @@ def shared(axes: Array, most: Array, momentum: Array, holds: Array, demand: Arra
         if free.any():
             torque[free] = squares(free, -demand - axes[~free].T @ torque[~free])
         torque = scaled(torque)
-    return torque
+    return torque, max(factors) > 1.0
 
 
 @pytest.mark.parametrize("count", [3, 4, 6])
@@ -180,11 +184,12 @@ def test_others_take_the_rest_of_full_wheels(count: int) -> None:
         momentum = rng.choice([-1.0, 1.0], count) * share * holds
         bench.momenta[:] = momentum
         demand = rng.normal(size=3) * 10.0 ** rng.uniform(-1.0, 1.0)
-        expected = shared(bench.axes, most, momentum, holds, demand)
+        expected, is_scaled = shared(bench.axes, most, momentum, holds, demand)
         bench.step(demand)
         np.testing.assert_allclose(bench.command, expected, rtol=0.0, atol=1e-9)
         assert np.all(np.abs(bench.command) <= most)
         assert np.all(np.abs(bench.momenta) <= np.maximum(np.abs(momentum), FULL * holds) + 1e-12)
+        assert bool(bench.allocation.wheels.is_scaled) is is_scaled
         full_ticks += int(bench.allocation.wheels.full_ticks)
     assert 5 < full_ticks < 20
 
