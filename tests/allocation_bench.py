@@ -1,22 +1,54 @@
-"""The allocation alone, of a base that does not turn."""
+"""The allocation alone, of a base that does not turn; layouts of wheels and thrusters."""
 
 from __future__ import annotations
 
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
-from wheel_layouts import PYRAMID
+from numpy.typing import ArrayLike, NDArray
 
 from space_robot_control.allocation.allocation import Allocation, allocate
 from space_robot_control.allocation.settings import AllocationSettings
+from space_robot_control.allocation.wheel_set import WheelSet, tabulate
 from space_robot_model.hardware.base_actuators import BaseActuatorSettings
-from space_robot_msgs_py.samples import State
+from space_robot_msgs_py.samples import MOST_WHEELS, State
 
 Array = NDArray[np.float64]
 
 PERIOD = 5e-4
 INERTIA = 0.02
+PYRAMID = np.array([[1, 0, 0.7], [0, 1, 0.7], [-1, 0, 0.7], [0, -1, 0.7]])
+
+
+def unit(axes: Array) -> Array:
+    return np.asarray(axes / np.linalg.norm(axes, axis=1, keepdims=True))
+
+
+def wheel_set(axes: Array, loads: ArrayLike = 1.0, out: tuple[int, ...] = ()) -> WheelSet:
+    """Tables of wheels with some axes (of any length) and full loads, but for those ``out``."""
+    wheels, axis, count = WheelSet.allocate(1), np.zeros((MOST_WHEELS, 3)), len(axes)
+    axis[:count] = unit(axes)
+    wheels.full_load[:] = 1.0
+    wheels.full_load[:count] = loads
+    wheels.takes_part[:count] = 1.0
+    wheels.takes_part[list(out)] = 0.0
+    tabulate(wheels, axis, count)
+    return wheels
+
+
+def couples(force: float = 1.0, shortest_pulse: float = 0.01) -> dict[str, Any]:
+    """Twelve thrusters, 1 m from the CoM, in pairs of pure couples about each axis."""
+    positions, directions = [], []
+    for axis in range(3):
+        for arm, side in ((1, 1), (1, -1), (-1, 1), (-1, -1)):
+            positions.append(arm * np.eye(3)[axis])
+            directions.append(side * np.eye(3)[(axis + 1) % 3])
+    return {
+        "positions": np.ravel(positions).tolist(),
+        "directions": np.ravel(directions).tolist(),
+        "force": [force],
+        "shortest_pulse": [shortest_pulse],
+    }
 
 
 class AllocationBench:
@@ -30,6 +62,7 @@ class AllocationBench:
         latency: int = 0,
         wheels: Any = None,
         sharing: str = "pseudo_inverse",
+        largest_dipole: float = 0.0,
         **settings: Any,
     ) -> None:
         hardware: dict[str, Any] = {"base_actuation": "hardware"}
@@ -43,6 +76,9 @@ class AllocationBench:
             }
         if thrusters:
             hardware["thrusters"] = thrusters
+        if largest_dipole:
+            torquers = {"axes": np.eye(3).ravel().tolist(), "max_dipole": [largest_dipole]}
+            hardware["magnetic_torquers"] = torquers
         assumed = BaseActuatorSettings(**hardware)
         self.count, self.thruster_count = assumed.wheel_count, assumed.thruster_count
         self.axes, self.torques = assumed.wheels.unit_axes, assumed.thrusters.torques
@@ -56,7 +92,7 @@ class AllocationBench:
         self.tick = 0
         self._late = [np.zeros(self.count)] * latency
 
-    def step(self, demand: Any) -> Array:
+    def step(self, demand: Any, field: Any = 0.0) -> Array:
         """Return the torque that the base got over a tick."""
         state = self.state
         state.wheel_velocities[: self.count] = self.momenta / self.inertia
@@ -64,8 +100,12 @@ class AllocationBench:
         allocation.reported_speeds[:] = state.wheel_velocities
         allocation.reported_torques[:] = state.wheel_torques
         allocation.demand[:] = demand
+        allocation.torquers.magnetic_field[:] = field
         allocate(allocation, float(self.tick))
-        self.command = command = allocation.command[: self.count + self.thruster_count].copy()
+        first = self.count + self.thruster_count
+        self.command = command = allocation.command[:first].copy()
+        self.dipoles = allocation.command[first : first + 3].copy()
+        self.of_torquers = np.cross(self.dipoles, allocation.torquers.magnetic_field)
         self._late.append(command[: self.count].copy())
         given = self._late.pop(0)
         given[list(self.failed)] = 0.0
@@ -73,7 +113,7 @@ class AllocationBench:
         state.wheel_torques[: self.count] = given
         self.tick += 1
         opened = command[self.count :] > 0.0
-        return np.asarray(opened @ self.torques - given @ self.axes)
+        return np.asarray(opened @ self.torques - given @ self.axes + self.of_torquers)
 
     def fly(self, demand: Any, ticks: int) -> Array:
         return np.array([self.step(demand) for _ in range(ticks)])

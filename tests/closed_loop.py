@@ -65,36 +65,29 @@ class Loop:
         self,
         robot: Robot,
         law: ControlLaw,
-        degrees: Any = None,
         navigation: NavigationFilterSettings | None = None,
         **plant: Any,
     ) -> None:
-        waypoints = PAPER_DEG if degrees is None else degrees
-        flat = np.asarray(waypoints, dtype=float).ravel().tolist()
+        flat = np.ravel(PAPER_DEG).astype(float).tolist()
         plant = {"initial_joints_deg": flat[: robot.n], **plant}
         mission = MissionSettings(waypoint_times=[0.0, 15.0, 30.0], waypoints_deg=flat)
         self.plant = Plant(robot, PlantSettings(**plant), PERIOD)
         self.controller = Controller(robot, law, PERIOD, navigation=navigation)
         self.mission = Mission(robot, mission, PERIOD)
         self.references = ReferenceBuffer(robot.n)
-        self.own_output_as_applied = False
-        self.flipped = False
-        self._last = np.zeros(robot.n + 3)
+        self.answer = self.controller.update
 
-    def fly(self, ticks: int) -> tuple[Array, Array]:
-        """Errors and torques, (ticks, m) each."""
+    def fly(self, ticks: int, is_blind: bool = False) -> tuple[Array, Array]:
+        """Errors and torques, (ticks, m) each; whoever is blind measures no attitude."""
         errors, torques = [], []
         for _ in range(ticks):
-            tick, state = self.plant.tick, self.plant.state
+            tick, state = self.plant.tick, self.plant.state.copy()
             if not self.references.covers(tick):
                 self.references.add(self.mission.chunk(tick, 100))
-            if self.own_output_as_applied:
-                state.applied_torque[:] = self._last
-            if self.flipped:
-                state.quaternion *= -1.0
-            command = self.controller.update(state, self.references.at(tick))
+            if is_blind:
+                state.quaternion[:] = np.nan
+            command = self.answer(state, self.references.at(tick))
             assert command.tick == tick
-            self._last[:] = command.torque
             errors.append(self.controller.signals.error.copy())
             torques.append(command.torque.copy())
             self.plant.step(command)

@@ -24,11 +24,14 @@ needs_compiler = pytest.mark.skipif(
 CTYPES = {lang.FLOAT: ctypes.c_double, lang.INT: ctypes.c_int64, lang.BOOL: ctypes.c_bool}
 
 
-def text_of(kernel: Any, *kinds: Any) -> str:
-    """The C of a kernel for arguments of some types, with all that it calls."""
+def text_of(*signatures: tuple[Any, ...]) -> str:
+    """The C of kernels, each with the types of its arguments, and of all that they call."""
     program = KernelProgram({}, 3)
-    number = program.function(kernel.py_func, tuple(lang.Value(kind, "given") for kind in kinds))
-    files = Files(program, [program.functions[number]], [], lambda _: "all")
+    functions = []
+    for kernel, *kinds in signatures:
+        values = tuple(lang.Value(kind, "given") for kind in kinds)
+        functions.append(program.functions[program.function(kernel.py_func, values)])
+    files = Files(program, functions, [], lambda _: "all")
     environment = jinja2.Environment(
         loader=jinja2.PackageLoader("space_robot_control.flight_code"), autoescape=False
     )
@@ -41,14 +44,18 @@ def text_of(kernel: Any, *kinds: Any) -> str:
     return files.final(header) + files.rooms()["all"]
 
 
-def in_c(kernel: Any, *kinds: Any, result: Any = lang.FLOAT) -> Callable[..., Any]:
-    """A kernel, compiled by the system's compiler; arrays are float64."""
-    text = text_of(kernel, *kinds)
+def in_c(*signatures: tuple[Any, ...]) -> dict[Any, Callable[..., Any]]:
+    """Kernels by themselves, compiled together by the system's compiler; arrays are float64."""
+    text = text_of(*signatures)
     flags = (*FLAGS, *WARNINGS, "-Wno-unused-function")
     library = ctypes.CDLL(str(build_library({PurePosixPath("kernel.c"): text}, flags)))
-    name = kernel.py_func.__name__.lstrip("_")
-    function = getattr(library, f"sr_{name}")
-    function.restype = None if result is None else CTYPES[result]
+    return {kernel: _call_of(library, kernel, kinds) for kernel, *kinds in signatures}
+
+
+def _call_of(library: ctypes.CDLL, kernel: Any, kinds: list[Any]) -> Callable[..., Any]:
+    function = getattr(library, f"sr_{kernel.py_func.__name__.lstrip('_')}")
+    result = kernel.py_func.__annotations__["return"]
+    function.restype = {"float": ctypes.c_double, "int": ctypes.c_int64, "None": None}[result]
 
     def call(*arguments: Any) -> Any:
         given = []

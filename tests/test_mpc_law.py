@@ -92,12 +92,6 @@ def test_without_active_limits_it_is_a_linear_quadratic_regulator(
         np.testing.assert_allclose(force, x.nominal.inertia @ u + x.nominal.bias, rtol=1e-6)
 
 
-def test_in_short_steps_its_poles_are_at_its_bandwidth() -> None:
-    """The endless horizon's gains are those of computed torque, K_P = W^2 and K_D = 2 W."""
-    kind = type("Mpc", (LAW,), {"steps": np.full(20, 1e-5)})
-    np.testing.assert_allclose(riccati_gain(kind), [1e4, 200.0], rtol=2e-3)
-
-
 @pytest.mark.parametrize("seed", range(8))
 def test_within_limits_it_is_the_optimum(seed: int) -> None:
     """Clarabel solves the same problem with errors and torques as variables, less condensed."""
@@ -147,13 +141,6 @@ def test_a_copy_and_a_restored_law_answer_the_same() -> None:
     expected = original.force(x).copy()
     for other in (*copies, restored):
         np.testing.assert_allclose(other.force(x), expected, rtol=1e-9, atol=1e-9)
-
-
-def test_gains_that_change_in_flight_are_those_of_the_next_tick() -> None:
-    x, changed = signals(1), law(NO_LIMIT)
-    changed.force(x)
-    changed.gain_values = {"weight": np.full(AXES, 2.0), "torque_limit": np.full(AXES, 5.0)}
-    np.testing.assert_allclose(changed.force(x), law(5.0, 2.0).force(x), rtol=1e-9, atol=1e-9)
 
 
 def test_with_a_weak_base_it_errs_less_than_computed_torque() -> None:

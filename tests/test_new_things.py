@@ -123,16 +123,3 @@ def test_a_command_is_one_file_of_its_name(tmp_path: Path, monkeypatch: pytest.M
     found = {command.name for command in commands()}
     sys.modules.pop(f"{room_of_commands.__name__}.newest")
     assert found == {*cli.commands, "newest"}
-
-
-def test_a_robot_is_one_file(tmp_path: Path) -> None:
-    """With a mission and gains of those that are there."""
-    text = (CONFIG / "robots/paper.yaml").read_text("utf-8")
-    (tmp_path / "newest.yaml").write_text(text)
-    plan = FlightPlan(
-        robot=str(tmp_path / "newest.yaml"),
-        mission=str(CONFIG / "missions/paper.yaml"),
-        gains=str(CONFIG / "gains/paper/tuned"),
-        duration=0.001,
-    )
-    assert simulate(Flight(resolve(plan))).ticks == 2

@@ -6,9 +6,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from allocation_bench import INERTIA, PERIOD, AllocationBench
+from allocation_bench import INERTIA, PERIOD, AllocationBench, couples
 from numpy.typing import NDArray
-from wheel_layouts import PYRAMID
 
 from space_robot_control.allocation.allocation import Allocation
 from space_robot_control.allocation.settings import AllocationSettings
@@ -17,19 +16,14 @@ from space_robot_model.hardware.base_actuators import BaseActuatorSettings
 Array = NDArray[np.float64]
 
 
-@pytest.mark.parametrize("sharing", ["pseudo_inverse", "least_largest"])
-def test_wheels_give_the_torque(sharing: str) -> None:
-    rng = np.random.default_rng(1)
-    for axes in (PYRAMID, np.eye(3), rng.normal(size=(8, 3))):
-        bench = AllocationBench(axes, sharing=sharing, null_gain=0.0)
-        for _ in range(10):
-            demand = rng.normal(size=3) * 0.1
-            np.testing.assert_allclose(bench.step(demand), demand, atol=1e-13)
-
-
 def test_null_motion_balances_and_the_base_feels_nothing() -> None:
-    bench = AllocationBench(momenta=[8.0, -5.0, 8.0, -5.0], null_gain=1.0, null_share=1.0)
-    given = bench.fly(np.zeros(3), 20000)
+    bench = AllocationBench(
+        momenta=[8.0, -5.0, 8.0, -5.0],
+        wheels={"max_torque": [20.0]},
+        null_gain=10.0,
+        null_share=1.0,
+    )
+    given = bench.fly(np.zeros(3), 2000)
     np.testing.assert_allclose(given, 0.0, atol=1e-13)
     stored = np.linalg.pinv(bench.axes.T) @ bench.axes.T @ [8.0, -5.0, 8.0, -5.0]
     np.testing.assert_allclose(bench.momenta, stored, atol=0.02)
@@ -37,150 +31,56 @@ def test_null_motion_balances_and_the_base_feels_nothing() -> None:
 
 @pytest.mark.parametrize("start", [0.0, [8.0, -3.0, -8.0, 1.0]])
 def test_wheels_are_kept_from_zero_speed(start: Any) -> None:
-    bench = AllocationBench(momenta=start, null_gain=1.0, least_speed=50.0)
-    bench.fly(np.zeros(3), 12000)
+    bench = AllocationBench(
+        momenta=start, wheels={"max_torque": [20.0]}, null_gain=10.0, least_speed=50.0
+    )
+    bench.fly(np.zeros(3), 1500)
     assert np.abs(bench.momenta / INERTIA).min() > 50.0
 
 
 def test_wheel_that_must_cross_zero_does_so_at_once() -> None:
     """A ramp through the stored momentum: 4 N m s are stored and taken out again and again."""
-    bench = AllocationBench(null_gain=5.0, least_speed=30.0)
-    bench.fly(np.zeros(3), 6000)
-    angles = np.arange(40000) * PERIOD
-    demands = 0.4 * np.stack([np.sin(angles), np.cos(angles), np.full(40000, 0.2)], axis=1)
-    given, momenta = np.empty((40000, 3)), np.empty((40001, 4))
+    wheels = {"max_torque": [8.0]}
+    bench, ticks = AllocationBench(wheels=wheels, null_gain=40.0, least_speed=30.0), 5000
+    bench.fly(np.zeros(3), 750)
+    angles = 8.0 * np.arange(ticks) * PERIOD
+    demands = 3.2 * np.stack([np.sin(angles), np.cos(angles), np.full(ticks, 0.2)], axis=1)
+    given, momenta = np.empty((ticks, 3)), np.empty((ticks + 1, 4))
     momenta[0] = bench.momenta
     for tick, demand in enumerate(demands):
         given[tick] = bench.step(demand)
         momenta[tick + 1] = bench.momenta
-    np.testing.assert_allclose(given, demands, atol=1e-12)
+    np.testing.assert_allclose(given, demands, atol=1e-11)
     assert np.sum(momenta[1:] * momenta[:-1] < 0.0) <= 40, "chatters"
-    assert np.sum(np.abs(momenta[1:]) < 0.9 * 30.0 * INERTIA) < 0.02 * 4 * 40000
-
-
-def test_null_motion_leaves_the_demand_what_it_needs() -> None:
-    bench = AllocationBench(momenta=[15.0, -15.0, 15.0, -15.0], null_gain=1e3, null_share=1.0)
-    given = bench.fly([0.9, 0.0, 0.0], 5)
-    np.testing.assert_allclose(given, np.tile([0.9, 0.0, 0.0], (5, 1)), atol=1e-12)
-    assert np.abs(bench.command).max() <= 1.0 + 1e-12
-
-
-def test_three_wheels_have_no_null_motion() -> None:
-    bench = AllocationBench(np.eye(3), momenta=[5.0, 4.0, 3.0], null_gain=10.0, least_speed=100.0)
-    bench.step(np.zeros(3))
-    np.testing.assert_array_equal(bench.command, 0.0)
-
-
-def test_two_failed_wheels_of_four_leave_two_axes() -> None:
-    bench = AllocationBench(failure_ticks=50)
-    bench.fly([0.3, 0.2, 0.1], 100)
-    bench.failed = {1, 3}
-    bench.fly([0.3, 0.2, 0.1], 200)
-    given = bench.step([0.3, 0.2, 0.1])
-    assert bench.allocation.wheels.healthy.rank == 2.0
-    np.testing.assert_allclose(given, [0.3, 0.0, 0.1], atol=1e-12)
-
-
-THRUSTERS = {
-    "positions": [
-        1,
-        0,
-        0,
-        1,
-        0,
-        0,
-        -1,
-        0,
-        0,
-        -1,
-        0,
-        0,
-        0,
-        1,
-        0,
-        0,
-        1,
-        0,
-        0,
-        -1,
-        0,
-        0,
-        -1,
-        0,
-        0,
-        0,
-        1,
-        0,
-        0,
-        1,
-        0,
-        0,
-        -1,
-        0,
-        0,
-        -1,
-    ],
-    "directions": [
-        0,
-        1,
-        0,
-        0,
-        -1,
-        0,
-        0,
-        1,
-        0,
-        0,
-        -1,
-        0,
-        0,
-        0,
-        1,
-        0,
-        0,
-        -1,
-        0,
-        0,
-        1,
-        0,
-        0,
-        -1,
-        1,
-        0,
-        0,
-        -1,
-        0,
-        0,
-        1,
-        0,
-        0,
-        -1,
-        0,
-        0,
-    ],
-    "force": [1.0],
-    "shortest_pulse": [0.01],
-}
+    assert np.sum(np.abs(momenta[1:]) < 0.9 * 30.0 * INERTIA) < 0.02 * 4 * ticks
 
 
 def test_thrusters_take_the_axis_that_wheels_cannot_give() -> None:
-    bench = AllocationBench(thrusters=THRUSTERS, failure_ticks=50)
-    bench.fly([0.3, 0.2, 0.1], 100)
-    assert np.all(bench.command[4:] == 0.0)
-    bench.failed = {1, 3}
-    bench.fly([0.3, 0.2, 0.1], 200)
-    given = bench.fly([0.3, 0.2, 0.1], 8000)
-    np.testing.assert_allclose(given.mean(axis=0), [0.3, 0.2, 0.1], atol=5e-3)
+    """Two failed wheels of four leave two axes."""
+    demand = [0.3, 0.2, 0.1]
+    benches = (
+        AllocationBench(failure_ticks=50),
+        AllocationBench(thrusters=couples(), failure_ticks=50),
+    )
+    for bench in benches:
+        bench.fly(demand, 100)
+        assert np.all(bench.command[4:] == 0.0)
+        bench.failed = {1, 3}
+        bench.fly(demand, 200)
+        assert bench.allocation.wheels.healthy.rank == 2.0
+    np.testing.assert_allclose(benches[0].step(demand), [0.3, 0.0, 0.1], atol=1e-12)
+    given = benches[1].fly(demand, 3000)
+    np.testing.assert_allclose(given.mean(axis=0), demand, atol=1e-2)
 
 
 def test_thrusters_alone_take_all() -> None:
-    given = AllocationBench(None, thrusters=THRUSTERS).fly([0.3, -0.2, 0.1], 8000)
-    np.testing.assert_allclose(given.mean(axis=0), [0.3, -0.2, 0.1], atol=5e-3)
+    given = AllocationBench(None, thrusters=couples()).fly([0.3, -0.2, 0.1], 3000)
+    np.testing.assert_allclose(given.mean(axis=0), [0.3, -0.2, 0.1], atol=1e-2)
 
 
 @pytest.mark.parametrize("wrong", [np.nan, np.inf])
 def test_demand_that_is_no_number_is_not_owed(wrong: float) -> None:
-    bench = AllocationBench(thrusters=THRUSTERS, null_gain=0.0)
+    bench = AllocationBench(thrusters=couples(), null_gain=0.0)
     bench.allocation.wheels.healthy.beyond[:] = np.eye(3)  # as without wheels
     bench.allocation.wheels.healthy.rank = 0.0
     bench.step([0.3, wrong, 0.1])
@@ -190,19 +90,20 @@ def test_demand_that_is_no_number_is_not_owed(wrong: float) -> None:
 
 def test_thrusters_unload_the_wheels_which_hold_the_base() -> None:
     bench = AllocationBench(
-        thrusters={**THRUSTERS, "force": [0.4]},
+        thrusters=couples(0.4),
         momenta=[14.2, 0.0, -14.2, 0.0],
+        wheels={"max_torque": [5.0]},
         unload_above=0.7,
-        unload_to=0.3,
-        unload_time=10.0,
+        unload_to=0.6,
+        unload_time=2.0,
         null_gain=0.0,
     )
-    given = bench.fly(np.zeros(3), 60000)
+    given = bench.fly(np.zeros(3), 12000)
     np.testing.assert_allclose(given, 0.0, atol=1e-12)
-    assert np.abs(bench.momenta).max() < 6.1
+    assert np.abs(bench.momenta).max() < 12.1
     assert bench.allocation.unloading.is_active == 0.0
     pulses = bench.allocation.modulation.pulses.sum()
-    bench.fly(np.zeros(3), 2000)
+    bench.fly(np.zeros(3), 1000)
     assert bench.allocation.modulation.pulses.sum() == pulses
 
 
@@ -212,7 +113,7 @@ def test_unloading_lasts_from_one_threshold_to_the_other(k: int, side: float) ->
     """Shares of each wheel's own largest momentum; the fullest wheel counts."""
     limits = np.array([40.0, 30.0, 50.0, 20.0])
     bench = AllocationBench(
-        thrusters=THRUSTERS,
+        thrusters=couples(),
         wheels={"max_momentum": limits.tolist()},
         null_gain=0.0,
         unload_above=0.7,
@@ -234,7 +135,7 @@ def test_unloading_asks_what_half_of_the_wheels_torque_can_hold(count: int) -> N
         most = rng.uniform(0.3, 2.0, count)
         bench = AllocationBench(
             rng.normal(size=(count, 3)),
-            THRUSTERS,
+            couples(),
             momenta=rng.uniform(-19.0, 19.0, count),
             wheels={"max_torque": most.tolist()},
             unload_above=0.02,
@@ -251,24 +152,11 @@ def test_unloading_asks_what_half_of_the_wheels_torque_can_hold(count: int) -> N
     assert 0 < cut < 20
 
 
-@pytest.mark.parametrize("seed", range(3))
-def test_thrusters_are_asked_for_what_the_axes_left_cannot_give(seed: int) -> None:
-    """Any two wheels: the part of the demand that is across both; the wheels get all of it."""
-    rng = np.random.default_rng(seed)
-    bench = AllocationBench(rng.normal(size=(4, 3)), THRUSTERS, failure_ticks=5, null_gain=0.0)
-    bench.failed = set(rng.permutation(4)[:2].tolist())
-    demand = rng.normal(size=3) * 0.1
-    bench.fly(demand, 20)
-    left = bench.axes[sorted({0, 1, 2, 3} - bench.failed)]
-    across = demand - np.linalg.pinv(left) @ (left @ demand)
-    np.testing.assert_allclose(bench.allocation.of_thrusters, across, atol=1e-9)
-
-
 def test_wheels_hold_against_pulses_when_these_come() -> None:
     """Valves are late by some ticks, each by its own; so is what the wheels do about them."""
     delays = np.arange(12) % 5
     bench = AllocationBench(
-        thrusters={**THRUSTERS, "force": [0.2], "delay": (delays * PERIOD).tolist()},
+        thrusters={**couples(0.2), "delay": (delays * PERIOD).tolist()},
         momenta=[15.0, 0.0, -15.0, 0.0],
         null_gain=0.0,
         unload_above=0.1,
@@ -290,8 +178,17 @@ def test_ideal_base_has_no_allocation() -> None:
 
 
 @pytest.mark.parametrize(
-    "wrong", [{"unload_to": 0.8}, {"schmitt_off": 1.0}, {"modulation": "pulse"}, {"gain": 1.0}]
+    ("key", "value"),
+    [
+        ("unload_to", 0.8),
+        ("schmitt_off", 1.0),
+        ("modulation", "pulse"),
+        ("gain", 1.0),
+        ("dump", "wheels"),
+        ("dump", ""),
+        ("magnetic_gain", -1e-3),
+    ],
 )
-def test_settings_that_cannot_be(wrong: dict[str, Any]) -> None:
-    with pytest.raises(ValueError, match=r"unload_to|schmitt_off|modulation|gain"):
-        AllocationSettings(**wrong)
+def test_settings_that_cannot_be(key: str, value: Any) -> None:
+    with pytest.raises(ValueError, match=key):
+        AllocationSettings(**{key: value})

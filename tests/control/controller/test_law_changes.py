@@ -1,126 +1,120 @@
-"""Laws and gains changed in flight as with ``ros2 param set``: recorded, told, replayed."""
+"""Laws and gains changed in flight, nodes that die: told, recorded, replayed; on real graphs."""
 
 from __future__ import annotations
 
-import threading
-import time
+import json
+from collections.abc import Callable
 from contextlib import closing
 from pathlib import Path
+from typing import Any
 
+import numpy as np
 import pytest
 from flights import forked_space_robot, space_robot_here, wait_for_nodes
 
 from space_robot.flight.graph.domain import ros_domain
-from space_robot.flight.graph.node_services import call_trigger, get_parameters, set_parameters
-from space_robot.flight.graph.temporary_node import TemporaryNode
 from space_robot.flight.replay.outcome import ReplayOptions
 from space_robot.flight.replay.run import replay
-from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.bag.reader import read_flight
 
 pytest.importorskip("rclpy")
-SWAP_S = 0.5
+
+from ground import Ground
+from rcl_interfaces.srv import GetParameters, SetParameters
+from rclpy.parameter import Parameter
+from std_srvs.srv import Trigger
+
+PERIOD = 5e-4
+SWAP_S, KILL_S = 0.5, 0.6
 """After all that the pilot changes: the plant goes on when the pilot says so, and no further."""
-SECONDS = 0.6
-TIMEOUT_S = 150.0
 
 
-class Pilot:
+class Pilot(Ground):
     """Lets a paused plant go on, and changes a controller's parameters as ``ros2 param`` does."""
 
-    def __init__(self, domain: int) -> None:
-        from rcl_interfaces.srv import SetParameters
-
-        self._visitors = [TemporaryNode(name, domain) for name in ("pilot", "stepper")]
-        self._node, self._stepper = (visitor.node for visitor in self._visitors)
-        self._set = self._node.create_client(SetParameters, "/controller_node/set_parameters")
-        self._request = SetParameters.Request
-        self._until = time.monotonic() + TIMEOUT_S
-
-    def _check(self) -> None:
-        assert time.monotonic() < self._until
-
-    def begin(self) -> None:
-        """Fly the first tick, as soon as the plant is active."""
-        self.law()  # with its answer those of the other service arrive, too
-        while not self._ask_plant("step"):
-            self._check()
-
-    def step(self, ticks: int) -> None:
-        set_parameters(self._stepper, "plant_node", {"step_ticks": ticks}, self._check)
-        assert self._ask_plant("step")
-
-    def resume(self) -> None:
-        assert self._ask_plant("resume")
-
-    def _ask_plant(self, action: str) -> bool:
-        return call_trigger(self._stepper, f"plant_node/{action}", self._check)[0]
-
-    def set(self, **values: object) -> list[bool]:
+    def set(self, node: str = "controller", **values: object) -> list[bool]:
         """In one call; whether each was accepted."""
-        from rclpy.executors import SingleThreadedExecutor
-        from rclpy.parameter import Parameter
-
         parameters = [Parameter(k.replace("__", "."), value=v) for k, v in values.items()]
-        request = self._request(parameters=[p.to_parameter_msg() for p in parameters])
-        executor = SingleThreadedExecutor(context=self._node.context)
-        executor.add_node(self._node)
-        future = self._set.call_async(request)
-        executor.spin_until_future_complete(future, TIMEOUT_S)
-        executor.shutdown()
-        assert future.done()
-        return [result.successful for result in future.result().results]
+        request = SetParameters.Request(parameters=[p.to_parameter_msg() for p in parameters])
+        answer = self.call(SetParameters, f"/{node}_node/set_parameters", request)
+        return [result.successful for result in answer.results]
 
     def law(self) -> str:
-        """The parameter ``controller``."""
-        return str(get_parameters(self._node, "controller_node", ["controller"], self._check)[0])
+        """The parameter ``controller``, as soon as there is one who tells it."""
+        request = GetParameters.Request(names=["controller"])
+        answer = self.call(GetParameters, "/controller_node/get_parameters", request)
+        return str(answer.values[0].string_value)
 
-    def close(self) -> None:
-        for visitor in self._visitors:
-            visitor.leave()
+    def ask_plant(self, action: str) -> str:
+        """What it answers, if it does so."""
+        answer = self.call(Trigger, f"/plant_node/{action}", Trigger.Request())
+        return answer.message if answer.success else ""
+
+    def step(self, ticks: int) -> int:
+        """The tick at which it then stands."""
+        assert self.set("plant", step_ticks=ticks) == [True]
+        message = self.ask_plant("step")
+        assert message.startswith("stepped to tick ")
+        return int(message.split()[3])
+
+    def step_until(self, is_there: Callable[[], bool], ticks: int, what: str) -> None:
+        """Step some ticks, and again until something is so."""
+
+        def stepped() -> bool:
+            tick = self.step(ticks)
+            self.until(lambda: self.value("plant", "tick") >= tick, "its diagnostics")
+            return is_there()
+
+        self.until(stepped, what)
 
 
 class Flown:
-    """What came of the flight, and the parameter ``controller`` after the planned swap."""
+    """What came of a flight."""
 
-    def __init__(self, bag: Path, errors: str, table: str, swapped_to: str) -> None:
-        self.bag, self.errors, self.table, self.swapped_to = bag, errors, table, swapped_to
-        self.log: FlightLog = read_flight(bag)
+    def __init__(self, bag: Path, output: str, errors: str) -> None:
+        self.bag, self.errors, self.log = bag, errors, read_flight(bag)
+        self.report: dict[str, Any] = json.loads(output)
+
+    def time_of(self, node: str, what: str, after: float = 0.0) -> float:
+        """Simulated time of the first event of a node that begins so."""
+        for event in self.report["graph"]["events"]:
+            is_it = event["node"] == f"{node}_node" and event["what"].startswith(what)
+            if is_it and event["simulated_s"] >= after:
+                return float(event["simulated_s"])
+        raise AssertionError(f"{node}: {what!r} not in {self.report['graph']['events']}")
 
 
 @pytest.fixture(scope="module")
 def flown(tmp_path_factory: pytest.TempPathFactory) -> Flown:
-    """Swapped, refused, two gains in two calls, there and back between two looks, and a plan."""
+    """Swapped, refused, two gains in two calls, there and back between two looks, and a plan; then
+    the controller is killed, and another one takes over."""
     bag = tmp_path_factory.mktemp("changed") / "bag"
     with ros_domain() as domain:
         pass  # a free one, for the flight to take
-    plan = ("--duration", str(SECONDS), "--swap", f"{SWAP_S}:tde_smc", "--bag", str(bag))
-    process = forked_space_robot("fly", "--paused", *plan, "--domain", str(domain))
+    plan = f"--duration 3 --swap {SWAP_S}:tde_smc --set plant.silence_timeout=0.2 --json".split()
+    plan += ["--set", "plant.hold_ticks=100"]
+    death = ["--restart-controller", "--fault", f"kill_controller@{KILL_S}"]
+    place = ["--bag", str(bag), "--domain", str(domain)]
+    process = forked_space_robot("fly", "--paused", *plan, *death, *place)
     try:
         wait_for_nodes(domain)
-        swapped_to = change_laws(domain)
-        table, errors = process.communicate(timeout=TIMEOUT_S)
+        change_laws(domain)
+        output, errors = process.communicate(timeout=150)
     finally:
         process.kill()
     assert process.returncode == 0, errors
-    return Flown(bag, errors, table, swapped_to)
+    return Flown(bag, output, errors)
 
 
-def change_laws(domain: int) -> str:
-    """The law by its parameter after the planned swap."""
+def change_laws(domain: int) -> None:
     with closing(Pilot(domain)) as pilot:
-        pilot.begin()
-        pilot.step(100)
-        going_on = threading.Thread(target=pilot.step, args=[400])
-        going_on.start()
+        pilot.law()
+        pilot.until(lambda: bool(pilot.ask_plant("step")), "an active plant")
+        pilot.step(500)
         assert pilot.set(controller="tde_tsmc") == [True]
-        going_on.join()
         pilot.step(40)
-        assert pilot.set(controller="pid", tde_stc__k_1=[0.3], tde_stc__lambda=[-1.0]) == [
-            False,
-            True,
-            False,
-        ]
+        gains: dict[str, object] = {"tde_stc__k_1": [0.3], "tde_stc__lambda": [-1.0]}
+        assert pilot.set(controller="pid", **gains) == [False, True, False]
         for _ in range(2):
             assert pilot.set(tde_tsmc__k_1=[0.5]) == [True]
             pilot.step(40)
@@ -128,51 +122,81 @@ def change_laws(domain: int) -> str:
         pilot.step(100)
         assert pilot.set(controller="tde_stc") == [True]
         pilot.step(400)
-        law = pilot.law()
-        pilot.resume()
-        return law
+        assert pilot.law() == "tde_smc", "the parameter tells the law after a planned swap"
+        pilot.step_until(lambda: pilot.value("plant", "missed_deadlines") >= 250, 400, "silence")
+        dead = pilot.value("plant", "tick")
+        pilot.step_until(lambda: pilot.value("controller", "tick") > dead, 20, "the next one")
+        pilot.step(400)
+        assert pilot.ask_plant("resume")
 
 
 def test_every_change_is_in_the_bag_with_its_tick(flown: Flown) -> None:
     laws = flown.log.laws
     names = [law.name for law in laws]
-    assert names == ["tde_stc", "tde_tsmc", "tde_tsmc", "ctc", "tde_stc", "tde_smc"]
+    assert names[:6] == ["tde_stc", "tde_tsmc", "tde_tsmc", "ctc", "tde_stc", "tde_smc"]
     ticks = [law.tick for law in laws]
     assert ticks == sorted(set(ticks))
-    assert (ticks[0], ticks[-1]) == (0, round(SWAP_S / 0.0005))
-    assert [law.is_first for law in laws] == [True, *[False] * 5]
+    assert (ticks[0], ticks[5]) == (0, round(SWAP_S / PERIOD))
+    assert ticks[6] > KILL_S / PERIOD
+    assert [law.is_first for law in laws] == [True, *[False] * 5, True]
     assert laws[1].gains["k_1"] != laws[2].gains["k_1"] == (0.5,) * 9
     assert laws[0].gains["k_1"] != laws[4].gains["k_1"] == (0.3,) * 9
     assert laws[0].gains["lambda"] == laws[4].gains["lambda"], "that one was refused"
 
 
-def test_the_parameter_tells_the_law_after_a_planned_swap(flown: Flown) -> None:
-    assert flown.swapped_to == "tde_smc"
+def test_a_dead_controller_leaves_the_plant_holding_then_without_torque(flown: Flown) -> None:
+    """And the next one takes over from no torque: its first step is like those of its next 10 ms.
+
+    The force before the death would be a step of hundreds of times that.
+    """
+    assert flown.report["graph"]["restarts"] == 1
+    killed = round(flown.time_of("controller", "killed") / PERIOD)
+    torque = flown.log.applied_torque
+    acts = np.abs(torque[killed:]).max(axis=1) > 0.0
+    safe = killed + int(np.argmin(acts))
+    back = safe + int(np.argmax(acts[safe - killed :]))
+    assert killed < safe < back
+    held = torque[safe - 50 : safe]
+    np.testing.assert_array_equal(held, np.broadcast_to(held[0], held.shape))
+    steps = np.abs(np.diff(torque[back - 1 : back + 20], axis=0))
+    assert np.all(steps[0] <= 3.0 * steps[1:].max(axis=0))
 
 
 def test_it_replays_to_the_last_bit(flown: Flown, domain: int) -> None:
+    """The replayed controller, too, begins again where the other did."""
+    assert flown.log.commanded_torque is not None
+    answered = np.flatnonzero(np.isfinite(flown.log.commanded_torque).all(axis=1))
+    assert flown.log.laws[6].tick in answered, "the recorder has missed the first answer"
     done = replay(ReplayOptions(flown.bag, domain=domain))
     assert done.is_judged
     assert done.comparison.is_identical, done.report()["first_difference"]
-    assert len(done.comparison.ticks) == flown.log.ticks
+    np.testing.assert_array_equal(done.comparison.ticks, answered)
 
 
 def test_a_part_begins_under_the_law_in_force_there(flown: Flown, domain: int) -> None:
     """CTC has no memory: it is equal again once it has taken over from the applied torque."""
-    ctc = flown.log.laws[3]
-    until = flown.log.laws[4].tick
-    period = flown.log.timebase.period
-    done = replay(
-        ReplayOptions(
-            flown.bag, domain=domain, start_s=(ctc.tick + 1) * period, end_s=until * period
-        )
-    )
-    assert done.comparison.ticks.tolist() == list(range(ctc.tick + 1, until))
+    first, until = flown.log.laws[3].tick + 1, flown.log.laws[4].tick
+    part = {"start_s": first * PERIOD, "end_s": until * PERIOD}
+    done = replay(ReplayOptions(flown.bag, domain=domain, **part))
+    assert done.comparison.ticks.tolist() == list(range(first, until))
     assert not done.comparison.equal[0]
     assert done.comparison.equal[45:].all(), "the transfer lasts 40 ticks, in flight and now"
 
 
-def test_another_controller_flies_its_own_law_throughout(flown: Flown) -> None:
-    result = space_robot_here("replay", str(flown.bag), "--controller", "ctc", "--end", "0.5")
-    assert result.returncode == 0, result.stderr
-    assert "ctc, gains default" in result.stdout
+def test_without_mission_the_last_point_is_held_and_without_recorder_the_exit_code_tells(
+    tmp_path: Path,
+) -> None:
+    limits = ["--set", "controller.reference_timeout=0.2", "--set", "mission.lead_ticks=200"]
+    kinds = "stop_controller@0.05:0.1", "kill_mission@0.2", "kill_recorder@0.6"
+    faults = ["--duration", "2", *(word for kind in kinds for word in ("--fault", kind))]
+    result = space_robot_here("fly", "--bag", str(tmp_path / "bag"), "--json", *limits, *faults)
+    assert result.returncode == 1
+    assert "Traceback" not in result.stderr
+    assert "recorder ended by signal 9" in result.stderr
+    flown = Flown(tmp_path / "bag", result.stdout, result.stderr)
+    flown.time_of("controller", "holding the reference: the mission is silent", after=0.2)
+    flown.time_of("controller", "goes on (SIGCONT)")
+    assert flown.report["unfinished"]
+    nodes = flown.report["graph"]["nodes"]
+    assert int(nodes["controller_node"]["references_held"]) > 100
+    assert int(nodes["plant_node"]["tick"]) == 4_000

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from contextlib import suppress
+from typing import Any
 
 import numpy as np
 import pytest
@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from space_robot_control.controller.controller import Controller
 from space_robot_control.controller.reference_buffer import ReferenceBuffer
+from space_robot_control.controller.signal_kernels import LARGEST
 from space_robot_control.controller.supervision import NOMINAL_FROM_ETA, SAFE_BELOW_ETA
 from space_robot_control.controller.supervisor import Mode, Supervisor
 from space_robot_control.controller.time_delay_estimation import LONGEST_GAP
@@ -21,11 +22,10 @@ from space_robot_control.laws import ControlLaw, LawGains, Signals
 from space_robot_model.hardware.base_actuators import BaseActuatorSettings
 from space_robot_model.robot import Robot
 from space_robot_msgs_py.compiled.records import Block
-from space_robot_msgs_py.errors import MessageError
+from space_robot_msgs_py.errors import MessageError, UnusableStateError
 from space_robot_msgs_py.samples import STATE_FIELDS, Reference, RobotState
 
 Array = NDArray[np.float64]
-
 AXES, HOLD = 9, 5
 REST = Reference.at_rest(6)
 """The reference that asks for rest at zero."""
@@ -60,9 +60,6 @@ def with_nan(state: RobotState) -> RobotState:
     return state
 
 
-# References
-
-
 def moving(tick: int) -> Block:
     """All axes move, and speed up."""
     reference = Reference.at_rest(6)
@@ -71,7 +68,7 @@ def moving(tick: int) -> Block:
     return reference
 
 
-@pytest.mark.parametrize("name", sorted(GAINS))
+@pytest.mark.parametrize("name", ["ctc", "tde_stc"])
 def test_a_bad_reference_is_held_as_a_buffer_holds_it(paper_robot: Robot, name: str) -> None:
     """And no law keeps anything of it."""
     bad = {4: (0, np.nan), 5: (17, -np.inf), 6: (22, 1.1e30), 11: (26, np.inf), 12: (18, np.nan)}
@@ -114,6 +111,7 @@ def test_before_the_first_reference_no_law_answers(paper_robot: Robot, law: Cont
 
 # Any stream of states
 
+
 numbers = st.lists(st.floats(width=64) | st.floats(-2.0, 2.0), min_size=31, max_size=31)
 unit = st.lists(st.floats(-1.0, 1.0), min_size=4, max_size=4).filter(
     lambda q: np.hypot(*q[:2]) > 1e-3
@@ -136,7 +134,7 @@ def assert_safe(supervisor: Supervisor, state: RobotState) -> None:
         assert not command.torque.any()
 
 
-@settings(max_examples=150)
+@settings(max_examples=100)
 @given(st.sampled_from(sorted(GAINS)), streams)
 @example("tde_stc", [(1, [0.0] * 4 + [1e300] * 27, [1.0, 0.0, 0.0, 0.0])] * 3)
 def test_whatever_is_measured_commands_are_finite_and_it_comes_back(
@@ -186,39 +184,48 @@ def test_a_bad_state_is_answered_with_the_last_torque_for_a_while(
     assert supervisor.rejected.total() == good.count(False)
 
 
-@pytest.mark.parametrize(
-    ("corrupt", "kind"),
-    [
-        (lambda s: s.omega_base.fill(np.nan), "state not finite"),
-        (lambda s: s.applied_torque.fill(-np.inf), "state not finite"),
-        (lambda s: s.quaternion.fill(np.inf), "state not finite"),
-        (lambda s: s.joint_positions.fill(1e200), "state too large"),
-        (lambda s: s.quaternion.__imul__(1.01), "quaternion not unit"),
-        (lambda s: s.quaternion.fill(0.0), "quaternion not unit"),
-    ],
-)
-def test_what_was_wrong_is_counted_and_held_over(
-    paper_robot: Robot, corrupt: Callable[[RobotState], None], kind: str
+BAD: list[tuple[str, Any, float, str]] = [
+    ("omega_base", slice(3), np.nan, "state not finite"),
+    ("applied_torque", slice(9), -np.inf, "state not finite"),
+    ("quaternion", slice(4), np.inf, "state not finite"),
+    *(
+        (field, place, number, "state not finite")
+        for place in (0, -1)
+        for field, number in (
+            ("quaternion", np.nan),
+            ("omega_base", np.inf),
+            ("joint_positions", np.nan),
+            ("joint_velocities", -np.inf),
+            ("applied_torque", np.nan),
+        )
+    ),
+    ("joint_velocities", 0, -2.0 * LARGEST, "state too large"),
+    ("joint_velocities", -1, -2.0 * LARGEST, "state too large"),
+    ("applied_torque", -1, 1e300, "state too large"),
+    ("joint_positions", slice(6), 1e200, "state too large"),
+    ("quaternion", 0, 1.1, "quaternion not unit"),
+    ("quaternion", slice(4), 0.0, "quaternion not unit"),
+]
+
+
+@pytest.mark.parametrize(("field", "place", "number", "kind"), BAD)
+def test_a_bad_state_is_counted_held_over_and_leaves_no_trace(
+    paper_robot: Robot, field: str, place: Any, number: float, kind: str
 ) -> None:
-    """An attitude of zeros is a broken sensor, not half a turn."""
-    supervisor = supervisor_of(paper_robot)
-    torque = supervisor.answer(state_at(0), REST).torque.copy()
-    state = state_at(1)
-    corrupt(state)
-    np.testing.assert_array_equal(supervisor.answer(state, REST).torque, torque)
-    assert supervisor.rejected == {kind: 1}
-    assert supervisor.mode is Mode.HOLDING
-
-
-def test_a_bad_state_leaves_no_trace(paper_robot: Robot) -> None:
-    """Answers after it are those of a controller that has not been shown it."""
-    with_bad, without = (Supervised(paper_robot, "tde_stc", HOLD) for _ in range(2))
-    for loop in (with_bad, without):
-        loop.fly_supervised(100)
-    for bad in (with_nan(state_at(100)), state_at(100, scale=1.1)):
-        with_bad.supervisor.answer(bad, REST)
-    torques = with_bad.fly_supervised(50)[1]
-    np.testing.assert_array_equal(torques, without.fly_supervised(50)[1])
+    """Wherever the bad number stands; an attitude of zeros is a broken sensor, not half a turn."""
+    shown, spared = (Supervised(paper_robot, "tde_stc", HOLD) for _ in range(2))
+    before, _ = (loop.fly(20)[1][-1] for loop in (shown, spared))
+    state, reference = shown.plant.state.copy(), shown.references.at(20)
+    getattr(state, field)[place] = number
+    held = shown.supervisor.answer(state, reference).torque
+    np.testing.assert_array_equal(held, before)
+    assert shown.supervisor.rejected == {kind: 1}
+    assert shown.supervisor.mode is Mode.HOLDING
+    with pytest.raises(UnusableStateError, match="at tick 20 the") as caught:
+        shown.controller.update(state, reference)
+    assert (caught.value.tick, caught.value.kind) == (20, kind)
+    torques = shown.fly(20)[1]
+    np.testing.assert_array_equal(torques, spared.fly(20)[1])
 
 
 # Near half a turn
@@ -234,15 +241,6 @@ def test_near_half_a_turn_it_is_safe_until_well_away(paper_robot: Robot) -> None
         modes.append(supervisor.mode)
     assert modes == [Mode.NOMINAL] * 2 + [Mode.SAFE] * 2 + [Mode.NOMINAL] * 2
     assert supervisor.rejected == {"attitude error near 180 degrees": 2}
-
-
-def test_a_single_bad_state_near_half_a_turn_is_held_over(paper_robot: Robot) -> None:
-    supervisor, between = supervisor_of(paper_robot), 0.5 * (SAFE_BELOW_ETA + NOMINAL_FROM_ETA)
-    modes = []
-    for state in (state_at(0, between), with_nan(state_at(1, between)), state_at(2, between)):
-        supervisor.answer(state, REST)
-        modes.append(supervisor.mode)
-    assert modes == [Mode.NOMINAL, Mode.HOLDING, Mode.NOMINAL]
 
 
 def test_half_a_turn_is_that_of_the_error(paper_robot: Robot) -> None:
@@ -267,17 +265,17 @@ def test_half_a_turn_is_that_of_the_error(paper_robot: Robot) -> None:
     assert supervisor.rejected == {"attitude error near 180 degrees": 2}
 
 
-def test_a_free_base_has_no_singular_attitude(paper_robot: Robot) -> None:
-    """Nothing turns it, so no J0 is asked for, wherever it is."""
-    controller = Controller(
-        paper_robot,
-        law_of("tde_stc"),
-        PERIOD,
-        actuators=BaseActuatorSettings(base_actuation="none"),
-    )
-    supervisor = Supervisor(controller, HOLD)
+@pytest.mark.parametrize("law", [law_of("tde_stc"), Held({}, PERIOD, AXES)])
+def test_a_free_base_has_no_singular_attitude_and_gets_no_torque(
+    paper_robot: Robot, law: ControlLaw
+) -> None:
+    """Nothing turns it, so no J0 is asked for, wherever it is, whatever the law asks for."""
+    free = BaseActuatorSettings(base_actuation="none")
+    supervisor = Supervisor(Controller(paper_robot, law, PERIOD, actuators=free), HOLD)
     for tick, eta in enumerate([1.0, 0.03, 1e-3, 0.0, -1e-9, -0.5]):
-        supervisor.answer(state_at(tick, eta), REST)
+        torque = supervisor.answer(state_at(tick, eta), REST).torque
+        np.testing.assert_array_equal(torque[:3], 0.0)
+        assert torque[3:].all()
         assert supervisor.mode is Mode.NOMINAL
     assert not supervisor.rejected
 
@@ -325,48 +323,23 @@ class Supervised(Loop):
     def __init__(self, robot: Robot, name: str, hold_ticks: int) -> None:
         super().__init__(robot, law_of(name))
         self.supervisor = Supervisor(self.controller, hold_ticks)
-
-    def fly_supervised(self, ticks: int, blind: bool = False) -> tuple[Array, Array]:
-        """Errors and torques, as `fly`; the errors while blind are the last ones."""
-        errors, torques = [], []
-        for _ in range(ticks):
-            tick, state = self.plant.tick, self.plant.state
-            if not self.references.covers(tick):
-                self.references.add(self.mission.chunk(tick, 100))
-            seen = state
-            if blind:
-                seen = RobotState.allocate(6)
-                seen.tick, seen.quaternion[:] = tick, np.nan
-            command = self.supervisor.answer(seen, self.references.at(tick))
-            errors.append(self.controller.signals.error.copy())
-            torques.append(command.torque.copy())
-            self.plant.step(command)
-        return np.array(errors), np.array(torques)
+        self.answer = self.supervisor.answer
 
 
-def test_supervised_flights_are_the_same_to_the_last_bit(paper_robot: Robot) -> None:
-    supervised, plain = (
-        Supervised(paper_robot, "tde_stc", HOLD),
-        Loop(paper_robot, law_of("tde_stc")),
-    )
-    for one, other in zip(supervised.fly_supervised(300), plain.fly(300), strict=True):
-        np.testing.assert_array_equal(one, other)
-
-
-@pytest.mark.parametrize("name", ["ctc", "tde_stc", "tde_tsmc"])
+@pytest.mark.parametrize("name", ["ctc", "tde_stc"])
 @pytest.mark.parametrize("blind_ticks", [1, LONGEST_GAP - 1, LONGEST_GAP + 5, 300])
 def test_a_blind_flight_finds_back_without_a_jolt(
     paper_robot: Robot, name: str, blind_ticks: int
 ) -> None:
     """Over a blink it holds; over 150 ms (100 of them without torque) it falls behind a little."""
     loop = Supervised(paper_robot, name, hold_ticks=100)
-    loop.fly_supervised(2000)
-    before = loop.fly_supervised(1)[1][-1]
-    _, torques = loop.fly_supervised(blind_ticks, blind=True)
+    loop.fly(2000)
+    before = loop.fly(1)[1][-1]
+    _, torques = loop.fly(blind_ticks, is_blind=True)
     np.testing.assert_array_equal(torques[:100], np.broadcast_to(before, torques[:100].shape))
     assert not torques[100:].any()
     applied = loop.plant.state.applied_torque.copy()
-    errors, torques = loop.fly_supervised(4000)
+    errors, torques = loop.fly(4000)
     assert loop.supervisor.mode is Mode.NOMINAL
     if blind_ticks > LONGEST_GAP:  # it takes over from what is applied
         np.testing.assert_allclose(torques[0], applied, atol=1e-9)

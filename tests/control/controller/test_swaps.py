@@ -1,15 +1,27 @@
-"""Swaps as text, and what is said of bad ones."""
+"""Swaps as text; laws and controllers that take over in flight without a jolt."""
 
 from __future__ import annotations
 
+from typing import Any
+
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from numpy.typing import NDArray
 
+from space_robot.analysis.metrics import tracking_error
+from space_robot.flight.closed_loop import close_loop
+from space_robot.flight.flown_log import empty_log
 from space_robot.flight.plan import Flight, FlightPlan, resolve
+from space_robot_control.controller.controller import TRANSFER_S, Controller
+from space_robot_control.controller.gains import build_law
 from space_robot_control.controller.swaps import Swap, parse_swaps
+from space_robot_control.laws import laws
+from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.errors import InputError
 
+Array = NDArray[np.float64]
 PERIOD = 5e-4
 
 
@@ -21,36 +33,134 @@ def test_swaps_are_read_in_the_order_of_their_ticks(laws: dict[int, str], shuffl
     assert parse_swaps(texts, PERIOD) == [Swap(tick, laws[tick]) for tick in sorted(laws)]
 
 
-def test_between_two_ticks_the_next_one_counts() -> None:
-    assert parse_swaps(["0.00051:ctc"], PERIOD) == [Swap(2, "ctc")]
+@pytest.mark.parametrize(
+    ("texts", "swaps"),
+    [
+        (["0.00051:ctc"], [Swap(2, "ctc")]),  # between two ticks the next one counts
+        (["", "  "], []),  # ROS has no empty list of strings
+        (["1: my_laws:Mine "], [Swap(2000, "my_laws:Mine")]),
+    ],
+)
+def test_a_swap_is_read(texts: list[str], swaps: list[Swap]) -> None:
+    assert parse_swaps(texts, PERIOD) == swaps
 
 
-def test_empty_texts_are_no_swaps() -> None:
-    """ROS has no empty list of strings."""
-    assert parse_swaps(["", "  "], PERIOD) == []
+NO_SWAP = "T:LAW expected.*as in 5:tde_smc"
+NO_TIME = r"T must be from 0 to 1e\+09 s"
 
 
-def test_a_law_of_ones_own_keeps_its_colon() -> None:
-    assert parse_swaps(["1: my_laws:Mine "], PERIOD) == [Swap(2000, "my_laws:Mine")]
+@pytest.mark.parametrize(
+    ("texts", "said"),
+    [
+        *(
+            ([text], rf"swap '{text}': {NO_SWAP}")
+            for text in ("5", "5:", ":ctc", "x:ctc", "nan:ctc")
+        ),
+        *(([f"{t}:ctc"], rf"swap '{t}:ctc': {NO_TIME}") for t in ("-1", "inf", "1.1e9")),
+        (["1:tde_stc", "0.9999999999:ctc"], "swaps to ctc and to tde_stc fall on tick 2000"),
+        (["1:nonesuch"], "nonesuch"),
+    ],
+)
+def test_a_wrong_swap_is_refused_before_the_flight(texts: list[str], said: str) -> None:
+    with pytest.raises(InputError, match=said):
+        Flight(resolve(FlightPlan(swaps=texts)))
 
 
-@pytest.mark.parametrize("text", ["5", "5:", ":ctc", "x:ctc", "nan:ctc"])
-def test_what_is_no_swap_is_refused_with_an_example(text: str) -> None:
-    with pytest.raises(InputError, match=rf"swap '{text}': T:LAW expected.*as in 5:tde_smc"):
-        parse_swaps([text], PERIOD)
+# Taking over
 
 
-@pytest.mark.parametrize("time", ["-1", "inf", "1.1e9"])
-def test_a_time_that_no_flight_has_is_refused(time: str) -> None:
-    with pytest.raises(InputError, match=rf"swap '{time}:ctc': T must be from 0 to 1e\+09 s"):
-        parse_swaps([f"{time}:ctc"], PERIOD)
+NOMINAL = [f"{name} nominal" for name, law in laws().items() if "h_bar" in law.gain_descriptions()]
+LAWS = sorted([*laws(), *NOMINAL])
+TAKEOVER, STOP = 2000, 2060
+"""Ticks: at 1 s the arm moves on all its joints; flown until 1.03 s."""
+TRANSFER = round(TRANSFER_S / PERIOD)
+ACCURATE = [name for name in LAWS if name.startswith(("ctc", "tde", "indi"))]
+"""Laws that know or estimate every force, and so have small errors in motion."""
 
 
-def test_two_swaps_on_one_tick_are_refused() -> None:
-    with pytest.raises(InputError, match="swaps to ctc and to tde_stc fall on tick 2000"):
-        parse_swaps(["1:tde_stc", "0.9999999999:ctc"], PERIOD)
+def name_of(law: str) -> str:
+    """Without the inertia of its estimate."""
+    return law.split()[0]
 
 
-def test_a_law_there_is_not_is_refused_before_the_flight() -> None:
-    with pytest.raises(InputError, match="nonesuch"):
-        Flight(resolve(FlightPlan(swaps=["1:nonesuch"])))
+class CommonBeginning:
+    """A flight up to `TAKEOVER` under one law, to be flown on under others."""
+
+    def __init__(self, law: str, **plan: object) -> None:
+        gains = {name_of(law): {"h_bar": ["nominal"]}} if law in NOMINAL else "tuned"
+        content = {"controller": name_of(law), "gains": gains, "duration": 1.05, **plan}
+        self.flight = Flight(resolve(FlightPlan.model_validate(content)))
+        self.log = empty_log(self.flight)
+        close_loop(self.flight.plant, self.flight.controller, self.log, 0, TAKEOVER)
+        plant = self.flight.plant
+        self._memories = [plant.block, plant.command_delay_buffer, self.flight.controller.block]
+        self._kept = [memory.copy() for memory in self._memories]
+
+    def goes_on(self, name: str, is_restarted: bool) -> tuple[Controller, FlightLog]:
+        """The flight under another law from `TAKEOVER` on: of the same controller, or of a new
+        one as after a restart; it has not been there at the tick before."""
+        for memory, kept in zip(self._memories, self._kept, strict=True):
+            memory[...] = kept
+        flight, controller = self.flight, self.flight.controller
+        flight.plant.state.tick = TAKEOVER
+        law = build_law(name_of(name), flight.controller_settings, flight.robot.n + 3)
+        if name in NOMINAL:
+            law.gain_values = {**law.gain_values, "h_bar": np.zeros(flight.robot.n + 3)}
+        if is_restarted:
+            actuators = flight.scenario.assumed_actuators
+            controller = Controller(flight.robot, law, flight.period, actuators=actuators)
+        else:
+            controller.law = law
+        close_loop(flight.plant, controller, self.log, TAKEOVER, TAKEOVER + 1)
+        applied, force = controller.signals.applied_force, controller.block[0].force
+        np.testing.assert_allclose(force, applied, rtol=1e-9, atol=1e-9)
+        close_loop(flight.plant, controller, self.log, TAKEOVER + 1, STOP)
+        assert controller.block[0].transfer_left == 0.0
+        return controller, self.log
+
+
+def assert_smooth(log: FlightLog, before: str, now: str) -> None:
+    """The torque steps no more than in the 10 ms after, on any axis, and the errors stay."""
+    assert log.commanded_torque is not None
+    steps = np.abs(np.diff(log.commanded_torque[:STOP], axis=0))
+    own = steps[TAKEOVER : TAKEOVER + 20].max(axis=0)
+    assert (steps[TAKEOVER - 1] <= own).all(), (before, now)
+    if {before, now} <= set(ACCURATE):
+        error = np.abs(tracking_error(log)[TAKEOVER:STOP])
+        assert error[:, :3].max() < 1e-5, (before, now)
+        assert error[:, 3:].max() < 1e-4, (before, now)
+
+
+@pytest.mark.parametrize("is_restarted", [False, True], ids=["swapped", "restarted"])
+@pytest.mark.parametrize("first", LAWS)
+def test_every_law_takes_over_smoothly_from_every_other(first: str, is_restarted: bool) -> None:
+    """At the first tick the force is the one applied; after 20 ms it is the law's own."""
+    beginning = CommonBeginning(first)
+    for law in LAWS:
+        if law != first or is_restarted:
+            assert_smooth(beginning.goes_on(law, is_restarted)[1], first, law)
+
+
+PLANS: list[dict[str, Any]] = [
+    {"command_latency_ticks": 1},
+    {"command_latency_ticks": 4},
+    {"parameters": {"plant": {"initial_quaternion": [0.8, 0.0, 0.6, 0.0]}}},
+    {"actuators": "none"},
+    {"case": "3"},
+]
+
+
+@pytest.mark.parametrize("plan", PLANS, ids=str)
+def test_so_it_does_late_at_any_attitude_with_a_free_base_and_payload(plan: dict[str, Any]) -> None:
+    """With late commands from what is applied now: the torque goes back by what it has gone since,
+    and no further. A base that nothing turns gets no torque, whatever was on its axes."""
+    beginning, late = CommonBeginning("tde_stc", **plan), plan.get("command_latency_ticks", 0)
+    for law in LAWS:
+        for is_restarted in (False, True):
+            torque = beginning.goes_on(law, is_restarted)[1].commanded_torque
+            assert torque is not None
+            applied = torque[TAKEOVER - 1 - late]
+            near = 2e-5 if "parameters" in plan else 1e-6  # J0 turns with the base
+            np.testing.assert_allclose(torque[TAKEOVER], applied, rtol=near, atol=near)
+            if "actuators" in plan:
+                assert (torque[TAKEOVER:STOP, :3] == 0.0).all()

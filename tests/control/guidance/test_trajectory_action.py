@@ -6,8 +6,8 @@ import os
 import signal
 import subprocess
 import sys
-import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
+from contextlib import closing
 from pathlib import Path
 from typing import Any
 
@@ -27,12 +27,11 @@ if not ros_interfaces.has_compilers():
 
 from action_msgs.msg import GoalStatus  # noqa: E402
 from builtin_interfaces.msg import Duration  # noqa: E402
+from ground import Ground  # noqa: E402
 from rclpy.action import ActionClient  # noqa: E402
-from rclpy.executors import SingleThreadedExecutor  # noqa: E402
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint  # noqa: E402
 
-from space_robot.flight.graph.temporary_node import TemporaryNode  # noqa: E402
-
+Array = np.ndarray[Any, np.dtype[np.float64]]
 TIMEOUT_S = 60.0
 NAMES = find_robot("paper").joint_names
 HOME = np.radians([0.0, 120.0, 220.0, 0.0, -10.0, 0.0])
@@ -55,32 +54,22 @@ def control_msgs(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
         del sys.modules[name]
 
 
-class Client:
+class Client(Ground):
     """A client of the action, in the flight's domain."""
 
     def __init__(self, domain: int) -> None:
         from control_msgs.action import FollowJointTrajectory
 
-        self.action = FollowJointTrajectory
-        self.node = TemporaryNode("moveit", domain)
-        self.executor = SingleThreadedExecutor(context=self.node.node.context)
-        self.executor.add_node(self.node.node)
-        self.client = ActionClient(
-            self.node.node, FollowJointTrajectory, "/mission_node/follow_joint_trajectory"
-        )
-        self.feedback: list[Any] = []
+        super().__init__(domain)
+        self.action, self.feedback = FollowJointTrajectory, list[Any]()
+        name = "/mission_node/follow_joint_trajectory"
+        self.client = ActionClient(self.node, FollowJointTrajectory, name)
 
-    def send(
-        self,
-        seconds: int,
-        goal: np.ndarray | None = None,
-        first: np.ndarray = HOME,
-        **settings: Any,
-    ) -> Any:
+    def send(self, seconds: int, goal: Array = GOAL, first: Array = HOME, **settings: Any) -> Any:
         """Send a goal, which begins with the present state as MoveIt's do; return its handle."""
         points = [
             JointTrajectoryPoint(positions=row.tolist(), time_from_start=Duration(sec=time))
-            for time, row in {0: first, seconds: GOAL if goal is None else goal}.items()
+            for time, row in {0: first, seconds: goal}.items()
         ]
         trajectory = JointTrajectory(joint_names=list(NAMES), points=points)
         request = self.action.Goal(trajectory=trajectory, **settings)
@@ -93,23 +82,21 @@ class Client:
 
     def answer(self, future: Any) -> Any:
         """Wait for an answer."""
-        until(lambda: self.spin() or future.done())
+        self._executor.spin_until_future_complete(future, TIMEOUT_S)
+        assert future.done()
         return future.result()
 
     def spin(self) -> None:
-        """Receive what has come."""
-        self.executor.spin_once(timeout_sec=0.05)
+        """Receive what comes next."""
+        self._executor.spin_once(timeout_sec=TIMEOUT_S)
+
+    def close(self) -> None:
+        self.client.destroy()  # else the node stays as long
+        super().close()
 
 
-def until(is_done: Callable[[], bool]) -> None:
-    end = time.monotonic() + TIMEOUT_S
-    while not is_done():
-        assert time.monotonic() < end
-        time.sleep(0.01)
-
-
-def sim(domain: int, *words: str) -> int:
-    return space_robot_here("sim", *words, "--domain", str(domain)).returncode
+def sim(domain: int, *words: str) -> bool:
+    return space_robot_here("sim", *words, "--domain", str(domain)).returncode == 0
 
 
 @pytest.fixture
@@ -129,7 +116,8 @@ def flight(control_msgs: Path, free_domain: int, tmp_path: Path) -> Iterator[sub
     ):
         try:
             wait_for_nodes(free_domain)
-            until(lambda: sim(free_domain, "step", "--ticks", "500") == 0)
+            while not sim(free_domain, "step", "--ticks", "500"):
+                assert process.poll() is None
             yield process
         finally:
             if process.poll() is None:
@@ -140,8 +128,7 @@ def flight(control_msgs: Path, free_domain: int, tmp_path: Path) -> Iterator[sub
 def test_goals_are_followed_superseded_and_cancelled(
     flight: subprocess.Popen[str], free_domain: int, tmp_path: Path
 ) -> None:
-    client = Client(free_domain)
-    try:
+    with closing(Client(free_domain)) as client:
         from control_msgs.msg import JointTolerance
 
         assert client.client.wait_for_server(timeout_sec=TIMEOUT_S)
@@ -155,18 +142,19 @@ def test_goals_are_followed_superseded_and_cancelled(
         )
         followed = client.send(1, path_tolerance=wide, goal_tolerance=near)
         assert followed.accepted
-        until(lambda: client.spin() or bool(client.feedback))
+        while not client.feedback:
+            client.spin()
         desired = client.feedback[-1].feedback
         assert desired.joint_names == list(NAMES)
         assert len(desired.desired.positions) == len(NAMES)
-        assert sim(free_domain, "step", "--ticks", "3500") == 0
+        assert sim(free_domain, "step", "--ticks", "3500")
         result = client.action.Result
         expected = (GoalStatus.STATUS_SUCCEEDED, result.SUCCESSFUL, "")
         assert client.end(followed) == expected
 
         narrow = [JointTolerance(name=NAMES[1], position=1e-15)]
         missed = client.send(1, HOME, GOAL, path_tolerance=narrow)
-        assert sim(free_domain, "step", "--ticks", "2500") == 0
+        assert sim(free_domain, "step", "--ticks", "2500")
         status, code, text = client.end(missed)
         assert (status, code) == (GoalStatus.STATUS_ABORTED, result.PATH_TOLERANCE_VIOLATED)
         assert text.startswith("the position of joint 'joint2' is off by ")
@@ -174,14 +162,11 @@ def test_goals_are_followed_superseded_and_cancelled(
         superseded, cancelled = client.send(2, HOME), client.send(4, GOAL + 0.1)
         expected = (GoalStatus.STATUS_ABORTED, result.INVALID_GOAL, "another motion took its place")
         assert client.end(superseded) == expected
-        assert sim(free_domain, "step", "--ticks", "1500") == 0
+        assert sim(free_domain, "step", "--ticks", "1500")
         client.answer(cancelled.cancel_goal_async())
         expected = (GoalStatus.STATUS_CANCELED, 0, "the reference is brought to rest")
         assert client.end(cancelled) == expected
-    finally:
-        client.client.destroy()  # else the node stays as long
-        client.node.leave()
-    assert sim(free_domain, "resume") == 0
+    assert sim(free_domain, "resume")
     output = flight.communicate(timeout=TIMEOUT_S)[0]
     assert flight.returncode == 0, output
     assert "mission_node: refused a trajectory: unknown joint 'wrist' of goal_tolerance" in output
@@ -191,4 +176,3 @@ def test_goals_are_followed_superseded_and_cancelled(
     assert np.abs(reference[-1, 0] - (GOAL + 0.1)).min() > 1e-3  # of the cancelled one
     np.testing.assert_array_equal(reference[-1, 1], 0.0)
     assert np.abs(np.diff(reference[:, 1], axis=0)).max() < 1e-3
-    assert space_robot_here("replay", str(tmp_path / "bag")).returncode == 0

@@ -25,13 +25,17 @@ from space_robot_control.laws import (
     Signals,
     find_law,
     laws,
-    per_axis,
 )
 from space_robot_control.laws.base import CONSTANT_INERTIA, NO_ESTIMATE, NOMINAL_INERTIA
 from space_robot_control.laws.ctc_smc import saturation
-from space_robot_msgs_py.errors import InputError
 
 Array = NDArray[np.float64]
+
+
+def law_of(name: str, seed: int, axes: int = 9) -> ControlLaw:
+    """A law with random gains."""
+    law = find_law(name)
+    return law(random_gains(law, axes, seed), PERIOD)
 
 
 def test_all_laws_are_found_by_name() -> None:
@@ -88,46 +92,26 @@ def test_a_gain_named_as_a_word_of_python_has_its_name_for_the_user() -> None:
 
 
 @pytest.mark.parametrize("name", EQUATIONS)
-def test_reset_empties_the_memory(name: str) -> None:
-    """After it the same signals give the same forces as at first, bit for bit."""
-    law, history = find_law(name)(random_gains(find_law(name), 9, seed=2), PERIOD), History(9, 3)
+def test_the_memory_is_a_laws_own_is_emptied_and_restored(name: str) -> None:
+    """Bit for bit: after a reset the forces are those at first, laws of one class share nothing,
+    gains and memory come back into a law that has other gains; signals are left alone."""
+    history, law, twin, other = History(9, 3), law_of(name, 2), law_of(name, 2), law_of(name, 5)
     first = forces(law, history)
+    np.testing.assert_array_equal(forces(twin, history), first)
+    saved = law.save()
     remembered = forces(law, history)
-    law.reset()
-    np.testing.assert_array_equal(forces(law, history), first)
     has_memory = name in ("tde_tsmc", "tde_stc", "dob", "adrc")
     assert np.any(remembered != first) == has_memory, "a memory must show"
-
-
-@pytest.mark.parametrize("name", EQUATIONS)
-def test_a_law_restored_goes_on_as_the_one_that_was_saved(name: str) -> None:
-    """Gains and memory come back into a law that has other gains and has answered for long."""
-    law, history = find_law(name)(random_gains(find_law(name), 9, seed=2), PERIOD), History(9, 3)
-    forces(law, history)
-    saved = law.save()
-    expected = forces(law, history)
-    other = find_law(name)(random_gains(find_law(name), 9, seed=5), PERIOD)
     forces(other, history)
     other.restore(saved)
     for value, restored in zip(law.gain_values.values(), other.gain_values.values(), strict=True):
         np.testing.assert_array_equal(restored, value)
-    np.testing.assert_array_equal(forces(other, history), expected)
-
-
-@pytest.mark.parametrize("name", EQUATIONS)
-def test_laws_of_one_class_share_nothing(name: str) -> None:
-    law, history = find_law(name), History(9, 4)
-    gains = random_gains(law, 9, seed=3)
-    one, other = law(gains, PERIOD), law(gains, PERIOD)
-    expected = forces(one, history)
-    np.testing.assert_array_equal(forces(other, history), expected)
-
-
-@pytest.mark.parametrize("name", EQUATIONS)
-def test_force_leaves_the_signals_alone(name: str) -> None:
-    law, block = find_law(name), History(9, 5).block(0)
+    np.testing.assert_array_equal(forces(other, history), remembered)
+    law.reset()
+    np.testing.assert_array_equal(forces(law, history), first)
+    block = history.block(0)
     before = block.tobytes()
-    law(random_gains(law, 9, seed=4), PERIOD).force(Signals.view(block))
+    law.force(Signals.view(block))
     assert block.tobytes() == before
 
 
@@ -193,87 +177,6 @@ def test_saturation_is_odd_bounded_and_linear_inside_the_layer(s: float, delta: 
     assert value == (np.sign(s) if abs(s) > delta else s / delta)
 
 
-@given(st.floats(-5.0, 5.0), st.floats(-5.0, 5.0), st.floats(1e-3, 1.0))
-def test_saturation_never_falls_and_has_no_step(a: float, b: float, delta: float) -> None:
-    """Lipschitz with 1/Delta, so continuous at the layer's edge."""
-    low, high = min(a, b), max(a, b)
-    rise = saturation(high, delta) - saturation(low, delta)
-    assert 0.0 <= rise <= (high - low) / delta + 1e-12
-
-
-class LeadGains(LawGains):
-    h_bar: Array = per_axis("constant inertia", "kg m2")
-    k: Array = per_axis("derivative gain", "1/s")
-
-
-class LeadLaw(ControlLaw):
-    """A further law, as a user would write it: PD on the time-delay estimate."""
-
-    name = "lead"
-    gains_type = LeadGains
-
-    def force(self, signals: Signals) -> Array:
-        force: Array = self.gains.h_bar * self.gains.k * signals.error_rate + signals.n_hat
-        return force
-
-
-def test_a_law_of_ones_own_is_found_by_module_and_class() -> None:
-    law = find_law(f"{__name__}:LeadLaw")
-    assert law.name == "lead"
-    history = History(4, 7)
-    built = law({"h_bar": np.full(4, 2.0), "k": np.full(4, 3.0)}, PERIOD)
-    assert built.estimate == CONSTANT_INERTIA
-    force = built.force(history.at(2))
-    np.testing.assert_allclose(force, 6.0 * history.edot[2] + history.n_hat[2])
-    assert "lead" not in laws(), "only a file in the laws' folder gets a name of its own"
-
-
-@pytest.mark.parametrize(
-    ("name", "why"),
-    [
-        ("pid", "unknown controller 'pid'"),
-        ("space_robot_control.laws.ctc:Pid", "has no attribute 'Pid'"),
-        ("space_robot_control.laws.ctc:", "cannot be imported"),
-        ("space_robot_model.robot:Robot", "is not a ControlLaw"),
-        ("math:pi", "is not a ControlLaw"),
-        (":Law", "cannot be imported"),
-        ("space_robot_control.laws:ControlLaw", "is not a ControlLaw"),
-    ],
-)
-def test_unknown_laws_are_errors_that_name_the_allowed_ones(name: str, why: str) -> None:
-    with pytest.raises(InputError, match=why) as caught:
-        find_law(name)
-    assert repr(name) in str(caught.value)
-    for allowed in (*laws(), "module:Class"):
-        assert allowed in str(caught.value)
-
-
-def test_a_missing_gain_is_an_error() -> None:
-    with pytest.raises(KeyError, match="k_d"):
-        find_law("ctc")({"k_p": np.ones(9)}, PERIOD)
-
-
-def test_the_law_of_ones_own_in_the_manual_flies(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Its two files to the letter."""
-    manual = (ROOT / "docs/manual/control_laws.md").read_text("utf-8")
-    module, gains = (
-        re.search(rf"```{language}\n(# {name}.*?)```", manual, re.DOTALL)
-        for language, name in (("python", "my_laws.py"), ("yaml", "gains/tde.yaml"))
-    )
-    assert module
-    assert gains
-    (tmp_path / "my_laws.py").write_text(module[1])
-    (tmp_path / "gains").mkdir()
-    (tmp_path / "gains/tde.yaml").write_text(gains[1])
-    monkeypatch.syspath_prepend(tmp_path)
-    own = "my_laws:TimeDelayControl"
-    flight = Flight(resolve(FlightPlan(controller=own, gains=f"{tmp_path}/gains", duration=0.05)))
-    errors = simulate(flight).telemetry[:, 3]  # type: ignore[index]
-    assert np.abs(errors).max() < 1e-6
-
-
 def test_the_integral_in_the_manual_is_kept_and_begins_at_zero(tmp_path: Path) -> None:
     """At the start, and when the law takes over again."""
     manual = (ROOT / "docs/manual/control_laws.md").read_text("utf-8")
@@ -304,3 +207,78 @@ def test_numba_finds_one_type_for_all_laws_and_keeps_it() -> None:
     assert [id(kind) for kind in first] == [id(kind) for kind in again]
     parts = [numba.typeof(part) for part in codes[0]]
     assert list(first[0].types) == parts
+
+
+# The extended state observer
+
+
+POLES = np.geomspace(1.0, 2000.0, 7)
+"""omega_o of the axes, rad/s."""
+
+
+class Axes:
+    """Axes ``rhodd = d + F / J`` under ``adrc``, each with its own omega_o; d is constant."""
+
+    def __init__(self, rng: np.random.Generator, push: float = 1.0) -> None:
+        m = len(POLES)
+        self.inertia, self._rng, self._push = rng.uniform(0.1, 10.0, m), rng, push
+        gains = {"inertia": self.inertia, "omega_c": np.full(m, 3.0), "omega_o": POLES}
+        self.law = find_law("adrc")(gains, PERIOD)
+        self.state = rng.normal(size=(3, m))
+        """rho, its rate and d."""
+        self._force = np.zeros(m)
+        self.observe()
+
+    def observe(self) -> Array:
+        """Errors of z_1, z_2 and z_3 after the law has seen this tick, (3, m)."""
+        signals = Signals.view(Signals.block(len(POLES) - 3))
+        signals.rho[:], signals.rho_rate[:] = self.state[:2]
+        signals.error[:], signals.error_rate[:] = -self.state[:2]
+        signals.applied_force[:] = self._force
+        self.law.force(signals)
+        memory = self.law.memory
+        errors: Array = self.state - [memory.z_1, memory.z_2, memory.z_3]
+        return errors
+
+    def step(self) -> Array:
+        """The same a tick later, after a force of any size has acted."""
+        self._force = self._push * self._rng.normal(size=len(POLES))
+        rho, rate, d = self.state
+        acceleration = d + self._force / self.inertia
+        rho = rho + PERIOD * rate + 0.5 * PERIOD**2 * acceleration
+        self.state = np.array([rho, rate + PERIOD * acceleration, d])
+        return self.observe()
+
+    def mislead(self, error: Array) -> None:
+        """Give the observer an error of z_1, z_2, z_3 (3, m)."""
+        memory = self.law.memory
+        memory.z_1[:], memory.z_2[:], memory.z_3[:] = self.state - error
+
+
+UNITS = np.array([1.0, PERIOD, PERIOD**2])
+"""Of position, rate and disturbance, for which the observer's matrix has entries of like size."""
+
+
+def error_matrices(axes: Axes) -> Array:
+    """(m, 3, 3) matrix of the observer's error from one tick to the next, in `UNITS`."""
+    columns = []
+    for k in range(3):
+        error = np.zeros((3, len(POLES)))
+        error[k] = 1.0 / UNITS[k]
+        axes.mislead(error)
+        columns.append(axes.step() * UNITS[:, None])
+    return np.array(columns).transpose(2, 1, 0)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_all_three_poles_of_the_observer_are_where_its_gain_says(seed: int) -> None:
+    """``beta = 1 / (1 + omega_o T)``: the characteristic polynomial is ``(z - beta)^3``, and by
+    Cayley and Hamilton ``(M - beta E)^3 = 0``; a motion of the axis and a force make no error."""
+    assert "poles are at 1/(1 + omega_o T)" in find_law("adrc").gain_descriptions()["omega_o"]
+    assert "pole is at 1/(1 + g T)" in find_law("dob").gain_descriptions()["bandwidth"]
+    axes = Axes(np.random.default_rng(seed), push=0.1)
+    for matrix, beta in zip(error_matrices(axes), 1.0 / (1.0 + POLES * PERIOD), strict=True):
+        polynomial = np.poly(matrix)
+        np.testing.assert_allclose(polynomial, np.poly([beta] * 3), rtol=0.0, atol=1e-9)
+        cubed = np.linalg.matrix_power(matrix - beta * np.eye(3), 3)
+        np.testing.assert_allclose(cubed, 0.0, atol=1e-9)

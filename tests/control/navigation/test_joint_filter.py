@@ -1,4 +1,4 @@
-"""The joints' filter against Riccati's equation, true errors and the exact motion."""
+"""The joints' filter against Riccati's equation and the exact motion; the low-pass of the base."""
 
 from __future__ import annotations
 
@@ -14,12 +14,17 @@ from space_robot_control.navigation.joint_filter import (
     begin_joints,
     filter_joints,
     jerk_density,
-    steady_gains,
     tune,
 )
+from space_robot_control.navigation.low_pass import (
+    LowPass,
+    begin_low_pass,
+    low_pass_weight,
+    pass_low,
+)
+from space_robot_msgs_py.compiled.records import assign
 
 Array = NDArray[np.float64]
-
 PERIOD = 5e-4
 
 
@@ -77,34 +82,6 @@ def test_with_the_angle_alone_the_poles_are_butterworths(corner: float) -> None:
         assert np.abs(poles - pole).min() < 0.1 * corner * PERIOD * 20
 
 
-@pytest.mark.parametrize("rate_noise", [0.0, 2e-4])
-def test_errors_are_as_large_as_the_covariance_says(rate_noise: float) -> None:
-    """Of 60 joints over 3000 ticks, whose jerk is the white noise that the filter believes in."""
-    n, corner, angle_noise = 60, 30.0, 1e-6
-    density = jerk_density(2.0 * np.pi * corner, angle_noise, rate_noise, PERIOD)
-    transition, noise = model(PERIOD, density)
-    rng = np.random.default_rng(1)
-    root = np.linalg.cholesky(noise / density) * density**0.5
-    truth = np.zeros((3, n))
-    filter = tuned(n, corner, angle_noise, rate_noise)
-    gains = np.zeros(3), np.zeros(3)
-    p = steady_gains(*gains, angle_noise**2, rate_noise**2, density, PERIOD, 3000)
-    zero, found = np.zeros(n), []
-    begin_joints(filter, zero, zero, zero)
-    for tick in range(3000):
-        truth = transition @ truth + root @ rng.normal(size=(3, n))
-        angle = truth[0] + angle_noise * rng.normal(size=n)
-        rate = truth[1] + rate_noise * rng.normal(size=n)
-        filter_joints(filter, angle, rate, zero, PERIOD)
-        if tick > 1000 and tick % 20 == 0:
-            error = np.array([filter.angle, filter.rate, filter.acceleration]) - truth
-            found.append(error**2)
-    for row, variance in ((0, angle_noise**2), (1, rate_noise**2))[: 2 if rate_noise else 1]:
-        gain = p[:, row] / (p[row, row] + variance)
-        p = p - np.outer(gain, p[row])
-    np.testing.assert_allclose(np.sqrt(np.mean(found, (0, 2))), np.sqrt(np.diag(p)), rtol=0.03)
-
-
 @given(st.floats(-3.0, 3.0), st.floats(-1.0, 1.0), st.floats(-5.0, 5.0))
 @settings(max_examples=20)
 def test_constant_acceleration_is_followed_without_lag(a: float, b: float, c: float) -> None:
@@ -151,3 +128,39 @@ def test_without_a_bandwidth_what_is_measured_is_handed_on() -> None:
         np.testing.assert_array_equal(filter.angle, angle)
         np.testing.assert_array_equal(filter.rate, rate)
         np.testing.assert_array_equal(filter.torque, torque)
+
+
+# The low-pass
+
+
+def low_pass(corner: float) -> LowPass:
+    found = LowPass.allocate(1)
+    assign(found, weight=low_pass_weight(corner, PERIOD))
+    return found
+
+
+@pytest.mark.parametrize("corner", [5.0, 20.0])
+def test_at_the_corner_half_is_left(corner: float) -> None:
+    """Two stages of -3 dB each."""
+    found, zero, largest = low_pass(corner), np.zeros(3), 0.0
+    begin_low_pass(found, zero, zero)
+    for tick in range(round(3.0 / corner / PERIOD)):
+        rate = np.full(3, np.sin(2.0 * np.pi * corner * tick * PERIOD))
+        pass_low(found, rate, zero)
+        if tick > 2.0 / corner / PERIOD:
+            largest = max(largest, found.rate[0])
+    assert largest == pytest.approx(0.5, rel=0.03)
+
+
+def test_torque_and_differenced_rate_of_the_base_stay_a_pair() -> None:
+    rng = np.random.default_rng(1)
+    found, inertia, rate = low_pass(50.0), np.array([2.0, 30.0, 700.0]), rng.normal(size=3)
+    begin_low_pass(found, rate, np.zeros(3))
+    for _ in range(200):
+        torque = rng.normal(size=9)
+        rate = rate + PERIOD * torque[:3] / inertia
+        before = found.rate.copy()
+        pass_low(found, rate, torque)
+        np.testing.assert_allclose(
+            inertia * (found.rate - before) / PERIOD, found.torque, rtol=1e-7, atol=1e-7
+        )

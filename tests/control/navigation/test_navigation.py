@@ -1,4 +1,4 @@
-"""From measured to estimated states: gaps, jumps in time, bad states, swaps; and the controller."""
+"""From measured to estimated states: gaps, jumps in time, bad states; quaternions."""
 
 from __future__ import annotations
 
@@ -6,16 +6,21 @@ import numpy as np
 import pytest
 from attitude_sensors import attitude_error, exponential
 from closed_loop import NAVIGATION, PERIOD, Loop, law_of
+from hypothesis import given
+from hypothesis import strategies as st
 from numpy.typing import NDArray
+from oracles import quaternion_of, rotation_of
+from random_robots import random_quaternion
+from scipy.spatial.transform import Rotation
 
 from space_robot_control.navigation.navigation import LONGEST_BRIDGE, Navigation, navigate
+from space_robot_control.navigation.quaternions import multiply, small_angle, turn
 from space_robot_control.navigation.settings import NavigationFilterSettings
 from space_robot_model.robot import Robot
 from space_robot_msgs_py.errors import InputError, UnusableStateError
 from space_robot_msgs_py.samples import RobotState
 
 Array = NDArray[np.float64]
-
 OMEGA = np.array([0.02, -0.03, 0.01])
 N = 6
 SETTINGS = NAVIGATION.model_copy(update={"tracker_delay": 0.01, "rate_filter_hz": 0.0})
@@ -58,17 +63,6 @@ def test_the_estimate_is_of_now_though_the_tracker_is_late() -> None:
     begun = exponential(OMEGA * PERIOD * 20)
     np.testing.assert_allclose(found[0, :4], begun, rtol=0.0, atol=1e-15)
     np.testing.assert_allclose(found[:, 4:7], np.tile(OMEGA, (400, 1)), atol=1e-6)
-
-
-def test_lost_states_are_bridged() -> None:
-    """Up to `LONGEST_BRIDGE` ticks; a tracker's measurement from between is not used."""
-    for lost in (1, LONGEST_BRIDGE - 1):
-        navigation = built()
-        ticks = [k for k in range(600) if not 301 <= k < 301 + lost]
-        found = estimates(navigation, ticks)
-        truth = exponential(OMEGA * PERIOD * np.array(ticks)[:, None])
-        assert np.abs(attitude_error(found[:, :4], truth))[41:].max() < 1e-7
-        assert navigation.attitude.updates == (27 if lost == 1 else 26)
 
 
 def ramped_state_at(tick: int) -> RobotState:
@@ -146,18 +140,6 @@ def test_after_a_jump_back_in_time_everything_begins_anew(again: int) -> None:
     np.testing.assert_array_equal(estimates(used, ticks), estimates(fresh, ticks))
 
 
-def test_the_torque_of_an_estimate_lags_as_its_rates_do() -> None:
-    navigation = built(rate_filter_hz=20.0)
-    state = state_at(0)
-    for tick in range(3):
-        state.applied_torque[:] = float(tick)
-        navigate(navigation, tick, state.block[0], PERIOD)
-    torque = navigation.estimate.applied_torque
-    assert ((torque > 0.0) & (torque < 1.5)).all()
-    assert (torque[:3] == torque[0]).all()
-    assert (torque[3:] == torque[3]).all()
-
-
 @pytest.mark.parametrize(
     ("key", "value", "why"),
     [
@@ -168,13 +150,6 @@ def test_the_torque_of_an_estimate_lags_as_its_rates_do() -> None:
 def test_what_does_not_fit_is_refused(key: str, value: object, why: str) -> None:
     with pytest.raises(InputError, match=why):
         Navigation.build(N, NAVIGATION.model_copy(update={key: value}), 1e-4)
-
-
-# In the controller
-
-
-def filtered_loop(robot: Robot) -> Loop:
-    return Loop(robot, law_of("tde_stc"), navigation=SETTINGS)
 
 
 @pytest.mark.parametrize("angle", [5e-324, 1e-200, 1e3])
@@ -188,39 +163,64 @@ def test_noises_whose_squares_vanish_give_a_filter(angle: float, rate: float) ->
 
 
 @pytest.mark.parametrize(("field", "value"), [("quaternion", 1.1), ("omega_base", np.nan)])
-def test_an_unusable_state_leaves_the_filter_as_it_is(
+def test_an_unusable_state_and_another_law_leave_the_filter_as_it_is(
     paper_robot: Robot, field: str, value: float
 ) -> None:
-    shown, spared = filtered_loop(paper_robot), filtered_loop(paper_robot)
+    shown, spared = (Loop(paper_robot, law_of("tde_stc"), navigation=SETTINGS) for _ in range(2))
     for loop in (shown, spared):
         loop.fly(50)
     state = shown.plant.state.copy()
     getattr(state, field)[0] = value
     with pytest.raises(UnusableStateError):
         shown.controller.update(state, shown.references.at(50))
-    assert shown.controller.block["navigation"].tobytes() == (
-        spared.controller.block["navigation"].tobytes()
-    )
+    blocks = [loop.controller.block["navigation"] for loop in (shown, spared)]
+    assert blocks[0].tobytes() == blocks[1].tobytes()
     np.testing.assert_array_equal(shown.fly(20)[1], spared.fly(20)[1])
+    before = blocks[0].tobytes()
+    shown.controller.law = law_of("ctc")
+    assert shown.controller.block["navigation"].tobytes() == before
 
 
-def test_a_law_that_takes_over_finds_the_filter_as_it_is(paper_robot: Robot) -> None:
-    loop, other = filtered_loop(paper_robot), filtered_loop(paper_robot)
-    for one in (loop, other):
-        one.fly(200)
-    before = loop.controller.block["navigation"].copy()
-    loop.controller.law = law_of("ctc")
-    assert loop.controller.block["navigation"].tobytes() == before.tobytes()
+# Quaternions
 
 
-def test_with_perfect_sensors_the_filter_hardly_matters(paper_robot: Robot) -> None:
-    """A tracker in every tick, without delay: errors stay below 1e-6."""
-    perfect = NAVIGATION.model_copy(update={"tracker_delay": 0.0})
-    loop = Loop(paper_robot, law_of("tde_stc"), navigation=perfect)
-    errors, _ = loop.fly(2000)
-    truth = loop.plant.state.copy()
-    loop.fly(1)
-    estimate = loop.controller.block[0].navigation.estimate
-    assert np.abs(errors).max() < 1e-5
-    assert np.abs(attitude_error(estimate.quaternion, truth.quaternion)).max() < 1e-7
-    np.testing.assert_allclose(estimate.joint_positions, truth.joint_positions, atol=1e-7)
+seeds = st.integers(0, 2**32 - 1).map(np.random.default_rng)
+
+
+def vector(rng: np.random.Generator, size: float) -> Array:
+    direction = rng.normal(size=3)
+    return size * direction / np.linalg.norm(direction)
+
+
+@given(seeds, st.sampled_from([1e-9, 1e-3, 0.03, 0.1]))
+def test_a_turn_is_exact_to_1e_12_of_its_angle(rng: np.random.Generator, angle: float) -> None:
+    rotation, out = vector(rng, angle), np.empty(4)
+    turn(rotation, out)
+    found = rotation_of(out / np.linalg.norm(out)).as_rotvec()
+    np.testing.assert_allclose(found, rotation, rtol=0.0, atol=1.2e-12 * angle)
+    turn(rotation * 1e6, out)
+    assert np.isfinite(out).all()
+
+
+@given(seeds)
+def test_products_are_scipys_whichever_is_overwritten(rng: np.random.Generator) -> None:
+    p, q = random_quaternion(rng), random_quaternion(rng)
+    expected = quaternion_of(rotation_of(p) * rotation_of(q))
+    for left, right in ((p.copy(), 3.0 * q), (2.0 * p, q.copy())):
+        for out in (np.empty(4), left, right):
+            multiply(left, right, out)
+            assert min(np.abs(out - expected).max(), np.abs(out + expected).max()) < 1e-15
+            left[:], right[:] = p, q
+
+
+@given(seeds, st.sampled_from([1e-8, 1e-4, 1e-2]), st.sampled_from([1.0, -1.0]))
+def test_a_small_angle_is_the_rotation_between(
+    rng: np.random.Generator, angle: float, sign: float
+) -> None:
+    """To third order, whichever sign; the cosine is that of half of it."""
+    origin, rotation, out = random_quaternion(rng), vector(rng, angle), np.empty(3)
+    other = sign * quaternion_of(rotation_of(origin) * Rotation.from_rotvec(rotation))
+    cosine = small_angle(origin, other, out)
+    np.testing.assert_allclose(out, rotation, rtol=0.0, atol=angle**3 / 10.0 + 1e-15)
+    assert abs(cosine - np.cos(0.5 * angle)) < 1e-14
+    assert small_angle(origin, origin[[1, 0, 3, 2]] * [-1.0, 1.0, 1.0, -1.0], out) < 1e-15

@@ -1,4 +1,4 @@
-"""N_hat of (35), (36) with the inertia of the nominal model in place of a constant one."""
+"""N_hat of (35), (36): with a constant inertia, and with that of the nominal model."""
 
 from __future__ import annotations
 
@@ -22,7 +22,6 @@ from oracles import (
 )
 from random_robots import Case, cases
 
-from space_robot import Scenario
 from space_robot_control.controller.controller import Controller
 from space_robot_control.controller.gains import NOMINAL, check_gains, read_gains
 from space_robot_control.controller.law_set import LawSet
@@ -30,15 +29,62 @@ from space_robot_control.controller.settings import ControllerNodeSettings
 from space_robot_control.controller.time_delay_estimation import (
     TimeDelayPair,
     nominal_estimate,
+    observe,
     time_delay_estimate,
 )
 from space_robot_control.laws import ControlLaw, find_law, laws
+from space_robot_control.navigation.low_pass import low_pass_weight
 from space_robot_model.hardware.base_actuators import BaseActuatorSettings
 from space_robot_msgs_py.compiled.records import assign
 from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.samples import Reference, RobotState
 
 Array = NDArray[np.float64]
+
+
+class Estimator:
+    """The kernels on a pair of their own; ``desired`` is the desired acceleration of all axes."""
+
+    def __init__(self, axes: int, desired: float = 0.0, corner_hz: float = 0.0) -> None:
+        self.pair = TimeDelayPair.allocate(axes - 3)
+        assign(self.pair, smoothing=low_pass_weight(corner_hz, PERIOD))
+        self.desired = np.full(axes, desired)
+
+    def observe(self, tick: int, force: Array, rate: Array) -> None:
+        observe(self.pair, tick, force, rate, self.desired, PERIOD)
+
+    def estimate(self, h_bar: Array) -> Array:
+        n_hat = np.full_like(h_bar, np.nan)
+        time_delay_estimate(self.pair, h_bar, n_hat)
+        return n_hat
+
+
+@given(st.floats(1.0, 900.0), st.floats(-50.0, 50.0))
+def test_low_pass_keeps_force_and_acceleration_a_pair(corner_hz: float, n: float) -> None:
+    """Whatever both do, N_hat of a constant N is N: none of it is filtered away."""
+    rng = np.random.default_rng(1)
+    filtered = Estimator(2, corner_hz=corner_hz)
+    rate = 0.0
+    filtered.observe(0, np.full(2, n), np.zeros(2))  # N alone at rest
+    for tick in range(1, 50):
+        acceleration = rng.normal()
+        rate += acceleration * PERIOD
+        filtered.observe(tick, np.full(2, 2.0 * acceleration + n), np.full(2, rate))
+    np.testing.assert_allclose(filtered.estimate(np.full(2, 2.0)), n, atol=1e-8)
+
+
+def test_low_pass_reaches_63_per_cent_in_its_time_constant() -> None:
+    corner_hz, still = 20.0, np.zeros(2)
+    time_constant = round(1.0 / (2.0 * np.pi * corner_hz) / PERIOD)
+    estimator = Estimator(2, corner_hz=corner_hz)
+    estimator.observe(0, still, still)
+    for tick in range(1, time_constant + 1):
+        estimator.observe(tick, np.ones(2), still)
+    np.testing.assert_allclose(estimator.pair.applied_force, 1.0 - np.exp(-1.0), atol=0.01)
+
+
+# With the nominal inertia
+
 
 WITH_H_BAR = sorted(name for name, law in laws().items() if "h_bar" in law.gain_descriptions())
 ESTIMATING = [*WITH_H_BAR, "indi"]
@@ -155,22 +201,6 @@ def test_the_controller_adds_the_inertia_times_u(name: str, case: Case) -> None:
     np.testing.assert_allclose(own, wanted, rtol=0.0, atol=1e-10 * size)
 
 
-def test_super_twisting_without_switching_is_incremental_inversion() -> None:
-    """``lambda`` alone is PD: ``tde_stc`` with the nominal inertia and ``K_1 = K_2 = 0`` flies as
-    ``indi`` with ``K_D = lambda``, ``K_P = 0``."""
-    length, zero = 4.0, [0.0]
-    stc = Scenario(
-        controller="tde_stc",
-        gains={"h_bar": NOMINAL, "lambda": length, "k_1": zero, "k_2": zero},
-        duration=0.3,
-    ).fly()
-    indi = Scenario(controller="indi", gains={"k_p": 0.0, "k_d": length}, duration=0.3).fly()
-    torque, other = (flight.log.commanded_torque for flight in (stc, indi))
-    assert torque is not None
-    assert other is not None
-    np.testing.assert_allclose(torque, other, rtol=0.0, atol=1e-9 * np.abs(other).max())
-
-
 # Gains
 
 
@@ -189,88 +219,71 @@ def test_a_gains_file_says_nominal(tmp_path: Path) -> None:
         assert law.in_force(3).gains["h_bar"] == (0.0,) * 9
 
 
+POSITIVE = "finite values above 0 (or nominal: as numbers all 0) were expected"
+
+
 @pytest.mark.parametrize(
-    ("h_bar", "said"),
+    ("law", "gain", "value", "said"),
     [
-        ([0.0] * 8 + [1.0], "finite values above 0 (or nominal: as numbers all 0) were expected"),
-        ([1.0] * 8 + [0.0], "finite values above 0 (or nominal: as numbers all 0) were expected"),
-        ([-1.0], "finite values above 0 (or nominal: as numbers all 0) were expected, got [-1.0]"),
-        ([0.0] * 8, "9 values (base x, y, z and the joints) or 1 were expected"),
-        ([0.0] * 8 + [float("nan")], "finite values above 0 (or nominal"),
-        ([NOMINAL] * 9, "numbers were expected, got"),
-        ([NOMINAL, 1.0], "numbers were expected, got"),
-        ("Nominal", "numbers were expected, got 'Nominal'"),
-        (0.0, "numbers were expected, got 0.0"),
+        ("tde_smc", "h_bar", [0.0] * 8 + [1.0], POSITIVE),
+        ("tde_smc", "h_bar", [1.0] * 8 + [0.0], POSITIVE),
+        ("tde_smc", "h_bar", [-1.0], POSITIVE + ", got [-1.0]"),
+        (
+            "tde_smc",
+            "h_bar",
+            [0.0] * 8,
+            "9 values (base x, y, z and the joints) or 1 were expected",
+        ),
+        ("tde_smc", "h_bar", [0.0] * 8 + [float("nan")], "finite values above 0 (or nominal"),
+        ("tde_smc", "h_bar", [NOMINAL] * 9, "numbers were expected, got"),
+        ("tde_smc", "h_bar", [NOMINAL, 1.0], "numbers were expected, got"),
+        ("tde_smc", "h_bar", "Nominal", "numbers were expected, got 'Nominal'"),
+        ("tde_smc", "h_bar", 0.0, "numbers were expected, got 0.0"),
+        ("tde_smc", "lambda", NOMINAL, "numbers were expected, got 'nominal'"),
+        ("dob", "inertia", [0.0], "finite values above 0 were expected"),
+        ("adrc", "inertia", [0.0], "finite values above 0 were expected"),
+        ("slotine_li", "spread", [1.0], "finite values 0 or more and below 1"),
     ],
 )
-def test_anything_between_the_two_is_refused(h_bar: Any, said: str) -> None:
-    content = {"h_bar": h_bar, "lambda": [1.0], "g": [0.1]}
+def test_wrong_gains_are_refused_in_one_line(law: str, gain: str, value: Any, said: str) -> None:
+    """None but ``h_bar`` is nominal, and that of all axes or of none."""
+    gains = {**random_gains(find_law(law), 9, 1), gain: value}
     with pytest.raises(InputError) as caught:
-        check_gains(content, find_law("tde_smc"), 9, "mine.yaml")
-    assert str(caught.value).startswith("mine.yaml: tde_smc.h_bar: ")
+        check_gains(gains, find_law(law), 9, "mine.yaml")
+    assert str(caught.value).startswith(f"mine.yaml: {law}.{gain}: ")
     assert said in str(caught.value)
     assert "\n" not in str(caught.value)
 
 
-def test_no_other_gain_is_nominal() -> None:
-    content = {"h_bar": NOMINAL, "lambda": NOMINAL, "g": [0.1]}
-    with pytest.raises(InputError, match=r"tde_smc\.lambda: numbers were expected, got 'nominal'"):
-        check_gains(content, find_law("tde_smc"), 9, "mine.yaml")
-    for name, gain in (("dob", "inertia"), ("adrc", "inertia")):
-        gains = {**random_gains(find_law(name), 9, 1), gain: [0.0]}
-        with pytest.raises(
-            InputError, match=rf"{name}\.{gain}: finite values above 0 were expected"
-        ):
-            check_gains(gains, find_law(name), 9, "mine.yaml")
-
-
-class ParameterNode:
-    """What `LawSet` asks of its node."""
-
-    def __init__(self, **given_values: Any) -> None:
-        from rclpy.parameter import Parameter
-
-        make: Any = Parameter
-        parameters = [make(k.replace("__", "."), value=v) for k, v in given_values.items()]
-        self._parameter_overrides = {p.name: p for p in parameters}
-        self.on_set: Any = None
-
-    def add_on_set_parameters_callback(self, callback: Any) -> None:
-        self.on_set = callback
-
-    def __getattr__(self, name: str) -> Any:
-        """Anything else is done without effect."""
-        from rcl_interfaces.msg import ParameterDescriptor
-
-        return lambda *_, **__: ParameterDescriptor()
-
-    def set(self, **values: Any) -> str:
-        """Set parameters; why not, if they are refused."""
-        from rclpy.parameter import Parameter
-
-        make: Any = Parameter
-        result = self.on_set([make(k.replace("__", "."), value=v) for k, v in values.items()])
-        assert result.successful == (not result.reason)
-        return str(result.reason)
-
-
-def test_a_parameter_does_not_change_the_kind_of_estimate() -> None:
+def test_a_parameter_does_not_change_the_kind_of_estimate(domain: int) -> None:
     """The compiled code is that of one of the two; a value of the same kind is taken."""
-    pytest.importorskip("rclpy")
-    settings_of = ControllerNodeSettings.resolve({"controller": "tde_stc"})
-    node = ParameterNode(tde_smc__h_bar=[0.0])
-    law_set = LawSet(node, settings_of, 9)  # type: ignore[arg-type]
-    by_name = {law.name: law for law in law_set.laws}
+    rclpy = pytest.importorskip("rclpy")
+    from rclpy.parameter import Parameter
+
+    def parameter(name: str, value: list[float]) -> Any:
+        return Parameter(f"{name}.h_bar", value=value)
+
+    context = rclpy.Context()
+    rclpy.init(args=[], context=context, domain_id=domain)
+    node = rclpy.create_node(
+        "laws", context=context, parameter_overrides=[parameter("tde_smc", [0.0])]
+    )
+    node.declare_parameter("controller", "tde_stc")
+    laws_of_node = LawSet(node, ControllerNodeSettings.resolve({"controller": "tde_stc"}), 9)
+    by_name = {law.name: law for law in laws_of_node.laws}
     assert (by_name["tde_stc"].needs_model, by_name["tde_smc"].needs_model) == (False, True)
-    assert node.set(tde_stc__h_bar=[2.0]) == node.set(tde_smc__h_bar=[0.0] * 9) == ""
-    np.testing.assert_array_equal(by_name["tde_stc"].h_bar, np.full(9, 2.0))
-    for values, said in (
-        ({"tde_stc__h_bar": [0.0]}, "tde_stc.h_bar cannot be changed from a constant to nominal"),
-        ({"tde_smc__h_bar": [1.0]}, "tde_smc.h_bar cannot be changed from nominal to a constant"),
-        ({"tde_smc__h_bar": [0.0] * 8 + [1.0]}, "tde_smc.h_bar: finite values above 0 (or nominal"),
+    for name, value, said in (
+        ("tde_stc", [2.0], ""),
+        ("tde_smc", [0.0] * 9, ""),
+        ("tde_stc", [0.0], "tde_stc.h_bar cannot be changed from a constant to nominal"),
+        ("tde_smc", [1.0], "tde_smc.h_bar cannot be changed from nominal to a constant"),
+        ("tde_smc", [0.0] * 8 + [1.0], "tde_smc.h_bar: finite values above 0 (or nominal"),
     ):
-        reason = node.set(**values)
-        assert said in reason
-        assert "\n" not in reason
+        (result,) = node.set_parameters([parameter(name, value)])
+        assert result.successful is not bool(said)
+        assert said in result.reason
+        assert "\n" not in result.reason
     np.testing.assert_array_equal(by_name["tde_stc"].h_bar, np.full(9, 2.0))
     np.testing.assert_array_equal(by_name["tde_smc"].h_bar, np.zeros(9))
+    node.destroy_node()
+    context.try_shutdown()

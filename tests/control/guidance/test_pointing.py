@@ -1,4 +1,4 @@
-"""Pointing against SciPy's rotations: attitudes, rates, accelerations, what is refused."""
+"""Courses that point and slews between courses, against SciPy's rotations."""
 
 from __future__ import annotations
 
@@ -10,21 +10,20 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import ArrayLike, NDArray
 from orbiting_robots import EARTH_RADIUS, MU
-from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
+from space_robot_control.guidance.courses import Course, Slew, turn_between
+from space_robot_control.guidance.matched_slew import MatchedSlew
 from space_robot_control.guidance.pointing import PointingCourse, PointingGoal
 from space_robot_model.orbit.ephemeris import AssumedOrbit, Ephemeris
 from space_robot_msgs_py.config.validation import validate
 from space_robot_msgs_py.errors import InputError
 
 Array = NDArray[np.float64]
-
 IDENTITY = np.array([1.0, 0.0, 0.0, 0.0])
 ISS = {"height": 420e3, "inclination_deg": 51.6, "raan_deg": 30.0, "anomaly_deg": 200.0}
 GTO = {"height": 18e6, "eccentricity": 0.72, "inclination_deg": 7.0, "anomaly_deg": -10.0}
 TARGET = {"name": "target", "position": [30.0, -50.0, 20.0], "velocity": [0.01, 0.03, -0.02]}
-MEAN_MOTION = float(np.sqrt(MU / (EARTH_RADIUS + ISS["height"]) ** 3))
 AXIS = st.tuples(*[st.floats(-1.0, 1.0)] * 3).map(list).filter(lambda a: np.linalg.norm(a) > 0.1)
 ANGLE = st.floats(-180.0, 180.0)
 PAIRS = [
@@ -49,21 +48,27 @@ def orbit(**assumed: Any) -> Ephemeris:
     return Ephemeris(AssumedOrbit.model_validate(content | assumed))
 
 
-def goal(**keys: Any) -> PointingGoal:
-    """Return a goal as a segment has it."""
+def course(known: Ephemeris | None, begin: float = 0.0, **keys: Any) -> PointingCourse:
+    """The course of a goal as a segment has it."""
     if keys["point"] == "inertial":
         keys.setdefault("direction", [0.5, 0.4, -0.1])
-    return validate(PointingGoal, keys, "base")
-
-
-def course(known: Ephemeris | None, begin: float = 0.0, **keys: Any) -> PointingCourse:
-    """Return the course of such a goal."""
-    return PointingCourse(goal(**keys), known, begin, IDENTITY)
+    near = keys.pop("near", IDENTITY)
+    return PointingCourse(validate(PointingGoal, keys, "base"), known, begin, near)
 
 
 def rotations(rows: Array) -> Rotation:
-    """Return the attitudes of rows (T, 10)."""
-    return Rotation.from_quat(rows[:, [1, 2, 3, 0]])
+    """Attitudes of rows (T, 10)."""
+    return Rotation.from_quat(rows[:, :4], scalar_first=True)
+
+
+def assert_derivatives(course: Course, times: Array, step: float, tolerances: Any) -> Array:
+    """Rates are those of the attitudes, accelerations those of the rates: central differences."""
+    rows, ahead, behind = (course.at(times + k * step) for k in (0, 1, -1))
+    turn = (rotations(behind).inv() * rotations(ahead)).as_rotvec() / (2.0 * step)
+    np.testing.assert_allclose(turn, rows[:, 4:7], rtol=0, atol=tolerances[0])
+    change = (ahead[:, 4:7] - behind[:, 4:7]) / (2.0 * step)
+    np.testing.assert_allclose(change, rows[:, 7:], rtol=1e-6, atol=tolerances[1])
+    return rows
 
 
 def direction(known: Ephemeris, name: str | list[float], time: float) -> Array:
@@ -118,70 +123,31 @@ def test_attitudes_are_those_of_two_directions(
     assert (rotations(row)[0] * turn.inv() * aligned.inv()).magnitude() < 1e-7
 
 
-def test_nadir_on_a_circular_orbit_turns_with_the_mean_motion() -> None:
-    """About the normal, at a constant rate; z points down and x ahead, so -y is the normal."""
-    known = orbit(j2=False)
-    rows = course(known, point="nadir").at(np.linspace(0.0, 5560.0, 5001))
-    np.testing.assert_allclose(rows[:, 5], -MEAN_MOTION, rtol=1e-12)
-    np.testing.assert_allclose(rows[:, [4, 6]], 0.0, rtol=0, atol=1e-12 * MEAN_MOTION)
-    np.testing.assert_allclose(rows[:, 7:], 0.0, rtol=0, atol=1e-15)
-
-
 @pytest.mark.parametrize("elements", [ISS, GTO])
 @pytest.mark.parametrize(("point", "about"), PAIRS)
 def test_rates_and_accelerations_are_the_attitudes_derivatives(
     elements: dict[str, float], point: str, about: Any
 ) -> None:
-    """By central differences of rotations and of rates; with J2."""
-    pointing = course(
-        orbit(orbital_elements=elements),
-        begin=3.0,
-        point=point,
-        about=about,
-        axis=[1.0, 2.0, 3.0],
-        offset_deg=[10.0, 20.0, 30.0],
-    )
-    times, step = np.linspace(4.0, 3000.0, 400), 0.02
-    rows, ahead, behind = (pointing.at(times + k * step) for k in (0, 1, -1))
-    turn = (rotations(behind).inv() * rotations(ahead)).as_rotvec() / (2.0 * step)
-    np.testing.assert_allclose(turn, rows[:, 4:7], rtol=0, atol=1e-8)
-    change = (ahead[:, 4:7] - behind[:, 4:7]) / (2.0 * step)
-    np.testing.assert_allclose(change, rows[:, 7:], rtol=1e-6, atol=1e-10)
-
-
-def test_rates_lead_to_the_attitude_along_an_eccentric_orbit() -> None:
-    pointing = course(orbit(orbital_elements=GTO), point="nadir", offset_deg=[5.0, 10.0, -20.0])
-    end = 6000.0
-
-    def derivative(time: float, q: Array) -> Array:
-        w = pointing.at(np.array([time]))[0, 4:7]
-        turn = Rotation.from_quat(q, scalar_first=False).as_quat()
-        x, y, z, s = turn
-        rate = [s * w[0] + y * w[2] - z * w[1], s * w[1] + z * w[0] - x * w[2]]
-        rate += [s * w[2] + x * w[1] - y * w[0], -x * w[0] - y * w[1] - z * w[2]]
-        return 0.5 * np.array(rate)
-
-    first, last = rotations(pointing.at(np.array([0.0, end])))
-    flown = solve_ivp(derivative, (0.0, end), first.as_quat(), rtol=1e-11, atol=1e-13)
-    assert (Rotation.from_quat(flown.y[:, -1]).inv() * last).magnitude() < 1e-8
+    """With J2."""
+    keys: dict[str, Any] = {"axis": [1.0, 2.0, 3.0], "offset_deg": [10.0, 20.0, 30.0]}
+    pointing = course(orbit(orbital_elements=elements), 3.0, point=point, about=about, **keys)
+    assert_derivatives(pointing, np.linspace(4.0, 3000.0, 200), 0.02, (1e-8, 1e-10))
 
 
 def test_quaternions_do_not_jump_and_do_not_depend_on_how_they_are_asked_for() -> None:
-    known, times = orbit(), np.arange(100.0, 17_000.0, 2.0)
+    known, times = orbit(), np.arange(100.0, 6_000.0, 2.0)
     keys: dict[str, Any] = {"point": "nadir", "axis": [1.0, 0.3, 0.2], "about": "target"}
     whole = course(known, begin=100.0, **keys).at(times)
     assert np.abs(np.diff(whole[:, :4], axis=0)).max() < 0.1
     assert rotations(whole).magnitude().max() > 3.0
     parts = course(known, begin=100.0, **keys)
-    for first, last in ((0, 1), (5000, 5003), (1, 5000), (5003, len(times))):
+    for first, last in ((0, 1), (1000, 1003), (1, 1000), (1003, len(times))):
         np.testing.assert_array_equal(parts.at(times[first:last]), whole[first:last])
 
 
 def test_the_first_quaternion_is_in_the_hemisphere_of_the_one_before() -> None:
-    known = orbit()
-    wanted = goal(point="nadir", offset_deg=[40.0, 0.0, 0.0])
     for near in (IDENTITY, -IDENTITY):
-        pointing = PointingCourse(wanted, known, 7.0, near)
+        pointing = course(orbit(), 7.0, point="nadir", offset_deg=[40.0, 0.0, 0.0], near=near)
         assert pointing.at(np.array([7.0]))[0, :4] @ near > 0.0
 
 
@@ -191,59 +157,6 @@ def test_a_fixed_direction_needs_no_orbit_and_does_not_turn() -> None:
     rows = pointing.at(np.array([0.0, 10.0]))
     np.testing.assert_allclose(rotations(rows).apply([1.0, 0.0, 0.0]), [[0.0, 1.0, 0.0]] * 2)
     np.testing.assert_array_equal(rows[:, 4:], 0.0)
-
-
-def test_the_sun_is_pointed_at_also_in_eclipse() -> None:
-    known = orbit(beta_angle_deg=0.0)
-    rows = course(known, point="sun", axis=[0.0, 1.0, 0.0]).at(np.linspace(0.0, 5560.0, 50))
-    expected = np.broadcast_to(known.sun, (50, 3))
-    np.testing.assert_allclose(rotations(rows).apply([0.0, 1.0, 0.0]), expected, atol=1e-15)
-
-
-@pytest.mark.parametrize(
-    ("keys", "text"),
-    [
-        ({"point": "nadir", "about": "nadir"}, "about: nadir is the direction that the axis"),
-        ({"point": "nadir", "about": "up"}, "about: choose one of velocity, .* or a direction"),
-        ({"point": "inertial", "direction": None}, "point: inertial needs direction"),
-        ({"point": "sun", "direction": [1.0, 0.0, 0.0]}, "direction is for point: inertial"),
-        ({"point": "sun", "axis": [0.0, 0.0, 0.0]}, "axis must have a norm of"),
-        ({"point": "sun", "about": [0.0, 0.0, 0.0]}, "about must have a norm of"),
-        (
-            {"point": "sun", "axis": [0.0, 0.0, 1.0], "about_axis": [0.0, 0.001, -2.0]},
-            r"axis \[0.0, 0.0, 1.0\] and about_axis \[0.0, 0.001, -2.0\] are parallel",
-        ),
-        (
-            {"point": "inertial", "direction": [1.0, 0.0, 0.0], "about": [-2.0, 0.01, 0.0]},
-            "direction .* and about .* are parallel to 0.29 degrees",
-        ),
-        ({"point": "zenith"}, "point: Input should be 'nadir', 'velocity', 'sun'"),
-        ({"point": "nadir", "about": [1.0, 0.0]}, "base: about"),
-    ],
-)
-def test_a_wrong_goal_is_refused_in_one_line(keys: dict[str, Any], text: str) -> None:
-    with pytest.raises(InputError, match=text) as error:
-        goal(**keys)
-    assert "\n" not in str(error.value)
-
-
-@pytest.mark.parametrize(
-    ("keys", "key"),
-    [
-        ({"point": "nadir"}, "point: nadir"),
-        ({"point": "sun"}, "point: sun"),
-        ({"point": "inertial", "about": "velocity"}, "about: velocity"),
-    ],
-)
-def test_what_needs_an_orbit_is_refused_without_one(keys: dict[str, Any], key: str) -> None:
-    with pytest.raises(InputError, match=f"base.{key} needs an orbit"):
-        course(None, **keys)
-
-
-@pytest.mark.parametrize("keys", [{"point": "target"}, {"point": "nadir", "about": "target"}])
-def test_a_target_that_is_not_known_is_refused(keys: dict[str, Any]) -> None:
-    with pytest.raises(InputError, match="target: flight software knows of no target"):
-        course(orbit(target={}), **keys)
 
 
 def test_directions_that_meet_on_the_way_are_refused() -> None:
@@ -274,3 +187,92 @@ def test_a_target_at_the_robot_is_refused() -> None:
     pointing.check(0.0, 50.0)
     with pytest.raises(InputError, match=r"base.point: target is 0.0\d+ m from .* at t = "):
         pointing.check(0.0, 300.0)
+
+
+# Slews from course to course
+
+
+BEGIN, SPAN = 50.0, 60.0
+QUATERNION = (
+    st.tuples(*[st.floats(-1.0, 1.0)] * 4)
+    .filter(lambda q: np.linalg.norm(q) > 0.1)
+    .map(lambda q: np.array(q) / np.linalg.norm(q))
+)
+
+
+def still(quaternion: Array) -> Slew:
+    """Return the course that keeps an attitude."""
+    return Slew(0.0, 1.0, quaternion, np.zeros(3), 0.0)
+
+
+class Spin:
+    """A turn about a fixed axis that is accelerated."""
+
+    def __init__(self, rate: float, acceleration: float) -> None:
+        self.rate, self.acceleration = rate, acceleration
+        self.axis = np.array([0.6, 0.0, 0.8])
+
+    def at(self, time: Array) -> Array:
+        """Return (T, 10)."""
+        since = time - BEGIN
+        angle = self.rate * since + 0.5 * self.acceleration * since**2
+        turns = Rotation.from_rotvec(angle[:, np.newaxis] * self.axis).as_quat()
+        rates = (self.rate + self.acceleration * since)[:, np.newaxis] * self.axis
+        accelerations = np.broadcast_to(self.acceleration * self.axis, rates.shape)
+        return np.column_stack([np.roll(turns, 1, axis=1), rates, accelerations])
+
+
+def assert_same(actual: Array, expected: Array, atol: float) -> None:
+    """Assert that rows are the same motion; a quaternion and its negative are one attitude."""
+    signs = np.sign(np.sum(actual[:, :4] * expected[:, :4], axis=1))[:, np.newaxis]
+    np.testing.assert_allclose(actual[:, :4] * signs, expected[:, :4], rtol=0, atol=atol)
+    np.testing.assert_allclose(actual[:, 4:], expected[:, 4:], rtol=0, atol=atol)
+
+
+KNOWN = orbit(target={"name": "target", "position": [30.0, 100.0, 20.0]})
+NADIR = course(KNOWN, point="nadir")
+COURSES: list[tuple[Course, Course]] = [
+    (NADIR, course(KNOWN, point="target", offset_deg=[10.0, 20.0, 30.0])),
+    (course(KNOWN, point="velocity", offset_deg=[170.0, -40.0, 0.0]), NADIR),
+    (still(np.array([0.5, -0.5, 0.5, 0.5])), NADIR),
+    (NADIR, still(np.array([0.0, 0.6, 0.0, -0.8]))),
+    (Spin(0.05, 0.001), course(KNOWN, point="nadir", offset_deg=[20.0, 0.0, 0.0])),
+    (Spin(-0.03, 0.0), Spin(0.02, 0.0005)),
+    (NADIR, course(KNOWN, point="nadir", offset_deg=[0.0, 0.0, 1e-5])),
+    (NADIR, NADIR),
+]
+
+
+@pytest.mark.parametrize(("before", "after"), COURSES)
+def test_a_slew_leaves_one_course_and_ends_on_the_other(before: Course, after: Course) -> None:
+    """Its quaternion does not jump, also across both ends; chunks have the same bits."""
+    slew = MatchedSlew(BEGIN, SPAN, before, after)
+    early, late = np.array([BEGIN - 3.0, BEGIN]), BEGIN + SPAN + np.array([-1e-9, 0.0, 1e-9, 40.0])
+    assert_same(slew.at(early), before.at(early), 1e-13)
+    assert_same(slew.at(late), after.at(late), 1e-11)
+    assert_same(slew.at(late[1:]), after.at(late[1:]), 1e-13)
+    times = BEGIN + np.linspace(0.01, SPAN - 0.01, 1001)
+    assert_derivatives(slew, times, 1e-3, (1e-9, 1e-9))
+    times = np.linspace(BEGIN - 2.0, BEGIN + SPAN + 2.0, 1501)
+    rows = slew.at(times)
+    assert np.abs(np.diff(rows, axis=0)).max() < 0.02
+    parts = [slew.at(part) for part in np.array_split(times, 17)]
+    np.testing.assert_array_equal(np.concatenate(parts), rows)
+
+
+@settings(max_examples=60, deadline=None)
+@given(QUATERNION, QUATERNION, st.floats(5.0, 500.0))
+def test_from_rest_to_rest_it_is_a_slew(first: Array, last: Array, span: float) -> None:
+    axis, angle = turn_between(first, last)
+    if angle > 3.1415:
+        return  # either way is the shortest one
+    times = BEGIN + np.linspace(-1.0, span + 1.0, 50)
+    expected = Slew(BEGIN, span, first, axis, angle).at(times)
+    matched = MatchedSlew(BEGIN, span, still(first), still(last)).at(times)
+    np.testing.assert_allclose(matched, expected, rtol=0, atol=1e-14 * max(1.0, angle / span**2))
+
+
+def test_a_slew_that_would_turn_once_round_is_refused() -> None:
+    line = "in 200 s the base would turn once round on its way, for it moves at 17.2 degrees/s"
+    with pytest.raises(InputError, match=line):
+        MatchedSlew(BEGIN, 200.0, Spin(0.3, 0.0), still(IDENTITY))
