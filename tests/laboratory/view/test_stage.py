@@ -3,19 +3,17 @@
 from __future__ import annotations
 
 import numpy as np
-import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from moving_logs import EARTH_RADIUS, CircularOrbit
 from numpy.typing import NDArray
-from orbiting_logs import EARTH_RADIUS, CircularOrbit
 
 from space_robot.flight.plan import FlightPlan, resolve
 from space_robot.view.base_surface import clearest_side
 from space_robot.view.horizon import Horizon
+from space_robot.view.local_server import local_server
 from space_robot.view.orbit_frames import OrbitFrames
-from space_robot.view.stage import DIRECTION, FIELD_OF_VIEW, LAMPS, SIDES, Rendering, set_stage
-
-viser = pytest.importorskip("viser")
+from space_robot.view.stage import DIRECTION, FIELD_OF_VIEW, LAMPS, SIDES, set_stage
 
 Array = NDArray[np.float64]
 
@@ -30,13 +28,10 @@ def random_points(seed: int, size: float) -> Array:
 @given(st.integers(0, 2**32 - 1), st.floats(0.1, 50.0))
 def test_the_camera_sees_every_point_and_no_more_than_it_must(seed: int, size: float) -> None:
     points = random_points(seed, size)
-    server = viser.ViserServer(port=0, verbose=False)
-    try:
-        set_stage(server, points, dark=False, rendering=Rendering(shadows=False))
+    with local_server() as server:
+        set_stage(server, points, dark=False)
         camera = server.initial_camera
         position, target = np.array(camera.position), np.array(camera.look_at)
-    finally:
-        server.stop()
     back = position - target
     assert np.allclose(np.cross(back, DIRECTION), 0.0, atol=1e-9 * np.linalg.norm(back))
     assert back @ DIRECTION > 0.0
@@ -70,8 +65,7 @@ def test_in_orbit_the_camera_sees_every_point_and_the_earth_below(
     orbit = CircularOrbit(height, inclination, start)
     now = np.zeros(1)
     frames = OrbitFrames(orbit.position(now), orbit.velocity(now), orbit.sun, np.zeros(1, bool))
-    server = viser.ViserServer(port=0, verbose=False)
-    try:
+    with local_server() as server:
         stage = set_stage(server, points, dark=False, horizon=Horizon.of(frames))
         camera, lamp = server.initial_camera, stage.lamp
         position, up, far = np.array(camera.position), np.array(camera.up), camera.far
@@ -82,8 +76,6 @@ def test_in_orbit_the_camera_sees_every_point_and_the_earth_below(
         assert 0.0 < lamp.intensity < 0.3 * bright
         stage.shade(False)
         assert lamp.intensity == bright == LAMPS[0][1]
-    finally:
-        server.stop()
     local_up = orbit.position(now)[0] / orbit.radius
     np.testing.assert_allclose(up, local_up, atol=1e-12)
     forward = (stage.middle - position) / np.linalg.norm(stage.middle - position)
@@ -115,11 +107,8 @@ def test_the_base_does_not_hide_the_arm() -> None:
     np.testing.assert_array_equal(sides["paper"], SIDES[0])
     np.testing.assert_array_equal(sides["canadarm2"], SIDES[0])
     assert sides["canadarm"][2] < 0.0, "the arm is on the other side of the Orbiter's z axis"
-    server = viser.ViserServer(port=0, verbose=False)
-    try:
+    with local_server() as server:
         set_stage(server, random_points(1, 2.0), dark=True, side=sides["canadarm"])
         camera = server.initial_camera
         back = np.array(camera.position) - np.array(camera.look_at)
-    finally:
-        server.stop()
     assert np.array_equal(np.sign(back), np.sign(DIRECTION * sides["canadarm"]))

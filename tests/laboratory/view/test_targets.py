@@ -131,11 +131,7 @@ def test_a_target_tumbles_by_eulers_equations_until_it_is_in_the_hand(
 ) -> None:
     """The plant's truth at the capture, integrated back on the target's own axes."""
     velocity, spin = [0.1, -0.2, 0.05], np.array([0.5, -0.8, 0.6])
-    motion = {
-        "relative_to": "inertial",
-        "velocity": velocity,
-        "angular_velocity": spin.tolist(),
-    }
+    motion = {"relative_to": "inertial", "velocity": velocity, "angular_velocity": spin.tolist()}
     content = {"name": "t", "mass": 50.0, "inertia": [3.0, 5.0, 7.0, 0.2, -0.1, 0.3]}
     target = Target.from_dict({"target": {**content, "motion": motion}})
     scene = scene_of(still_log(paper_robot), paper_robot, monkeypatch, Capture(3.0, target))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import signal
-import subprocess
 import threading
 import time
 from collections.abc import Iterator
@@ -12,7 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from flights import COMMAND, ended, forked_space_robot, ros_environment, space_robot_here
+from flights import forked_space_robot, space_robot_here
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
@@ -133,7 +132,7 @@ def fly(domain: int, bag: Path, shown: list[Poses], *options: str) -> FlightLog:
         return space_robot_here("sim", *words, "--domain", str(domain)).returncode == 0
 
     where = ("--domain", str(domain), "--bag", str(bag))
-    how = ("--paused", "--realtime", "--duration", "2")
+    how = ("--paused", "--realtime", "--duration", "1")
     with forked_space_robot("fly", *how, *where, *options) as process:
         until = time.monotonic() + TIMEOUT_S
         while not (sim("step", "--ticks", "50") and any(is_robot_in(poses) for poses in shown)):
@@ -173,76 +172,39 @@ def unit_rows(vectors: Array) -> Array:
     return np.asarray(vectors / np.linalg.norm(vectors, axis=-1, keepdims=True))
 
 
-def test_two_flights_one_after_the_other(tmp_path: Path, free_domain: int) -> None:
-    # the second one's sensors are so far off that their poses are none of the truth's
-    given = ((), ("--sensors", "tactical"))
-    server = Server(free_domain, len(given))
-    server.start()
-    assert server.waits.wait(TIMEOUT_S)
-    shown: list[list[Poses]] = []
-    done = threading.Event()
-
-    def watch() -> None:
-        for poses in frames(server):
-            shown[-1].append(poses)
-        done.set()
-
-    shown.append([])
-    threading.Thread(target=watch, daemon=True).start()
-    for k, options in enumerate(given):
-        log = fly(free_domain, tmp_path / f"bag{k}", shown[-1], *options)
-        seen, _ = shown[-1], shown.append([])
-        rows = shown_rows(log, seen)
-        assert len(set(rows)) > 3
-        assert rows == sorted(rows)
-    server.join(TIMEOUT_S)
-    assert isinstance(server.error, EndedError)
-    assert done.wait(TIMEOUT_S)
-    following = f"following the flight in ROS domain {free_domain}"
-    robot, showing = "its robot is paper; waiting for its first state", "showing it from "
-    once = [serving.WAITING, following, robot, showing, serving.OVER]
-    lines = [line for line in server.lines if not line.startswith("still ")]
-    assert [showing if line.startswith(showing) else line for line in lines] == [
-        *once,
-        *once,
-        serving.WAITING,
-    ]
+def turn(poses: Poses, name: str) -> tuple[float, ...]:
+    return poses.get(f"Ori/robot/{name}", UNTURNED)
 
 
-def test_ctrl_c_ends_it(free_domain: int) -> None:
-    command = [*COMMAND, "view", "--live", "--no-open", "--port", "0", "--domain", str(free_domain)]
-    with (
-        subprocess.Popen(
-            command, stderr=subprocess.PIPE, text=True, env=ros_environment()
-        ) as process,
-        ended(process),
-    ):
-        assert process.stderr is not None
-        assert process.stderr.readline().strip() == "starting the scene ..."
-        address, waiting = process.stderr.readline(), process.stderr.readline()
-        assert address.startswith("the scene is at http://127.0.0.1:")
-        assert waiting.strip() == serving.WAITING
-        process.send_signal(signal.SIGINT)
-        assert process.communicate(timeout=TIMEOUT_S)[1].strip() == "ended"
-        assert process.returncode == 0
-
-
-def test_a_flight_in_orbit_has_the_earth_below(tmp_path: Path, free_domain: int) -> None:
+def test_a_flight_is_shown_as_it_is_in_truth(tmp_path: Path, free_domain: int) -> None:
+    """In orbit, with wheels, and sensors so far off that their poses are none of the truth's."""
     server = Server(free_domain, 1)
     server.start()
     assert server.waits.wait(TIMEOUT_S)
-    collected: list[Poses] = []
+    shown: list[Poses] = []
 
     def watch() -> None:
-        for poses in frames(server):
-            collected.append(poses)
+        shown.extend(frames(server))
 
-    threading.Thread(target=watch, daemon=True).start()
-    log = fly(free_domain, tmp_path / "bag", collected, "--orbit", "iss")
+    watcher = threading.Thread(target=watch, daemon=True)
+    watcher.start()
+    how = ("--orbit", "iss", "--actuators", "wheels", "--sensors", "tactical")
+    log = fly(free_domain, tmp_path / "bag", shown, *how)
     server.join(TIMEOUT_S)
-    last = collected[-1]
+    watcher.join(TIMEOUT_S)
+    assert isinstance(server.error, EndedError)
+    following = f"following the flight in ROS domain {free_domain}"
+    robot, showing = "its robot is paper; waiting for its first state", "showing it from "
+    lines = [line for line in server.lines if not line.startswith("still ")]
+    assert [showing if line.startswith(showing) else line for line in lines] == [
+        *(serving.WAITING, following, robot, showing, serving.OVER, serving.WAITING)
+    ]
+    rows = shown_rows(log, shown)
+    assert len(set(rows)) > 3
+    assert rows == sorted(rows)
+    last = shown[-1]
     nadir, velocity = (
-        Rotation.from_quat(last[f"Ori/robot/orbit/{name}"], scalar_first=True).apply(Z)
+        Rotation.from_quat(turn(last, f"orbit/{name}"), scalar_first=True).apply(Z)
         for name in ("nadir", "orbital_velocity")
     )
     away = np.abs(nadir + unit_rows(log.orbit_position)).max(axis=1)
@@ -252,33 +214,25 @@ def test_a_flight_in_orbit_has_the_earth_below(tmp_path: Path, free_domain: int)
     np.testing.assert_allclose(velocity, unit_rows(log.orbit_velocity)[row], atol=CLOSE)
     earth = np.array(last["Pos/earth"])  # from the middle of the scene
     np.testing.assert_allclose(unit_rows(earth), nadir, atol=1e-3)
-
-
-def test_wheels_turn_in_the_live_scene(tmp_path: Path, free_domain: int) -> None:
-    """By the integral of their speeds up to a row of the bag, slowed down."""
-    server = Server(free_domain, 1)
-    server.start()
-    assert server.waits.wait(TIMEOUT_S)
-    collected: list[Poses] = []
-
-    def watch() -> None:
-        for poses in frames(server):
-            collected.append(poses)
-
-    threading.Thread(target=watch, daemon=True).start()
-    log = fly(free_domain, tmp_path / "bag", collected, "--actuators", "wheels")
-    server.join(TIMEOUT_S)
-    turned = np.zeros(4)
-    last = collected[-1]
-    for wheel in range(4):
-        path = f"/robot/base_link/wheel_{wheel + 1}"
-        w, x, y, z = last.get(f"Ori{path}/rotor", UNTURNED)
-        assert (x, y) == (0.0, 0.0)
-        turned[wheel] = 2.0 * np.arctan2(z, w)
-    speeds = log.wheel_velocities
+    turns = np.array([turn(last, f"base_link/wheel_{k + 1}/rotor") for k in range(4)])
+    assert not turns[:, 1:3].any()
+    turned = 2.0 * np.arctan2(turns[:, 3], turns[:, 0])
     largest = 20.0 / 0.0318  # momentum and rotor's inertia of config/actuators/wheels.yaml
-    angles = log.timebase.period * np.cumsum(speeds, axis=0) / slowdown_of(largest)
-    away = np.abs(angles - turned).max(axis=1)
+    angles = log.timebase.period * np.cumsum(log.wheel_velocities, axis=0) / slowdown_of(largest)
+    wrong = np.abs(angles - turned).max(axis=1)
     assert np.abs(angles[-1]).max() > 0.02
-    assert away.min() < 0.1 * np.abs(angles[-1]).max() + 1e-3
-    assert int(away.argmin()) > log.ticks // 2
+    assert wrong.min() < 0.1 * np.abs(angles[-1]).max() + 1e-3
+    assert int(wrong.argmin()) > log.ticks // 2
+
+
+def test_ctrl_c_ends_it(free_domain: int) -> None:
+    options = ("--live", "--no-open", "--port", "0", "--domain", str(free_domain))
+    with forked_space_robot("view", *options) as process:
+        assert process.stderr is not None
+        assert process.stderr.readline().strip() == "starting the scene ..."
+        address, waiting = process.stderr.readline(), process.stderr.readline()
+        assert address.startswith("the scene is at http://127.0.0.1:")
+        assert waiting.strip() == serving.WAITING
+        process.send_signal(signal.SIGINT)
+        assert process.communicate(timeout=TIMEOUT_S)[1].strip() == "ended"
+        assert process.returncode == 0
