@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import yaml
 from conservation import momentum
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from paths import CONFIG
 from random_robots import random_quaternion, random_robot
@@ -50,20 +50,14 @@ def on_its_path(robot: Robot, seed: int) -> FlightLog:
     return log
 
 
-@given(SEEDS, st.integers(1, 8))
-def test_a_flight_on_its_path_has_no_error(seed: int, n: int) -> None:
-    robot = random_robot(np.random.default_rng(seed), n)
-    log = on_its_path(robot, seed)
-    errors = ToolError(log, of(robot), robot).errors(log)
-    np.testing.assert_allclose(errors, 0.0, atol=1e-12)
-
-
+@settings(max_examples=40)
 @given(SEEDS, st.integers(1, 8))
 def test_a_displaced_and_turned_base_displaces_and_turns_the_tool(seed: int, n: int) -> None:
     rng = np.random.default_rng(seed)
     robot = random_robot(rng, n)
     log = on_its_path(robot, seed)
     metric = ToolError(log, of(robot), robot)
+    np.testing.assert_allclose(metric.errors(log), 0.0, atol=1e-12)
     shift, angle = rng.normal(size=3), 0.3
     turn = Rotation.from_rotvec([0.0, 0.0, angle])
     log.base_position[1:] += shift  # with the whole robot, and so with the path
@@ -167,10 +161,7 @@ def test_a_line_is_flown_within_a_micrometre_and_a_payload_moves_it() -> None:
     assert loaded.fly().report()["tool"]["largest_m"] > 1e-3
 
 
-@pytest.mark.parametrize(
-    ("law", "most"),
-    [("ctc", 1e-5), ("ctc_smc", 1e-5), ("tde_smc", 1e-5), ("tde_tsmc", 1e-5), ("tde_stc", 2e-4)],
-)
+@pytest.mark.parametrize(("law", "most"), [("ctc", 1e-5), ("tde_tsmc", 1e-5), ("tde_stc", 2e-4)])
 def test_every_law_follows_a_slew_with_the_arm_moving(law: str, most: float) -> None:
     segments = [
         {"joints_deg": [5, 115, 215, 5, -5, 5], "base": {"rpy_deg": [0, 0, 3]}, "duration": 4}

@@ -1,4 +1,4 @@
-"""Wheels that turn by SciPy's integral of their speeds, and plumes as long as the thrust is large."""
+"""Wheels that turn by SciPy's integral of their speeds, and plumes as long as the thrust."""
 
 from __future__ import annotations
 

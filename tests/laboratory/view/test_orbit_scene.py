@@ -1,4 +1,4 @@
-"""Where Earth and Sun are in a flight's orbit, its shadow, and how the Earth and arrows are drawn."""
+"""Earth, Sun and shadow in a flight's orbit, and how the Earth and arrows are drawn."""
 
 from __future__ import annotations
 
