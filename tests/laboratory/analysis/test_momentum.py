@@ -40,7 +40,6 @@ from space_robot_msgs_py.samples import SOURCES
 from space_robot_sim.environment.captures import Captures
 from space_robot_sim.environment.disturbance import DisturbanceSettings
 from space_robot_sim.environment.orbit_settings import OrbitSettings
-from space_robot_sim.plant.settings import PlantNodeSettings
 from space_robot_sim.plant.surroundings import REPORT_TICKS
 
 Array = NDArray[np.float64]
@@ -166,18 +165,6 @@ def test_what_thrusters_bring_is_accounted_for(paper_robot: Robot) -> None:
     assert 0.0 < found["pushed_m"]["end"] != pytest.approx(pushed[-1], rel=1e-3)
 
 
-def test_pushing_is_of_the_centre_of_mass(paper_robot: Robot) -> None:
-    """A force of 8 N along x for 2 s on 860 kg that does not turn."""
-    actuators = hardware(
-        thrusters={"positions": [0.0, 0.0, 0.0], "directions": [1.0, 0.0, 0.0], "force": [8.0]}
-    )
-    log = still_log(paper_robot, ROWS, actuators, PERIOD)
-    log.thrusts[1:] = 8.0
-    log.base_position[:, 0] = 0.5 * 8.0 / paper_robot.mass.sum() * log.time**2
-    found = budget(log, paper_robot, actuators)
-    assert found["pushed_m"]["end"] == pytest.approx(0.5 * 8.0 / 860.0 * 4.0)
-
-
 @pytest.mark.parametrize("time", [0.3, 1.0, 7.7])
 def test_the_disturbances_impulse_is_its_integral(time: float) -> None:
     disturbance = DisturbanceSettings(scale=2.0, base_frequencies=[0.5, 0.0])
@@ -251,29 +238,6 @@ def test_dipoles_are_accounted_for_to_rounding() -> None:
     assert lost == pytest.approx(np.linalg.norm(held), rel=1e-3)  # on base axes, nearly inertial
 
 
-def test_thrusters_and_torquers_together_are_accounted_for() -> None:
-    """On a base with all three, whose thrusters fire."""
-    files = [
-        PlantNodeSettings.resolve({"actuators": name}).model_dump()
-        for name in ("wheels_and_thrusters", "wheels_and_torquers")
-    ]
-    parts = {"thrusters": files[0]["thrusters"]}
-    parts |= {name: files[1][name] for name in ("wheels", "magnetic_torquers")}
-    unloading = {"allocation.unload_above": 0.1, "allocation.unload_to": 0.05}
-    scenario = Scenario(
-        actuators={"base_actuation": "hardware", **parts},
-        orbit=FIELD,
-        duration=0.5,
-        parameters={"controller": unloading},
-    )
-    log = scenario.fly().log
-    momentum, rest = remainder(log)
-    assert log.thrusts.any(axis=0).sum() > 1
-    assert np.abs(log.actuator_commands[:, 16:]).max(axis=0).all()
-    assert np.linalg.norm(momentum.outside[-1]) > 0.1
-    assert np.abs(rest).max() < 1e-12 * np.linalg.norm(momentum.wheels[0])
-
-
 @pytest.mark.parametrize("period", [5e-4, 2e-3])
 def test_what_remains_with_gravity_is_that_its_torque_is_held(period: float) -> None:
     """It is computed every 20 ticks and summed as if it stayed the same until then.
@@ -289,16 +253,6 @@ def test_what_remains_with_gravity_is_that_its_torque_is_held(period: float) -> 
     assert size > 1e-7
     np.testing.assert_allclose(rest[last], lag, rtol=0.0, atol=0.01 * size)
     assert np.linalg.norm(rest[-1]) < 1e-6 * np.linalg.norm(log.wheel_velocities[0])
-
-
-def test_what_remains_with_air_is_that_the_centre_of_mass_moves() -> None:
-    """Its force is held over a tick, in which its lever changes with the arm: by the period."""
-    sizes = []
-    for period in (5e-4, 1e-3):
-        momentum, rest = remainder(flown("air", period))
-        sizes.append(np.abs(rest).max())
-        assert sizes[-1] < 1e-5 * np.linalg.norm(momentum.outside[-1])
-    assert sizes[1] == pytest.approx(2.0 * sizes[0], rel=0.05)
 
 
 @pytest.mark.parametrize("case", ["1", "3"])

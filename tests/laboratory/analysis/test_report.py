@@ -5,7 +5,6 @@ from __future__ import annotations
 import copy
 import itertools
 import json
-from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -16,7 +15,7 @@ import yaml
 from driven_robots import PLATES, driven_paper
 from flights import space_robot_here
 from numpy.typing import NDArray
-from paths import CONFIG
+from paths import CONFIG, DATA
 from random_logs import random_log
 
 from space_robot import Scenario
@@ -30,39 +29,19 @@ from space_robot.console.tables import NONE
 from space_robot_model.robot.gears import geared_joints
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.bag.reader import read_flight
-from space_robot_msgs_py.samples import SOURCES, Timebase
+from space_robot_msgs_py.samples import Timebase
 
 Array = NDArray[np.float64]
 Report = dict[str, Any]
-GROUPS = {"base": "base", "1_3": "joints_1_3", "4_6": "joints_4_6"}
-PATHS: dict[str, tuple[str, ...]] = {
-    "RMS, mean of axes": ("rms", "mean_axis"),
-    "RMS, eq. (64)": ("rms", "eq64"),
-    "maximum": ("maxima",),
-    "variation per s": ("chatter", "total_variation_per_s"),
-    "power > 100 Hz": ("chatter", "power_above_100_hz"),
-    "ripple": ("ripple", "rms"),
-    "settled after": ("settling", "settled_s"),
-    "navigation error": ("navigation_error", "rms"),
-}
-"""Groups with a line for every key below."""
-ANGLES: dict[str, Callable[[Report], float]] = {
-    "RMS, mean of axes": lambda r: r["attitude_error_deg"]["mean_axis"],
-    "RMS, eq. (64)": lambda r: r["attitude_error_deg"]["eq64"],
-    "maximum": lambda r: r["attitude_error_deg"]["max"],
-    "navigation error": lambda r: r["navigation_error"]["attitude_deg"]["rms"],
-}
-"""The attitude's angle in degrees, in the place of the quaternion's vector part."""
-OF_BASE = {
-    "base, half cone": "half_cone_arcsec",
-    "base, about the axis": "about_arcsec",
-    "base, rotation": "rotation_arcsec",
-}
-POINTING = {
-    "pointing": "boresight_rad",
-    "rotation": "rotation_rad",
-    "tool position": "tool_position_m",
-    "base's drift": "base_drift_m",
+LINES = DATA / "report_lines.txt"
+DRIVEN_LINES, DRIVEN = DATA / "report_lines_driven.txt", {"disturbance torque", "deflection"}
+NOT_BRIEF = {
+    "RMS, mean of axes",
+    "RMS, eq. (64)",
+    "variation per s",
+    "power > 100 Hz",
+    "ripple",
+    "asked of the base",
 }
 OF_OTHER_FLIGHTS = {
     "attitude drift",
@@ -103,13 +82,24 @@ def numbers(report: Any, path: str = "") -> dict[str, Any]:
     return {name: value for part in inner for name, value in part.items()}
 
 
-def numbered(value: Any, counter: itertools.count[int]) -> Any:
-    """The same report with another number in every place."""
+class Named(float):
+    """A number that shows its path in the report, and how it is written."""
+
+    path: str
+
+    def __format__(self, spec: str) -> str:
+        return f"{self.path}:{spec}"
+
+
+def named(value: Any, path: str = "") -> Any:
+    """The same report with a `Named` in the place of each number with a point, 1.5 in size."""
     if isinstance(value, dict):
-        return {key: numbered(v, counter) for key, v in value.items()}
-    if isinstance(value, float):
-        return 1.0 + next(counter) / 1000.0
-    return 100 + next(counter) if type(value) is int else value
+        return {key: named(v, f"{path}.{key}".removeprefix(".")) for key, v in value.items()}
+    if not isinstance(value, float):
+        return value
+    number = Named(1.5)
+    number.path = path
+    return number
 
 
 def by_label(found: list[Line]) -> dict[tuple[str, str], Line]:
@@ -134,77 +124,32 @@ def test_a_report_does_not_depend_on_the_blocks() -> None:
 
 
 @pytest.fixture(scope="module")
-def reports() -> list[Report]:
-    """Of one flight, each with other numbers."""
+def report() -> Report:
     log = Scenario(duration=1.0, faults=["noise_gyro@0:1e-9"]).fly().log
     log.latency_s = np.linspace(1e-4, 3e-4, log.ticks)
     log.flight["parameters"]["plant"] |= {"base_torque_limit": 1.0, "joint_torque_limit": 1.0}
     report = analyze(log)
     assert report["unavailable"] == {}
-    counter = itertools.count()
-    return [numbered(copy.deepcopy(report), counter) for _ in range(3)]
+    counts = {"filled_ticks": 3, "unanswered_ticks": 4, "lost": {"a": 5, "b": 6}}
+    report["saturation"]["ticks"], report["missed_deadlines"]["differing_ticks"] = 7, 8
+    return {**report, **counts}
 
 
-def expected_texts(r: Report) -> Iterator[tuple[tuple[str, str], str]]:
-    """Of every line, written out."""
-    for group, path in PATHS.items():
-        values: Any = r
-        for key in path:
-            values = values[key]
-        if group in ANGLES:
-            values = values | {"attitude": ANGLES[group](r)}
-        for key, value in values.items():
-            yield (group, key), f"{value:.4g}"
-    for key, peak in r["ripple"]["peak"].items():
-        yield ("ripple's peak", key), f"{peak['frequency_hz']:.4g} Hz\n{peak['rms']:.2e} N m"
-    share = r["saturation"]["share"]
-    yield ("saturation", "ticks at a limit"), f"{r['saturation']['ticks']} ({share:.2%})"
-    for name in ("p50", "p99", "max"):
-        ms, ticks = (r["latency"][f"{name}_{unit}"] for unit in ("ms", "ticks"))
-        yield ("latency", name), f"{ms:.3g} ({ticks:.3g})"
-    yield ("commands", "unanswered"), str(r["unanswered_ticks"])
-    yield ("commands", "not as commanded"), str(r["missed_deadlines"]["differing_ticks"])
-    for kind, label in (("rms", "RMS"), ("max", "max")):
-        for group, name in GROUPS.items():
-            value = r["estimate_error"][kind][group]
-            yield ("estimate error", f"{name} {label}"), f"{value:.4g}"
-    for group, key in OF_BASE.items():
-        for kind, value in r["base_pointing"][key].items():
-            if kind == "within_band":
-                yield (group, "time within the band"), f"{value:.2%}"
-            else:
-                label = kind.replace("_", ", ").replace("rms", "RMS")
-                yield (group, label), f"{value:.3g} arcsec"
-    for group, key in POINTING.items():
-        for kind, label in (("rms", "RMS"), ("max", "max"), ("end", "end")):
-            value = r["pointing"][key][kind]
-            angle = f"{value:.3g} rad\n{value * 180 / np.pi:.3g} deg"
-            yield (group, label), angle if key.endswith("rad") else f"{value:.4g}"
-    for kind, label in (("rms", "RMS"), ("largest", "max")):
-        yield ("tool on its path", label), f"{r['tool'][f'{kind}_m']:.4g}"
-        yield ("tool on its path", f"rotation, {label}"), f"{r['tool'][f'{kind}_deg']:.4g}"
-    yield ("tool on its path", "the path's drift"), f"{r['tool']['drift_m']:.4g}"
-    for axis, asked in r["sizing"]["axes"].items():
-        yield ("asked of the base", f"{axis} torque"), f"{asked['peak_torque_n_m']:.4g}"
-        yield ("asked of the base", f"{axis} momentum"), f"{asked['peak_momentum_n_m_s']:.4g}"
-    yield ("recording", "messages lost"), str(sum(r["lost"].values()))
-    yield ("recording", "states filled in"), str(r["filled_ticks"])
-    yield ("recording", "finished"), "yes"
-    yield ("recording", "damage found"), "0"
+def table_of(found: list[Line]) -> list[str]:
+    return [" | ".join((x.group, x.name, x.unit, *x.texts)).replace("\n", " / ") for x in found]
 
 
-def test_every_line_is_its_figure(reports: list[Report]) -> None:
-    each = [dict(expected_texts(report)) for report in reports]
-    found = by_label(lines(reports))
-    texts = {label: line.texts for label, line in found.items()}
-    assert texts == {label: [report[label] for report in each] for label in each[0]}
-    assert {group for group, _ in found} == DEFINITIONS.keys() - OF_OTHER_FLIGHTS
-    left_out = [*PATHS][:2] + [*PATHS][3:6] + ["asked of the base"]
-    assert lines(reports, brief=True) == [x for x in lines(reports) if x.group not in left_out]
+def test_every_line_is_its_figure(report: Report) -> None:
+    shown = named(report)
+    found = lines([shown])
+    assert table_of(found) == LINES.read_text("utf-8").splitlines()
+    assert {line.group for line in found} == DEFINITIONS.keys() - OF_OTHER_FLIGHTS
+    left_out = {line.group for line in found} - {x.group for x in lines([shown], brief=True)}
+    assert left_out == NOT_BRIEF
 
 
-def test_what_is_special_in_a_line(reports: list[Report]) -> None:
-    report = copy.deepcopy(reports[0])
+def test_what_is_special_in_a_line(report: Report) -> None:
+    report = copy.deepcopy(report)
     report["pointing"]["boresight_rad"] = {"rms": np.radians(1 / 3600), "max": 1e-2, "end": 1.0}
     report["settling"]["settled_s"]["attitude"] = None
     report["saturation"] |= {"base_torque_limit_n_m": None, "joint_torque_limit_n_m": None}
@@ -222,10 +167,10 @@ def test_what_is_special_in_a_line(reports: list[Report]) -> None:
         assert found[label].texts == [text]
 
 
-def test_a_figure_that_a_flight_does_not_have_is_a_dash(reports: list[Report]) -> None:
+def test_a_figure_that_a_flight_does_not_have_is_a_dash(report: Report) -> None:
     log = random_log(6, 300, 0)
     log.flight = {}
-    found = by_label(lines([analyze(log), reports[0]]))
+    found = by_label(lines([analyze(log), report]))
     for label in (
         ("saturation", "ticks at a limit"),
         ("latency", "p99"),
@@ -247,10 +192,8 @@ def test_gains_of_ones_own_stand_in_the_title() -> None:
     assert "own" not in rms_table(scenario.fly().report()).title
 
 
-def test_the_attitude_is_shown_in_degrees_and_a_divergence_with_exponents(
-    reports: list[Report],
-) -> None:
-    report = copy.deepcopy(reports[0])
+def test_the_attitude_is_shown_in_degrees_and_a_divergence_with_exponents(report: Report) -> None:
+    report = copy.deepcopy(report)
     report["attitude_error_deg"] = {"mean_axis": 1.146e-3, "eq64": 6.6e-4, "max": 2e-3}
     report["navigation_error"] = None
     maximum = by_label(lines([report]))["maximum", "attitude"]
@@ -303,35 +246,15 @@ def driven(bag: Path) -> FlightLog:
 
 def test_every_line_on_orbit_and_gears_is_its_figure(driven: FlightLog) -> None:
     """And a dash where a flight is in no orbit and has no gears."""
-    counter, report = itertools.count(), analyze(driven)
+    report = analyze(driven)
     json.dumps(report, allow_nan=False)
-    assert tuple(report["disturbance_by_source"]) == (*SOURCES, "sines")
-    reports = [copy.deepcopy(report) for _ in range(2)]
-    for each in reports:
-        for key in ("disturbance_by_source", "deflection"):
-            each[key] = numbered(each[key], counter)
-    plain = {**copy.deepcopy(report), "disturbance_by_source": None, "deflection": None}
-    expected: dict[tuple[str, str], tuple[str, list[str]]] = {}
-    for source in (*SOURCES, "sines"):
-        for key, name, unit in (
-            ("rms_n_m", "RMS", "N m"),
-            ("max_n_m", "max", "N m"),
-            ("impulse_n_m_s", "impulse", "N m s"),
-        ):
-            texts = [f"{each['disturbance_by_source'][source][key]:.4g}" for each in reports]
-            expected["disturbance torque", f"{source} {name}"] = unit, [*texts, NONE]
-    for joint in driven.geared_names:
-        for key, name in (("rms", "RMS"), ("largest", "largest")):
-            texts = [f"{each['deflection'][key][joint]:.4g}" for each in reports]
-            expected["deflection", f"{joint} {name}"] = "rad or m", [*texts, NONE]
-    found = by_label(lines([*reports, plain]))
-    groups = {group for group, _ in expected}
-    shown = {label: (x.unit, x.texts) for label, x in found.items() if label[0] in groups}
-    assert shown == expected
-    assert not {label[0] for label in by_label(lines([plain]))} & groups
+    plain = {**report, "disturbance_by_source": None, "deflection": None}
+    found = table_of([x for x in lines([named(report), plain]) if x.group in DRIVEN])
+    assert found == DRIVEN_LINES.read_text("utf-8").splitlines()
+    assert not {x.group for x in lines([plain])} & DRIVEN
     table = comparison_table({"flight": report})
     notes = {group.name: group.note for group in table.groups}
-    assert all(notes[name] == DEFINITIONS[name] for name in groups)
+    assert all(notes[name] == DEFINITIONS[name] for name in DRIVEN)
     texts = [row[0] for group in table.groups for row in table.texts(group)]
     assert {"gravity_gradient RMS (N m)", "joint5 largest (rad or m)"} < {*texts}
 

@@ -7,15 +7,13 @@ from typing import Any
 import numpy as np
 import pytest
 from actuator_sets import PYRAMID, flat, hardware, still_log
-from hypothesis import given, settings
-from hypothesis import strategies as st
 from oracles import quaternion_of
 from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
 from space_robot.analysis import analyze
 from space_robot.analysis.base_demand import BaseDemand
-from space_robot.analysis.loads import LoadRequirement, OtherWheelLoad, ThrusterLoad, WheelLoad
+from space_robot.analysis.loads import LoadRequirement, OtherWheelLoad
 from space_robot.analysis.metrics import of_log
 from space_robot.analysis.sizing import ActuatorSet, Sizing
 from space_robot.analysis.sizing_table import sizing_table
@@ -43,21 +41,6 @@ def turning_log(robot: Robot, rate: float, ticks: int = 2001) -> FlightLog:
     assert log.commanded_torque is not None
     log.commanded_torque[:, 0] = 2.0
     return log
-
-
-@pytest.mark.parametrize("rate", [0.0, 0.3, 2.0])
-def test_stored_momentum_is_the_integral_on_inertial_axes(paper_robot: Robot, rate: float) -> None:
-    """``H = -2 [sin(rt), 1 - cos(rt)] / r`` on inertial axes, seen from the base."""
-    log = turning_log(paper_robot, rate)
-    found = BaseDemand(BaseActuatorSettings()).add(log)
-    t = log.time
-    taken = np.array([2.0 * t, 0.0 * t, 0.0 * t]).T
-    if rate:
-        taken = 2.0 / rate * np.array([np.sin(rate * t), 1.0 - np.cos(rate * t), 0.0 * t]).T
-    held = -Rotation.from_rotvec(np.outer(rate * t, [0, 0, 1])).inv().apply(taken)
-    np.testing.assert_allclose(found.momentum, held, atol=1e-6)
-    np.testing.assert_allclose(found.torque[1:], [[2.0, 0.0, 0.0]] * 2000)
-    assert np.all(found.torque[0] == 0.0)
 
 
 def test_stored_momentum_is_scipys_integral_of_any_motion(paper_robot: Robot) -> None:
@@ -170,19 +153,6 @@ class TestWheels:
         inside = slice(2, -2)
         np.testing.assert_allclose((torque - friction)[inside], given[inside], atol=3e-3)
 
-    def test_they_and_the_flown_ones_agree_on_a_base_that_stands(self, paper_robot: Robot) -> None:
-        wheels = hardware(wheels={"axes": flat(np.eye(3)), "rotor_inertia": [0.1]})
-        log = still_log(paper_robot, 101, wheels)
-        assert log.commanded_torque is not None
-        log.commanded_torque[:, 0] = 0.2
-        log.wheel_torques[1:, 0] = -0.2
-        log.wheel_velocities[:, 0] = -0.2 * log.time / 0.1
-        loads = WheelLoad(wheels.wheels), OtherWheelLoad(wheels.wheels)
-        for flown, load in zip((wheels, BaseActuatorSettings()), loads, strict=True):
-            load.add(log, BaseDemand(flown).add(log))
-        for one, other in zip(*(load.requirements(PERIOD) for load in loads), strict=True):
-            assert one.asked == pytest.approx(other.asked, abs=1e-12)
-
 
 class TestThrusters:
     def test_pulses_and_propellant_by_axis(self, paper_robot: Robot) -> None:
@@ -209,24 +179,6 @@ class TestThrusters:
             "is_met": True,
             "is_at_limit": False,
         }
-
-    @settings(max_examples=20)
-    @given(st.integers(0, 99), st.integers(1, 58))
-    def test_pulses_are_those_of_a_plain_loop(
-        self, paper_robot: Robot, seed: int, cut: int
-    ) -> None:
-        thrusters = hardware(thrusters=PAIRS)
-        log = still_log(paper_robot, 60, thrusters)
-        log.thrusts[:] = 2.0 * (np.random.default_rng(seed).random(log.thrusts.shape) < 0.5)
-        load, demand = ThrusterLoad(thrusters.thrusters, True), BaseDemand(thrusters)
-        for part in (log.rows(0, cut), log.rows(cut, 60)):
-            load.add(part, demand.add(part))
-        begun = [0, 0, 0]
-        for i in range(12):
-            for k in range(60):
-                if log.thrusts[k, i] and not (k and log.thrusts[k - 1, i]):
-                    begun[(2, 0, 1)[i // 4]] += 1
-        assert load.pulses().tolist() == begun
 
     def test_of_others_the_least_is_known(self, paper_robot: Robot) -> None:
         log = turning_log(paper_robot, 0.0)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import copy
 import json
 import pickle
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -345,53 +345,6 @@ def test_a_copied_bench_flies_on_to_the_same_bits(midway: Bench, copied: Any) ->
     assert other.reset().block.tobytes() == RICH.bench().state.block.tobytes()
 
 
-def arrays_in(thing: Any, path: str, visited: set[int]) -> Iterator[tuple[str, NDArray[Any]]]:
-    """Yield every array that an object reaches, with the path to it."""
-    if isinstance(thing, np.ndarray):
-        yield path, thing
-        return
-    if id(thing) in visited or isinstance(thing, (str, bytes, type)) or callable(thing):
-        return
-    visited.add(id(thing))
-    inner: dict[Any, Any] = dict(getattr(thing, "__dict__", {}))
-    inner |= {name: getattr(thing, name) for name in getattr(type(thing), "__slots__", ())}
-    if isinstance(thing, dict):
-        inner |= thing
-    elif isinstance(thing, (list, tuple)):
-        inner |= dict(enumerate(thing))
-    for name, value in inner.items():
-        yield from arrays_in(value, f"{path}.{name}", visited)
-
-
-def memory_map(thing: Any) -> dict[str, tuple[str, int]]:
-    """Return of each array the largest one in whose memory it lies, and where in it."""
-    arrays = sorted(
-        (a for a in arrays_in(thing, "", set()) if a[1].size), key=lambda a: (-a[1].nbytes, a[0])
-    )
-    found = {}
-    for path, array in arrays:
-        whole = next(a for a in arrays if np.may_share_memory(a[1], array))
-        found[path] = whole[0], array.ctypes.data - whole[1].ctypes.data
-    return found
-
-
-@copies
-def test_a_copy_has_the_same_views_of_memory_of_its_own(copied: Any) -> None:
-    """Whatever looks into a block looks into the copy's block, at the same place."""
-    bench = RICH.bench()
-    fly_on(bench, 45)
-    bench.controller.allocate  # noqa: B018
-    bench.reference  # noqa: B018
-    other = copied(bench)
-    assert memory_map(other) == memory_map(bench)
-    mine, theirs = (dict(arrays_in(thing, "", set())) for thing in (bench, other))
-    for path, array in theirs.items():
-        if array.flags.writeable and mine[path].flags.writeable:
-            assert not np.may_share_memory(array, mine[path]), path
-    signals = other.controller.signals
-    assert signals.address == other.controller.block["signals"].ctypes.data
-
-
 def test_compiled_code_knows_the_blocks_of_another_process(
     midway: Bench, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -402,16 +355,6 @@ def test_compiled_code_knows_the_blocks_of_another_process(
     for block in (other._plant.block, other.controller.block):
         assert records.layout_of(block.dtype) is not None
     records._dtype.cache_clear()
-
-
-def test_benches_of_one_flight_do_not_disturb_one_another() -> None:
-    """Each has laws of its own: these remember."""
-    flight = Scenario(controller="tde_stc", case="3", duration=0.05).check()
-    alone, one, other = Bench(flight), Bench(flight), Bench(flight)
-    fly_on(other, 7)
-    for _ in range(40):
-        assert fly_on(one, 1) == fly_on(alone, 1)
-        fly_on(other, 1)
 
 
 def test_a_copied_state_is_a_state_and_a_view_of_a_record_is_refused(midway: Bench) -> None:

@@ -20,7 +20,7 @@ from tree_oracle import pinocchio_tree
 from space_robot import FlownFlight, Scenario
 from space_robot.analysis import excerpt
 from space_robot.view.film import FilmedFlight, film
-from space_robot.view.flights import ViewOptions, flights_page, shown_robot
+from space_robot.view.flights import ViewOptions, shown_robot
 from space_robot.view.frames import shown_times
 from space_robot.view.marks import Mark, marks_of, shared_marks
 from space_robot.view.quantities import quantities_of
@@ -125,14 +125,6 @@ def test_side_by_side_nobody_is_in_anothers_place(flown: Flown) -> None:
     for root in roots:
         np.testing.assert_allclose(together[root].position, first, atol=1e-8)
         np.testing.assert_allclose(apart[root].position[1:], first[1:], atol=1e-8)
-
-
-def test_different_robots_stand_side_by_side_of_themselves(flown: Flown) -> None:
-    logs = {name: flown(name) for name in ("paper", "dual_arm")}
-    robots = {name: shown_robot(log) for name, log in logs.items()}
-    poses = Scene(flights_page(logs, robots, ViewOptions(), quiet)).poses(0.0)
-    assert poses["/paper"].position[0] == 0.0
-    assert poses["/dual_arm"].position[0] > 1.0
 
 
 def test_a_target_waits_where_it_is_grasped_and_is_seen_while_it_is_held(flown: Flown) -> None:

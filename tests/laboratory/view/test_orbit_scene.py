@@ -237,17 +237,6 @@ def test_day_is_where_the_sun_is_and_circles_are_of_right_ascension_and_declinat
     assert len(earth.lines) > 30
 
 
-@pytest.mark.parametrize(("part", "most"), [(0.004, 500_000), (1.0, 1_500_000)])
-def test_it_is_cheap_to_draw(part: float, most: int) -> None:
-    """Before compression; of a flight of 20 s, and of a whole orbit."""
-    orbit = CircularOrbit()
-    times = np.linspace(0.0, part * 2.0 * np.pi / orbit.rate, 100)
-    data = earth_glb(frames_of(orbit, times), 1.0, ON_DARK_PAGE)
-    assert len(data) < most
-    earth = EarthFile(data)
-    assert len(earth.faces) + len(earth.haze) < 100_000
-
-
 class FakeScene:
     """Keeps the nodes that are added."""
 
@@ -309,10 +298,3 @@ def test_each_arrow_has_a_colour_of_the_page(dark: bool) -> None:
     assert len(colours) == 3
     assert colours <= set(palette(dark)) - set(palette(dark)[:2])  # those of the first flights
     assert arrow_kinds(False, dark) == kinds[:2]
-
-
-def test_arrows_reach_out_of_the_base(paper_robot: Robot) -> None:
-    """The paper's base is a cube of 1 m."""
-    size = ArrowSize.of(paper_robot, np.array([[0.0, 0.0, 0.0], [5.0, 1.0, 1.0]]))
-    assert size.size == 5.0
-    assert np.sqrt(0.75) + 0.5 < size.length < 2.5

@@ -209,10 +209,3 @@ def test_the_page_has_whatever_names_and_values_of_four_digits(
         else:
             assert number == pytest.approx(value, rel=5e-4, abs=0.0)
     np.testing.assert_allclose(data["time"], time, atol=5e-5)
-
-
-def test_a_name_of_100000_letters_is_shortened(paper_robot: Robot) -> None:
-    log = flight(paper_robot, "")
-    log.joint_names = ("j" * 100_000, *log.joint_names[1:])
-    plots = plots_of({"one": log}, {"one": paper_robot}, ["#112233"])
-    assert max(len(series.label) for plot in plots for series in plot.series) == 40

@@ -17,7 +17,6 @@ from scene_pages import Scene
 
 from space_robot.view import mesh, meshes
 from space_robot.view.arrows import ArrowSize, arrow_glb
-from space_robot.view.glb import grid_faces, unlit_glb
 from space_robot.view.local_server import local_server
 from space_robot.view.mesh import read_mesh, simplify
 from space_robot.view.meshes import read_meshes, shown_shapes
@@ -214,19 +213,6 @@ def test_a_mesh_is_drawn_in_its_size_and_a_mirrored_one_looks_outwards(
         shown = trimesh.Trimesh(vertices, faces, process=False)
         np.testing.assert_allclose(np.ptp(vertices, axis=0), [0.1, 0.2, 0.3], rtol=1e-6)
         assert shown.volume == pytest.approx(0.006, rel=1e-5)
-
-
-@pytest.mark.parametrize("rings", [2, 70, 300])
-def test_many_vertices_have_longer_indices(rings: int) -> None:
-    parts = 250
-    vertices = np.random.default_rng(rings).normal(size=(rings * parts, 3))
-    faces = grid_faces(rings, parts)
-    assert len(faces) == 2 * parts * (rings - 1)
-    assert len(grid_faces(1, parts)) == 0
-    data = unlit_glb(vertices, np.zeros_like(vertices), faces, np.empty((0, 2), np.int64))
-    (read,) = trimesh.load(io.BytesIO(data), "glb", process=False).geometry.values()
-    np.testing.assert_array_equal(read.faces, faces)
-    np.testing.assert_allclose(read.vertices, vertices, atol=1e-6)
 
 
 def test_an_arrow_is_closed_and_has_its_length() -> None:
