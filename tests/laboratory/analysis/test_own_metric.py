@@ -20,36 +20,13 @@ from space_robot_msgs_py.errors import InputError
 
 FILE = """
 import numpy as np
-
-
-def largest_error(log):
-    return np.abs(log.joint_positions - log.reference_joints[:, 0]).max()
-
-
-def ticks(log):
-    return log.ticks
-
-
-def raises(log):
-    return 1 / (log.ticks - log.ticks)
-
-
-def nan(log):
-    return float("nan")
-
-
-def array(log):
-    return np.zeros(3)
-
-
-def text(log):
-    return "3"
-
-
-def leaves(log):
-    raise SystemExit("away")
-
-
+def largest_error(log): return np.abs(log.joint_positions - log.reference_joints[:, 0]).max()
+def ticks(log): return log.ticks
+def raises(log): return 1 / (log.ticks - log.ticks)
+def nan(log): return float("nan")
+def array(log): return np.zeros(3)
+def text(log): return "3"
+def leaves(log): raise SystemExit("away")
 NUMBER = 3
 """
 
@@ -101,8 +78,8 @@ def test_analyze_shows_it(bag: Path) -> None:
 @pytest.mark.parametrize(
     ("metric", "why"),
     [
-        ("mine.py:raises", "failed: ZeroDivisionError: division by zero (mine.py, line 14)"),
-        ("mine.py:leaves", "metric leaves failed: SystemExit: away (mine.py, line 30)"),
+        ("mine.py:raises", "failed: ZeroDivisionError: division by zero (mine.py, line 5)"),
+        ("mine.py:leaves", "metric leaves failed: SystemExit: away (mine.py, line 9)"),
         ("mine.py:nan", "metric nan: the function must return a finite number, got nan"),
         ("mine.py:array", "metric array: the function must return one number, got an array of"),
         ("mine.py:text", "metric text: the function must return one number, got '3'"),

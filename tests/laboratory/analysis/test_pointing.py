@@ -14,7 +14,7 @@ from scipy.spatial.transform import Rotation
 
 from space_robot import Scenario
 from space_robot.analysis import analyze
-from space_robot.analysis.metrics import of_log, tracking_error
+from space_robot.analysis.metrics import of_log
 from space_robot.analysis.pointing import (
     BASE_ANGLES,
     BasePointing,
@@ -207,17 +207,3 @@ def test_a_flight_whose_mission_points_the_base_says_how_well(
         rms = base["half_cone_arcsec"]["rms"]
         assert f"half cone from the reference {rms:.3g} arcsec RMS" in text
         assert "jitter" not in text
-
-
-def test_the_error_of_a_log_is_that_which_the_law_saw() -> None:
-    """Also where the base is to stand at 180 degrees from the inertial frame."""
-    half_turn = [0.0, 0.6, 0.0, 0.8]
-    parameters = {
-        "mission": {"base_quaternion": half_turn},
-        "plant": {"initial_quaternion": [1e-3, 0.6, 1e-3, 0.8]},
-    }
-    log = Scenario(duration=0.1, parameters=parameters).fly().log
-    assert log.telemetry is not None
-    seen = log.telemetry[:, 3]
-    assert np.abs(seen[0, :3]).max() > 1e-4
-    np.testing.assert_allclose(tracking_error(log), seen, rtol=0.0, atol=1e-15)

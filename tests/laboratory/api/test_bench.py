@@ -9,7 +9,6 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-import gymnasium
 import numpy as np
 import pytest
 from bags import messages_of
@@ -19,7 +18,6 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from space_robot import Bench, Scenario, load_bag
-from space_robot.api.gymnasium_env import NAME
 from space_robot.flight.replay.choice import ControllerChoice
 from space_robot_control.laws.ctc import ComputedTorque
 from space_robot_msgs_py.bag.flight_log import FlightLog
@@ -376,19 +374,3 @@ def test_a_copied_state_is_a_state_and_a_view_of_a_record_is_refused(midway: Ben
         assert (other.block["joint_positions"][0, 1], state.joint_positions[1]) == (3.0, 0.0)
         with pytest.raises(TypeError, match="copy the object that owns its block"):
             copied(midway.controller.signals)
-
-
-@pytest.mark.parametrize("copied", [copy.deepcopy, COPIES["pickle"]])
-def test_a_copied_environment_goes_on_to_the_same_rewards(copied: Any) -> None:
-    """In its wrappers, and with the random numbers of the episodes to come."""
-    made: Any = gymnasium.make(NAME, scenario=PLAIN)
-    made.reset(seed=3)
-    actions = np.random.default_rng(0).uniform(-1.0, 1.0, (3, 9))
-    made.step(actions[0])
-    other = copied(made)
-
-    def go_on(env: Any) -> list[Any]:
-        steps = [env.step(action) for action in actions[1:]]
-        return [(step[0].tobytes(), *step[1:]) for step in steps] + [env.reset()[0].tobytes()]
-
-    assert go_on(other) == go_on(made)

@@ -19,21 +19,8 @@ from space_robot_model.robot.find import find_robot
 from space_robot_msgs_py.errors import InputError
 
 UNIT = [1.0, 0.0, 0.0, 0.0]
-JUNK = [
-    None,
-    3,
-    1.5,
-    True,
-    float("nan"),
-    [],
-    ["x"],
-    {},
-    {"a": 1},
-    b"x",
-    object(),
-    np.zeros(3),
-    np.array([None]),
-]
+JUNK: list[Any] = [None, 3, 1.5, True, float("nan"), [], ["x"], {}, {"a": 1}, b"x", object()]
+JUNK += [np.zeros(3), np.array([None])]
 NO_NUMBERS = [None, "up", [None] * 9, ["a"] * 9, [1j] * 9, [[1.0], [1.0, 2.0]], {}, b"x", object()]
 NO_WHOLE_NUMBERS = [1.5, 1.0, "2", True, [1], float("nan"), np.float64(1.0), np.bool_(True)]
 SHORT = Scenario(controller=None, duration=0.2)

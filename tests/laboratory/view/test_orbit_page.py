@@ -105,15 +105,6 @@ def test_side_by_side_each_has_its_arrows_and_over_one_another_the_first(
     np.testing.assert_allclose(offset, (offset @ track) * track, atol=1e-9)
 
 
-def test_a_bag_that_does_not_tell_of_the_sun(paper_robot: Robot, log: FlightLog) -> None:
-    page = page_of(paper_robot, one=replace(log, flight={}))
-    names = Scene(page).names()
-    assert names >= {"/earth", "/one/orbit/nadir"}
-    assert "/one/orbit/Sun" not in names
-    assert plot_data(page)["marks"] == []
-    assert ">Sun<" not in page
-
-
 def test_a_flight_without_orbit_and_gears_has_nothing_of_them(
     paper_robot: Robot, log: FlightLog
 ) -> None:

@@ -23,8 +23,7 @@ from space_robot.view.arrows import ArrowSize, BaseArrows, arrow_directions, arr
 from space_robot.view.earth import ON_DARK_PAGE, Earth, Shades, earth_glb
 from space_robot.view.frames import shown_times
 from space_robot.view.marks import Mark, marks_of
-from space_robot.view.orbit_frames import OrbitFrames, is_in_shadow, shadow_intervals, sun_direction
-from space_robot.view.palette import palette
+from space_robot.view.orbit_frames import OrbitFrames, shadow_intervals, sun_direction
 from space_robot_model.robot import Robot
 
 Array = NDArray[np.float64]
@@ -125,19 +124,6 @@ def test_the_sun_is_unknown_without_sunlight_or_description(
     assert sun_direction(replace(named, trusted=False)) is None
     named.flight["orbit"] = "iss"
     assert sun_direction(replace(named, trusted=False)) is not None
-
-
-@given(st.floats(1.0, 7.0), DIRECTIONS, DIRECTIONS)
-def test_in_the_shadow_the_way_to_the_sun_leads_through_the_earth(
-    distance: float, place: tuple[float, ...], sun: tuple[float, ...]
-) -> None:
-    """The way is sampled; where it grazes the Earth it may be either."""
-    up, to_sun = (np.array(v) / norm(v) for v in (place, sun))
-    position = distance * EARTH_RADIUS * up
-    way = position + np.linspace(0.0, 10.0 * EARTH_RADIUS, 20_001)[:, np.newaxis] * to_sun
-    nearest = norm(way, axis=1).min() / EARTH_RADIUS
-    if abs(nearest - 1.0) > 1e-4:
-        assert is_in_shadow(position[np.newaxis], to_sun)[0] == (nearest < 1.0)
 
 
 def test_an_orbits_shadow_lasts_as_long_as_its_geometry_says(paper_robot: Robot) -> None:
@@ -288,13 +274,3 @@ def test_arrows_stand_at_the_base_point_to_their_directions_and_have_labels(
         assert label.text == name.replace("_", " ")
         assert label.position[2] > 1.5
     assert len(arrow_directions(position, velocity, None)) == 2
-
-
-@pytest.mark.parametrize("dark", [True, False])
-def test_each_arrow_has_a_colour_of_the_page(dark: bool) -> None:
-    kinds = arrow_kinds(True, dark)
-    assert [kind.name for kind in kinds] == ["nadir", "orbital velocity", "Sun"]
-    colours = {kind.colour for kind in kinds}
-    assert len(colours) == 3
-    assert colours <= set(palette(dark)) - set(palette(dark)[:2])  # those of the first flights
-    assert arrow_kinds(False, dark) == kinds[:2]

@@ -7,8 +7,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 from meeting_targets import circular_orbit, meeting_target, target_of
 from moving_logs import moving_log
 from numpy.typing import NDArray
@@ -18,7 +16,7 @@ from scipy.spatial.transform import Rotation
 
 from space_robot.view import targets as drawing
 from space_robot.view.flights import ViewOptions
-from space_robot.view.free_body import FreeBody, before_capture, held_poses
+from space_robot.view.free_body import before_capture, held_poses
 from space_robot_model.robot import Robot
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_sim.environment.events import Capture, Release
@@ -33,26 +31,6 @@ TICK_S, TICKS = 0.1, 41
 def rotations(quaternions: Array) -> Array:
     axes: Array = Rotation.from_quat(quaternions, scalar_first=True).as_matrix()
     return axes
-
-
-@settings(max_examples=20)
-@given(st.integers(0, 10_000))
-def test_nothing_acts_on_a_free_body(seed: int) -> None:
-    """Momentum and energy stay, and the attitude's own rate is the angular velocity's."""
-    rng = np.random.default_rng(seed)
-    turned, start = (Rotation.random(rng=rng).as_matrix() for _ in range(2))
-    inertia = turned @ np.diag([2.0, 3.0, 4.5]) @ turned.T
-    body = FreeBody(rng.normal(size=3), start, rng.normal(size=3), rng.normal(size=3), inertia)
-    step = 1e-3
-    times = np.array([-6.0, -3.0 - step, -3.0, -3.0 + step, 0.0])
-    positions, quaternions = body.poses(times)
-    np.testing.assert_allclose(positions, body.position + np.outer(times, body.velocity))
-    axes = rotations(quaternions)
-    np.testing.assert_allclose(axes[-1], body.rotation, atol=1e-8)
-    rate = Rotation.from_matrix(axes[3] @ axes[1].T).as_rotvec() / (2.0 * step)
-    kept = body.rotation @ inertia @ body.rotation.T @ body.angular_velocity
-    np.testing.assert_allclose(axes[2] @ inertia @ axes[2].T @ rate, kept, atol=1e-4)
-    assert rate @ kept == pytest.approx(body.angular_velocity @ kept, rel=1e-4)
 
 
 def capture(relative_to: str, velocity: list[float], rate: list[float]) -> Capture:
