@@ -543,7 +543,10 @@ def test_of_several_flights_each_has_its_own(paper_robot: Robot, tmp_path: Path)
         "lying": lying,
     }.items():
         figures.add(name, log)
-    captions = {name: drawing.caption for name, drawing in figures.drawings().items()}
+    drawings = figures.drawings()
+    empty = {name for name, drawing in drawings.items() if not drawing.draw().axes}
+    assert empty == {"latency", "ripple"}
+    captions = {name: drawing.caption for name, drawing in drawings.items()}
     text = "Angular momentum about the common centre of mass of"
     assert (captions["momentum_1"], captions["momentum_2"]) == (f"{text} wheels", f"{text} free")
     assert {"wheels_1", "junctions", "chatter"} <= {*captions}

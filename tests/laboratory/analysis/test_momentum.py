@@ -29,6 +29,7 @@ from space_robot.analysis.momentum import (
     disturbance_impulse,
 )
 from space_robot.analysis.report_tables import comparison_table
+from space_robot.analysis.words import analyzed
 from space_robot_model.hardware.base_actuators import BaseActuatorSettings
 from space_robot_model.robot import Robot
 from space_robot_msgs_py import topics
@@ -336,3 +337,5 @@ def test_ticks_whose_torques_are_lost_are_left_out(
     json.dumps([report["momentum"], report["disturbance_by_source"]], allow_nan=False)
     assert report["momentum"]["peak_n_m_s"]["outside"] > 0.0
     assert (report["from_s"], report["to_s"]) == stretch
+    share = (stretch[1] - stretch[0]) / 0.1
+    assert analyzed(report).startswith(f"{share:.1%} of the flight, {report['ticks']} of 200 ticks")

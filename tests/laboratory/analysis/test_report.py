@@ -108,8 +108,9 @@ def by_label(found: list[Line]) -> dict[tuple[str, str], Line]:
     return labels
 
 
-def test_a_report_does_not_depend_on_the_blocks() -> None:
-    log = RICH.fly().check().log
+@pytest.mark.parametrize("scenario", [RICH, Scenario(duration=3.0)])
+def test_a_report_does_not_depend_on_the_blocks(scenario: Scenario) -> None:
+    log = scenario.fly().check().log
     whole, parts = Analysis(), Analysis()
     whole.add(log)
     for start, stop in itertools.pairwise([0, 1, 2999, 3001, BLOCKS_TICKS - 1, BLOCKS_TICKS]):

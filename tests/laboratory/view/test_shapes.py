@@ -153,14 +153,17 @@ def test_files_that_are_too_large_or_none_are_told_and_the_others_share_the_face
     archive.write_bytes(content)
     os.mkfifo(pipe)
     empty.write_text("solid nothing\nendsolid nothing\n")
-    files = [archive, pipe, ball, tmp_path / "lacking.stl", empty]
-    read = read_meshes(tuple(map(str, files)), 5 * 2_000)
+    broken = tmp_path / "broken.glb"
+    broken.write_bytes(b"glTF" + bytes(30))
+    files = [archive, pipe, ball, tmp_path / "lacking.stl", empty, broken]
+    read = read_meshes(tuple(map(str, files)), 6 * 2_000)
     assert [read[0].reason, read[1].reason, read[3].reason] == [
         "has 3e+03 MB, at most 500 MB are allowed",
         "not a file",
         "no such file",
     ]
-    assert read[4].mesh is None
+    assert [result.mesh for result in read[4:]] == [None, None]
+    assert all(result.reason for result in read[4:])
     assert read[2].mesh is not None
     assert read[2].whole == 20_480
     assert 500 < len(read[2].mesh.faces) <= 2_000  # its share
