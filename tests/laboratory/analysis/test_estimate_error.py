@@ -172,6 +172,9 @@ def test_the_navigation_error_is_measured_less_true_at_the_telemetry(noisy: Flig
         assert found["rms"][name] == pytest.approx(rms_of(error), rel=1e-9)
         assert found["max"][name] == pytest.approx(float(np.abs(error).max()), rel=1e-9)
     assert found["rms"]["joints_1_3"] == pytest.approx(2e-5, rel=0.2)
+    for kind in ("rms", "max"):  # angles of small errors
+        angle = np.degrees(2.0 * found[kind]["attitude"])
+        assert found["attitude_deg"][kind] == pytest.approx(angle, rel=1e-6)
 
 
 def test_errors_and_torques_are_the_true_ones(noisy: FlightLog) -> None:

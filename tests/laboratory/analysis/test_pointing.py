@@ -18,6 +18,7 @@ from space_robot.analysis.metrics import of_log
 from space_robot.analysis.pointing import (
     BASE_ANGLES,
     BasePointing,
+    Pointing,
     PointingBudget,
     angle_between,
     base_pointing_error,
@@ -94,6 +95,11 @@ def test_a_roll_is_rotation_but_not_pointing_and_the_bases_drift_is_told_apart(
     np.testing.assert_allclose(error.rotation, 0.01, rtol=1e-9)
     np.testing.assert_allclose(error.position, 0.0, atol=1e-12)
     np.testing.assert_array_equal(error.base_drift, [0.0, 0.0, 5.0, 2.0])
+    found = of_log(Pointing(log, paper_robot), log)
+    drift = {"rms": np.sqrt(29.0 / 4.0), "max": 5.0, "end": 2.0}
+    assert found["base_drift_m"] == pytest.approx(drift)
+    for kind in drift:
+        assert found["rotation_rad"][kind] == pytest.approx(0.01)
 
 
 ARCSEC = np.pi / 180.0 / 3600.0

@@ -60,6 +60,7 @@ RICH = Scenario(
     navigation="filtered",
     actuators="small_wheels",
     swaps=["1.5:tde_smc"],
+    orbit="iss",
     duration=BLOCKS_TICKS * 0.0005,
     events=["capture@1:small_satellite"],
     mission={

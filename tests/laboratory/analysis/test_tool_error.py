@@ -15,7 +15,7 @@ from scipy.spatial.transform import Rotation
 
 import space_robot as sr
 from space_robot.analysis.described import assumed_robot_of, captures_of
-from space_robot.analysis.tool_error import ToolError, ToolPath
+from space_robot.analysis.tool_error import ToolError, ToolPath, leads_tool
 from space_robot_model.robot import Robot
 from space_robot_model.robot.momentum import Motion, robot_momentum
 from space_robot_model.robot.tool import tool_pose
@@ -147,3 +147,13 @@ def test_a_line_is_flown_within_a_micrometre_and_a_payload_moves_it() -> None:
         controller="ctc", mission=mission, friction=False, case={"payload": {"mass": 20.0}}
     )
     assert loaded.fly().report()["tool"]["largest_m"] > 1e-3
+
+
+def test_waypoints_lead_no_tool_unless_changed_in_flight() -> None:
+    log = sr.Scenario(duration=0.1).fly().log
+    assert not leads_tool(log)
+    for column in (log.reference_joints[-1, 0], log.reference_base[-1, :4]):
+        before = column.copy()
+        column += 0.01
+        assert leads_tool(log)
+        column[:] = before
