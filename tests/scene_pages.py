@@ -6,6 +6,7 @@ import base64
 import html
 import json
 import re
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import msgspec
@@ -14,8 +15,22 @@ import zstandard
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from space_robot.view.flights import ViewOptions, flights_page
+from space_robot_model.robot import Robot
+from space_robot_msgs_py.bag.flight_log import FlightLog
+
 Array = NDArray[np.float64]
 Message = dict[str, Any]
+
+
+def quiet(total: int) -> Callable[[], None]:
+    """Show no progress."""
+    return lambda: None
+
+
+def page_of(robot: Robot, options: ViewOptions = ViewOptions(), **logs: FlightLog) -> str:  # noqa: B008
+    """Return the page of flights of one robot."""
+    return flights_page(logs, dict.fromkeys(logs, robot), options, quiet)
 
 
 class Pose(NamedTuple):

@@ -233,11 +233,6 @@ def eq64(each: Array) -> float:
     return norm(each) / len(each)
 
 
-def mean_axis_rms(values: Array) -> float:
-    """Mean over the axes of each axis' RMS; ``values`` (N, axes)."""
-    return float(np.mean(np.sqrt(np.mean(values**2, axis=0))))
-
-
 class TotalVariation:
     """``sum |x_k+1 - x_k|`` of each axis."""
 

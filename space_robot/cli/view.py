@@ -17,9 +17,7 @@ SECTION = "Results"
 @click.command()
 @click.argument("bags", nargs=-1, type=click.Path(path_type=Path), metavar="[BAG...]")
 @file_option(
-    "--out",
-    help="Page to write, or of one bag an animated picture: .webp, .gif or .png. An older one is "
-    "replaced [default: <BAG>_view.html, here].",
+    "--out", help="Page to write. An older one is replaced [default: <BAG>_view.html, here]."
 )
 @click.option("--open/--no-open", "opens", default=True, help="Open the page in a browser.")
 @click.option(
@@ -94,7 +92,6 @@ def view(
     The page needs only a browser and no network. Play, scrub, or click a plot or a mark to go to
     that time. Several bags are drawn over one another, or side by side.
 
-    With the ending .webp, .gif or .png the file is an animated picture, which needs Chromium.
     With --live and no bag the same scene is served from a running graph, one flight after another.
 
     \b
@@ -104,7 +101,6 @@ def view(
       space-robot view flights/one flights/two --side-by-side --no-open
       space-robot view flights/mine --robot my.urdf --from 10 --to 12 --rate 200
       space-robot view flights/one --plots attitude,rates,wheels
-      space-robot view flights/one --out one.webp
       space-robot view --live
       space-robot view --live --domain 7 --namespace /sat1
     """
@@ -113,8 +109,7 @@ def view(
     from ..analysis import excerpt
     from ..console.files import check_writable, make_folder, whole_file
     from ..console.progress import counting_progress
-    from ..view.animation import FORMATS
-    from ..view.flights import ViewOptions, flights_page, picture_of, remarks_on, shown_robot
+    from ..view.flights import ViewOptions, flights_page, remarks_on, shown_robot
     from ..view.stage import check_viser
     from .analyze import bag_names
     from .view_live import check_options, serve_live
@@ -138,10 +133,7 @@ def view(
         click.echo(line, err=True)
     options = ViewOptions(side_by_side, rate, title, not light, kinds)
     with counting_progress("drawing") as advance:
-        if page.suffix in FORMATS:
-            data = picture_of(logs, robots, options, page, advance)
-        else:
-            data = flights_page(logs, robots, options, advance).encode()
+        data = flights_page(logs, robots, options, advance).encode()
     with whole_file(page, replace=True) as written:
         written.write(data)
     click.echo(f"wrote {page} ({page.stat().st_size / 1e6:.1f} MB)", err=True)

@@ -8,13 +8,12 @@ import subprocess
 from collections.abc import Iterator
 
 from space_robot_control.flight_code.compiler import COMPILERS
-from space_robot_msgs_py.errors import InputError
 
 from ..export.verify import CROSS, EMULATORS
-from ..view.browser import find_browser
 from .checked_item import CheckedItem
 
 TIMEOUT_S = 5.0
+BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "chrome")
 
 
 def check_tools(search_path: str | None = None) -> Iterator[CheckedItem]:
@@ -66,12 +65,12 @@ def _check_cross(
 
 
 def check_browser() -> CheckedItem:
-    """Report the browser that `view` renders pictures and films with."""
-    try:
-        path = find_browser()
-    except InputError as error:
+    """Report the browser that pictures of the pages of `view` are made with."""
+    path = next(filter(None, map(shutil.which, BROWSERS)), None)
+    if not path:
+        text = f"no browser is installed: one of {', '.join(BROWSERS)} is needed"
         advice = "install Chromium, if you need pictures of view; its pages open in any browser"
-        return CheckedItem("browser", "missing", str(error), advice)
+        return CheckedItem("browser", "missing", text, advice)
     return CheckedItem("browser", "ok", path, values={"path": path})
 
 

@@ -83,12 +83,7 @@ class BaseArrows:
     """Arrows at the base of a robot in orbit."""
 
     def __init__(
-        self,
-        scene: SceneApi,
-        root: str,
-        size: ArrowSize,
-        kinds: Sequence[ArrowKind],
-        labels: bool = True,
+        self, scene: SceneApi, root: str, size: ArrowSize, kinds: Sequence[ArrowKind]
     ) -> None:
         """Draw them.
 
@@ -97,7 +92,6 @@ class BaseArrows:
             root: name of the robot in the scene.
             size: of the arrows.
             kinds: from `arrow_kinds`.
-            labels: whether they have labels.
         """
         self._base = scene.add_frame(f"{root}/orbit", show_axes=False)
         self._nodes = []
@@ -110,9 +104,8 @@ class BaseArrows:
                 cast_shadow=False,
                 receive_shadow=False,
             )
-            if labels:
-                end = size.length + 0.5 * HEAD * size.size
-                scene.add_label(f"{path}/label", kind.name, position=(0.0, 0.0, end))
+            end = size.length + 0.5 * HEAD * size.size
+            scene.add_label(f"{path}/label", kind.name, position=(0.0, 0.0, end))
 
     def move(self, base: Array, directions: Array) -> None:
         """Move them.

@@ -22,7 +22,7 @@ from .local_server import local_server
 from .orbit_frames import OrbitFrames
 from .orbit_scene import ArrowFrames, earth_frames
 from .scene import RobotScene, SceneStyle, rgb
-from .stage import PAGE, Rendering, extent, set_stage
+from .stage import extent, set_stage
 from .targets import targets
 from .trails import Move, trails
 
@@ -87,7 +87,6 @@ def add_flights(
     times: Array,
     side_by_side: bool,
     dark: bool,
-    rendering: Rendering = PAGE,
 ) -> list[Move]:
     """Add robots, trails and targets to a server's empty scene.
 
@@ -97,7 +96,6 @@ def add_flights(
         times: (K,) of the frames, s.
         side_by_side: whether the robots are side by side.
         dark: whether the page is light on dark.
-        rendering: what is drawn.
 
     Returns:
         Functions that move everything to a frame.
@@ -130,7 +128,7 @@ def add_flights(
         for flight, of, rows in zip(flights, frames, map(_rows, frames), strict=True)
     ]
     side = clearest_side(drawn, horizon)
-    stage = set_stage(server, np.concatenate([points, *tips]), dark, rendering, horizon, side)
+    stage = set_stage(server, np.concatenate([points, *tips]), dark, horizon, side)
     moves = [earth_frames(scene, stage, orbit, dark)] if orbit else []
     for index, (flight, of, place) in enumerate(zip(flights, frames, places, strict=True)):
         root = f"/{flight.name.replace('/', '_')}"
@@ -146,7 +144,7 @@ def add_flights(
         moves += actuators(scene, robot, flight.log, flight.robot, times, dark)
         moves += targets(scene, root, robot, flight.log, flight.robot, times)
         if own := arrows[index]:
-            moves.append(own.add(scene, root, rendering.labels))
+            moves.append(own.add(scene, root))
     return moves
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from pathlib import Path
 
 from space_robot_model.robot import Robot
 from space_robot_model.robot.find import find_robot, robot_as_path
@@ -16,7 +15,6 @@ from space_robot_msgs_py.errors import InputError
 
 from ..analysis.described import check_joints, robot_of
 from .actuators import actuator_notes
-from .animation import animate, encoded
 from .arrows import ArrowKind, arrow_kinds
 from .film import FilmedFlight, film
 from .frames import RATE_HZ, shown_times
@@ -24,12 +22,8 @@ from .marks import shared_marks
 from .meshes import shown_shapes
 from .orbit_frames import is_in_orbit, sun_direction
 from .page import Shown, render
-from .palette import ON_DARK, palette
+from .palette import palette
 from .plots import plots_of
-
-OF_TRAIL = "#FFB000"
-PICTURED, MOST_PLOTS = ("attitude", "base torque", "torque"), 3
-"""Prefixes of the titles of plots beside an animated picture."""
 
 
 @dataclass(frozen=True)
@@ -90,42 +84,6 @@ def flights_page(
         _legend(logs, options.dark),
         notes,
     )
-
-
-def picture_of(
-    logs: Mapping[str, FlightLog],
-    robots: Mapping[str, Robot],
-    options: ViewOptions,
-    file: Path,
-    advance: Callable[[int], Callable[[], None]],
-) -> bytes:
-    """Return the animated picture of a flight.
-
-    Args:
-        logs: exactly one, by name.
-        robots: that flew, by the same names.
-        options: its title, empty: law, robot and case; its plots.
-        file: with a suffix of `animation.FORMATS`.
-        advance: called with the number of frames, then after each frame.
-
-    Raises:
-        InputError: there are several flights, there is no browser, or the flight has no state, or
-            nothing of the plots.
-        FlightError: the browser did not start.
-    """
-    if len(logs) > 1:
-        raise InputError(f"{file}: an animated picture shows one flight, got {len(logs)} bags")
-    ((name, log),) = logs.items()
-    flight = FilmedFlight(name, log, robots[name], _law(log), OF_TRAIL)
-    shown = [
-        plot
-        for plot in plots_of(logs, robots, ON_DARK, options.plots)
-        if plot.is_shown and (options.plots or plot.title.startswith(PICTURED))
-    ]
-    if not shown:
-        raise InputError(f"the flight has nothing of --plots {','.join(options.plots)}")
-    caption = options.title or _told(flight)
-    return encoded(animate(flight, shown[:MOST_PLOTS], caption, advance), file)
 
 
 def shown_robot(log: FlightLog, name: str = "") -> Robot:

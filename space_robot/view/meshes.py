@@ -2,22 +2,14 @@
 
 from __future__ import annotations
 
-import json
-import subprocess
 from functools import lru_cache
-from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import NamedTuple
-
-import numpy as np
 
 from space_robot_model.robot import Robot
 from space_robot_model.robot.shapes import drawn_shapes, shapes_of
 from space_robot_model.robot.tree import Visual
-from space_robot_msgs_py.ros.run_module import clean_environment, module_command
 
-from . import mesh_process
-from .mesh import Mesh
+from .mesh import Mesh, UnreadableMeshError, check_drawable, read_mesh, simplify
 from .spacecraft import panels_of_plates
 
 MOST_FACES = 60_000
@@ -72,41 +64,19 @@ def shown_shapes(robot: Robot) -> Shapes:
 
 @lru_cache(maxsize=32)
 def read_meshes(files: tuple[str, ...], most: int) -> tuple[ReadMesh, ...]:
-    """Read mesh files of any format supported by trimesh, in processes with limits.
+    """Read mesh files of any format supported by trimesh.
 
     Args:
         files: their paths.
         most: maximum number of faces of all files; a file with more than its share is simplified.
     """
-    read: list[ReadMesh] = []
-    while len(read) < len(files):  # a process ends at a file that exceeds the limits
-        read += _read_in_process(files[len(read) :], most // len(files))
+    read = []
+    for file in files:
+        try:
+            whole = read_mesh(file)
+            shown = simplify(whole, most // len(files))
+            check_drawable(shown)
+            read.append(ReadMesh(shown, len(whole.faces)))
+        except UnreadableMeshError as error:
+            read.append(ReadMesh(None, reason=str(error)))
     return tuple(read)
-
-
-def _read_in_process(files: tuple[str, ...], most: int) -> list[ReadMesh]:
-    """Read files until the process ends; return at least one result."""
-    # one BLAS thread: each thread would reserve memory, and BLAS is not used
-    environment = {**clean_environment(), "OPENBLAS_NUM_THREADS": "1"}
-    read: list[ReadMesh] = []
-    with TemporaryDirectory() as folder:
-        subprocess.run(
-            module_command(mesh_process.__name__, str(most), folder),
-            env=environment,
-            input=json.dumps(files).encode(),
-            stdout=subprocess.DEVNULL,
-            stderr=subprocess.DEVNULL,
-            check=False,
-        )
-        for number in range(len(files)):
-            result = Path(folder) / f"{number}.npz"
-            reason = result.with_suffix(".txt")
-            if result.is_file():
-                with np.load(result) as data:
-                    mesh = Mesh(data["vertices"], data["faces"])
-                    read.append(ReadMesh(mesh, int(data["whole"])))
-            elif reason.is_file():
-                read.append(ReadMesh(None, reason=reason.read_text("utf-8")))
-            else:
-                return [*read, ReadMesh(None, reason=mesh_process.TOO_MUCH)]
-    return read

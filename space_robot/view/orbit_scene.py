@@ -72,13 +72,12 @@ class ArrowFrames:
         tips: Array = self._base[0] + self._size.length * self._directions(0)
         return tips
 
-    def add(self, scene: SceneApi, root: str, labels: bool) -> Move:
+    def add(self, scene: SceneApi, root: str) -> Move:
         """Draw them; returns what moves them to a frame.
 
         Args:
             scene: of a server.
             root: name of the robot in the scene.
-            labels: whether they have labels.
         """
-        arrows = BaseArrows(scene, root, self._size, self._kinds, labels)
+        arrows = BaseArrows(scene, root, self._size, self._kinds)
         return lambda k: arrows.move(self._base[k], self._directions(k))

@@ -41,11 +41,9 @@ STARS_AT, STAR = 40.0, 0.0025
 STAR_DARK, STAR_LIGHT = (130, 136, 150), (205, 209, 216)
 """Colours of the stars on dark and on light pages."""
 DISTANCE = 3000.0
-"""Largest distance of the Earth's centre relative to the size of the scene."""
+"""Distance of the Earth's centre relative to the size of the scene."""
 BEHIND = 2.0
 """Distance of the stars in orbit relative to that."""
-EARTH_OF_FAR = 0.4
-"""That distance at most, relative to the largest one that is drawn."""
 IN_SHADOW = 0.12
 """Intensity of the Sun's light in the Earth's shadow, relative to that outside: none would hide
 the robot."""
@@ -60,20 +58,6 @@ def check_viser() -> None:
     """
     if find_spec("viser") is None:
         raise InputError(f"view needs viser: {install_command('view')}")
-
-
-class Rendering(NamedTuple):
-    """What a renderer of the scene can draw."""
-
-    shadows: bool = True
-    """Whether shadows are drawn; without a graphics card this takes five times as long."""
-    labels: bool = True
-    """Whether text is drawn."""
-    far: float = np.inf
-    """Largest distance of what is drawn, m."""
-
-
-PAGE = Rendering()
 
 
 class Stage(NamedTuple):
@@ -99,7 +83,6 @@ def set_stage(
     server: ViserServer,
     points: Array,
     dark: bool,
-    rendering: Rendering = PAGE,
     horizon: Horizon | None = None,
     side: Array = SIDES[0],
 ) -> Stage:
@@ -109,7 +92,6 @@ def set_stage(
         server: of the scene.
         points: (K, 3) that must be visible, m, inertial frame.
         dark: whether the page is light on dark.
-        rendering: what is drawn.
         horizon: of a scene in orbit.
         side: (3,) of `SIDES`, where camera and lights are.
     """
@@ -121,16 +103,16 @@ def set_stage(
     points = points @ axes
     low, high = points.min(axis=0), points.max(axis=0)
     middle, size = 0.5 * (low + high), max(float(np.linalg.norm(high - low)), 0.1)
-    earth_at = min(DISTANCE * size, EARTH_OF_FAR * rendering.far)
+    earth_at = DISTANCE * size
     stars_at = BEHIND * earth_at if horizon else STARS_AT * size
     far = 2.0 * stars_at if horizon else 100.0 * size
     corner = low - 0.05 * size
     if horizon:
         corner[2] = middle[2]  # above the Earth
         points = np.vstack([points, corner])
-    _inertial_axes(scene, size, axes @ corner, rendering.labels)
+    _inertial_axes(scene, size, axes @ corner)
     _stars(scene, axes @ middle, stars_at, dark, "float32" if horizon else "float16")
-    lamp = _light(scene, rendering.shadows, axes * side, horizon.sun if horizon else None)
+    lamp = _light(scene, axes * side, horizon.sun if horizon else None)
     camera.fov, camera.near, camera.far = float(FIELD_OF_VIEW), 0.01 * size, far
     if horizon or camera.up is not None:  # that of a flight before
         camera.up = axes[:, 2]
@@ -152,7 +134,7 @@ def camera_direction(side: Array, horizon: Horizon | None) -> Array:
     return np.asarray(direction / np.linalg.norm(direction))
 
 
-def _inertial_axes(scene: SceneApi, size: float, corner: Array, is_labelled: bool) -> None:
+def _inertial_axes(scene: SceneApi, size: float, corner: Array) -> None:
     """Draw inertial axes of a round length, which make drift and rotation visible."""
     length = 10.0 ** np.floor(np.log10(0.5 * size))
     scene.add_frame(
@@ -162,8 +144,7 @@ def _inertial_axes(scene: SceneApi, size: float, corner: Array, is_labelled: boo
         origin_radius=0.004 * size,
         position=corner,
     )
-    if is_labelled:
-        scene.add_label("/inertial/length", f"{length:g} m", position=(length, 0.0, 0.0))
+    scene.add_label("/inertial/length", f"{length:g} m", position=(length, 0.0, 0.0))
 
 
 def _stars(
@@ -185,9 +166,7 @@ def _stars(
     )
 
 
-def _light(
-    scene: SceneApi, shadows: bool, axes: Array, sun: Array | None
-) -> DirectionalLightHandle:
+def _light(scene: SceneApi, axes: Array, sun: Array | None) -> DirectionalLightHandle:
     """Add lights instead of viser's environment map, which may load late or not at all."""
     scene.configure_environment_map(None)
     scene.configure_default_lights(False)
@@ -202,7 +181,7 @@ def _light(
                 color=(255, 250, 240),
                 intensity=strength,
                 position=tuple(direction),
-                cast_shadow=shadows and number == 0,
+                cast_shadow=number == 0,
                 wxyz=wxyz(turn.as_matrix()),
             )
         )

@@ -1,4 +1,5 @@
-"""N_hat from a log's motion and torque is the N_hat the controller formed."""
+"""N_hat from motion and torque is the law's; errors are of the truth, the navigation error of what
+the law assumed."""
 
 from __future__ import annotations
 
@@ -6,106 +7,88 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from numpy.typing import NDArray
+from oracles import rotation_of
 from random_logs import random_log
-from scipy.spatial.transform import Rotation
 
-from space_robot.analysis import analyze, excerpt
+from space_robot import Scenario
+from space_robot.analysis import analyze, excerpt, tracking_error
 from space_robot.analysis.described_estimator import estimator
 from space_robot.analysis.estimate_error import DelayedEstimate, EstimateErrors
 from space_robot.analysis.generalised_motion import neglected_force
-from space_robot.flight.plan import Flight, FlightPlan, resolve
-from space_robot.flight.simulate import simulate
+from space_robot.analysis.report_tables import comparison_table, rms_table
 from space_robot_msgs_py.bag.flight_log import FlightLog
+
+Array = NDArray[np.float64]
+EVERY = 20
+"""Ticks from one telemetry to the next."""
+FAULTS = [
+    "noise_attitude@0:1e-5",
+    "noise_joint_position@0:2e-5",
+    "noise_gyro@0:1e-6",
+    "torque_scale@0:base=0.999",
+]
+STATE = ("quaternion", "omega_base", "joint_positions", "joint_velocities")
 
 
 def flown(**options: Any) -> FlightLog:
-    return simulate(Flight(resolve(FlightPlan.model_validate({"duration": 0.3, **options}))))
+    return Scenario(**{"duration": 0.3, "case": "2", **options}).fly().log
 
 
-def estimate_error(
-    log: FlightLog, h_bar: np.ndarray, smoothing: float = 0.0, cuts: tuple[int, ...] = ()
-) -> np.ndarray:
-    """Of a whole log, or of parts that begin at some rows."""
-    errors = EstimateErrors(lambda log: h_bar, smoothing, rest=log.first_tick == 0)
-    parts = zip((0, *cuts), (*cuts, log.ticks), strict=True)
-    return np.concatenate([errors.of(log.rows(start, stop)) for start, stop in parts])
+@pytest.fixture(scope="module")
+def noisy() -> FlightLog:
+    return flown(case="1", faults=FAULTS, duration=1.5)
 
 
-def assert_same_estimate(log: FlightLog) -> None:
+def estimate_error(log: FlightLog, h_bar: Array) -> Array:
+    return EstimateErrors(lambda log: h_bar, 0.0, rest=log.first_tick == 0).of(log)
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        {"controller": "tde_smc", "case": "4-2"},
+        {"controller": "tde_tsmc", "case": "4-2"},
+        {"controller": "tde_stc", "case": "4-2"},
+        {"command_latency_ticks": 3},
+        {"parameters": {"controller": {"acceleration_filter_hz": 100.0}}},
+    ],
+)
+def test_the_estimate_is_the_controllers(options: dict[str, Any]) -> None:
+    log = flown(**options)
     assert log.telemetry is not None
     of_law, smoothing = estimator(log)
-    h_bar = of_law(log)
-    estimate = DelayedEstimate(smoothing, rest=log.first_tick == 0).of(neglected_force(log, h_bar))
+    estimate = DelayedEstimate(smoothing, rest=True).of(neglected_force(log, of_law(log)))
     expected = log.telemetry[1:, 2]
     # the difference of two rates over half a millisecond amplifies their last bits
     np.testing.assert_allclose(estimate, expected, rtol=1e-9, atol=1e-9)
     assert np.ptp(expected, axis=0).min() > 1e-3
 
 
-@pytest.mark.parametrize("law", ["tde_smc", "tde_tsmc", "tde_stc"])
-def test_the_estimate_is_the_controllers(law: str) -> None:
-    assert_same_estimate(flown(controller=law, case="4-2"))
-
-
-def test_with_late_commands_it_is_too() -> None:
-    assert_same_estimate(flown(case="2", command_latency_ticks=3))
-
-
-def test_with_a_low_pass_it_is_too() -> None:
-    log = flown(parameters={"controller": {"acceleration_filter_hz": 100.0}})
-    log.flight["parameters"] = {"controller": {"acceleration_filter_hz": 100.0}}
-    assert_same_estimate(log)
-
-
-def test_a_turned_quaternion_changes_nothing() -> None:
-    log = flown(case="2")
-    h_bar = estimator(log)[0](log)
-    expected = estimate_error(log, h_bar)
-    log.quaternion[200:] *= -1.0
-    log.quaternion[300:] *= -1.0
-    turned = estimate_error(log, h_bar)
-    np.testing.assert_allclose(np.abs(turned), np.abs(expected), atol=1e-8)
-
-
 def test_the_error_is_what_changed_in_a_tick() -> None:
-    log = flown(case="2")
+    """Also in an excerpt, on the other side of the quaternion, and beside ticks filled in."""
+    log = flown()
     h_bar = estimator(log)[0](log)
     assert log.telemetry is not None
-    neglected = neglected_force(log, h_bar)
     error = estimate_error(log, h_bar)
+    neglected = neglected_force(log, h_bar)
     np.testing.assert_allclose(error, neglected[1:] - log.telemetry[1:-1, 2], atol=1e-9)
     report = analyze(log)["estimate_error"]
     assert report["max"]["base"] == pytest.approx(np.max(np.abs(error[:, :3])))
     rms = np.sqrt(np.mean(error[:, 6:] ** 2, axis=0))
     assert report["rms"]["4_6"] == pytest.approx(np.mean(rms))
-
-
-def test_an_excerpt_has_the_errors_of_its_ticks() -> None:
-    log = flown(case="2")
-    h_bar = estimator(log)[0](log)
-    whole, part = estimate_error(log, h_bar), estimate_error(excerpt(log, 0.1, 0.2), h_bar)
-    np.testing.assert_array_equal(part, whole[200 : 200 + len(part)])
-
-
-CUTS = st.sets(st.integers(1, 49), max_size=6).map(lambda cuts: tuple(sorted(cuts)))
-
-
-@given(st.sampled_from([1, 3, 6, 7]), st.integers(0, 99), CUTS, st.booleans(), st.booleans())
-def test_parts_make_the_whole(
-    n: int, seed: int, cuts: tuple[int, ...], filled: bool, smoothed: bool
-) -> None:
-    """To the last bit, but for the sign of the base's part: Q and -Q are the same attitude."""
-    log, smoothing = random_log(n, 50, seed), 0.3 if smoothed else 0.0
-    h_bar = np.array(log.flight["gains_used"]["h_bar"])
-    if filled:
-        log.filled = 5
-        for k in np.random.default_rng(seed).integers(1, 50, 5):
-            for name in ("quaternion", "omega_base", "joint_positions", "joint_velocities"):
-                getattr(log, name)[k] = getattr(log, name)[k - 1]
-    whole = estimate_error(log, h_bar, smoothing)
-    np.testing.assert_array_equal(estimate_error(log, h_bar, smoothing, cuts), whole)
+    part = estimate_error(excerpt(log, 0.1, 0.2), h_bar)
+    np.testing.assert_array_equal(part, error[200 : 200 + len(part)])
+    log.quaternion[200:] *= -1.0
+    log.quaternion[300:] *= -1.0
+    turned = estimate_error(log, h_bar)
+    np.testing.assert_allclose(np.abs(turned), np.abs(error), atol=1e-8)
+    for name in STATE:
+        getattr(log, name)[300:303] = getattr(log, name)[299]
+    log.filled = 3
+    filled = estimate_error(log, h_bar)
+    assert len(filled) >= len(error) - 6
+    assert np.max(np.abs(filled)) <= np.max(np.abs(error))
 
 
 @pytest.mark.parametrize("n", [1, 3, 6, 7])
@@ -117,11 +100,7 @@ def test_it_is_that_of_a_plain_loop(n: int) -> None:
     log.reference_base[:, 4:7] = np.random.default_rng(n).normal(size=(20, 3))
     last = None
     for k in range(20):
-        desired, true = (
-            Rotation.from_quat(q, scalar_first=True)
-            for q in (log.reference_base[k, :4], log.quaternion[k])
-        )
-        turned = desired.inv() * true
+        turned = rotation_of(log.reference_base[k, :4]).inv() * rotation_of(log.quaternion[k])
         eps, eta = np.split(turned.as_quat(canonical=last is None), [3])
         if last is not None and np.dot([*eps, *eta], last) < 0.0:
             eps, eta = -eps, -eta
@@ -139,44 +118,17 @@ def test_it_is_that_of_a_plain_loop(n: int) -> None:
         before = jacobian, rate
     expected = np.diff(neglected, axis=0)
     np.testing.assert_allclose(estimate_error(log, h_bar), expected, rtol=1e-9, atol=1e-7)
-    report = analyze(log)["estimate_error"]
-    groups = {"base": [0, 1, 2], "1_3" if n > 1 else "1_1": list(range(3, 3 + min(n, 3)))}
-    if n > 3:
-        groups[f"4_{n}"] = list(range(6, n + 3))
-    for name, axes in groups.items():
-        rms = [float(np.sqrt(np.mean(expected[:, i] ** 2))) for i in axes]
-        assert report["rms"][name] == pytest.approx(sum(rms) / len(rms), rel=1e-9)
-        assert report["max"][name] == pytest.approx(np.abs(expected[:, axes]).max(), rel=1e-9)
 
 
 @pytest.mark.filterwarnings("error")
 def test_at_180_degrees_there_is_none() -> None:
-    """J0 is singular there; it was NaN in JSON, and a warning on the terminal."""
+    """J0 is singular there."""
     log = random_log(6, 20, 1)
     w, x, y, z = log.reference_base[7, :4]
     log.quaternion[7] = [-x, w, z, -y]  # turned by 180 degrees about the desired x axis
     report = analyze(log)
     assert report["estimate_error"] is None
     assert "180 degrees" in report["unavailable"]["estimate_error"]
-
-
-def test_filled_ticks_are_passed_over() -> None:
-    log = flown(case="2")
-    h_bar = estimator(log)[0](log)
-    expected = estimate_error(log, h_bar)
-    for name in ("quaternion", "omega_base", "joint_positions", "joint_velocities"):
-        getattr(log, name)[300:303] = getattr(log, name)[299]
-    log.filled = 3
-    error = estimate_error(log, h_bar)
-    assert len(error) >= len(expected) - 6
-    assert np.max(np.abs(error)) <= np.max(np.abs(expected))
-
-
-def test_the_gains_of_the_bag_come_before_those_of_the_name() -> None:
-    log = flown()
-    log.laws = ()  # as of a bag from before they were recorded
-    log.flight["gains_used"] = {"h_bar": [2.0] * 9}
-    np.testing.assert_array_equal(estimator(log)[0](log), [2.0] * 9)
 
 
 @pytest.mark.parametrize(
@@ -190,10 +142,91 @@ def test_the_gains_of_the_bag_come_before_those_of_the_name() -> None:
 )
 def test_without_an_estimate_the_report_says_why(change: dict[str, Any], reason: str) -> None:
     log = flown(duration=0.01)
-    log.laws = ()
+    log.laws = ()  # as of a bag from before they were recorded
+    log.flight.pop("gains_used", None)
     log.flight |= change
-    for key in ("gains_used",):
-        log.flight.pop(key, None)
+    assert reason in analyze(log)["unavailable"]["estimate_error"]
+
+
+def test_the_gains_of_the_bag_come_before_those_of_the_name() -> None:
+    log = flown(duration=0.01)
+    log.laws = ()
+    log.flight["gains_used"] = {"h_bar": [2.0] * 9}
+    np.testing.assert_array_equal(estimator(log)[0](log), [2.0] * 9)
+
+
+def rms_of(values: Array) -> float:
+    return float(np.mean(np.sqrt(np.mean(values**2, axis=0))))
+
+
+def test_the_navigation_error_is_measured_less_true_at_the_telemetry(noisy: FlightLog) -> None:
+    found, told = analyze(noisy)["navigation_error"], noisy.measured
+    assert told is not None
+    joints = (told.joint_positions - noisy.joint_positions)[::EVERY]
+    assert found["ticks"] == len(joints) == noisy.ticks // EVERY
+    for name, error in (
+        ("attitude", (told.quaternion - noisy.quaternion)[::EVERY, 1:]),
+        ("joints_1_3", joints[:, :3]),
+        ("joints_4_6", joints[:, 3:]),
+    ):
+        assert found["rms"][name] == pytest.approx(rms_of(error), rel=1e-9)
+        assert found["max"][name] == pytest.approx(float(np.abs(error).max()), rel=1e-9)
+    assert found["rms"]["joints_1_3"] == pytest.approx(2e-5, rel=0.2)
+    for kind in ("rms", "max"):  # angles of small errors
+        angle = np.degrees(2.0 * found[kind]["attitude"])
+        assert found["attitude_deg"][kind] == pytest.approx(angle, rel=1e-6)
+
+
+def test_errors_and_torques_are_the_true_ones(noisy: FlightLog) -> None:
+    """Those measured show the noise; limits and commands are of the reported torque."""
+    report, told = analyze(noisy), analyze(noisy.as_measured())
+    error = noisy.reference_joints[:, 0] - noisy.joint_positions
+    np.testing.assert_array_equal(tracking_error(noisy)[:, 3:], error)
+    true, reported = (r["rms"]["mean_axis"] for r in (report, told))
+    assert true["joints_1_3"] == pytest.approx(rms_of(error[:, :3]), rel=1e-12)
+    assert reported["joints_1_3"] > 20.0 * true["joints_1_3"]
+    assert true["base_torque"] == pytest.approx(0.999 * reported["base_torque"], rel=1e-12)
+    assert (report["truth_recorded"], told["truth_recorded"]) == (True, False)
+    assert report["missed_deadlines"]["differing_ticks"] == 0
+    assert report["missed_deadlines"]["compared_ticks"] > 2900
+
+
+def test_the_estimates_error_is_of_the_true_force(noisy: FlightLog) -> None:
+    """N by the formulas of true motion and torque given, N_hat as in the telemetry."""
+    h_bar = np.array(noisy.flight["gains_used"]["h_bar"])
+    assert noisy.telemetry is not None
+    eta, eps = noisy.quaternion[:, :1], noisy.quaternion[:, 1:]
+    omega = noisy.omega_base
+    rate = np.hstack([0.5 * (eta * omega + np.cross(eps, omega)), noisy.joint_velocities])
+    force = noisy.applied_torque[2:].copy()
+    for k, (w, x, y, z) in enumerate(noisy.quaternion[1:-1]):
+        skew = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+        force[k, :3] = np.linalg.inv(0.5 * (w * np.eye(3) + skew)).T @ force[k, :3]
+    true = force - h_bar * np.diff(rate, axis=0)[1:] / 0.0005
+    errors = EstimateErrors(lambda log: h_bar).of(noisy)
+    np.testing.assert_allclose(errors, true - noisy.telemetry[1:-1, 2], atol=1e-7)
+
+
+def test_tables_say_of_what_they_are(noisy: FlightLog) -> None:
+    report, ideal = analyze(noisy), analyze(random_log(6, 300, 0))
+    table = rms_table(report)
+    assert "errors and torques are the true ones" in table.title
+    (row,) = (row for row in table.groups[0].rows if row[0] == "joints_1_3")
+    assert row[3] == f"{report['navigation_error']['rms']['joints_1_3']:.3e}"
+    assert "true" not in rms_table(ideal).title
+    both = comparison_table({"one": report, "other": ideal})
+    assert ["errors are of", "the truth", "the truth"] in both.groups[0].rows
+    alone = comparison_table({"one": ideal})
+    assert not any(row[0] == "errors are of" for row in alone.groups[0].rows)
+
+
+def test_without_telemetry_or_of_a_filter_there_is_none(noisy: FlightLog) -> None:
+    report = analyze(noisy.rows(1, 15))
+    assert report["navigation_error"] is None
+    assert report["unavailable"]["navigation_error"] == "no telemetry was recorded"
+    log, parameters = noisy.rows(0, noisy.ticks), noisy.flight["parameters"]
+    controller = {**parameters["controller"], "navigation": "filtered"}
+    log.flight = {**log.flight, "parameters": {**parameters, "controller": controller}}
     report = analyze(log)
-    assert report["estimate_error"] is None
-    assert reason in report["unavailable"]["estimate_error"]
+    assert report["navigation"] == "filtered"
+    assert "not recorded" in report["unavailable"]["estimate_error"]

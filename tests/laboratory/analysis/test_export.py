@@ -1,4 +1,4 @@
-"""CSV and Parquet: the numbers of the flight, whole files or none."""
+"""CSV, Parquet and pandas: the numbers of the flight, whole files or none; and parts by time."""
 
 from __future__ import annotations
 
@@ -8,14 +8,15 @@ from pathlib import Path
 import numpy as np
 import pyarrow as pa
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from pyarrow import csv, parquet
 
-from space_robot.analysis import excerpt, tracking_error
+from space_robot import Scenario
+from space_robot.analysis import analyze, excerpt, tracking_error
 from space_robot.analysis.columns import BATCH, batches, column_names
 from space_robot.analysis.export import METADATA_KEY, dataframe, write_csv, write_parquet
 from space_robot.console.files import whole_file
-from space_robot.flight.plan import Flight, FlightPlan, resolve
-from space_robot.flight.simulate import simulate
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.samples import Timebase
@@ -23,22 +24,20 @@ from space_robot_msgs_py.samples import Timebase
 
 @pytest.fixture(scope="module")
 def log() -> FlightLog:
-    log = simulate(Flight(resolve(FlightPlan(duration=0.1, case="2"))))
-    log.latency_s = np.full(200, 1e-4)
+    log = Scenario(duration=0.3, case="2").fly().log
+    log.latency_s = np.full(600, 1e-4)
     log.latency_s[3] = np.nan
     return log
 
 
-def column(table: pa.Table, name: str) -> np.ndarray:
-    return table[name].to_numpy()
-
-
 def assert_same(table: pa.Table, log: FlightLog) -> None:
     assert table.num_rows == log.ticks
-    np.testing.assert_allclose(column(table, "time_s"), column(table, "tick") * 5e-4, rtol=1e-12)
     assert log.commanded_torque is not None
-    error = tracking_error(log)
+    assert log.latency_s is not None
+    error, first = tracking_error(log), log.first_tick
+    np.testing.assert_allclose(table["time_s"].to_numpy(), log.time, rtol=1e-12)
     for name, expected in {
+        "tick": np.arange(first, first + log.ticks),
         "q_w": log.quaternion[:, 0],
         "omega_base_x_rad_s": log.omega_base[:, 0],
         "base_position_z_m": log.base_position[:, 2],
@@ -57,23 +56,24 @@ def assert_same(table: pa.Table, log: FlightLog) -> None:
         "error_q_z": error[:, 2],
         "error_joint4_rad": error[:, 6],
     }.items():
-        np.testing.assert_array_equal(column(table, name), expected, err_msg=name)
-    latency = table["latency_s"]
-    assert latency.null_count == int(np.isnan(log.latency_s).sum())  # type: ignore[arg-type]
+        np.testing.assert_array_equal(table[name].to_numpy(), expected, err_msg=name)
+    assert table["latency_s"].null_count == int(np.isnan(log.latency_s).sum())
 
 
-def test_csv_has_every_bit(log: FlightLog, tmp_path: Path) -> None:
-    write_csv(log, tmp_path / "flight.csv")
-    assert_same(csv.read_csv(tmp_path / "flight.csv"), log)
-
-
-def test_parquet_has_every_bit_and_what_was_flown(log: FlightLog, tmp_path: Path) -> None:
-    write_parquet(log, tmp_path / "flight.parquet")
-    table = parquet.read_table(tmp_path / "flight.parquet")
-    assert_same(table, log)
-    about = json.loads(table.schema.metadata[METADATA_KEY])
-    assert about["flight"] == json.loads(json.dumps(log.flight))
-    assert about["lost"] == log.lost
+def test_files_and_tables_have_every_bit_and_what_was_flown(log: FlightLog, tmp_path: Path) -> None:
+    """Of a part of a flight, too, whose first tick is not 0."""
+    for part in (log, excerpt(log, 0.1, 0.2)):
+        file = tmp_path / f"{part.first_tick}.csv"
+        write_csv(part, file)
+        write_parquet(part, file.with_suffix(".parquet"))
+        table = parquet.read_table(file.with_suffix(".parquet"))
+        about = json.loads(table.schema.metadata[METADATA_KEY])
+        assert (about["flight"], about["lost"]) == (json.loads(json.dumps(log.flight)), log.lost)
+        frame = dataframe(part)
+        assert [*frame.columns] == column_names(part)
+        assert frame["tick"].dtype == np.int64
+        for each in (table, csv.read_csv(file), pa.Table.from_pandas(frame)):
+            assert_same(each, part)
 
 
 def test_without_pyarrow_there_is_csv_and_one_line_on_parquet(
@@ -86,58 +86,15 @@ def test_without_pyarrow_there_is_csv_and_one_line_on_parquet(
     assert [path.name for path in tmp_path.iterdir()] == ["flight.csv"]
 
 
-def test_an_excerpt_keeps_its_time(log: FlightLog, tmp_path: Path) -> None:
-    write_csv(excerpt(log, 0.05, None), tmp_path / "part.csv")
-    table = csv.read_csv(tmp_path / "part.csv")
-    assert (column(table, "tick")[0], column(table, "time_s")[0]) == (100, 0.05)
-    assert table.num_rows == 100
-
-
 def test_every_column_has_one_name_and_what_is_not_known_has_none() -> None:
     log = FlightLog.allocate(BATCH + 5, ("a", "b"), Timebase(500_000))
     names = column_names(log)
     assert len(set(names)) == len(names)
     assert not any(name.startswith(("commanded", "latency")) for name in names)
-    sizes = [len(ticks) for ticks, _ in batches(log)]
-    assert sizes == [BATCH, 5]
-
-
-def test_nothing_is_overwritten(log: FlightLog, tmp_path: Path) -> None:
-    path = tmp_path / "flight.csv"
-    path.write_text("mine")
-    with pytest.raises(InputError, match=r"flight\.csv: exists already"):
-        write_csv(log, path)
-    assert path.read_text() == "mine"
-    assert list(tmp_path.iterdir()) == [path]
-
-
-def test_a_file_begun_and_not_ended_leaves_nothing(tmp_path: Path) -> None:
-    def fail() -> None:
-        with whole_file(tmp_path / "x") as file:
-            file.write(b"half")
-            raise RuntimeError
-
-    with pytest.raises(RuntimeError):
-        fail()
-    assert list(tmp_path.iterdir()) == []
-
-
-def test_nor_is_one_that_came_meanwhile_overwritten(tmp_path: Path) -> None:
-    def race() -> None:
-        with whole_file(tmp_path / "x") as file:
-            file.write(b"ours")
-            (tmp_path / "x").write_text("theirs")
-
-    with pytest.raises(InputError, match="exists already"):
-        race()
-    assert (tmp_path / "x").read_text() == "theirs"
-    assert [path.name for path in tmp_path.iterdir()] == ["x"]
-
-
-def test_a_folder_that_cannot_be_is_named(log: FlightLog, tmp_path: Path) -> None:
-    (tmp_path / "file").write_text("")
-    with pytest.raises(InputError, match="the folder cannot be created"):
-        write_parquet(log, tmp_path / "file" / "flight.parquet")
+    assert [len(ticks) for ticks, _ in batches(log)] == [BATCH, 5]
+    log.flight = {"base_actuators": {"base_actuation": "none"}}
+    of_base = {f"error_q_{axis}" for axis in "xyz"} | {f"error_base_{axis}_deg" for axis in "xyz"}
+    assert set(names) - set(column_names(log)) == of_base
 
 
 def test_every_actuator_has_its_columns(tmp_path: Path) -> None:
@@ -156,15 +113,90 @@ def test_every_actuator_has_its_columns(tmp_path: Path) -> None:
         "commanded_dipole_1_a_m2": log.actuator_commands[:, 3],
         "commanded_dipole_3_a_m2": log.actuator_commands[:, 5],
     }.items():
-        np.testing.assert_array_equal(column(table, name), expected, err_msg=name)
+        np.testing.assert_array_equal(table[name].to_numpy(), expected, err_msg=name)
     assert not any("wheel_velocity_3" in name for name in table.column_names)
 
 
-def test_a_table_of_pandas_has_the_columns_of_the_files(log: FlightLog, tmp_path: Path) -> None:
-    """Of a part of a flight, too, whose first tick is not 0."""
-    for part in (log, log.rows(50, 80)):
-        table = dataframe(part)
-        assert_same(pa.Table.from_pandas(table), part)
-        assert [*table.columns] == column_names(part)
-        assert table["tick"].dtype == np.int64
-        assert [*table["tick"]] == [*range(part.first_tick, part.first_tick + part.ticks)]
+@pytest.mark.parametrize("is_late", [False, True])
+def test_nothing_is_overwritten(tmp_path: Path, is_late: bool) -> None:
+    """Nor what came while a file was written."""
+    path = tmp_path / "x"
+
+    def write() -> None:
+        with whole_file(path) as file:
+            file.write(b"ours")
+            if is_late:
+                path.write_text("theirs")
+
+    if not is_late:
+        path.write_text("theirs")
+    with pytest.raises(InputError, match="x: exists already"):
+        write()
+    assert path.read_text() == "theirs"
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_a_file_begun_and_not_ended_leaves_nothing(log: FlightLog, tmp_path: Path) -> None:
+    def fail() -> None:
+        with whole_file(tmp_path / "x") as file:
+            file.write(b"half")
+            raise RuntimeError
+
+    with pytest.raises(RuntimeError):
+        fail()
+    assert list(tmp_path.iterdir()) == []
+    (tmp_path / "file").write_text("")
+    with pytest.raises(InputError, match="the folder cannot be created"):
+        write_parquet(log, tmp_path / "file" / "flight.parquet")
+
+
+@given(st.integers(0, 600), st.integers(0, 600), st.integers(0, 600))
+def test_parts_add_up_to_the_whole(log: FlightLog, a: int, b: int, c: int) -> None:
+    low, middle, high = sorted((a, b, c))
+    if low == middle or middle == high:
+        return
+    first, second = (
+        excerpt(log, low * 5e-4, middle * 5e-4),
+        excerpt(log, middle * 5e-4, high * 5e-4),
+    )
+    assert (first.first_tick, first.ticks) == (low, middle - low)
+    assert (second.first_tick, second.ticks) == (middle, high - middle)
+    joined = np.concatenate([first.quaternion, second.quaternion])
+    np.testing.assert_array_equal(joined, log.quaternion[low:high])
+    again = excerpt(excerpt(log, low * 5e-4, high * 5e-4), middle * 5e-4, None)
+    np.testing.assert_array_equal(again.quaternion, second.quaternion)
+
+
+def test_the_report_is_of_the_excerpt_and_so_are_unanswered_ticks(log: FlightLog) -> None:
+    assert excerpt(log, None, None) is log
+    report = analyze(excerpt(log, 0.1, 0.2))
+    assert (report["from_s"], report["to_s"], report["ticks"]) == (0.1, 0.2, 200)
+    assert report["duration_s"] == 0.1
+    assert report["maxima"] != analyze(log)["maxima"]
+    other = log.rows(0, 200)
+    assert log.commanded_torque is not None
+    other.commanded_torque = log.commanded_torque[:200].copy()
+    other.commanded_torque[[3, 150, 151]] = np.nan
+    other.unanswered = 3
+    assert excerpt(other, 0.05, None).unanswered == 2
+    assert excerpt(other, None, 0.05).unanswered == 1
+
+
+@pytest.mark.parametrize(
+    ("from_s", "to_s", "text"),
+    [
+        (0.2, 0.1, "--from 0.2 --to 0.1: the start must come before the end"),
+        (0.1, 0.1, "the start must come before the end"),
+        (-1.0, None, "--from -1: outside the flight, which lasts from 0 to 0.3 s"),
+        (None, 0.31, "--to 0.31: outside the flight"),
+        (0.3, None, "--from 0.3: outside the flight"),
+        (None, 0.0, "--to 0: outside the flight"),
+        (float("nan"), None, "outside the flight"),
+        (0.1001, 0.1002, "no tick lies between"),
+    ],
+)
+def test_wrong_times_are_named(
+    log: FlightLog, from_s: float | None, to_s: float | None, text: str
+) -> None:
+    with pytest.raises(InputError, match=text):
+        excerpt(log, from_s, to_s)

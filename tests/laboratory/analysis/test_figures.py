@@ -1,17 +1,16 @@
-"""The figures: what they draw is what was flown, readable, and the same bytes every time."""
+"""The figures: what they draw is what was flown, readable, and of every flight that has it."""
 
 from __future__ import annotations
 
 import math
-import subprocess
-import sys
 import xml.etree.ElementTree as ET
-from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import matplotlib
 import numpy as np
 import pytest
+from actuator_sets import PYRAMID, flat, hardware, still_log
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
@@ -21,31 +20,52 @@ from matplotlib.figure import Figure
 from matplotlib.legend import Legend
 from matplotlib.lines import Line2D
 from matplotlib.transforms import Bbox
+from numpy.typing import NDArray
 from PIL import Image
+from random_logs import random_log
 from random_robots import random_robot
 from scipy import signal
 
+from space_robot import Scenario
 from space_robot.analysis import excerpt, tracking_error
+from space_robot.analysis.described import momentum_of
 from space_robot.analysis.figures import (
     chatter,
     control_results,
     desired_joints,
+    errors_and_torques,
     junctions,
+    latency_histogram,
+    momentum,
+    pointing,
     save_figure,
+    thrusters,
+    wheels,
 )
 from space_robot.analysis.figures.base_torque import common_limits, power_spectral_density
+from space_robot.analysis.figures.figure_set import FigureSet
+from space_robot.analysis.figures.overlay import words
 from space_robot.analysis.figures.style import LineStyle, house_style, thinned
 from space_robot.analysis.metrics import attitude_angles
-from space_robot.analysis.plot_series import BaseTorque
-from space_robot.analysis.waypoints import junction_ticks, waypoint_ticks
-from space_robot.flight.plan import Flight, FlightPlan, resolve
-from space_robot.flight.simulate import simulate
+from space_robot.analysis.momentum import Momentum
+from space_robot.analysis.plot_series import BaseTorque, PlotSeries
 from space_robot_control.guidance.mission import Mission, MissionSettings
+from space_robot_model.hardware.base_actuators import BaseActuatorSettings
+from space_robot_model.robot import Robot
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.samples import Timebase
 
+Array = NDArray[np.float64]
 PERIOD = 0.0005
 PAPER_TIMES = (0.0, 15.0, 30.0)
+WHEELS = {"axes": PYRAMID, "max_momentum": [3.0], "max_torque": [0.5, 0.0, 0.5, 0.5]}
+THRUSTERS = {
+    "positions": flat([sign * axis for axis in np.eye(3) for sign in (1, -1, 1, -1)]),
+    "directions": flat([sign * np.roll(axis, 1) for axis in np.eye(3) for sign in (1, -1, -1, 1)]),
+    "force": [2.0],
+}
+BOTH = hardware(wheels=WHEELS, thrusters=THRUSTERS)
+FREE = BaseActuatorSettings(base_actuation="none")
 
 
 def flown(
@@ -74,8 +94,12 @@ def flown(
     return log
 
 
-def base_torques(logs: Mapping[str, FlightLog]) -> dict[str, BaseTorque]:
+def base_torques(logs: dict[str, FlightLog]) -> dict[str, BaseTorque]:
     return {name: BaseTorque.of(log) for name, log in logs.items()}
+
+
+def data_of(line: Line2D) -> tuple[Array, Array]:
+    return np.asarray(line.get_xdata(), float), np.asarray(line.get_ydata(), float)
 
 
 def curves(axes: Axes) -> list[Line2D]:
@@ -85,13 +109,8 @@ def curves(axes: Axes) -> list[Line2D]:
 
 def by_look(axes: Axes, index: int) -> Line2D:
     look = LineStyle.of(index)
-    found = [x for x in curves(axes) if (x.get_color(), x.get_marker()) == look[:2]]
-    assert len(found) == 1
-    return found[0]
-
-
-def legend_names(figure: Figure) -> list[list[str]]:
-    return [[text.get_text() for text in legend.get_texts()] for legend in legends(figure)]
+    (found,) = (x for x in curves(axes) if (x.get_color(), x.get_marker()) == look[:2])
+    return found
 
 
 def legends(figure: Figure) -> list[Legend]:
@@ -100,355 +119,212 @@ def legends(figure: Figure) -> list[Legend]:
     return found + [x for axes in figure.axes if (x := axes.get_legend()) is not None]
 
 
-class TestThinning:
-    @given(
-        arrays(np.float64, st.integers(1, 700), elements=st.floats(-1e9, 1e9) | st.just(math.nan)),
-        st.integers(1, 60),
-    )
-    def test_keeps_ends_and_the_extremes_of_every_column(
-        self, signal: np.ndarray, columns: int
-    ) -> None:
-        kept = thinned(signal, columns)
-        assert (kept[0], kept[-1]) == (0, len(signal) - 1)
-        assert np.all(np.diff(kept) > 0)
-        if len(signal) <= 2 * columns:
-            assert len(kept) == len(signal)
-            return
-        assert len(kept) <= 2 * columns + 2
-        length = math.ceil(len(signal) / columns)
-        for start in range(0, len(signal), length):
-            stretch = signal[start : start + length]
-            drawn = signal[kept[(kept >= start) & (kept < start + length)]]
-            if not np.isnan(stretch).all():
-                assert np.nanmin(drawn) == np.nanmin(stretch)
-                assert np.nanmax(drawn) == np.nanmax(stretch)
-
-    def test_one_tick_of_60000_stays(self) -> None:
-        signal = np.zeros(60000)
-        signal[31234] = 1.0
-        assert 31234 in thinned(signal)
+def legend_names(figure: Figure) -> list[list[str]]:
+    return [[text.get_text() for text in legend.get_texts()] for legend in legends(figure)]
 
 
-class TestWaypoints:
-    def test_of_the_papers_mission(self) -> None:
-        log = flown()
-        assert waypoint_ticks(log).tolist() == [0, 30000, 59999]
-        assert junction_ticks(log).tolist() == [30000]
-
-    @pytest.mark.parametrize(
-        ("times", "duration", "expected"),
-        [
-            ((0.0, 2.0), 3.0, [0, 4000, 5999]),  # held after the last one
-            ((0.0, 1.00025, 3.0), None, [0, 2001, 5999]),  # between two ticks
-            ((0.0, 2.0, 4.0), 1.0, [0]),  # cut short
-            ((0.0, 2.0, 4.0), 0.0055, [0]),
-            ((0.0,), 1.0, [0]),  # nothing moves
-        ],
-    )
-    def test_of_others(
-        self, times: tuple[float, ...], duration: float | None, expected: list[int]
-    ) -> None:
-        ticks = waypoint_ticks(flown(times=times, duration=duration))
-        assert len(ticks) == len(expected)
-        assert np.all(np.abs(ticks - expected) <= 1)
-
-    def test_a_log_without_rest_has_none(self) -> None:
-        moving = excerpt(flown(), 5.0, 6.0)
-        assert waypoint_ticks(moving).tolist() == []
-        desired_joints(moving)
-        control_results(moving, "x")
-
-    def test_both_ends_of_a_rest(self) -> None:
-        log = flown(times=(0.0, 1.0, 2.0))
-        log.reference_joints = np.insert(
-            log.reference_joints, [2000] * 500, log.reference_joints[2000], axis=0
-        )
-        assert waypoint_ticks(log).tolist() == [0, 2000, 2500, 4499]
+@given(
+    arrays(np.float64, st.integers(1, 700), elements=st.floats(-1e9, 1e9) | st.just(math.nan)),
+    st.integers(1, 60),
+)
+def test_thinning_keeps_ends_and_the_extremes_of_every_column(values: Array, columns: int) -> None:
+    kept = thinned(values, columns)
+    assert (kept[0], kept[-1]) == (0, len(values) - 1)
+    assert np.all(np.diff(kept) > 0)
+    if len(values) <= 2 * columns:
+        assert len(kept) == len(values)
+        return
+    assert len(kept) <= 2 * columns + 2
+    length = math.ceil(len(values) / columns)
+    for start in range(0, len(values), length):
+        stretch = values[start : start + length]
+        drawn = values[kept[(kept >= start) & (kept < start + length)]]
+        if not np.isnan(stretch).all():
+            assert np.nanmin(drawn) == np.nanmin(stretch)
+            assert np.nanmax(drawn) == np.nanmax(stretch)
 
 
-def hyphened(number: str) -> str:
-    return number.replace("\u2212", "-")
+@pytest.mark.parametrize(
+    ("largest", "power"), [(0.8, ""), (3e-8, "1e-8"), (6.77e7, "1e7"), (1e300, "1e300")]
+)
+def test_a_power_of_ten_stands_once_above_its_axis(largest: float, power: str) -> None:
+    def hyphened(number: str) -> str:
+        return number.replace("\u2212", "-")
+
+    log = flown(duration=1.0, error=0.0)
+    log.applied_torque[:] = largest * np.linspace(-1.0, 1.0, 2000)[:, np.newaxis]
+    figure = control_results(log, "x")
+    with house_style():
+        FigureCanvasAgg(figure).draw()
+    axis = figure.axes[1].yaxis
+    assert hyphened(axis.get_offset_text().get_text()) == power
+    for tick in axis.get_major_ticks():
+        shown = hyphened(tick.label1.get_text())
+        assert len(shown) <= 6
+        value = float(shown) * float(power or 1.0)
+        assert value == pytest.approx(tick.get_loc(), abs=1e-9 * largest)
 
 
-class TestScales:
-    @pytest.mark.parametrize(
-        ("largest", "power"), [(0.8, ""), (3e-8, "1e-8"), (6.77e7, "1e7"), (1e300, "1e300")]
-    )
-    def test_a_power_of_ten_stands_once_above_its_axis(self, largest: float, power: str) -> None:
-        log = flown(duration=1.0, error=0.0)
-        log.applied_torque[:] = largest * np.linspace(-1.0, 1.0, 2000)[:, np.newaxis]
-        figure = control_results(log, "x")
-        with house_style():
-            FigureCanvasAgg(figure).draw()
-        axis = figure.axes[1].yaxis
-        assert hyphened(axis.get_offset_text().get_text()) == power
-        factor = float(power or 1.0)
-        for tick in axis.get_major_ticks():
-            shown = hyphened(tick.label1.get_text())
-            assert len(shown) <= 6
-            assert float(shown) * factor == pytest.approx(tick.get_loc(), abs=1e-9 * largest)
+@pytest.mark.parametrize(("samples", "length"), [(6000, 2048), (801, 801), (100, 100), (65, 65)])
+def test_the_spectrum_is_welchs_without_each_segments_trend(samples: int, length: int) -> None:
+    values = np.cumsum(np.random.default_rng(1).normal(size=(samples, 3)), axis=0)
+    f, expected = signal.welch(values, 1.0 / PERIOD, nperseg=length, detrend="linear", axis=0)
+    frequency, density = power_spectral_density(values, PERIOD)
+    np.testing.assert_allclose(frequency, f[1:], rtol=1e-12)
+    np.testing.assert_allclose(density, expected[1:].sum(axis=1), rtol=1e-9)
+    for nothing in (np.ones((10, 3)), np.full((5000, 3), math.nan)):
+        assert len(power_spectral_density(nothing, PERIOD)[0]) == 0
+    assert np.isnan(power_spectral_density(np.zeros((5000, 3)), PERIOD)[1]).all()
 
 
-class TestSpectrum:
-    def test_power_of_all_axes_is_kept(self) -> None:
-        values = np.random.default_rng(3).normal(scale=[1.0, 2.0, 3.0], size=(60000, 3))
-        frequency, density = power_spectral_density(values, PERIOD)
-        assert np.sum(density) * frequency[0] == pytest.approx(14.0, rel=0.05)
-
-    @pytest.mark.parametrize(
-        ("samples", "length"), [(6000, 2048), (801, 801), (100, 100), (65, 65)]
-    )
-    def test_is_welchs_without_each_segments_trend(self, samples: int, length: int) -> None:
-        values = np.cumsum(np.random.default_rng(1).normal(size=(samples, 3)), axis=0)
-        f, expected = signal.welch(values, 1.0 / PERIOD, nperseg=length, detrend="linear", axis=0)
-        frequency, density = power_spectral_density(values, PERIOD)
-        np.testing.assert_allclose(frequency, f[1:], rtol=1e-12)
-        np.testing.assert_allclose(density, expected[1:].sum(axis=1), rtol=1e-9)
-
-    def test_a_tone_stands_out_of_slow_motion(self) -> None:
-        time = np.arange(60000)[:, np.newaxis] * PERIOD
-        values = np.sin(0.2 * time) + 1e-6 * np.sin(2.0 * np.pi * 300.0 * time)
-        frequency, density = power_spectral_density(values, PERIOD)
-        high = frequency > 100.0
-        assert frequency[high][np.argmax(density[high])] == pytest.approx(300.0, abs=1.0)
-
-    def test_what_has_none(self) -> None:
-        assert len(power_spectral_density(np.ones((10, 3)), PERIOD)[0]) == 0
-        values = np.ones((5000, 3))
-        values[20:] = math.nan
-        assert len(power_spectral_density(values, PERIOD)[0]) == 0
-        assert np.isnan(power_spectral_density(np.zeros((5000, 3)), PERIOD)[1]).all()
+def test_desired_joints_are_the_missions_in_degrees() -> None:
+    log = flown()
+    figure = desired_joints(log)
+    (axes,) = figure.axes
+    assert (axes.get_xlabel(), axes.get_ylabel()) == ("time (s)", "desired joint angle (deg)")
+    assert legend_names(figure) == [list(log.joint_names)]
+    for joint in range(6):
+        line = by_look(axes, joint)
+        x, y = data_of(line)
+        angle = np.degrees(log.reference_joints[:, 0, joint])
+        np.testing.assert_allclose(y, angle[np.round(x / PERIOD).astype(int)], rtol=1e-12)
+        np.testing.assert_allclose(x[line.get_markevery()], [0.0, 15.0, 29.9995])
 
 
-class TestDesiredJoints:
-    def test_draws_the_mission_in_degrees(self) -> None:
-        log = flown()
-        figure = desired_joints(log)
-        (axes,) = figure.axes
-        assert (axes.get_xlabel(), axes.get_ylabel()) == ("time (s)", "desired joint angle (deg)")
-        assert legend_names(figure) == [list(log.joint_names)]
-        for joint in range(6):
-            line = by_look(axes, joint)
-            x, y = np.asarray(line.get_xdata()), np.asarray(line.get_ydata())
-            angle = np.degrees(log.reference_joints[:, 0, joint])
-            np.testing.assert_allclose(y, angle[np.round(x / PERIOD).astype(int)], rtol=1e-12)
-            marked = x[line.get_markevery()]
-            np.testing.assert_allclose(marked, [0.0, 15.0, 29.9995])
+def test_control_results_hold_errors_and_torques_of_base_and_joints() -> None:
+    """Torques are enlarged round the junction; one tick of 60,000 is seen."""
+    log = flown(ripple=0.1)
+    log.applied_torque[41111, 1] = 7.0
+    log.applied_torque[29990, 0] = 9.0
+    figure = control_results(log, "TDE-STC, case 1")
+    assert [axes.get_ylabel() for axes in figure.axes] == [
+        "attitude error (deg)",
+        "base torque (N m)",
+        "base torque (N m)",
+        "joint error (rad)",
+        "joint torque (N m)",
+        "joint torque (N m)",
+    ]
+    assert figure.get_suptitle() == "TDE-STC, case 1"
+    assert legend_names(figure) == [["base x", "base y", "base z"], list(log.joint_names)]
+    torque = log.applied_torque
+    drawn = [attitude_angles(log), torque[:, :3], tracking_error(log)[:, 3:], torque[:, 3:]]
+    for place, values in zip((0, 1, 3, 4), drawn, strict=True):
+        axes = figure.axes[place]
+        assert len(curves(axes)) == values.shape[1]
+        for axis in range(values.shape[1]):
+            _, y = data_of(by_look(axes, axis))
+            column = values[:, axis]
+            assert (y.min(), y.max()) == pytest.approx((column.min(), column.max()))
+            assert y[[0, -1]] == pytest.approx(column[[0, -1]])
+    x, y = data_of(by_look(figure.axes[2], 0))
+    assert figure.axes[2].get_xlabel() == "time from 15 s (ms)"
+    assert (x[0], x[-1]) == pytest.approx((-150.0, 150.0))
+    assert x[np.argmax(y)] == pytest.approx(-5.0)
 
 
-class TestControlResults:
-    def test_panels_hold_errors_and_torques_of_base_and_joints(self) -> None:
-        log = flown(ripple=0.1)
-        log.applied_torque[41111, 1] = 7.0  # one tick
-        figure = control_results(log, "TDE-STC, case 1")
-        assert [axes.get_ylabel() for axes in figure.axes] == [
-            "attitude error (deg)",
-            "base torque (N m)",
-            "base torque (N m)",
-            "joint error (rad)",
-            "joint torque (N m)",
-            "joint torque (N m)",
-        ]
-        assert figure.get_suptitle() == "TDE-STC, case 1"
-        assert legend_names(figure) == [["base x", "base y", "base z"], list(log.joint_names)]
-        error = tracking_error(log)
-        drawn = [
-            attitude_angles(log),
-            log.applied_torque[:, :3],
-            error[:, 3:],
-            log.applied_torque[:, 3:],
-        ]
-        for place, values in zip((0, 1, 3, 4), drawn, strict=True):
-            axes = figure.axes[place]
-            assert len(curves(axes)) == values.shape[1]
-            for axis in range(values.shape[1]):
-                y = np.asarray(by_look(axes, axis).get_ydata())
-                assert (y.min(), y.max()) == pytest.approx(
-                    (values[:, axis].min(), values[:, axis].max())
-                )
-                assert y[[0, -1]] == pytest.approx(values[[0, -1], axis])
-
-    def test_torques_are_enlarged_round_the_junction(self) -> None:
-        log = flown()
-        log.applied_torque[29990, 0] = 9.0
-        axes = control_results(log, "").axes[2]
-        line = by_look(axes, 0)
-        x, y = np.asarray(line.get_xdata()), np.asarray(line.get_ydata())
-        assert axes.get_xlabel() == "time from 15 s (ms)"
-        assert (x[0], x[-1]) == pytest.approx((-150.0, 150.0))
-        assert x[np.argmax(y)] == pytest.approx(-5.0)
-
-    @pytest.mark.parametrize(
-        ("times", "duration", "panels"),
-        [
-            (PAPER_TIMES, 5.0, 4),
-            ((0.0, 1.0), None, 4),
-            ((0.0, 1.0, 2.0, 3.0), None, 8),
-            (tuple(np.arange(9.0).tolist()), None, 10),
-        ],
-    )
-    def test_as_many_enlargements_as_junctions_up_to_three(
-        self, times: tuple[float, ...], duration: float | None, panels: int
-    ) -> None:
-        figure = control_results(flown(times=times, duration=duration), "x")
-        assert len(figure.axes) == panels
-        per_side = (panels - 4) // 2
-        for axes in figure.axes:
-            if "s (ms)" in axes.get_xlabel():
-                assert axes.get_xlabel().startswith("time from" if per_side < 3 else "from")
-                shown = np.abs(axes.get_xticks()) <= 150.0
-                assert shown.sum() == (7 if per_side == 1 else 3), "more would overlap"
-
-    @pytest.mark.parametrize("n", [1, 7, 12])
-    def test_any_number_of_joints(self, n: int) -> None:
-        figure = control_results(flown(n, (0.0, 1.0, 2.0)), "x")
-        assert len(curves(figure.axes[4])) == n
-        assert len(legend_names(figure)[1]) == n
-
-    @pytest.mark.filterwarnings("error")
-    def test_a_flight_that_diverged(self, tmp_path: Path) -> None:
-        log = flown(duration=0.0055)
-        log.applied_torque[-3:, :] = [[1e7] * 9, [1e300] * 9, [math.inf] * 9]
-        log.joint_positions[-1] = math.nan
-        figure = control_results(log, "CTC, printed gains: diverged at tick 11")
-        save_figure(figure, tmp_path / "diverged")
-
-    def test_a_real_flight(self) -> None:
-        log = simulate(Flight(resolve(FlightPlan(duration=0.1))))
-        axes = control_results(log, "x").axes[1]
-        y = np.asarray(by_look(axes, 2).get_ydata())
-        np.testing.assert_allclose(y, log.applied_torque[:, 2], rtol=1e-12)
+@pytest.mark.parametrize(
+    ("n", "times", "panels"),
+    [
+        (1, (0.0, 1.0), 4),
+        (12, (0.0, 1.0, 2.0), 6),
+        (6, (0.0, 1.0, 2.0, 3.0), 8),
+        (6, tuple(np.arange(9.0).tolist()), 10),
+    ],
+)
+def test_as_many_enlargements_as_junctions_up_to_three(
+    n: int, times: tuple[float, ...], panels: int
+) -> None:
+    figure = control_results(flown(n, times), "x")
+    assert len(figure.axes) == panels
+    assert len(legend_names(figure)[1]) == n
+    per_side = (panels - 4) // 2
+    for axes in figure.axes:
+        if "s (ms)" in axes.get_xlabel():
+            assert axes.get_xlabel().startswith("time from" if per_side < 3 else "from")
+            shown = np.abs(axes.get_xticks()) <= 150.0
+            assert shown.sum() == (7 if per_side == 1 else 3), "more would overlap"
 
 
-class TestComparisons:
-    def test_junctions_have_one_scale_and_say_what_it_cuts_off(self) -> None:
-        logs = {"TDE-SMC": flown(ripple=5.0), "TDE-TSMC": flown(ripple=0.02), "TDE-STC": flown()}
-        figure = junctions(base_torques({**logs, "CTC": flown(duration=0.0055)}))
-        smc, tsmc, stc, ctc = figure.axes
-        assert len({axes.get_ylim() for axes in figure.axes}) == 1
-        assert {axes.get_xlim() for axes in figure.axes} == {(-150.0, 150.0)}
-        assert smc.get_title("left").startswith("TDE-SMC, cut: -")
-        assert [a.get_title("left") for a in (tsmc, stc, ctc)] == ["TDE-TSMC", "TDE-STC", "CTC"]
-        assert ctc.texts[0].get_text() == "ended at 0.0055 s"
-        assert ctc.get_xlabel() == "time from 15 s (ms)"
-        assert smc.get_ylabel() == "base torque x (N m)"
-        y = np.asarray(by_look(tsmc, 0).get_ydata())
-        shown = logs["TDE-TSMC"].applied_torque[29700:30301, 0]
-        assert (y.min(), y.max()) == pytest.approx((shown.min(), shown.max()))
-
-    def test_junctions_of_flights_without_any(self) -> None:
-        figure = junctions(base_torques({"TDE-STC": flown(duration=1.0)}))
-        assert figure.axes == []
-        assert "None of these flights" in figure.get_suptitle()
-
-    def test_chatter_shows_ticks_and_spectra(self) -> None:
-        logs = {"TDE-SMC": flown(ripple=0.5), "TDE-STC": flown(), "CTC": flown(duration=0.0055)}
-        figure = chatter(base_torques(logs))
-        smc, stc, ctc, spectrum = figure.axes
-        assert smc.get_ylim() == stc.get_ylim() == ctc.get_ylim()
-        assert smc.get_xlabel() == "time from 7.5 s (ms)"
-        for axis in range(3):
-            line = by_look(smc, axis)
-            assert line.get_drawstyle() == "steps-pre"
-            np.testing.assert_array_equal(
-                line.get_ydata(), logs["TDE-SMC"].applied_torque[15000:15101, axis]
-            )
-        rough, smooth = by_look(spectrum, 0), by_look(spectrum, 1)
-        frequency = np.asarray(rough.get_xdata())
-        high = frequency > 100.0
-        assert np.all(np.asarray(rough.get_ydata())[high] > np.asarray(smooth.get_ydata())[high])
-        assert spectrum.get_xscale() == spectrum.get_yscale() == "log"
-        assert spectrum.get_ylabel() == "PSD of base torque, x + y + z ((N m)²/Hz)"
-        (mark,) = (line for line in spectrum.get_lines() if line.get_linestyle() == ":")
-        assert np.asarray(mark.get_xdata()).tolist() == [100.0, 100.0]
-        assert legend_names(figure)[1] == ["TDE-SMC", "TDE-STC", "CTC: too short"]
-
-    def test_a_loud_one_does_not_set_the_scale(self) -> None:
-        quiet, loud = np.linspace(-1.0, 1.0, 9), np.array([-9.0, 9.0])
-        assert common_limits([quiet, loud, 1.5 * quiet]) == pytest.approx((-1.65, 1.65))
-        assert common_limits([np.array([math.nan])]) == (-1.0, 1.0)
-        low, high = common_limits([np.zeros(5)])
-        assert low < 0.0 < high
+@pytest.mark.filterwarnings("error")
+def test_flights_that_diverged_or_never_rest_are_drawn(tmp_path: Path) -> None:
+    log = flown(duration=0.0055)
+    log.applied_torque[-3:, :] = [[1e7] * 9, [1e300] * 9, [math.inf] * 9]
+    log.joint_positions[-1] = math.nan
+    save_figure(control_results(log, "CTC: diverged at tick 11"), tmp_path / "diverged")
+    moving = excerpt(flown(), 5.0, 6.0)
+    assert desired_joints(moving).axes
+    assert len(control_results(moving, "x").axes) == 4
 
 
-class TestPrint:
-    def test_looks_differ_in_colour_and_marker(self) -> None:
-        assert len({LineStyle.of(index)[:2] for index in range(63)}) == 63
+def test_junctions_have_one_scale_and_say_what_it_cuts_off() -> None:
+    logs = {"TDE-SMC": flown(ripple=5.0), "TDE-TSMC": flown(ripple=0.02), "TDE-STC": flown()}
+    figure = junctions(base_torques({**logs, "CTC": flown(duration=0.0055)}))
+    smc, tsmc, stc, ctc = figure.axes
+    assert len({axes.get_ylim() for axes in figure.axes}) == 1
+    assert {axes.get_xlim() for axes in figure.axes} == {(-150.0, 150.0)}
+    assert smc.get_title("left").startswith("TDE-SMC, cut: -")
+    assert [a.get_title("left") for a in (tsmc, stc, ctc)] == ["TDE-TSMC", "TDE-STC", "CTC"]
+    assert ctc.texts[0].get_text() == "ended at 0.0055 s"
+    assert ctc.get_xlabel() == "time from 15 s (ms)"
+    assert smc.get_ylabel() == "base torque x (N m)"
+    _, y = data_of(by_look(tsmc, 0))
+    shown = logs["TDE-TSMC"].applied_torque[29700:30301, 0]
+    assert (y.min(), y.max()) == pytest.approx((shown.min(), shown.max()))
+    none = junctions(base_torques({"TDE-STC": flown(duration=1.0)}))
+    assert none.axes == []
+    assert "None of these flights" in none.get_suptitle()
 
-    @pytest.mark.parametrize("n", [1, 7])
-    def test_nothing_overlaps_or_leaves_the_page(self, n: int) -> None:
-        names = tuple(f"upper_arm_{i}" for i in range(n))
-        times = (0.0, 1.0, 2.0)
-        log = flown(n, times, ripple=0.1, names=names)
-        laws = ("CTC (printed)", "CTC-SMC (printed)", "TDE-SMC", "TDE-TSMC", "TDE-STC")
-        flights = {law: BaseTorque.of(log) for law in laws}
-        title = "TDE-STC, case 4-2, gains printed, friction, payload of 20 kg, disturbances " * 2
-        for figure in (
-            desired_joints(log),
-            control_results(log, title),
-            junctions(flights),
-            chatter(flights),
-            control_results(flown(n, (0.0, 1.0), error=0.0126), title),
-        ):
-            boxes = text_boxes(figure)
-            page = figure.bbox
-            for text, box in boxes:
-                assert page.x0 <= box.x0, text
-                assert page.y0 <= box.y0, text
-                assert box.x1 <= page.x1, text
-                assert box.y1 <= page.y1, text
-            for index, (text, box) in enumerate(boxes):
-                for other, other_box in boxes[:index]:
-                    assert not box.overlaps(other_box), (text, other)
 
-    def test_same_bytes_whatever_the_users_settings(self, tmp_path: Path) -> None:
-        log = flown(times=(0.0, 0.5, 1.0))
-        first = save_figure(desired_joints(log), tmp_path / "a" / "case_4.2")
-        assert [path.name for path in first] == ["case_4.2.png", "case_4.2.svg"]
-        with matplotlib.rc_context({"font.size": 20.0, "lines.linewidth": 5.0}):
-            figure = desired_joints(log)
-            second = save_figure(figure, tmp_path / "b")
-            assert matplotlib.rcParams["font.size"] == 20.0
-        again = save_figure(figure, tmp_path / "c")
-        for one, two, three in zip(first, second, again, strict=True):
-            assert one.read_bytes() == two.read_bytes() == three.read_bytes()
+def test_chatter_shows_ticks_and_spectra() -> None:
+    logs = {"TDE-SMC": flown(ripple=0.5), "TDE-STC": flown(), "CTC": flown(duration=0.0055)}
+    figure = chatter(base_torques(logs))
+    smc, stc, ctc, spectrum = figure.axes
+    assert smc.get_ylim() == stc.get_ylim() == ctc.get_ylim()
+    assert smc.get_xlabel() == "time from 7.5 s (ms)"
+    for axis in range(3):
+        line = by_look(smc, axis)
+        assert line.get_drawstyle() == "steps-pre"
+        drawn = logs["TDE-SMC"].applied_torque[15000:15101, axis]
+        np.testing.assert_array_equal(line.get_ydata(), drawn)
+    frequency, rough = data_of(by_look(spectrum, 0))
+    high = frequency > 100.0
+    assert np.all(rough[high] > data_of(by_look(spectrum, 1))[1][high])
+    assert spectrum.get_xscale() == spectrum.get_yscale() == "log"
+    assert spectrum.get_ylabel() == "PSD of base torque, x + y + z ((N m)²/Hz)"
+    (mark,) = (line for line in spectrum.get_lines() if line.get_linestyle() == ":")
+    assert data_of(mark)[0].tolist() == [100.0, 100.0]
+    assert legend_names(figure)[1] == ["TDE-SMC", "TDE-STC", "CTC: too short"]
 
-    def test_same_bytes_of_whole_flights(self, tmp_path: Path) -> None:
-        for stem in ("a", "b"):
-            save_figure(control_results(flown(times=(0.0, 0.5, 1.0)), "x"), tmp_path / stem)
-        for suffix in (".png", ".svg"):
-            files = [(tmp_path / stem).with_suffix(suffix) for stem in ("a", "b")]
-            assert files[0].read_bytes() == files[1].read_bytes()
 
-    def test_files_are_180_mm_wide_and_small(self, tmp_path: Path) -> None:
-        log = flown(ripple=0.3, error=1e-9)
-        log.joint_positions += 1e-9 * np.random.default_rng(1).normal(size=(60000, 6))
-        png, svg = save_figure(control_results(log, "chatter everywhere"), tmp_path / "picture")
-        header = png.read_bytes()[:24]
-        assert header.startswith(b"\x89PNG")
-        assert int.from_bytes(header[16:20], "big") == pytest.approx(180 / 25.4 * 150, abs=1)
-        with Image.open(png) as image:
-            assert image.info["dpi"] == pytest.approx((150.0, 150.0), rel=1e-3)
-        root = ET.parse(svg).getroot()
-        assert root.tag == "{http://www.w3.org/2000/svg}svg"
-        assert float(root.attrib["width"].removesuffix("pt")) == pytest.approx(180 / 25.4 * 72)
-        assert b"<image" not in svg.read_bytes()
-        assert svg.stat().st_size < 400_000
+def test_a_loud_one_does_not_set_the_scale() -> None:
+    quiet, loud = np.linspace(-1.0, 1.0, 9), np.array([-9.0, 9.0])
+    assert common_limits([quiet, loud, 1.5 * quiet]) == pytest.approx((-1.65, 1.65))
+    assert common_limits([np.array([math.nan])]) == (-1.0, 1.0)
+    low, high = common_limits([np.zeros(5)])
+    assert low < 0.0 < high
 
-    def test_svg_alone(self, tmp_path: Path) -> None:
-        files = save_figure(desired_joints(flown()), tmp_path / "x", png=False)
-        assert files == (tmp_path / "x.svg",)
-        assert list(tmp_path.iterdir()) == [tmp_path / "x.svg"]
 
-    def test_pyplot_stays_out_and_matplotlib_is_lazy(self) -> None:
-        program = (
-            "import sys\n"
-            "import space_robot.analysis, space_robot.cli.main\n"
-            "assert 'matplotlib' not in sys.modules\n"
-            "import space_robot.analysis.figures\n"
-            "assert 'matplotlib.pyplot' not in sys.modules\n"
-        )
-        subprocess.run([sys.executable, "-c", program], check=True)
+@pytest.mark.parametrize("n", [1, 7])
+def test_nothing_overlaps_or_leaves_the_page(n: int) -> None:
+    names = tuple(f"upper_arm_{i}" for i in range(n))
+    log = flown(n, (0.0, 1.0, 2.0), ripple=0.1, names=names)
+    laws = ("CTC (printed)", "CTC-SMC (printed)", "TDE-SMC", "TDE-TSMC", "TDE-STC")
+    flights = {law: BaseTorque.of(log) for law in laws}
+    title = "TDE-STC, case 4-2, gains printed, friction, payload of 20 kg, disturbances " * 2
+    for figure in (
+        desired_joints(log),
+        control_results(log, title),
+        junctions(flights),
+        chatter(flights),
+        control_results(flown(n, (0.0, 1.0), error=0.0126), title),
+    ):
+        boxes, page = text_boxes(figure), figure.bbox
+        for index, (text, box) in enumerate(boxes):
+            assert page.x0 <= box.x0 <= box.x1 <= page.x1, text
+            assert page.y0 <= box.y0 <= box.y1 <= page.y1, text
+            for other, other_box in boxes[:index]:
+                assert not box.overlaps(other_box), (text, other)
 
 
 def text_boxes(figure: Figure) -> list[tuple[str, Bbox]]:
@@ -462,9 +338,9 @@ def text_boxes(figure: Figure) -> list[tuple[str, Bbox]]:
             texts.append(figure._suptitle)
         for axes in figure.axes:
             texts += [axes.xaxis.label, axes.yaxis.label, axes._left_title, *axes.texts]
-            texts += [axis.get_offset_text() for axis in (axes.xaxis, axes.yaxis)]
             for axis in (axes.xaxis, axes.yaxis):
                 low, high = sorted(axis.get_view_interval())
+                texts.append(axis.get_offset_text())
                 texts += [
                     tick.label1
                     for tick in axis.get_major_ticks()
@@ -473,3 +349,205 @@ def text_boxes(figure: Figure) -> list[tuple[str, Bbox]]:
         unique = {id(text): text for text in texts if text.get_text() and text.get_visible()}
         renderer = canvas.get_renderer()
         return [(text.get_text(), text.get_window_extent(renderer)) for text in unique.values()]
+
+
+def test_files_are_the_same_bytes_whatever_the_users_settings(tmp_path: Path) -> None:
+    assert len({LineStyle.of(index)[:2] for index in range(63)}) == 63
+    log = flown(times=(0.0, 0.5, 1.0))
+    first = save_figure(desired_joints(log), tmp_path / "a" / "case_4.2")
+    assert [path.name for path in first] == ["case_4.2.png", "case_4.2.svg"]
+    with matplotlib.rc_context({"font.size": 20.0, "lines.linewidth": 5.0}):
+        second = save_figure(desired_joints(log), tmp_path / "b")
+        assert matplotlib.rcParams["font.size"] == 20.0
+    for one, two in zip(first, second, strict=True):
+        assert one.read_bytes() == two.read_bytes()
+    alone = save_figure(desired_joints(log), tmp_path / "svg" / "x", png=False)
+    assert alone == (tmp_path / "svg" / "x.svg",)
+    assert list((tmp_path / "svg").iterdir()) == [*alone]
+
+
+def test_files_are_180_mm_wide_and_small(tmp_path: Path) -> None:
+    log = flown(ripple=0.3, error=1e-9)
+    log.joint_positions += 1e-9 * np.random.default_rng(1).normal(size=(60000, 6))
+    png, svg = save_figure(control_results(log, "chatter everywhere"), tmp_path / "picture")
+    with Image.open(png) as image:
+        assert image.format == "PNG"
+        assert image.size[0] == pytest.approx(180 / 25.4 * 150, abs=1)
+        assert image.info["dpi"] == pytest.approx((150.0, 150.0), rel=1e-3)
+    root = ET.parse(svg).getroot()
+    assert root.tag == "{http://www.w3.org/2000/svg}svg"
+    assert float(root.attrib["width"].removesuffix("pt")) == pytest.approx(180 / 25.4 * 72)
+    assert b"<image" not in svg.read_bytes()
+    assert svg.stat().st_size < 400_000
+
+
+@pytest.fixture(scope="module")
+def overlaid() -> dict[str, PlotSeries]:
+    found = {}
+    for law in ("tde_stc", "ctc", "tde_smc"):
+        log = Scenario(controller=law, duration=0.3).fly().log
+        log.latency_s = None if law == "ctc" else np.linspace(1e-4, 2e-3, log.ticks)
+        found[law] = PlotSeries.of(excerpt(log, 0.1, None))
+    return found
+
+
+def test_each_panel_has_a_line_a_flight_over_its_time(overlaid: dict[str, PlotSeries]) -> None:
+    """The smoothest in front; a logarithmic one without the few values below its foot."""
+    for figure, panels in ((errors_and_torques(overlaid), 6), (pointing(overlaid), 4)):
+        assert len(figure.axes) == panels
+        for axes in figure.axes:
+            assert len(axes.get_lines()) == 3
+            assert axes.get_xlim() == pytest.approx((0.1, 0.3), abs=0.01)
+        assert legend_names(figure)[0] == list(overlaid)
+    error, torque = errors_and_torques(overlaid).axes[:2]
+    rough = {x.get_color(): np.nansum(np.abs(np.diff(data_of(x)[1]))) for x in torque.get_lines()}
+    front = max(torque.get_lines(), key=lambda line: line.get_zorder())
+    assert rough[front.get_color()] == min(rough.values())
+    assert error.get_yscale() == "log"
+    sizes = [series.errors["attitude_deg"] for series in overlaid.values()]
+    lowest = min(np.percentile(size[size > 0.0], 0.5) for size in sizes)
+    assert error.get_ylim()[0] == pytest.approx(0.5 * lowest)
+    unknown = {name: series._replace(pointing=None) for name, series in overlaid.items()}
+    assert not pointing(unknown).axes
+
+
+def test_the_histogram_counts_every_answer(overlaid: dict[str, PlotSeries]) -> None:
+    def steps(figure: Figure) -> list[Any]:
+        return [patch.get_data() for patch in figure.axes[0].patches]  # type: ignore[attr-defined]
+
+    figure = latency_histogram(overlaid)
+    assert [step.values.sum() for step in steps(figure)] == [400, 400]
+    assert legend_names(figure)[0] == ["tde_stc", "tde_smc"]
+    assert not latency_histogram({"ctc": overlaid["ctc"]}).axes
+    (axes,) = figure.axes
+    for axis in (axes.xaxis, axes.yaxis):
+        assert axis.get_major_formatter()(0.1) == "0.1", "not as a power of ten"
+    assert axes.xaxis.get_minor_formatter()(0.2) == ""
+    known = np.concatenate([overlaid[law].latency_ms for law in ("tde_stc", "tde_smc")])  # type: ignore[misc]
+    assert steps(figure)[0].edges[[0, -1]] == pytest.approx((known.min(), known.max()))
+    assert axes.get_ylim()[0] == 0.7
+    for latency in (0.0, 0.5):
+        same = overlaid["tde_stc"]._replace(latency_ms=np.full(30, latency))
+        assert steps(latency_histogram({"same": same}))[0].values.sum() == 30
+
+
+@pytest.mark.parametrize(
+    ("key", "text"),
+    [
+        ("joints_1_3", "joints 1-3"),
+        ("joints_4", "joints 4"),
+        ("attitude_deg", "attitude"),
+        ("half_cone_arcsec_jitter", "half cone jitter"),
+        ("base_torque", "base torque"),
+    ],
+)
+def test_keys_as_words(key: str, text: str) -> None:
+    assert words(key) == text
+
+
+def lively_log(robot: Robot, actuators: BaseActuatorSettings, ticks: int = 50) -> FlightLog:
+    log, rng = still_log(robot, ticks, actuators), np.random.default_rng(1)
+    for name in ("omega_base", "joint_velocities", "wheel_velocities", "wheel_torques"):
+        getattr(log, name)[:] = rng.normal(size=getattr(log, name).shape)
+    log.thrusts[:] = 2.0 * (rng.random(log.thrusts.shape) < 0.5)
+    return log
+
+
+def has_curve(axes: Axes, values: Array) -> bool:
+    return any(np.array_equal(data_of(line)[1], values) for line in axes.get_lines())
+
+
+def test_momentum_of_robot_wheels_and_sum(paper_robot: Robot) -> None:
+    """Of a free base what arm and base exchange."""
+    log = lively_log(paper_robot, hardware(wheels=WHEELS))
+    found = momentum_of(log).add(log)
+    figure = momentum(log, found, hardware(wheels=WHEELS))
+    assert legend_names(figure)[0] == ["robot", "wheels", "sum"]
+    for i, axes in enumerate(figure.axes):
+        for wanted in (found.robot, found.wheels, found.robot + found.wheels):
+            assert has_curve(axes, wanted[:, i])
+    free = lively_log(paper_robot, FREE)
+    found = momentum_of(free).add(free)
+    assert legend_names(momentum(free, found, FREE))[0] == ["base", "arm", "sum"]
+    outside = Momentum(*found._replace(outside=found.outside + 1.0))
+    assert len(legend_names(momentum(free, outside, FREE))[0]) == 4
+
+
+def test_wheels_stand_between_their_limits(paper_robot: Robot) -> None:
+    log = lively_log(paper_robot, hardware(wheels=WHEELS))
+    above, below = wheels(log, BOTH.wheels).axes
+    for axes, values, limit in (
+        (above, log.wheel_velocities * 0.01, 3.0),
+        (below, log.wheel_torques, 0.5),
+    ):
+        drawn = [data_of(line)[1] for line in axes.get_lines()]
+        shown = [y for y in drawn if len(y) == log.ticks]
+        assert len(shown) == 4
+        assert all(any(np.allclose(y, column) for y in shown) for column in values.T)
+        assert sorted(y[0] for y in drawn if len(y) == 2) == [-limit, limit]
+
+
+@pytest.mark.parametrize("ticks", [1, 50, 1300])
+def test_the_raster_is_dark_where_a_thruster_is_open(paper_robot: Robot, ticks: int) -> None:
+    log = lively_log(paper_robot, hardware(thrusters=THRUSTERS), ticks)
+    pulses, used, *_ = thrusters(log, np.zeros((ticks, 3)), BOTH.thrusters).axes
+    (image,) = pulses.get_images()
+    shown = np.asarray(image.get_array())
+    length = -(-ticks // shown.shape[1])
+    assert shown.shape[0] == 12
+    for column in (0, shown.shape[1] - 1):
+        part = log.thrusts[column * length : (column + 1) * length] / 2.0
+        np.testing.assert_allclose(shown[:, column], part.mean(axis=0))
+    (curve,) = used.get_lines()
+    total = log.thrusts.sum() * log.timebase.period / (220.0 * 9.80665)
+    assert data_of(curve)[1][-1] == pytest.approx(1e3 * total)
+
+
+@pytest.mark.filterwarnings("ignore:Data has no positive values")
+@pytest.mark.parametrize(
+    ("actuators", "names"),
+    [
+        (BOTH, {"momentum", "wheels", "thrusters"}),
+        (hardware(wheels=WHEELS), {"momentum", "wheels"}),
+        (hardware(thrusters=THRUSTERS), {"momentum", "thrusters"}),
+        (FREE, {"momentum"}),
+        (BaseActuatorSettings(), set()),
+    ],
+)
+def test_each_flight_has_the_figures_of_its_base(
+    paper_robot: Robot, tmp_path: Path, actuators: BaseActuatorSettings, names: set[str]
+) -> None:
+    """Thrusters that never fired gave no torque at all, which has no spectrum."""
+    figures = FigureSet()
+    figures.add("one", still_log(paper_robot, 100, actuators))
+    own = {k: v for k, v in figures.drawings().items() if k in {"momentum", "wheels", "thrusters"}}
+    saved = {k for k, v in own.items() if save_figure(v.draw(), tmp_path / k, png=False)}
+    assert saved == names
+
+
+@pytest.mark.filterwarnings("ignore:Data has no positive values")
+def test_of_several_flights_each_has_its_own(paper_robot: Robot, tmp_path: Path) -> None:
+    """A free base has no torque and drift in the place of errors; a bag may lie about its base."""
+    lying = lively_log(paper_robot, FREE)
+    lying.flight["base_actuators"] = hardware(wheels=WHEELS).model_dump()
+    alone = FigureSet()
+    alone.add("free", lively_log(paper_robot, FREE))
+    saved = {figure.svg.stem: figure.svg.read_text("utf-8") for figure in alone.save(tmp_path)}
+    assert not {"junctions", "chatter"} & {*saved}
+    assert "attitude drift" in saved["control_results"]
+    figures = FigureSet()
+    for name, log in {
+        "ideal": random_log(6, 400, 0),
+        "wheels": lively_log(paper_robot, hardware(wheels=WHEELS)),
+        "free": lively_log(paper_robot, FREE),
+        "lying": lying,
+    }.items():
+        figures.add(name, log)
+    drawings = figures.drawings()
+    empty = {name for name, drawing in drawings.items() if not drawing.draw().axes}
+    assert empty == {"latency", "ripple"}
+    captions = {name: drawing.caption for name, drawing in drawings.items()}
+    text = "Angular momentum about the common centre of mass of"
+    assert (captions["momentum_1"], captions["momentum_2"]) == (f"{text} wheels", f"{text} free")
+    assert {"wheels_1", "junctions", "chatter"} <= {*captions}
+    assert not {"momentum_3", "wheels_3"} & {*captions}

@@ -1,4 +1,4 @@
-"""Settling times of hand-made errors, and waypoints, against plain loops."""
+"""Waypoints and settling times of hand-made references and errors, against plain loops."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from hypothesis.extra.numpy import arrays
 
 from space_robot.analysis import excerpt
 from space_robot.analysis.settling import BAND, Settling
-from space_robot.analysis.waypoints import Waypoints
+from space_robot.analysis.waypoints import Waypoints, junction_ticks, waypoint_ticks
 from space_robot.flight.flown_log import empty_log
 from space_robot.flight.plan import Flight, FlightPlan, resolve
 from space_robot_msgs_py.bag.blocks import blocks_of
@@ -21,8 +21,8 @@ from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.samples import Timebase
 
 PERIOD = 0.0005
-WATCH = 200
-"""Ticks of flight that a waypoint must have after it."""
+SPEEDS = st.sampled_from([0.0, 0.0, 1e-12, 5e-10, 1e-6, 2e-5, 9e-5, 0.5, 1.0, 3.0])
+CUTS = st.lists(st.integers(0, 300), max_size=5)
 
 
 def log_with(speed: np.ndarray, first_tick: int = 0) -> FlightLog:
@@ -33,38 +33,42 @@ def log_with(speed: np.ndarray, first_tick: int = 0) -> FlightLog:
     return log
 
 
-def settling_of(log: FlightLog, error: np.ndarray, cuts: tuple[int, ...] = ()) -> Settling:
-    figure = Settling(log, band=1.0)
-    for start, stop in zip((0, *cuts), (*cuts, log.ticks), strict=True):
-        figure.add(log.rows(start, stop), error[start:stop])
-    return figure
+def planned_log(duration: float) -> FlightLog:
+    """The paper's mission, whose waypoints are at 0, 15 and 30 s."""
+    return empty_log(Flight(resolve(FlightPlan(duration=duration))))
+
+
+def settling_of(log: FlightLog, error: np.ndarray, cuts: list[int] | None = None) -> Settling:
+    metric = Settling(log, band=1.0)
+    for start, stop in itertools.pairwise([0, *sorted(cuts or []), log.ticks]):
+        metric.add(log.rows(start, stop), error[start:stop])
+    return metric
 
 
 def last_waypoint(log: FlightLog) -> int | None:
-    figure = Settling(log)
+    metric = Settling(log)
     for block in blocks_of(log):
-        figure.add(block, np.zeros((block.ticks, log.axes)))
-    return figure.last_waypoint
+        metric.add(block, np.zeros((block.ticks, log.axes)))
+    return metric.last_waypoint
 
 
 @given(
     arrays(np.float64, (300, 4), elements=st.floats(-2.0, 2.0)),
     st.integers(0, 100),
     st.integers(0, 300),
-    st.sets(st.integers(0, 300), max_size=40),
+    st.sets(st.integers(0, 299), max_size=40),
     st.integers(0, 50),
+    CUTS,
 )
 def test_after_it_the_error_stays_in_the_band_and_before_it_does_not(
-    error: np.ndarray, start: int, calm_from: int, loud: set[int], first_tick: int
+    error: np.ndarray, start: int, calm_from: int, loud: set[int], first_tick: int, cuts: list[int]
 ) -> None:
     """Of the base's and the joint's column alike; the largest in size of the axes counts."""
     error[calm_from:] *= 0.4
-    for k in loud:
-        error[k % 300, 2] = -1.5
+    error[sorted(loud), 2] = -1.5
     speed = np.ones(300)
     speed[start] = 0.0
-    log = log_with(speed, first_tick)
-    found = settling_of(log, error).result()
+    found = settling_of(log_with(speed, first_tick), error, cuts).result()
     assert found["band"] == 1.0
     assert found["after_s"] == pytest.approx((first_tick + start) * PERIOD)
     for name, axes in (("attitude", slice(0, 3)), ("joints_1_1", slice(3, 4))):
@@ -72,41 +76,26 @@ def test_after_it_the_error_stays_in_the_band_and_before_it_does_not(
         rows = [k for k in range(start, 300) if np.all(size[k:] <= 1.0)]
         expected = (rows[0] - start) * PERIOD if rows else None
         assert found["settled_s"][name] == pytest.approx(expected)
-    assert settling_of(log, error, (1, 77, 77, 230)).result() == found
-
-
-def test_of_a_decay_it_is_the_logarithm() -> None:
-    time = np.arange(4000) * PERIOD
-    log = log_with(np.where(time == 0.0, 0.0, 1.0))
-    error = np.tile(1e3 * np.exp(-time / 0.1)[:, np.newaxis], 4)
-    settled = settling_of(log, error).result()["settled_s"]
-    assert settled["attitude"] == pytest.approx(0.1 * np.log(1e3), abs=PERIOD)
 
 
 def test_a_flight_that_never_rests_settles_nowhere() -> None:
-    log = log_with(np.ones(300))
     with pytest.raises(InputError, match="does not come to rest"):
-        settling_of(log, np.zeros((300, 4))).result()
+        settling_of(log_with(np.ones(300)), np.zeros((300, 4))).result()
+    assert BAND == 1e-5  # as documented
 
 
 @pytest.mark.parametrize(
     ("duration", "expected"), [(30.0, 30_000), (31.0, 60_000), (14.0, 0), (0.5, 0), (0.05, None)]
 )
 def test_the_last_waypoint_has_flight_after_it(duration: float, expected: int | None) -> None:
-    assert last_waypoint(empty_log(Flight(resolve(FlightPlan(duration=duration))))) == expected
+    assert last_waypoint(planned_log(duration)) == expected
 
 
-def test_the_shortest_watch() -> None:
-    for rows, expected in ((WATCH + 1, 1), (WATCH, 0), (WATCH - 1, None)):
-        speed = np.ones(rows)
-        speed[:2] = 0.0
-        assert last_waypoint(log_with(speed)) == expected
-
-
-def test_an_excerpt_without_rest_has_none() -> None:
-    log = empty_log(Flight(resolve(FlightPlan(duration=30.0))))
-    assert last_waypoint(excerpt(log, 5.0, 10.0)) is None
-    assert last_waypoint(excerpt(log, 12.0, 20.0)) == 6000
+@pytest.mark.parametrize(("rows", "expected"), [(201, 1), (200, 0), (199, None)])
+def test_the_shortest_flight_after_it(rows: int, expected: int | None) -> None:
+    speed = np.ones(rows)
+    speed[:2] = 0.0
+    assert last_waypoint(log_with(speed)) == expected
 
 
 def plain_waypoints(speed: list[float]) -> list[int]:
@@ -124,13 +113,8 @@ def plain_waypoints(speed: list[float]) -> list[int]:
     return sorted(found)
 
 
-SPEEDS = st.sampled_from([0.0, 0.0, 1e-12, 5e-10, 1e-6, 2e-5, 9e-5, 0.5, 1.0, 3.0])
-
-
-@given(st.lists(SPEEDS, max_size=60), st.lists(st.integers(0, 60), max_size=5))
-def test_waypoints_are_those_of_a_plain_loop_in_any_parts(
-    speed: list[float], cuts: list[int]
-) -> None:
+@given(st.lists(SPEEDS, max_size=60), CUTS)
+def test_waypoints_are_those_of_a_plain_loop(speed: list[float], cuts: list[int]) -> None:
     rows = np.zeros((len(speed), 3, 2))
     rows[:, 1, 1] = np.negative(speed)
     waypoints = Waypoints()
@@ -142,5 +126,23 @@ def test_waypoints_are_those_of_a_plain_loop_in_any_parts(
     assert waypoints.highest == max(speed, default=0.0)
 
 
-def test_the_band_is_the_documented_one() -> None:
-    assert BAND == 1e-5
+RESTS = [*[0.0] * 5, *[0.2] * 10, *[0.0] * 7, *[0.1] * 10]
+UNKNOWN = [*[0.0] * 3, *[1.0] * 12, np.nan, *[1.0] * 4]
+"""A reference is missing: no rest."""
+
+
+@pytest.mark.parametrize(
+    ("log", "ticks", "junctions"),
+    [
+        (planned_log(30.0), [0, 30_000, 59_999], [30_000]),
+        (planned_log(1.0), [0], []),  # cut short
+        (log_with(1e-3 * np.sin(np.pi * np.linspace(0, 2, 201)) ** 4), [0, 100, 200], [100]),
+        (log_with(np.array(RESTS)), [0, 4, 15, 21], [4, 15, 21]),
+        (log_with(np.zeros(20)), [0], []),
+        (log_with(np.array(UNKNOWN)), [0, 2], [2]),
+        (excerpt(planned_log(30.0), 5.0, 6.0), [], []),
+    ],
+)
+def test_waypoints_and_junctions(log: FlightLog, ticks: list[int], junctions: list[int]) -> None:
+    assert waypoint_ticks(log) == pytest.approx(ticks, abs=1)
+    assert junction_ticks(log) == pytest.approx(junctions, abs=1)

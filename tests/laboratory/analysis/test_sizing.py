@@ -7,15 +7,14 @@ from typing import Any
 import numpy as np
 import pytest
 from actuator_sets import PYRAMID, flat, hardware, still_log
-from hypothesis import given
-from hypothesis import strategies as st
 from oracles import quaternion_of
 from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
 from space_robot.analysis import analyze
 from space_robot.analysis.base_demand import BaseDemand
-from space_robot.analysis.loads import LoadRequirement, OtherWheelLoad, ThrusterLoad, WheelLoad
+from space_robot.analysis.loads import LoadRequirement, OtherWheelLoad
+from space_robot.analysis.metrics import of_log
 from space_robot.analysis.sizing import ActuatorSet, Sizing
 from space_robot.analysis.sizing_table import sizing_table
 from space_robot_model.hardware.base_actuators import BaseActuatorSettings
@@ -23,7 +22,6 @@ from space_robot_model.robot import Robot
 from space_robot_msgs_py.bag.flight_log import FlightLog
 
 PERIOD = 0.0005
-NOTHING = np.empty(0)
 PAIRS = {
     "positions": flat([sign * axis for axis in np.eye(3) for sign in (1, -1, 1, -1)]),
     "directions": flat([sign * np.roll(axis, 1) for axis in np.eye(3) for sign in (1, -1, -1, 1)]),
@@ -43,29 +41,6 @@ def turning_log(robot: Robot, rate: float, ticks: int = 2001) -> FlightLog:
     assert log.commanded_torque is not None
     log.commanded_torque[:, 0] = 2.0
     return log
-
-
-def sized(log: FlightLog, flown: BaseActuatorSettings, *cuts: int) -> dict[str, Any]:
-    metric = Sizing(log, ActuatorSet("mine", flown))
-    for start, stop in zip((0, *cuts), (*cuts, log.ticks), strict=True):
-        metric.add(log.rows(start, stop), NOTHING)
-    found: dict[str, Any] = metric.result()
-    return found
-
-
-@pytest.mark.parametrize("rate", [0.0, 0.3, 2.0])
-def test_stored_momentum_is_the_integral_on_inertial_axes(paper_robot: Robot, rate: float) -> None:
-    """``H = -2 [sin(rt), 1 - cos(rt)] / r`` on inertial axes, seen from the base."""
-    log = turning_log(paper_robot, rate)
-    found = BaseDemand(BaseActuatorSettings()).add(log)
-    t = log.time
-    taken = np.array([2.0 * t, 0.0 * t, 0.0 * t]).T
-    if rate:
-        taken = 2.0 / rate * np.array([np.sin(rate * t), 1.0 - np.cos(rate * t), 0.0 * t]).T
-    held = -Rotation.from_rotvec(np.outer(rate * t, [0, 0, 1])).inv().apply(taken)
-    np.testing.assert_allclose(found.momentum, held, atol=1e-6)
-    np.testing.assert_allclose(found.torque[1:], [[2.0, 0.0, 0.0]] * 2000)
-    assert np.all(found.torque[0] == 0.0)
 
 
 def test_stored_momentum_is_scipys_integral_of_any_motion(paper_robot: Robot) -> None:
@@ -99,17 +74,6 @@ def test_a_command_that_is_not_known_was_the_torque_given(paper_robot: Robot) ->
     np.testing.assert_array_equal(
         BaseDemand(BaseActuatorSettings()).add(log).torque, log.applied_torque[:, :3]
     )
-
-
-@given(st.integers(1, 1999), st.integers(1, 1999))
-def test_cuts_change_nothing(paper_robot: Robot, one: int, other: int) -> None:
-    log = turning_log(paper_robot, 1.0)
-    cuts = sorted({one, other})
-    whole, parts = (sized(log, BaseActuatorSettings(), *c) for c in ((), cuts))
-    for axis, values in whole["axes"].items():
-        known = {key: value for key, value in values.items() if value is not None}
-        again = {key: parts["axes"][axis][key] for key in known}
-        assert again == pytest.approx(known, rel=1e-12, abs=1e-12)
 
 
 def test_axes_have_peak_rms_impulse_and_momentum(paper_robot: Robot) -> None:
@@ -148,7 +112,7 @@ class TestWheels:
         log.wheel_velocities[:] = 10.0
         log.wheel_velocities[5] = [20.0, -25.0, 0.0, 11.0]
         log.wheel_torques[3] = [0.5, -1.0, 0.0, 0.0]
-        found = sized(log, wheels)["requirements"]
+        found = of_log(Sizing(log, ActuatorSet("mine", wheels)), log)["requirements"]
         of_wheels = [(r["asked"], r["has"], r["is_met"]) for r in found if "wheel" in r["part"]]
         assert of_wheels == [
             (0.5, 1.0, True),
@@ -189,19 +153,6 @@ class TestWheels:
         inside = slice(2, -2)
         np.testing.assert_allclose((torque - friction)[inside], given[inside], atol=3e-3)
 
-    def test_they_and_the_flown_ones_agree_on_a_base_that_stands(self, paper_robot: Robot) -> None:
-        wheels = hardware(wheels={"axes": flat(np.eye(3)), "rotor_inertia": [0.1]})
-        log = still_log(paper_robot, 101, wheels)
-        assert log.commanded_torque is not None
-        log.commanded_torque[:, 0] = 0.2
-        log.wheel_torques[1:, 0] = -0.2
-        log.wheel_velocities[:, 0] = -0.2 * log.time / 0.1
-        loads = WheelLoad(wheels.wheels), OtherWheelLoad(wheels.wheels)
-        for flown, load in zip((wheels, BaseActuatorSettings()), loads, strict=True):
-            load.add(log, BaseDemand(flown).add(log))
-        for one, other in zip(*(load.requirements(PERIOD) for load in loads), strict=True):
-            assert one.asked == pytest.approx(other.asked, abs=1e-12)
-
 
 class TestThrusters:
     def test_pulses_and_propellant_by_axis(self, paper_robot: Robot) -> None:
@@ -229,23 +180,6 @@ class TestThrusters:
             "is_at_limit": False,
         }
 
-    @given(st.integers(0, 99), st.integers(1, 58))
-    def test_pulses_are_those_of_a_plain_loop(
-        self, paper_robot: Robot, seed: int, cut: int
-    ) -> None:
-        thrusters = hardware(thrusters=PAIRS)
-        log = still_log(paper_robot, 60, thrusters)
-        log.thrusts[:] = 2.0 * (np.random.default_rng(seed).random(log.thrusts.shape) < 0.5)
-        load, demand = ThrusterLoad(thrusters.thrusters, True), BaseDemand(thrusters)
-        for part in (log.rows(0, cut), log.rows(cut, 60)):
-            load.add(part, demand.add(part))
-        begun = [0, 0, 0]
-        for i in range(12):
-            for k in range(60):
-                if log.thrusts[k, i] and not (k and log.thrusts[k - 1, i]):
-                    begun[(2, 0, 1)[i // 4]] += 1
-        assert load.pulses().tolist() == begun
-
     def test_of_others_the_least_is_known(self, paper_robot: Robot) -> None:
         log = turning_log(paper_robot, 0.0)
         found = analyze(log, ActuatorSet("pairs", hardware(thrusters=PAIRS)))["sizing"]
@@ -258,74 +192,60 @@ class TestThrusters:
     def test_of_others_beside_wheels_nothing_is_known(self, paper_robot: Robot) -> None:
         both = hardware(thrusters=PAIRS, wheels={"axes": PYRAMID, "max_torque": [1.0]})
         found = analyze(turning_log(paper_robot, 0.0), ActuatorSet("both", both))["sizing"]
-        assert {r["part"] for r in found["requirements"]} == {
-            "base_x",
-            "base_y",
-            "base_z",
-            "wheel_1",
-            "wheel_2",
-            "wheel_3",
-            "wheel_4",
-        }
+        parts = {f"base_{axis}" for axis in "xyz"} | {f"wheel_{k}" for k in range(1, 5)}
+        assert {r["part"] for r in found["requirements"]} == parts
         assert found["axes"]["base_x"]["propellant_kg"] is None
 
 
-def test_at_its_limit_a_part_lacks_it() -> None:
-    def of(asked: float, has: float) -> tuple[bool, float | None]:
-        found = LoadRequirement("a", "b", "c", asked, has)
-        return found.is_met, found.margin
-
-    assert of(1.0, 4.0) == (True, 0.75)
-    assert of(4.0, 4.0) == (False, 0.0)
-    assert not of(3.999, 4.0)[0]
-    assert of(3.99, 4.0)[0]
-    assert of(6.0, 4.0) == (False, -0.5)
-    assert of(0.0, 0.0) == (True, None)
-    assert of(9.0, np.inf) == (True, None)
-    assert LoadRequirement("a", "b", "c", 3.999, 4.0).is_at_limit
-    assert not LoadRequirement("a", "b", "c", 6.0, 4.0).is_at_limit
+@pytest.mark.parametrize(
+    ("asked", "has", "is_met", "margin", "is_at_limit"),
+    [
+        (1.0, 4.0, True, 0.75, False),
+        (4.0, 4.0, False, 0.0, True),
+        (3.999, 4.0, False, pytest.approx(0.00025), True),
+        (3.99, 4.0, True, pytest.approx(0.0025), False),
+        (6.0, 4.0, False, -0.5, False),
+        (0.0, 0.0, True, None, False),
+        (9.0, np.inf, True, None, False),
+    ],
+)
+def test_at_its_limit_a_part_lacks_it(
+    asked: float, has: float, is_met: bool, margin: Any, is_at_limit: bool
+) -> None:
+    found = LoadRequirement("a", "b", "c", asked, has)
+    assert (found.is_met, found.margin, found.is_at_limit) == (is_met, margin, is_at_limit)
 
 
 def test_of_a_free_base_nothing_was_asked(paper_robot: Robot) -> None:
     report = analyze(still_log(paper_robot, 9, BaseActuatorSettings(base_actuation="none")))
     assert report["sizing"] is None
     assert report["unavailable"]["sizing"] == "the base floated freely: nothing was asked of it"
-
-
-def test_a_bag_whose_columns_are_others_has_none(paper_robot: Robot) -> None:
     log = still_log(paper_robot, 9)
     log.flight["base_actuators"] = hardware(wheels={"axes": PYRAMID}).model_dump()
     why = analyze(log)["unavailable"]["sizing"]
     assert "describes 4 wheels and 0 thrusters, and has the states of 0 and 0" in why
 
 
-def test_the_table_has_every_number_once(paper_robot: Robot) -> None:
-    report = analyze(turning_log(paper_robot, 0.0))
+def shown(report: dict[str, Any]) -> dict[tuple[str, str], list[str]]:
     table = sizing_table(report)
+    assert table is not None
+    return {(g.name, row[0]): row[2:] for g in table.groups for row in table.texts(g)}
+
+
+def test_the_table_has_every_number_once(paper_robot: Robot) -> None:
+    table = sizing_table(analyze(turning_log(paper_robot, 0.0)))
     assert table is not None
     assert [group.name for group in table.groups] == ["base_x", "base_y", "base_z"]
     assert [column.heading for column in table.columns] == ["", "unit", "asked"]
     wheels = {"axes": flat(np.eye(3)), "max_torque": [1.0], "max_momentum": [3.0]}
-    report = analyze(turning_log(paper_robot, 0.0), ActuatorSet("w", hardware(wheels=wheels)))
-    table = sizing_table(report)
-    assert table is not None
-    texts = {(g.name, row[0]): row[2:] for g in table.groups for row in table.texts(g)}
+    other = ActuatorSet("w", hardware(wheels=wheels))
+    texts = shown(analyze(turning_log(paper_robot, 0.0), other))
     assert texts["base_x", "peak torque"] == ["2", "1", "-100 % lacks it"]
     assert texts["base_x", "stored momentum"] == ["2", "3", "+33 % has it"]
     assert texts["wheel_1", "peak torque"] == ["2", "1", "-100 % lacks it"]
     assert texts["wheel_2", "largest momentum"] == ["0", "3", "+100 % has it"]
     assert len(texts) == 3 * 4 + 3 * 2
-
-
-@pytest.mark.parametrize(
-    ("limit", "shown"), [(2.0, "at the limit"), (2.0001, "at the limit"), (0.08, "25 times")]
-)
-def test_at_a_limit_and_far_beyond_it_the_table_has_no_margin(
-    paper_robot: Robot, limit: float, shown: str
-) -> None:
-    wheels = {"axes": flat(np.eye(3)), "max_torque": [limit], "max_momentum": [3.0]}
-    report = analyze(turning_log(paper_robot, 0.0), ActuatorSet("w", hardware(wheels=wheels)))
-    table = sizing_table(report)
-    assert table is not None
-    texts = {(g.name, row[0]): row[4] for g in table.groups for row in table.texts(g)}
-    assert texts["base_x", "peak torque"] == shown
+    for limit, margin in ((2.0, "at the limit"), (2.0001, "at the limit"), (0.08, "25 times")):
+        other = ActuatorSet("w", hardware(wheels={**wheels, "max_torque": [limit]}))
+        texts = shown(analyze(turning_log(paper_robot, 0.0), other))
+        assert texts["base_x", "peak torque"][2] == margin

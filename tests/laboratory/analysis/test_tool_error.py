@@ -7,8 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 import yaml
-from conservation import momentum
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from paths import CONFIG
 from random_robots import random_quaternion, random_robot
@@ -16,8 +15,7 @@ from scipy.spatial.transform import Rotation
 
 import space_robot as sr
 from space_robot.analysis.described import assumed_robot_of, captures_of
-from space_robot.analysis.tool_error import ToolError, ToolPath
-from space_robot.campaign.draws.changes import RobotArrays
+from space_robot.analysis.tool_error import ToolError, ToolPath, leads_tool
 from space_robot_model.robot import Robot
 from space_robot_model.robot.momentum import Motion, robot_momentum
 from space_robot_model.robot.tool import tool_pose
@@ -50,20 +48,14 @@ def on_its_path(robot: Robot, seed: int) -> FlightLog:
     return log
 
 
-@given(SEEDS, st.integers(1, 8))
-def test_a_flight_on_its_path_has_no_error(seed: int, n: int) -> None:
-    robot = random_robot(np.random.default_rng(seed), n)
-    log = on_its_path(robot, seed)
-    errors = ToolError(log, of(robot), robot).errors(log)
-    np.testing.assert_allclose(errors, 0.0, atol=1e-12)
-
-
+@settings(max_examples=40)
 @given(SEEDS, st.integers(1, 8))
 def test_a_displaced_and_turned_base_displaces_and_turns_the_tool(seed: int, n: int) -> None:
     rng = np.random.default_rng(seed)
     robot = random_robot(rng, n)
     log = on_its_path(robot, seed)
     metric = ToolError(log, of(robot), robot)
+    np.testing.assert_allclose(metric.errors(log), 0.0, atol=1e-12)
     shift, angle = rng.normal(size=3), 0.3
     turn = Rotation.from_rotvec([0.0, 0.0, angle])
     log.base_position[1:] += shift  # with the whole robot, and so with the path
@@ -73,16 +65,6 @@ def test_a_displaced_and_turned_base_displaces_and_turns_the_tool(seed: int, n: 
     attitude = turn * Rotation.from_quat(np.roll(log.quaternion, -1, axis=1))
     log.quaternion[:] = np.roll(attitude.as_quat(), 1, axis=1)
     np.testing.assert_allclose(metric.errors(log)[:, 1], angle, rtol=1e-9)
-
-
-def test_a_base_with_its_centre_of_mass_elsewhere_is_on_its_path_at_rest() -> None:
-    """The base's frame, to which it is measured, is elsewhere; its parts are where they were."""
-    robot = random_robot(np.random.default_rng(1), 4)
-    log = on_its_path(robot, 1).rows(0, 1)
-    arrays = RobotArrays(robot, has_surfaces=False)
-    arrays.com[0] = [0.02, -0.03, 0.05]
-    errors = ToolError(log, of(arrays.robot()), robot).errors(log)
-    np.testing.assert_allclose(errors, 0.0, atol=1e-12)
 
 
 def one_sided_panel() -> dict[str, Any]:
@@ -167,31 +149,11 @@ def test_a_line_is_flown_within_a_micrometre_and_a_payload_moves_it() -> None:
     assert loaded.fly().report()["tool"]["largest_m"] > 1e-3
 
 
-@pytest.mark.parametrize(
-    ("law", "most"),
-    [("ctc", 1e-5), ("ctc_smc", 1e-5), ("tde_smc", 1e-5), ("tde_tsmc", 1e-5), ("tde_stc", 2e-4)],
-)
-def test_every_law_follows_a_slew_with_the_arm_moving(law: str, most: float) -> None:
-    segments = [
-        {"joints_deg": [5, 115, 215, 5, -5, 5], "base": {"rpy_deg": [0, 0, 3]}, "duration": 4}
-    ]
-    mission = {"start": {"joints_deg": [0, 120, 220, 0, -10, 0]}, "segments": segments}
-    report = sr.Scenario(controller=law, mission=mission).fly().report()
-    assert report["duration_s"] == 4.0
-    assert report["maxima"]["attitude"] < most
-
-
-def test_a_line_is_flown_with_the_base_free_and_no_momentum_comes_in() -> None:
-    start, goal = [0, 90, 200, 20, 30, 10], {"xyz": [0.2, 0.1, -0.2], "rpy_deg": [0, 0, 0]}
-    segments = [{"tool": goal, "base": "free", "duration": 3}]
-    mission = {"start": {"joints_deg": start}, "segments": segments}
-    flown = sr.Scenario(controller="ctc", mission=mission, actuators="none", friction=False).fly()
-    tool, log = flown.report()["tool"], flown.log
-    assert tool["largest_m"] < 1e-6
-    assert tool["largest_deg"] < 1e-4
-    turned = 2.0 * np.arcsin(np.linalg.norm(log.quaternion[-1, 1:]))
-    assert np.degrees(turned) > 5.0
-    for tick in range(0, log.ticks, 500):
-        linear, angular = momentum(flown.flight.robot, log.state(tick))
-        assert np.abs(linear).max() < 1e-10
-        assert np.abs(angular).max() < 1e-10
+def test_waypoints_lead_no_tool_unless_changed_in_flight() -> None:
+    log = sr.Scenario(duration=0.1).fly().log
+    assert not leads_tool(log)
+    for column in (log.reference_joints[-1, 0], log.reference_base[-1, :4]):
+        before = column.copy()
+        column += 0.01
+        assert leads_tool(log)
+        column[:] = before

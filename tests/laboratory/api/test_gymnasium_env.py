@@ -133,24 +133,3 @@ def test_a_scenario_may_be_drawn_at_every_reset() -> None:
     changing._draw = lambda rng: Scenario(controller=None, robot="seven_joint")
     with pytest.raises(InputError, match="9 axes were expected, got 10"):
         changing.reset()
-
-
-def test_a_snapshot_goes_on_between_two_steps(env: SpaceRobotEnv) -> None:
-    action = np.full(9, 0.1)
-    env.reset(seed=2)
-    env.step(action)
-    snapshot = env.bench.save()
-    expected = env.step(action)
-    env.step(-action)
-    env.bench.restore(snapshot)
-    again = env.step(action)
-    assert expected[0].tobytes() == again[0].tobytes()
-    assert expected[1:] == again[1:]
-
-
-def test_a_scale_is_above_zero_and_one_or_one_an_axis() -> None:
-    for scale in (-1.0, 0.0, [1.0, 2.0], [1.0] * 8 + [np.inf]):
-        with pytest.raises(InputError, match="torque_scale: 1 or 9 numbers above 0 are allowed"):
-            SpaceRobotEnv(SCENARIO, torque_scale=scale)
-    with pytest.raises(InputError, match="ticks_per_step: 1 or more is allowed, got 0"):
-        SpaceRobotEnv(SCENARIO, ticks_per_step=0)

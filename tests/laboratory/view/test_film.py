@@ -3,34 +3,44 @@
 from __future__ import annotations
 
 import itertools
-from pathlib import Path
+import math
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pinocchio as pin
 import pytest
+from moving_logs import moving_log
 from numpy.typing import NDArray
 from random_trees import random_bodies
-from scene_pages import Scene, plot_data
+from scene_pages import Scene, page_of, plot_data, quiet
 from tree_oracle import pinocchio_tree
 
-from space_robot.flight.plan import Flight, FlightPlan, resolve
-from space_robot.flight.simulate import simulate
+from space_robot import FlownFlight, Scenario
+from space_robot.analysis import excerpt
 from space_robot.view.film import FilmedFlight, film
-from space_robot.view.flights import ViewOptions, flights_page, shown_robot
+from space_robot.view.flights import ViewOptions, shown_robot
 from space_robot.view.frames import shown_times
+from space_robot.view.marks import Mark, marks_of, shared_marks
+from space_robot.view.quantities import quantities_of
 from space_robot_model.robot import Robot
 from space_robot_model.robot.frame_names import frame_names
+from space_robot_model.robot.tool import tool_pose
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.bag.reader import read_flight
-from space_robot_msgs_py.samples import Timebase
 
 Array = NDArray[np.float64]
+Flown = Callable[..., FlightLog]
 TOLERANCE = 1e-6
 """m, and of the axes' numbers."""
-
-
-def quiet(total: int):  # type: ignore[no-untyped-def]
-    return lambda: None
+START = {"joints_deg": [0, 90, 200, 20, 30, 10]}
+LINE = {"tool": {"xyz": [0.05, 0.0, -0.05], "rpy_deg": [0, 0, 5]}, "duration": 1.0}
+CAPTURE = Mark(0.1, 0.1, "capture small_satellite", "event")
+SCALE = Mark(0.15, 0.2, "drive_scale all=0.9", "fault")
+STICK = Mark(0.18, math.inf, "stuck_joint 3=20", "fault")
+SWAP = Mark(0.25, 0.25, "tde_stc -> ctc", "law")
+RELEASE = Mark(0.28, 0.28, "release", "event")
 
 
 def expected(robot: Robot, log: FlightLog, row: int) -> dict[str, pin.SE3]:
@@ -66,25 +76,24 @@ def assert_shown(scene: Scene, log: FlightLog, robot: Robot, times: Array) -> No
 
 
 @pytest.fixture(scope="module")
-def flown(tmp_path_factory: pytest.TempPathFactory):  # type: ignore[no-untyped-def]
+def flown(tmp_path_factory: pytest.TempPathFactory) -> Flown:
+    """Bags of flights, read back."""
     folder = tmp_path_factory.mktemp("flights")
 
-    def fly(name: str, **plan: object) -> FlightLog:
+    def fly(name: str, **options: Any) -> FlightLog:
         if not (folder / name).exists():
-            simulate(Flight(resolve(FlightPlan(duration=1.0, **plan))), folder / name)  # type: ignore[arg-type]
+            Scenario(**{"robot": name, "duration": 1.0, **options}).fly(folder / name)
         return read_flight(folder / name)
 
     return fly
 
 
-@pytest.mark.parametrize("robot_name", ["paper", "flexible_panels", "boom", "dual_arm"])
-def test_the_poses_on_the_page_are_the_bags(flown, robot_name: str) -> None:  # type: ignore[no-untyped-def]
-    log = flown(robot_name, robot=robot_name)
-    robot = shown_robot(log)
-    times = shown_times([log], 30.0)
+@pytest.mark.parametrize("robot_name", ["paper", "flexible_panels", "dual_arm"])
+def test_the_poses_on_the_page_are_the_bags(flown: Flown, robot_name: str) -> None:
+    log = flown(robot_name)
+    robot, times = shown_robot(log), shown_times([log], 30.0)
     assert len(times) == 31
-    page = flights_page({"one": log}, {"one": robot}, ViewOptions(), quiet)
-    scene = Scene(page)
+    scene = Scene(page_of(robot, one=log))
     assert scene.duration == pytest.approx(times[-1] - times[0])
     assert_shown(scene, log, robot, times)
 
@@ -93,52 +102,36 @@ def test_the_poses_of_a_tree_with_all_kinds_of_joints() -> None:
     rng = np.random.default_rng(5)
     kinds = ["revolute", "prismatic", "passive revolute", "fixed", "passive prismatic", "revolute"]
     robot = Robot.of_tree("tree", random_bodies(rng, kinds))
-    log = FlightLog.allocate(
-        40, robot.joint_names, Timebase(10_000_000), passive_names=robot.passive_names
-    )
+    log = moving_log(robot, 40, period_ns=10_000_000)
     log.base_position[:] = rng.normal(size=(40, 3))
-    log.quaternion[:] = rng.normal(size=(40, 4))
-    log.quaternion[:] /= np.linalg.norm(log.quaternion, axis=1, keepdims=True)
-    log.joint_positions[:] = rng.uniform(-3.0, 3.0, log.joint_positions.shape)
     log.passive_positions[:] = rng.uniform(-0.2, 0.2, log.passive_positions.shape)
     times = shown_times([log], 100.0)
     page = film([FilmedFlight("tree", log, robot, "", "#112233")], times, False, True, quiet)
     assert_shown(Scene(page), log, robot, times)
 
 
-def test_side_by_side_nobody_is_in_anothers_place(flown) -> None:  # type: ignore[no-untyped-def]
-    log = flown("paper", robot="paper")
-    robot = shown_robot(log)
-    logs, robots = {"a": log, "b/c": log, "d": log}, dict.fromkeys(("a", "b/c", "d"), robot)
-    apart = Scene(flights_page(logs, robots, ViewOptions(side_by_side=True), quiet)).poses(0.5)
-    together = Scene(flights_page(logs, robots, ViewOptions(), quiet)).poses(0.5)
+def test_side_by_side_nobody_is_in_anothers_place(flown: Flown) -> None:
+    log = flown("paper")
+    logs, robot = {"a": log, "b/c": log, "d": log}, shown_robot(log)
+    apart = Scene(page_of(robot, ViewOptions(side_by_side=True), **logs)).poses(0.5)
+    together = Scene(page_of(robot, **logs)).poses(0.5)
     roots = ("/a/base_link", "/b_c/base_link", "/d/base_link")
     reach = [
         [poses.position for path, poses in apart.items() if path.startswith(root)] for root in roots
     ]
     for left, right in itertools.pairwise(reach):
         assert max(x for x, _, _ in left) < min(x for x, _, _ in right)
+    first = apart[roots[0]].position
     for root in roots:
-        np.testing.assert_allclose(
-            together[root].position, apart["/a/base_link"].position, atol=1e-8
-        )
-        np.testing.assert_allclose(
-            apart[root].position[1:], apart["/a/base_link"].position[1:], atol=1e-8
-        )
+        np.testing.assert_allclose(together[root].position, first, atol=1e-8)
+        np.testing.assert_allclose(apart[root].position[1:], first[1:], atol=1e-8)
 
 
-def test_different_robots_stand_side_by_side_of_themselves(flown) -> None:  # type: ignore[no-untyped-def]
-    logs = {name: flown(name, robot=name) for name in ("paper", "boom")}
-    robots = {name: shown_robot(log) for name, log in logs.items()}
-    poses = Scene(flights_page(logs, robots, ViewOptions(), quiet)).poses(0.0)
-    assert poses["/paper"].position[0] == 0.0
-    assert poses["/boom"].position[0] > 1.0
-
-
-def test_a_target_waits_where_it_is_grasped_and_is_seen_while_it_is_held(flown) -> None:  # type: ignore[no-untyped-def]
-    log = flown("held", events=["capture@0.2:small_satellite", "release@0.6"])
+def test_a_target_waits_where_it_is_grasped_and_is_seen_while_it_is_held(flown: Flown) -> None:
+    events = ["capture@0.2:small_satellite", "release@0.6"]
+    log = flown("held", robot="paper", events=events)
     robot = shown_robot(log)
-    scene = Scene(flights_page({"one": log}, {"one": robot}, ViewOptions(rate=100.0), quiet))
+    scene = Scene(page_of(robot, ViewOptions(rate=100.0), one=log))
     free, held = "/one/free_target_0", next(n for n in scene.names() if n.endswith("/target_0"))
     times = shown_times([log], 100.0)
     for time in times:
@@ -153,30 +146,89 @@ def test_a_target_waits_where_it_is_grasped_and_is_seen_while_it_is_held(flown) 
     np.testing.assert_allclose(place.rotation, hand.rotation, atol=1e-4)
 
 
-def test_the_trail_grows_and_is_the_tools_way(flown) -> None:  # type: ignore[no-untyped-def]
-    log = flown("paper", robot="paper")
-    scene = Scene(flights_page({"one": log}, {"one": shown_robot(log)}, ViewOptions(), quiet))
-    pieces = [name for name in scene.names() if name.startswith("/one/trail_tool/")]
-    assert len(pieces) == 30
-    counts = [sum(scene.visible(time)[name] for name in pieces) for time in (0.0, 0.5, 1.0)]
-    assert counts[0] == 0
-    assert 14 <= counts[1] <= 16
-    assert counts[2] == 30
-
-
-def test_a_row_without_a_state_shows_the_one_before(flown, tmp_path: Path) -> None:  # type: ignore[no-untyped-def]
-    log = flown("paper", robot="paper")
+def test_the_trail_grows_and_rows_without_a_state_show_the_one_before(flown: Flown) -> None:
+    log = flown("paper")
     robot = shown_robot(log)
     log.quaternion[900:1100] = np.nan
-    scene = Scene(flights_page({"one": log}, {"one": robot}, ViewOptions(rate=100.0), quiet))
+    scene = Scene(page_of(robot, one=log))
     held, before = scene.poses(0.5)["/one/base_link/link1"], expected(robot, log, 899)["link1"]
     np.testing.assert_allclose(held.position, before.translation, atol=TOLERANCE)
     np.testing.assert_allclose(held.rotation, before.rotation, atol=TOLERANCE)
+    pieces = [name for name in scene.names() if name.startswith("/one/trail_tool/")]
+    counts = [sum(scene.visible(time)[name] for name in pieces) for time in (0.0, 0.5, 1.0)]
+    assert (len(pieces), counts[0], counts[2]) == (30, 0, 30)
+    assert 14 <= counts[1] <= 16
 
 
-def test_many_flights_all_have_curves(flown) -> None:  # type: ignore[no-untyped-def]
-    log = flown("paper", robot="paper")
+def test_many_flights_all_have_curves(flown: Flown) -> None:
+    log = flown("paper")
     logs = {f"flight_{k}": log for k in range(8)}
-    page = flights_page(logs, dict.fromkeys(logs, shown_robot(log)), ViewOptions(rate=2.0), quiet)
-    for plot in plot_data(page)["plots"]:
+    for plot in plot_data(page_of(shown_robot(log), ViewOptions(rate=2.0), **logs))["plots"]:
         assert [series["label"] for series in plot["series"]] == list(logs)
+
+
+@pytest.fixture(scope="module")
+def line() -> FlownFlight:
+    mission = {"start": START, "segments": [LINE, {"hold": 0.2}]}
+    return Scenario(controller="ctc", mission=mission).fly()
+
+
+def test_the_tool_ends_at_its_goal(line: FlownFlight) -> None:
+    log, robot = line.log, line.flight.robot
+    scene = Scene(page_of(robot, one=log))
+    poses = scene.poses(log.time[-1])
+    goals = [pose for name, pose in sorted(poses.items()) if "/goal_" in name]
+    for goal, row in ((goals[0], 0), (goals[-1], -1)):
+        rotation, offset = tool_pose(robot, log.quaternion[[row]], log.joint_positions[[row]])
+        place = poses["/one"].position + log.base_position[row] + offset[0]
+        np.testing.assert_allclose(goal.position, place, atol=1e-5)
+        np.testing.assert_allclose(goal.rotation, rotation[0], atol=1e-4)
+    assert np.linalg.norm(goals[-1].position - goals[0].position) > 0.07
+
+
+def test_the_distance_from_the_path_is_plotted_where_there_is_one(
+    line: FlownFlight, flown: Flown
+) -> None:
+    quantities = quantities_of(line.log, line.flight.robot)
+    (tool,) = [quantity for quantity in quantities if quantity.title == "tool error"]
+    assert tool.values.max() == line.metrics["tool"]["largest_m"]
+    plain = flown("paper")
+    assert not any("/goal_" in name for name in Scene(page_of(shown_robot(plain), a=plain)).names())
+    titles = [quantity.title for quantity in quantities_of(plain, shown_robot(plain))]
+    assert "tool error" not in titles
+
+
+@pytest.fixture(scope="module")
+def marked(flown: Flown) -> FlightLog:
+    return flown(
+        "marked",
+        robot="paper",
+        duration=0.3,
+        swaps=["0.25:ctc"],
+        events=["capture@0.1:small_satellite", "release@0.28"],
+        faults=["stuck_joint@0.18:3=20", "drive_scale@0.15-0.2:all=0.9", "noise_gyro@2:1e-6"],
+    )
+
+
+def test_events_faults_and_laws_are_marked_by_time(marked: FlightLog) -> None:
+    assert marks_of(marked) == [CAPTURE, SCALE, STICK, SWAP, RELEASE]
+    assert marks_of(excerpt(marked, 0.16, 0.24)) == [SCALE, STICK]
+    assert marks_of(excerpt(marked, 0.1, 0.14)) == [CAPTURE]  # it begins with the excerpt
+
+
+def test_what_makes_no_sense_is_left_out(marked: FlightLog) -> None:
+    faults = ["drive_scale@0.15-0.2:all=0.9", "no_such@1", "", 7]
+    broken = replace(marked, laws=(), flight={"faults": faults, "events": ["capture@x", 3]})
+    assert marks_of(broken) == [SCALE]
+    assert marks_of(replace(marked, laws=(), flight={})) == []
+
+
+def test_what_not_all_flights_had_says_which(marked: FlightLog) -> None:
+    other = replace(marked, flight={**marked.flight, "faults": []})
+    assert [mark.text for mark in shared_marks({"one": marked, "two": other})] == [
+        CAPTURE.text,
+        f"one: {SCALE.text}",
+        f"one: {STICK.text}",
+        SWAP.text,
+        RELEASE.text,
+    ]

@@ -8,19 +8,13 @@ from typing import Any
 
 import numpy as np
 import pytest
-from moving_logs import moving_log
-from numpy.typing import NDArray
-from orbiting_logs import EARTH_RADIUS, CircularOrbit, orbiting_log
-from scene_pages import Scene, plot_data
+from moving_logs import EARTH_RADIUS, CircularOrbit, moving_log, orbiting_log
+from scene_pages import Scene, page_of, plot_data
 
-from space_robot.view import film, flights, marks
-from space_robot.view.flights import ViewOptions, flights_page
+from space_robot.view.flights import ViewOptions
 from space_robot_model.robot import Robot
 from space_robot_msgs_py.bag.flight_log import ORBIT_WIDTHS, FlightLog
 
-pytest.importorskip("viser")
-
-Array = NDArray[np.float64]
 SECOND = 1_000_000_000
 NOON = CircularOrbit(beta=0.5)
 DUSK = np.pi - np.arccos(np.sqrt(1.0 - (EARTH_RADIUS / NOON.radius) ** 2) / np.cos(NOON.beta))
@@ -28,14 +22,6 @@ DUSK = np.pi - np.arccos(np.sqrt(1.0 - (EARTH_RADIUS / NOON.radius) ** 2) / np.c
 EVENING = NOON._replace(start=float(DUSK) - 9.8 * NOON.rate)
 """Enters the shadow after 9.8 s."""
 ARROWS = ("nadir", "orbital_velocity", "Sun")
-
-
-def quiet(total: int):  # type: ignore[no-untyped-def]
-    return lambda: None
-
-
-def page_of(robot: Robot, options: ViewOptions | None = None, **logs: FlightLog) -> str:
-    return flights_page(logs, dict.fromkeys(logs, robot), options or ViewOptions(), quiet)
 
 
 @pytest.fixture(scope="module")
@@ -74,84 +60,61 @@ def test_legend_labels_and_the_shadow(page: str) -> None:
     scene = Scene(page)
     labels = {m["props"]["text"] for _, m in scene.messages if m["type"] == "LabelMessage"}
     assert set(names) < labels
-    data = plot_data(page)
-    assert data["marks"] == [
-        {"start": 10.0, "stop": None, "text": "in the Earth's shadow", "kind": "shadow"}
-    ]
+    shadow = {"start": 10.0, "stop": None, "text": "in the Earth's shadow", "kind": "shadow"}
+    assert plot_data(page)["marks"] == [shadow]
     assert "--shadow:" in page
-    lit = [
+    ((time, intensity),) = [
         (time, message["updates"]["intensity"])
         for time, message in scene.messages
         if message["type"] == "SceneNodeUpdateMessage" and message["name"] == "/lamp_0"
     ]
-    assert [time for time, _ in lit] == [pytest.approx(10.0)]
-    assert lit[0][1] < 0.5
+    assert time == pytest.approx(10.0)
+    assert intensity < 0.5
 
 
 def test_the_torques_by_source_and_the_magnetic_field_are_plotted(page: str) -> None:
     plots = {plot["title"]: plot for plot in plot_data(page)["plots"]}
-    shown = [title for title in plots if title.endswith(("torque", "field"))]
-    assert shown == [
+    assert [title for title in plots if title.endswith(("torque", "field"))] == [
         "base torque",
         "gravity gradient torque",
         "magnetic torque",
         "magnetic field",
     ]  # no air and no sunlight acted
-    largest = {
-        title: [max(v for v in s["values"] if v is not None) for s in plots[title]["series"]]
-        for title in shown[1:]
-    }
-    assert largest["gravity gradient torque"] == [1e-3, 0.0, 0.0]
-    assert largest["magnetic torque"] == [0.0, 0.0, 2e-6]
-    assert largest["magnetic field"] == [1e-5, 2e-5, 3e-5]
-    assert (plots["magnetic field"]["unit"], plots["magnetic torque"]["unit"]) == ("T", "N m")
+    for title, unit, largest in (
+        ("gravity gradient torque", "N m", [1e-3, 0.0, 0.0]),
+        ("magnetic torque", "N m", [0.0, 0.0, 2e-6]),
+        ("magnetic field", "T", [1e-5, 2e-5, 3e-5]),
+    ):
+        series = plots[title]["series"]
+        assert [max(v for v in s["values"] if v is not None) for s in series] == largest
+        assert plots[title]["unit"] == unit
 
 
 def test_side_by_side_each_has_its_arrows_and_over_one_another_the_first(
     paper_robot: Robot, log: FlightLog
 ) -> None:
-    plain = moving_log(paper_robot, 41, period_ns=SECOND // 2)
-    logs = {"plain": plain, "one": log, "two": log}
+    logs = {"plain": moving_log(paper_robot, 41, period_ns=SECOND // 2), "one": log, "two": log}
     together = Scene(page_of(paper_robot, **logs)).names()
     assert {name for name in together if name.endswith("orbit")} == {"/one/orbit"}
     apart = Scene(page_of(paper_robot, ViewOptions(side_by_side=True), **logs))
-    shown = {name for name in apart.names() if name.endswith("orbit")}
-    assert shown == {"/one/orbit", "/two/orbit"}
+    assert {n for n in apart.names() if n.endswith("orbit")} == {"/one/orbit", "/two/orbit"}
     poses = apart.poses(0.0)
     track = log.orbit_velocity[0] / np.linalg.norm(log.orbit_velocity[0])
-    first, second = (poses[f"/{name}"].position for name in ("one", "two"))
-    offset = second - first
+    offset = poses["/two"].position - poses["/one"].position
     assert offset @ track > 1.0
     np.testing.assert_allclose(offset, (offset @ track) * track, atol=1e-9)
 
 
-def test_a_bag_that_does_not_tell_of_the_sun(paper_robot: Robot, log: FlightLog) -> None:
-    silent = replace(log, flight={})
-    page = page_of(paper_robot, one=silent)
-    names = Scene(page).names()
-    assert "/earth" in names
-    assert "/one/orbit/nadir" in names
-    assert "/one/orbit/Sun" not in names
-    assert plot_data(page)["marks"] == []
-    assert ">Sun<" not in page
-
-
-def without_orbit(log: FlightLog) -> FlightLog:
-    columns: dict[str, Any] = {name: np.empty((log.ticks, 0)) for name in ORBIT_WIDTHS}
-    return replace(log, **columns)
-
-
-def test_a_flight_without_orbit_and_gears_has_the_page_that_it_had(
-    paper_robot: Robot, log: FlightLog, monkeypatch: pytest.MonkeyPatch
+def test_a_flight_without_orbit_and_gears_has_nothing_of_them(
+    paper_robot: Robot, log: FlightLog
 ) -> None:
-    plain = without_orbit(log)
-    page = page_of(paper_robot, one=plain)
+    columns: dict[str, Any] = {name: np.empty((log.ticks, 0)) for name in ORBIT_WIDTHS}
+    page = page_of(paper_robot, one=replace(log, **columns))
     scene = Scene(page)
-    names = scene.names()
-    assert {name for name in names if not name.startswith(("/one/", "/inertial/"))} == {
+    assert {name for name in scene.names() if not name.startswith(("/one/", "/inertial/"))} == {
         *("/one", "/inertial", "/stars", "/sky", "/lamp_0", "/lamp_1", "/WorldAxes")
     }
-    assert not any("orbit" in name for name in names)
+    assert not any("orbit" in name for name in scene.names())
     types = {message["type"] for _, message in scene.messages}
     assert not types & {"GlbMessage", "SceneNodeUpdateMessage"}
     assert [plot["title"] for plot in plot_data(page)["plots"] if plot["shown"]] == [
@@ -165,9 +128,3 @@ def test_a_flight_without_orbit_and_gears_has_the_page_that_it_had(
     ]
     assert "--shadow" not in page
     assert 'id="arrows"' not in page
-    # and nothing of what is drawn in orbit has a part in it
-    for module, name in ((film, "Horizon"), (film, "ArrowFrames"), (film, "earth_frames")):
-        monkeypatch.delattr(module, name)
-    monkeypatch.delattr(flights, "arrow_kinds")
-    monkeypatch.setattr(marks, "shadow_intervals", lambda log: [])
-    assert page_of(paper_robot, one=plain) == page

@@ -17,6 +17,7 @@ from scipy.spatial.transform import Rotation
 
 from space_robot.view.page import Shown, render
 from space_robot.view.plots import STRETCHES, Plot, Series, extremes, plots_of
+from space_robot.view.plotted_quantity import PlottedQuantity
 from space_robot.view.quantities import quantities_of
 from space_robot_control.allocation.assumed_actuators import assumed_actuators
 from space_robot_model.hardware.base_actuators import BaseActuatorSettings
@@ -58,32 +59,34 @@ def flight(robot: Robot, actuators: str) -> FlightLog:
     log, rng = moving_log(robot, 30), np.random.default_rng(7)
     log.wheel_velocities = rng.normal(size=(30, hardware.wheel_count))
     log.thrusts = rng.uniform(size=(30, hardware.thruster_count))
-    log.passive_positions[:] = rng.normal(size=log.passive_positions.shape)
-    log.applied_torque[:] = rng.normal(size=log.applied_torque.shape)
-    log.base_position[:] = rng.normal(size=(30, 3))
+    for column in (log.passive_positions, log.applied_torque, log.base_position):
+        column[:] = rng.normal(size=column.shape)
     if actuators:
         log.flight = {"base_actuators": hardware.model_dump(), "robot": robot.name}
     return log
 
 
+def shown_of(log: FlightLog, robot: Robot) -> dict[str, PlottedQuantity]:
+    return {quantity.title: quantity for quantity in quantities_of(log, robot)}
+
+
 def test_drift_is_counted_from_the_first_known_row(paper_robot: Robot) -> None:
     log = flight(paper_robot, "none")
     log.quaternion[:3] = log.base_position[1] = np.nan
-    shown = {quantity.title: quantity for quantity in quantities_of(log, paper_robot)}
+    shown = shown_of(log, paper_robot)
     assert not {"attitude error", "base torque", "wheel momentum", "thruster pulses"} & set(shown)
-    np.testing.assert_array_equal(
-        shown["base drift"].values, log.base_position - log.base_position[3]
-    )
+    moved = log.base_position - log.base_position[3]
+    np.testing.assert_array_equal(shown["base drift"].values, moved)
     axes = Rotation.from_quat(log.quaternion[3:], scalar_first=True)
     turned = np.degrees((axes[0].inv() * axes).as_rotvec())
     assert shown["attitude drift"].unit == "deg"
     np.testing.assert_allclose(shown["attitude drift"].values[3:], turned, atol=1e-6)
 
 
-def test_actuators_are_plotted_in_their_units(paper_robot: Robot) -> None:
+def test_wheels_and_thrusters_by_their_description_or_what_the_log_has(paper_robot: Robot) -> None:
     log = flight(paper_robot, "wheels_and_thrusters")
     hardware = assumed_actuators("wheels_and_thrusters", paper_robot)
-    shown = {quantity.title: quantity for quantity in quantities_of(log, paper_robot)}
+    shown = shown_of(log, paper_robot)
     inertia = np.broadcast_to(hardware.wheels.rotor_inertia, hardware.wheel_count)
     np.testing.assert_allclose(shown["wheel momentum"].values, log.wheel_velocities * inertia)
     force = np.broadcast_to(hardware.thrusters.force, hardware.thruster_count)
@@ -91,7 +94,7 @@ def test_actuators_are_plotted_in_their_units(paper_robot: Robot) -> None:
     assert shown["thruster pulses"].are_pulses
     log.flight = {}  # a bag of others
     log.thrusts[:, 1] = 0.0
-    shown = {quantity.title: quantity for quantity in quantities_of(log, paper_robot)}
+    shown = shown_of(log, paper_robot)
     np.testing.assert_array_equal(shown["wheel speed"].values, log.wheel_velocities)
     largest = shown["thruster pulses"].values.max(axis=0)
     np.testing.assert_allclose(largest, np.arange(hardware.thruster_count) != 1)
@@ -100,53 +103,44 @@ def test_actuators_are_plotted_in_their_units(paper_robot: Robot) -> None:
 def test_passive_joints_are_counted_from_their_rest() -> None:
     robot = find_robot("flexible_panels")
     rest = 0.1 * (1 + np.arange(len(robot.springs)))
-    bent = replace(
-        robot, springs=tuple(s._replace(rest=r) for s, r in zip(robot.springs, rest, strict=True))
-    )
+    springs = tuple(s._replace(rest=r) for s, r in zip(robot.springs, rest, strict=True))
     log = flight(robot, "")
     log.flight = {"prismatic_joints": [robot.passive_names[1]]}
-    turning, sliding = [q for q in quantities_of(log, bent) if q.title == "deflection"]
+    quantities = quantities_of(log, replace(robot, springs=springs))
+    turning, sliding = [q for q in quantities if q.title == "deflection"]
     away = log.passive_positions - rest
     assert (turning.unit, sliding.unit, sliding.labels) == ("rad", "m", [robot.passive_names[1]])
     np.testing.assert_array_equal(turning.values, np.delete(away, 1, axis=1))
     np.testing.assert_array_equal(sliding.values, away[:, 1:2])
 
 
-def geared(robot: Robot, encoder: Any) -> Robot:
-    """The robot with gears in its first, third and last joint; the first is on this side."""
-    gears: list[Gear | None] = [None] * robot.n
-    gears[0] = Gear(1e-4, 100.0, 2e4, 10.0, encoder)
-    gears[2] = gears[-1] = Gear(1e-4, 50.0, 1e4)
-    return replace(robot, gears=tuple(gears))
-
-
 @pytest.mark.parametrize("encoder", ["motor", "link"])
 @pytest.mark.parametrize("has_truth", [True, False])
 def test_motors_are_ahead_of_their_joints_by_the_gears_deflection(
-    paper_robot: Robot, encoder: str, has_truth: bool
+    paper_robot: Robot, encoder: Any, has_truth: bool
 ) -> None:
     """What a motor's encoder says is no joint's position: without the truth nothing is known."""
-    robot = geared(paper_robot, encoder)
-    log, names = flight(robot, ""), paper_robot.joint_names
+    gears: list[Gear | None] = [None] * paper_robot.n
+    gears[0] = Gear(1e-4, 100.0, 2e4, 10.0, encoder)
+    gears[2] = gears[-1] = Gear(1e-4, 50.0, 1e4)
+    log, names = flight(paper_robot, ""), paper_robot.joint_names
     log.geared_names = (names[0], names[2], names[-1])
     log.motor_positions = np.random.default_rng(2).normal(size=(30, 3))
     log.flight = {"prismatic_joints": [names[2]]}
     if has_truth:
         log.record_measured()
-    shown = [q for q in quantities_of(log, robot) if q.title == "gear deflection"]
+    quantities = quantities_of(log, replace(paper_robot, gears=tuple(gears)))
     away = log.motor_positions - log.joint_positions[:, [0, 2, 5]]
-    if has_truth:
-        turning, sliding = shown
-        assert (turning.unit, turning.labels) == ("rad", [names[0], names[-1]])
-        assert (sliding.unit, sliding.labels) == ("m", [names[2]])
-        np.testing.assert_array_equal(turning.values, away[:, [0, 2]])
-        np.testing.assert_array_equal(sliding.values, away[:, 1:2])
-    elif encoder == "link":
-        (turning,) = shown
-        assert turning.labels == [names[0]]
-        np.testing.assert_array_equal(turning.values, away[:, :1])
-    else:
-        assert not shown
+    expected = {
+        (True, "motor"): [("rad", [0, 2]), ("m", [1])],
+        (True, "link"): [("rad", [0, 2]), ("m", [1])],
+        (False, "link"): [("rad", [0])],
+    }.get((has_truth, encoder), [])
+    shown = [q for q in quantities if q.title == "gear deflection"]
+    for quantity, (unit, columns) in zip(shown, expected, strict=True):
+        assert quantity.unit == unit
+        assert quantity.labels == [log.geared_names[k] for k in columns]
+        np.testing.assert_array_equal(quantity.values, away[:, columns])
 
 
 def test_of_several_flights_each_has_the_size_of_each_quantity(paper_robot: Robot) -> None:
@@ -187,42 +181,31 @@ NAMES = st.one_of(
 )
 
 
-def rendered(names: list[str], values: Array, is_logarithmic: bool) -> str:
-    series = [Series(name, "#112233", values) for name in names]
-    plot = Plot(names[0], "", np.arange(len(values)) / 3.0, series, is_logarithmic)
-    return render(names[0], "", [Shown(names[0], "#112233", names[0])], [plot], [], 0.0, True)
-
-
-@settings(max_examples=15)
-@given(st.lists(NAMES, min_size=1, max_size=3))
-def test_whatever_names_are_the_page_has_its_data_and_its_script(names: list[str]) -> None:
-    page = rendered(names, np.array([1.0]), False)
-    scripts = Scripts(page).contents
-    assert len(scripts) == 3
-    assert "<" not in scripts["data"]
-    (plot,) = json.loads(scripts["data"])["plots"]
-    assert [series["label"] for series in plot["series"]] == names
-    assert "uPlot.sync" in list(scripts.values())[-1]
-
-
 @settings(max_examples=20)
-@given(st.lists(NUMBERS, min_size=1, max_size=20), st.booleans())
-def test_values_have_four_digits_and_none_where_nothing_can_be_drawn(
-    values: list[float], is_logarithmic: bool
+@given(
+    st.lists(NAMES, min_size=1, max_size=3),
+    st.lists(NUMBERS, min_size=1, max_size=20),
+    st.booleans(),
+)
+def test_the_page_has_whatever_names_and_values_of_four_digits(
+    names: list[str], values: list[float], is_logarithmic: bool
 ) -> None:
-    data = json.loads(Scripts(rendered(["a"], np.array(values), is_logarithmic)).contents["data"])
-    (plot,) = data["plots"]
-    assert plot["logarithmic"] == is_logarithmic
-    for value, shown in zip(values, plot["series"][0]["values"], strict=True):
+    """And none where nothing can be drawn."""
+    time = np.arange(len(values)) / 3.0
+    series = [Series(name, "#112233", np.array(values)) for name in names]
+    plot = Plot(names[0], "", time, series, is_logarithmic)
+    shown = [Shown(names[0], "#112233", names[0])]
+    scripts = Scripts(render(names[0], "", shown, [plot], [], 0.0, True)).contents
+    assert len(scripts) == 3
+    assert "uPlot.sync" in list(scripts.values())[-1]
+    assert "<" not in scripts["data"]
+    data = json.loads(scripts["data"])
+    (drawn,) = data["plots"]
+    assert drawn["logarithmic"] == is_logarithmic
+    assert [one["label"] for one in drawn["series"]] == names
+    for value, number in zip(values, drawn["series"][-1]["values"], strict=True):
         if not np.isfinite(value) or (is_logarithmic and value <= 0.0):
-            assert shown is None
+            assert number is None
         else:
-            assert shown == pytest.approx(value, rel=5e-4, abs=0.0)
-    np.testing.assert_allclose(data["time"], np.arange(len(values)) / 3.0, atol=5e-5)
-
-
-def test_a_name_of_100000_letters_is_shortened(paper_robot: Robot) -> None:
-    log = flight(paper_robot, "")
-    log.joint_names = ("j" * 100_000, *log.joint_names[1:])
-    plots = plots_of({"one": log}, {"one": paper_robot}, ["#112233"])
-    assert max(len(series.label) for plot in plots for series in plot.series) == 40
+            assert number == pytest.approx(value, rel=5e-4, abs=0.0)
+    np.testing.assert_allclose(data["time"], time, atol=5e-5)

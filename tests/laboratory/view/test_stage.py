@@ -2,20 +2,20 @@
 
 from __future__ import annotations
 
+from typing import Any, NamedTuple
+
 import numpy as np
-import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from moving_logs import EARTH_RADIUS, CircularOrbit
 from numpy.typing import NDArray
-from orbiting_logs import EARTH_RADIUS, CircularOrbit
 
 from space_robot.flight.plan import FlightPlan, resolve
 from space_robot.view.base_surface import clearest_side
 from space_robot.view.horizon import Horizon
+from space_robot.view.local_server import local_server
 from space_robot.view.orbit_frames import OrbitFrames
-from space_robot.view.stage import DIRECTION, FIELD_OF_VIEW, LAMPS, SIDES, Rendering, set_stage
-
-viser = pytest.importorskip("viser")
+from space_robot.view.stage import DIRECTION, FIELD_OF_VIEW, LAMPS, SIDES, set_stage
 
 Array = NDArray[np.float64]
 
@@ -26,33 +26,42 @@ def random_points(seed: int, size: float) -> Array:
     return points
 
 
+class View(NamedTuple):
+    """What a camera sees of points: how far right and up, 1 at the edge, and how deep."""
+
+    right: Array
+    axes: Array
+    wide: Array
+    high: Array
+    depth: Array
+
+    @classmethod
+    def of(cls, camera: Any, up: Array, points: Array) -> View:
+        position, slope = np.array(camera.position), np.tan(0.5 * FIELD_OF_VIEW)
+        forward = np.array(camera.look_at) - position
+        forward /= np.linalg.norm(forward)
+        right = np.cross(forward, up)
+        right /= np.linalg.norm(right)
+        axes = np.array([right, np.cross(right, forward), forward])
+        x, y, depth = axes @ (points - position).T
+        return cls(right, axes, np.abs(x / depth / slope) / 1.1, np.abs(y / depth / slope), depth)
+
+
 @settings(max_examples=10)
 @given(st.integers(0, 2**32 - 1), st.floats(0.1, 50.0))
 def test_the_camera_sees_every_point_and_no_more_than_it_must(seed: int, size: float) -> None:
     points = random_points(seed, size)
-    server = viser.ViserServer(port=0, verbose=False)
-    try:
-        set_stage(server, points, dark=False, rendering=Rendering(shadows=False))
+    with local_server() as server:
+        set_stage(server, points, dark=False)
         camera = server.initial_camera
-        position, target = np.array(camera.position), np.array(camera.look_at)
-    finally:
-        server.stop()
-    back = position - target
-    assert np.allclose(np.cross(back, DIRECTION), 0.0, atol=1e-9 * np.linalg.norm(back))
-    assert back @ DIRECTION > 0.0
+        view = View.of(camera, np.array([0.0, 0.0, 1.0]), points)
+        back = np.array(camera.position) - np.array(camera.look_at)
+        target, near, far = np.array(camera.look_at), camera.near, camera.far
+    np.testing.assert_allclose(back / np.linalg.norm(back), DIRECTION / np.linalg.norm(DIRECTION))
     np.testing.assert_allclose(target, 0.5 * (points.min(axis=0) + points.max(axis=0)))
-    forward = -back / np.linalg.norm(back)
-    right = np.cross(forward, [0.0, 0.0, 1.0])
-    right /= np.linalg.norm(right)
-    up = np.cross(right, forward)
-    depth = (points - position) @ forward
-    slope = np.tan(0.5 * FIELD_OF_VIEW)
-    high = np.abs((points - position) @ up) / depth / slope
-    wide = np.abs((points - position) @ right) / depth / slope / 1.1
-    assert np.all(depth > 0.0)
-    assert 0.7 < max(high.max(), wide.max()) < 1.0
-    assert camera.near < depth.min()
-    assert depth.max() < camera.far
+    assert 0.7 < max(view.high.max(), view.wide.max()) < 1.0
+    assert 0.0 < near < view.depth.min()
+    assert view.depth.max() < far
 
 
 @settings(max_examples=10)
@@ -70,11 +79,11 @@ def test_in_orbit_the_camera_sees_every_point_and_the_earth_below(
     orbit = CircularOrbit(height, inclination, start)
     now = np.zeros(1)
     frames = OrbitFrames(orbit.position(now), orbit.velocity(now), orbit.sun, np.zeros(1, bool))
-    server = viser.ViserServer(port=0, verbose=False)
-    try:
+    with local_server() as server:
         stage = set_stage(server, points, dark=False, horizon=Horizon.of(frames))
         camera, lamp = server.initial_camera, stage.lamp
-        position, up, far = np.array(camera.position), np.array(camera.up), camera.far
+        up, far = np.array(camera.up), camera.far
+        view = View.of(camera, up, points)
         np.testing.assert_allclose(np.array(camera.look_at), stage.middle)
         np.testing.assert_allclose(lamp.position, orbit.sun, atol=1e-12)
         bright = lamp.intensity
@@ -82,24 +91,17 @@ def test_in_orbit_the_camera_sees_every_point_and_the_earth_below(
         assert 0.0 < lamp.intensity < 0.3 * bright
         stage.shade(False)
         assert lamp.intensity == bright == LAMPS[0][1]
-    finally:
-        server.stop()
     local_up = orbit.position(now)[0] / orbit.radius
     np.testing.assert_allclose(up, local_up, atol=1e-12)
-    forward = (stage.middle - position) / np.linalg.norm(stage.middle - position)
-    right = np.cross(forward, up)
-    right /= np.linalg.norm(right)
-    assert right @ orbit.velocity(now)[0] > 0.0  # it flies to the right
-    above = np.cross(right, forward)
-    depth, slope = (points - position) @ forward, np.tan(0.5 * FIELD_OF_VIEW)
-    assert np.all(depth > 0.0)
-    assert np.abs((points - position) @ above / depth / slope).max() < 1.0
-    assert np.abs((points - position) @ right / depth / slope / 1.1).max() < 1.0
+    assert view.right @ orbit.velocity(now)[0] > 0.0  # it flies to the right
+    assert np.all(view.depth > 0.0)
+    assert max(view.high.max(), view.wide.max()) < 1.0
     # the limb, straight ahead, is in the lower half of the picture
-    ahead = np.cross(local_up, right)
+    ahead = np.cross(local_up, view.right)
     dip = np.arccos(EARTH_RADIUS / orbit.radius)
     limb = np.cos(dip) * ahead - np.sin(dip) * local_up
-    assert -1.0 < (limb @ above) / (limb @ forward) / slope < -0.2
+    _, high, depth = view.axes @ limb
+    assert -1.0 < high / depth / np.tan(0.5 * FIELD_OF_VIEW) < -0.2
     assert far > 2.0 * stage.earth_distance > 5000.0 * stage.size
 
 
@@ -115,11 +117,8 @@ def test_the_base_does_not_hide_the_arm() -> None:
     np.testing.assert_array_equal(sides["paper"], SIDES[0])
     np.testing.assert_array_equal(sides["canadarm2"], SIDES[0])
     assert sides["canadarm"][2] < 0.0, "the arm is on the other side of the Orbiter's z axis"
-    server = viser.ViserServer(port=0, verbose=False)
-    try:
+    with local_server() as server:
         set_stage(server, random_points(1, 2.0), dark=True, side=sides["canadarm"])
         camera = server.initial_camera
         back = np.array(camera.position) - np.array(camera.look_at)
-    finally:
-        server.stop()
     assert np.array_equal(np.sign(back), np.sign(DIRECTION * sides["canadarm"]))

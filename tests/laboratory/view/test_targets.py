@@ -10,13 +10,13 @@ import pytest
 from meeting_targets import circular_orbit, meeting_target, target_of
 from moving_logs import moving_log
 from numpy.typing import NDArray
-from scene_pages import Scene
+from scene_pages import Scene, page_of
 from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
 from space_robot.view import targets as drawing
-from space_robot.view.flights import ViewOptions, flights_page
-from space_robot.view.free_body import held_poses
+from space_robot.view.flights import ViewOptions
+from space_robot.view.free_body import before_capture, held_poses
 from space_robot_model.robot import Robot
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_sim.environment.events import Capture, Release
@@ -24,14 +24,68 @@ from space_robot_sim.environment.grasp import Grasp
 from space_robot_sim.environment.neighbouring_orbit import fall, meet
 from space_robot_sim.environment.target import Target
 
-pytest.importorskip("viser")
-
 Array = NDArray[np.float64]
 TICK_S, TICKS = 0.1, 41
 
 
-def quiet(total: int):  # type: ignore[no-untyped-def]
-    return lambda: None
+def rotations(quaternions: Array) -> Array:
+    axes: Array = Rotation.from_quat(quaternions, scalar_first=True).as_matrix()
+    return axes
+
+
+def capture(relative_to: str, velocity: list[float], rate: list[float]) -> Capture:
+    content = {
+        "name": "box",
+        "mass": 3.0,
+        "inertia": [1.0, 2.0, 2.5, 0.1, 0.0, -0.2],
+        "place": {"position": [0.1, -0.2, 0.3], "quaternion": [0.6, 0.0, 0.8, 0.0]},
+        "motion": {"relative_to": relative_to, "velocity": velocity, "angular_velocity": rate},
+    }
+    return Capture(0.0051, Target.from_dict({"target": content}))
+
+
+STILL = capture("tool", [0.0] * 3, [0.0] * 3)
+"""Counts from tick 11: row 8 of a log from tick 3."""
+
+
+def test_what_stands_still_in_the_hand_is_in_it_a_tick_before(paper_robot: Robot) -> None:
+    log = moving_log(paper_robot, 12, first_tick=3)
+    body = before_capture(STILL, log, paper_robot)
+    assert body is not None
+    positions, axes = held_poses(Grasp.of(paper_robot, STILL.target), log, paper_robot)
+    shown, quaternions = body.poses(np.array([-log.timebase.period, 0.0]))
+    np.testing.assert_allclose(shown, positions[7:9], atol=1e-9)
+    np.testing.assert_allclose(rotations(quaternions)[1], axes[8], atol=1e-7)
+    turned = Rotation.from_matrix(axes[8] @ axes[7].T).as_rotvec() / log.timebase.period
+    np.testing.assert_allclose(body.angular_velocity, turned)
+
+
+def test_what_moves_in_the_tools_axes_and_in_inertial_ones(paper_robot: Robot) -> None:
+    turned = Rotation.from_rotvec([0.3, -0.5, 0.8]).as_matrix()
+    robot = replace(paper_robot, tools=(replace(paper_robot.tool, rotation=turned),))
+    log = moving_log(robot, 12, first_tick=3)
+    velocity, rate = [0.1, 0.2, -0.3], [0.4, -0.5, 0.6]
+    events = (STILL, capture("tool", velocity, rate), capture("inertial", velocity, rate))
+    still, moved, inertial = (before_capture(event, log, robot) for event in events)
+    assert still
+    assert moved
+    assert inertial
+    np.testing.assert_array_equal(inertial.velocity, velocity)
+    np.testing.assert_array_equal(inertial.angular_velocity, rate)
+    tool = still.rotation @ turned
+    np.testing.assert_allclose(moved.velocity - still.velocity, tool @ velocity, atol=1e-9)
+    added = moved.angular_velocity - still.angular_velocity
+    np.testing.assert_allclose(added, tool @ rate, atol=1e-9)
+
+
+def test_what_the_bag_does_not_know(paper_robot: Robot) -> None:
+    event = capture("inertial", [0.0] * 3, [0.0] * 3)
+    for ticks, first_tick in ((8, 3), (12, 11), (12, 30)):
+        log = moving_log(paper_robot, ticks, first_tick)
+        assert before_capture(event, log, paper_robot) is None
+    log = moving_log(paper_robot, 12, 3)
+    log.joint_positions[7] = np.nan
+    assert before_capture(event, log, paper_robot) is None
 
 
 def still_log(robot: Robot) -> FlightLog:
@@ -45,36 +99,27 @@ def still_log(robot: Robot) -> FlightLog:
     return log
 
 
-def page_of(log: FlightLog, robot: Robot, monkeypatch: pytest.MonkeyPatch, *events: Any) -> Scene:
-    monkeypatch.setattr(drawing, "events_of", lambda log: list(events))
-    options = ViewOptions(rate=10.0)
-    return Scene(flights_page({"one": log}, {"one": robot}, options, quiet))
+def scene_of(log: FlightLog, robot: Robot, patch: pytest.MonkeyPatch, *events: Any) -> Scene:
+    patch.setattr(drawing, "events_of", lambda log: list(events))
+    return Scene(page_of(robot, ViewOptions(rate=10.0), one=log))
 
 
 def test_a_target_tumbles_by_eulers_equations_until_it_is_in_the_hand(
     paper_robot: Robot, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The plant's truth at the capture, integrated back on the target's own axes."""
-    motion = {"relative_to": "inertial", "velocity": [0.1, -0.2, 0.05]}
-    spin = np.array([0.5, -0.8, 0.6])
-    target = Target.from_dict(
-        {
-            "target": {
-                "name": "tumbler",
-                "mass": 50.0,
-                "inertia": [3.0, 5.0, 7.0, 0.2, -0.1, 0.3],
-                "motion": {**motion, "angular_velocity": spin.tolist()},
-            }
-        }
-    )
-    scene = page_of(still_log(paper_robot), paper_robot, monkeypatch, Capture(3.0, target))
+    velocity, spin = [0.1, -0.2, 0.05], np.array([0.5, -0.8, 0.6])
+    motion = {"relative_to": "inertial", "velocity": velocity, "angular_velocity": spin.tolist()}
+    content = {"name": "t", "mass": 50.0, "inertia": [3.0, 5.0, 7.0, 0.2, -0.1, 0.3]}
+    target = Target.from_dict({"target": {**content, "motion": motion}})
+    scene = scene_of(still_log(paper_robot), paper_robot, monkeypatch, Capture(3.0, target))
     held = next(name for name in scene.names() if name.endswith("/target_0"))
     end = scene.poses(3.0 + 1e-3)[held]
     grasp = Grasp.of(paper_robot, target)
     # axes of the drawn box: those of the inertia of a box
     second = 0.5 * np.trace(grasp.inertia) * np.eye(3) - grasp.inertia
     moments = np.linalg.eigvalsh(second)
-    inertia = np.diag(np.trace(np.diag(moments)) - moments)
+    inertia = np.diag(moments.sum() - moments)
 
     def rates(_: float, x: Array) -> Array:
         q, w = x[:4], x[4:]
@@ -86,9 +131,8 @@ def test_a_target_tumbles_by_eulers_equations_until_it_is_in_the_hand(
     back = solve_ivp(rates, (0.0, -3.0), x, dense_output=True, rtol=1e-10, atol=1e-12)
     for time in (0.0, 1.0, 2.5):
         shown = scene.poses(time + 1e-3)["/one/free_target_0/box"]
-        due = Rotation.from_quat(back.sol(time - 3.0)[:4], scalar_first=True).as_matrix()
-        np.testing.assert_allclose(shown.rotation, due, atol=1e-6)
-        way = (time - 3.0) * np.array(motion["velocity"])
+        np.testing.assert_allclose(shown.rotation, rotations(back.sol(time - 3.0)[:4]), atol=1e-6)
+        way = (time - 3.0) * np.array(velocity)
         np.testing.assert_allclose(shown.position, end.position + way, atol=1e-6)
 
 
@@ -96,11 +140,10 @@ def test_after_its_release_it_flies_on_as_the_hand_moved(
     paper_robot: Robot, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     target = Target.from_dict({"target": {"name": "b", "mass": 5.0, "inertia": [1, 1, 1, 0, 0, 0]}})
-    log = still_log(paper_robot)
     events = (Capture(1.0, target), Release(2.0, 0.4))
-    scene = page_of(log, paper_robot, monkeypatch, *events)
+    scene = scene_of(still_log(paper_robot), paper_robot, monkeypatch, *events)
     free = "/one/released_target_0"
-    held = next(name for name in scene.names() if name.endswith("/target_0"))
+    held, tool = (next(n for n in scene.names() if n.endswith(e)) for e in ("/target_0", "/tool"))
     for time in TICK_S * np.arange(TICKS):
         shown = scene.visible(time + 1e-3)
         assert shown[free] == (time >= 2.0 - 1e-9)
@@ -108,20 +151,16 @@ def test_after_its_release_it_flies_on_as_the_hand_moved(
     first, later = (scene.poses(time + 1e-3) for time in (2.0, 3.5))
     np.testing.assert_allclose(first[free].position, first[held].position, atol=1e-6)
     hand = scene.poses(2.1 + 1e-3)[held].position - first[held].position
-    spring = 0.4 * 1.5 * first["/one/base_link/" + tool_path(scene)].rotation[:, 2]
+    spring = 0.4 * 1.5 * first[tool].rotation[:, 2]
     way = later[free].position - first[free].position
     np.testing.assert_allclose(way, 15.0 * hand + spring, atol=1e-5)
     turned = Rotation.from_matrix(later[free].rotation @ first[free].rotation.T).as_rotvec()
     np.testing.assert_allclose(turned, [0.0, 0.15, 0.3], atol=1e-6)  # as the base turns
 
 
-def tool_path(scene: Scene) -> str:
-    path = next(name for name in scene.names() if name.endswith("/tool"))
-    return path.removeprefix("/one/base_link/")
-
-
+@pytest.mark.parametrize("is_reached", [True, False])
 def test_a_target_on_an_orbit_falls_as_the_plant_has_it(
-    paper_robot: Robot, monkeypatch: pytest.MonkeyPatch
+    paper_robot: Robot, monkeypatch: pytest.MonkeyPatch, is_reached: bool
 ) -> None:
     """One that is met comes to the hand; one that is missed flies past it."""
     orbit, log = circular_orbit(420e3), still_log(paper_robot)
@@ -130,34 +169,28 @@ def test_a_target_on_an_orbit_falls_as_the_plant_has_it(
     place = held_poses(grasp, log.rows(30, 31), paper_robot)[0][0]
     target = meeting_target(orbit, 3.0, place, **motion)
     monkeypatch.setattr(drawing, "orbit_of", lambda log: orbit)
-    met = replace(
-        Capture(3.0, target),
-        target=target.model_copy(update={"motion": meet(target, orbit, 3.0).motion}),
-    )
-    for reached in (True, False):
-        monkeypatch.setattr(drawing, "_as_met", lambda event, log, r=reached: met if r else None)
-        scene = page_of(log, paper_robot, monkeypatch, Capture(3.0, target))
-        times = np.array([0.0, 1.0, 2.9])
-        for time in times:
-            shown = scene.poses(time + 1e-3)["/one/free_target_0/box"]
-            truth = meet(target, orbit, float(time))
-            np.testing.assert_allclose(shown.position, truth.position, atol=1e-6)
-            near = [scene.poses(t + 1e-3)["/one/free_target_0/box"] for t in (time, time + 0.1)]
-            if time < 2.9:
-                turned = near[1].rotation @ near[0].rotation.T
-                rate = Rotation.from_matrix(turned).as_rotvec() / 0.1
-                np.testing.assert_allclose(rate, truth.motion.angular_velocity, atol=0.02)
-        held = [name for name in scene.names() if name.endswith("/target_0")]
-        assert bool(held) is reached
-        if reached:
-            last, hand = (
-                scene.poses(t + 1e-3)[name]
-                for t, name in ((2.9, "/one/free_target_0/box"), (3.0, held[0]))
-            )
-            turned = Rotation.from_matrix(hand.rotation @ last.rotation.T).as_rotvec() / 0.1
-            np.testing.assert_allclose(turned, met.target.motion.angular_velocity, atol=0.02)
-    _, attitudes = fall(target, orbit, np.array([0.0, 4.0]))
-    last = scene.poses(4.0 + 1e-3)["/one/free_target_0"].rotation
-    first = scene.poses(1e-3)["/one/free_target_0"].rotation
-    axes = Rotation.from_quat(attitudes, scalar_first=True).as_matrix()
-    np.testing.assert_allclose(last @ first.T, axes[1] @ axes[0].T, atol=1e-6)
+    moving = target.model_copy(update={"motion": meet(target, orbit, 3.0).motion})
+    met = replace(Capture(3.0, target), target=moving) if is_reached else None
+    monkeypatch.setattr(drawing, "_as_met", lambda event, log: met)
+    scene = scene_of(log, paper_robot, monkeypatch, Capture(3.0, target))
+
+    def shown(time: float, name: str = "/one/free_target_0/box") -> Any:
+        return scene.poses(time + 1e-3)[name]
+
+    for time in (0.0, 1.0, 2.9):
+        truth = meet(target, orbit, time)
+        np.testing.assert_allclose(shown(time).position, truth.position, atol=1e-6)
+        if time < 2.9:
+            turned = shown(time + 0.1).rotation @ shown(time).rotation.T
+            rate = Rotation.from_matrix(turned).as_rotvec() / 0.1
+            np.testing.assert_allclose(rate, truth.motion.angular_velocity, atol=0.02)
+    held = [name for name in scene.names() if name.endswith("/target_0")]
+    assert bool(held) is is_reached
+    if met:
+        turned = shown(3.0, held[0]).rotation @ shown(2.9).rotation.T
+        rate = Rotation.from_matrix(turned).as_rotvec() / 0.1
+        np.testing.assert_allclose(rate, met.target.motion.angular_velocity, atol=0.02)
+    else:
+        first, last = (shown(time, "/one/free_target_0").rotation for time in (0.0, 4.0))
+        axes = rotations(fall(target, orbit, np.array([0.0, 4.0]))[1])
+        np.testing.assert_allclose(last @ first.T, axes[1] @ axes[0].T, atol=1e-6)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from itertools import pairwise
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -13,7 +13,7 @@ from moving_logs import moving_log
 from numpy.typing import NDArray
 
 from space_robot.view.frames import MOST_FRAMES, Frames, shown_times
-from space_robot.view.trails import PIECES, trails
+from space_robot.view.trails import DESIRED, PIECES, trails
 from space_robot_model.robot import Robot
 from space_robot_model.robot.tool import tool_pose
 from space_robot_msgs_py.bag.flight_log import FlightLog
@@ -91,31 +91,46 @@ class DrawnLines:
     def __init__(self) -> None:
         self.lines: dict[str, Any] = {}
 
-    def add_line_segments(self, path: str, points: Array, *_: Any, **options: Any) -> Any:
-        self.lines[path] = type("Line", (), {"points": points, **options})()
-        return self.lines[path]
+    def add_line_segments(
+        self, path: str, points: Array, colour: Any, thickness: float, visible: bool
+    ) -> Any:
+        assert path not in self.lines
+        line = SimpleNamespace(points=points, colour=colour, width=thickness, visible=visible)
+        self.lines[path] = line
+        return line
 
 
 @pytest.mark.parametrize("count", [2, 3, PIECES, PIECES + 1, 4 * PIECES + 7])
-def test_a_trail_is_the_whole_way_and_no_more_than_has_been_flown(
-    paper_robot: Robot, count: int
+@pytest.mark.parametrize("has_desired", [False, True])
+def test_trails_are_the_whole_ways_and_no_more_than_has_been_flown(
+    count: int, has_desired: bool
 ) -> None:
-    log = moving_log(paper_robot, count)
-    frames = Frames.of(log, paper_robot, np.arange(count) * log.timebase.period)
+    random = np.random.default_rng(count)
+    ways = {name: random.normal(size=(count, 3)) for name in ("left/hand", "right")}
+    desired = random.normal(size=(count, 3)) if has_desired else None
+    frames: Any = SimpleNamespace(time=np.arange(count), tools=ways, desired=desired)
     scene: Any = DrawnLines()
-    (move,) = trails(scene, "/one", frames, (1, 2, 3), 0.1)
-    ways = {path: line for path, line in scene.lines.items() if "/trail_" in path}
-    (places,) = frames.tools.values()
-    segments = np.concatenate([line.points for line in ways.values()])
-    np.testing.assert_array_equal(segments, np.stack([places[:-1], places[1:]], axis=1))
-    desired = scene.lines["/one/desired"]
-    assert desired.visible
-    np.testing.assert_array_equal(
-        desired.points, np.stack([frames.desired[:-1], frames.desired[1:]], axis=1)
-    )
-    ends = np.cumsum([len(line.points) for line in ways.values()])
-    assert len(ends) == min(PIECES, count - 1)
+    moves = trails(scene, "/robot", frames, (1, 2, 3), 0.5)
+    assert len(moves) == len(ways)
+    wish = scene.lines.pop("/robot/desired", None)
+    assert (wish is not None) == has_desired
+    if wish:
+        assert (wish.colour, wish.width, wish.visible) == (DESIRED, 0.15, True)
+        np.testing.assert_array_equal(wish.points, np.stack([desired[:-1], desired[1:]], axis=1))
+    pieces = {
+        name: [x for path, x in scene.lines.items() if f"/trail_{name.replace('/', '_')}/" in path]
+        for name in ways
+    }
+    for name, places in ways.items():
+        points = np.concatenate([line.points for line in pieces[name]])
+        np.testing.assert_array_equal(points, np.stack([places[:-1], places[1:]], axis=1))
+        assert len(pieces[name]) == min(PIECES, count - 1)
+        sizes = [len(line.points) for line in pieces[name]]
+        assert max(sizes) - min(sizes) <= 1
+        assert all((x.colour, x.width) == ((1, 2, 3), 0.5) for x in pieces[name])
     for k in range(count):
-        move(k)
-        assert [line.visible for line in ways.values()] == (ends <= k).tolist()
-    assert all(len(a.points) - len(b.points) in (-1, 0, 1) for a, b in pairwise(ways.values()))
+        for move in moves:
+            move(k)
+        for lines in pieces.values():
+            ends = np.cumsum([len(line.points) for line in lines])
+            assert [line.visible for line in lines] == (ends <= k).tolist()

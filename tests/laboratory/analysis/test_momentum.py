@@ -1,0 +1,341 @@
+"""Momentum of robot and wheels, and what comes from outside by source: a gyrostat that SciPy
+integrates, and flights whose dipoles, air, thrusters and own disturbances are accounted for."""
+
+from __future__ import annotations
+
+import copy
+import json
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+import pytest
+from actuator_sets import PYRAMID, flat, hardware, still_log
+from numpy.typing import NDArray
+from oracles import pinocchio_model, rotation_of
+from scipy.integrate import quad, solve_ivp
+
+from space_robot import Scenario
+from space_robot.analysis import analyze
+from space_robot.analysis.described import momentum_of
+from space_robot.analysis.metrics import of_log
+from space_robot.analysis.momentum import (
+    Momentum,
+    MomentumBudget,
+    MomentumSeries,
+    disturbance_impulse,
+)
+from space_robot.analysis.report_tables import comparison_table
+from space_robot.analysis.words import analyzed
+from space_robot_model.hardware.base_actuators import BaseActuatorSettings
+from space_robot_model.robot import Robot
+from space_robot_msgs_py import topics
+from space_robot_msgs_py.bag.flight_log import FlightLog
+from space_robot_msgs_py.bag.folder import open_bag
+from space_robot_msgs_py.bag.reader import read_flight
+from space_robot_msgs_py.bag.recorder import BagRecorder
+from space_robot_msgs_py.samples import SOURCES
+from space_robot_sim.environment.captures import Captures
+from space_robot_sim.environment.disturbance import DisturbanceSettings
+from space_robot_sim.environment.orbit_settings import OrbitSettings
+from space_robot_sim.plant.surroundings import REPORT_TICKS
+
+Array = NDArray[np.float64]
+POSTURE = np.array([0.3, -0.8, 1.1, 0.2, -0.5, 0.9])
+WHEELS = {"axes": PYRAMID, "rotor_inertia": [0.1, 0.2, 0.1, 0.3], "initial_speed": [20.0]}
+ROWS, PERIOD = 401, 0.005
+FIELD = {
+    "orbital_elements": {"height": 420e3, "inclination_deg": 51.6, "anomaly_deg": 30.0},
+    "gravity": {"gradient": False},
+    "magnetism": {"strength": 2.98e-5, "residual_dipole": [10.0, -20.0, 30.0]},
+}
+ORBITS: dict[str, Any] = {
+    "field": FIELD,
+    "gravity": {**FIELD, "gravity": {"gradient": True}},
+    "air": {**FIELD, "atmosphere": {"density": 3e-12, "at_height": 420e3}},
+    "all": {
+        **FIELD,
+        "gravity": {"gradient": True, "j2": True},
+        "atmosphere": {"density": 3e-12, "at_height": 420e3},
+        "sunlight": {"pressure": 4.56e-6, "noon_deg": 30.0},
+    },
+}
+WIND = {
+    "time": [0.1, 0.4, 0.8],
+    "base_force_y": [0.5, -1.0, 2.0],
+    "base_torque_x": [0.3, 0.3, -0.1],
+    "joint2": [0.5, 0.0, 0.5],
+}
+
+
+def gyrostat_log(robot: Robot, actuators: BaseActuatorSettings) -> FlightLog:
+    """The robot, its arm locked, turns and tumbles as SciPy integrates Euler's equations.
+
+    Motors turn the wheels by torques known beforehand; thrusters push as `thrust` says.
+    """
+    model = pinocchio_model(robot)
+    data = model.createData()
+    pin.ccrba(model, data, np.concatenate([np.zeros(6), [1.0], POSTURE]), np.zeros(model.nv))
+    inertia, com, mass = data.Ig.inertia.copy(), data.com[0].copy(), float(robot.mass.sum())
+    wheels, thrusters = actuators.wheels, actuators.thrusters
+    axes, spin = wheels.unit_axes, wheels.values("rotor_inertia")
+    phases = np.arange(wheels.count)
+
+    def thrust(t: float) -> Array:
+        on = 1.0 + np.sin(3.0 * t + np.arange(thrusters.count))
+        return on * thrusters.values("force")
+
+    def rate(t: float, x: Array) -> Array:
+        q, w, speed = x[:4], x[4:7], x[7 : 7 + wheels.count]
+        motors = 0.5 * np.sin(2.0 * t + phases)
+        force = thrust(t)[:, np.newaxis] * thrusters.unit_directions
+        torque = np.cross(thrusters.places - com, force).sum(axis=0)
+        h = inertia @ w + axes.T @ (spin * speed)
+        bare = inertia - (axes.T * spin) @ axes
+        wdot = np.linalg.solve(bare, torque - axes.T @ motors - np.cross(w, h))
+        qdot = 0.5 * np.array([-q[1:] @ w, *(q[0] * w + np.cross(q[1:], w))])
+        pushed = rotation_of(q / np.linalg.norm(q)).apply(force.sum(axis=0)) / mass
+        return np.concatenate([qdot, wdot, motors / spin - axes @ wdot, x[-3:], pushed])
+
+    log = still_log(robot, ROWS, actuators, PERIOD)
+    start = np.concatenate(
+        [[1.0, 0.0, 0.0, 0.0], [0.1, -0.2, 0.15], wheels.values("initial_speed"), com, np.zeros(3)]
+    )
+    found = solve_ivp(
+        rate, (0.0, log.time[-1]), start, t_eval=log.time, rtol=1e-11, atol=1e-12, method="DOP853"
+    ).y.T
+    log.quaternion[:] = found[:, :4] / np.linalg.norm(found[:, :4], axis=1, keepdims=True)
+    log.omega_base[:], log.joint_positions[:] = found[:, 4:7], POSTURE
+    log.wheel_velocities[:] = found[:, 7 : 7 + wheels.count]
+    turned = np.array([rotation_of(q).apply(com) for q in log.quaternion])
+    log.base_position[:] = found[:, -6:-3] - turned
+    log.thrusts[1:] = [thrust(t) for t in log.time[1:] - 0.5 * PERIOD]
+    return log
+
+
+def budget(log: FlightLog, robot: Robot, actuators: BaseActuatorSettings) -> Any:
+    captures = Captures((), robot, PERIOD, OrbitSettings())
+    series = MomentumSeries(captures, actuators, DisturbanceSettings())
+    return of_log(MomentumBudget(series), log)
+
+
+def test_inner_torques_alone_move_momentum_but_do_not_change_it(paper_robot: Robot) -> None:
+    actuators = hardware(wheels=WHEELS)
+    log = gyrostat_log(paper_robot, actuators)
+    report = analyze(log)
+    found = report["momentum"]
+    assert found["drift"]["relative"] < 1e-10
+    assert found["peak_n_m_s"]["robot"] > 100.0
+    assert found["peak_n_m_s"]["wheels"] > 1.0
+    assert found["peak_n_m_s"]["outside"] == 0.0
+    assert found["pushed_m"] is None
+    table = comparison_table({"flight": report})
+    texts = {(g.name, row[0]): row[1] for g in table.groups for row in table.texts(g)}
+    peak = f"{found['peak_n_m_s']['robot']:.4g}"
+    assert texts["momentum", "robot at most (N m s)"] == peak
+    assert ("momentum", "drift, relative") in texts
+    log.wheel_velocities[200:] *= 1.001  # which no torque can do
+    lost = budget(log, paper_robot, actuators)["drift"]["n_m_s"]
+    spin = [0.1, 0.2, 0.1, 0.3] * log.wheel_velocities[200:] / 1001.0
+    largest = np.linalg.norm(spin @ actuators.wheels.unit_axes, axis=1).max()
+    assert lost == pytest.approx(largest, rel=1e-6)
+    log.flight["case"] = "4-2"
+    series = momentum_of(log)
+    assert series._captures.robot_at(0).mass[-1] > paper_robot.mass[-1]
+    assert series._disturbance.scale > 0.0
+
+
+def test_what_thrusters_bring_is_accounted_for(paper_robot: Robot) -> None:
+    """Their impulse by the mean force of an interval, its axes turned: right to its square."""
+    rng = np.random.default_rng(5)
+    thrusters = {
+        "positions": flat(rng.uniform(-1.0, 1.0, (5, 3))),
+        "directions": flat(rng.normal(size=(5, 3))),
+        "force": [4.0],
+    }
+    actuators = hardware(wheels=WHEELS, thrusters=thrusters)
+    log = gyrostat_log(paper_robot, actuators)
+    found = budget(log, paper_robot, actuators)
+    assert found["peak_n_m_s"]["outside"] > 1.0
+    assert found["drift"]["n_m_s"] < 1e-4 * found["peak_n_m_s"]["outside"]
+    pushed = np.linalg.norm(log.base_position - log.base_position[0], axis=1)
+    assert found["pushed_m"]["end"] == pytest.approx(found["pushed_m"]["max"])
+    assert 0.0 < found["pushed_m"]["end"] != pytest.approx(pushed[-1], rel=1e-3)
+
+
+@pytest.mark.parametrize("time", [0.3, 1.0, 7.7])
+def test_the_disturbances_impulse_is_its_integral(time: float) -> None:
+    disturbance = DisturbanceSettings(scale=2.0, base_frequencies=[0.5, 0.0])
+
+    def wave(t: float) -> float:
+        return -2.0 * disturbance.base_amplitude * float(np.sin(2.0 * np.pi * 0.5 * t))
+
+    found = disturbance_impulse(disturbance, np.array([time]))[0]
+    assert found == pytest.approx(quad(wave, 0.0, time)[0])
+
+
+def test_what_disturbs_a_flight_is_accounted_for() -> None:
+    """A base that floats freely, disturbed and with a payload that its arm does not know of."""
+    log = Scenario(actuators="none", case="4-2", duration=0.5).fly().log
+    found = analyze(log)["momentum"]
+    assert found["peak_n_m_s"]["outside"] > 1e-3
+    assert found["peak_n_m_s"]["robot"] == pytest.approx(found["peak_n_m_s"]["outside"])
+    assert found["drift"]["n_m_s"] < 1e-9 * found["peak_n_m_s"]["outside"]
+
+
+def test_of_a_free_base_it_is_relative_to_the_bases(paper_robot: Robot) -> None:
+    """The robot's momentum stays what it was, however small that is."""
+    log = still_log(paper_robot, 5, BaseActuatorSettings(base_actuation="none"))
+    assert analyze(log)["momentum"]["drift"] == {"n_m_s": 0.0, "relative": None}
+    log.omega_base[2] = [0.0, 0.0, 0.01]
+    drift, peak = (analyze(log)["momentum"][key] for key in ("drift", "peak_n_m_s"))
+    assert drift["relative"] == pytest.approx(drift["n_m_s"] / peak["base"])
+
+
+@cache
+def flown(orbit: str, period: float = 5e-4, duration: float = 2.0, case: str = "1") -> FlightLog:
+    return (
+        Scenario(
+            actuators="wheels_and_torquers",
+            orbit=ORBITS[orbit],
+            period=period,
+            duration=duration,
+            case=case,
+        )
+        .fly()
+        .log
+    )
+
+
+def remainder(log: FlightLog) -> tuple[Momentum, Array]:
+    """Return the momentum of a flight, and what of its change is not accounted for, (N, 3)."""
+    momentum = momentum_of(log).add(log)
+    return momentum, momentum.total - momentum.total[0] - momentum.outside
+
+
+def test_dipoles_are_accounted_for_to_rounding() -> None:
+    """Those of torquers and that of the base: their torques are held on base axes over a tick.
+
+    The torquers' torque is what the base is applied beyond its wheels' motors.
+    """
+    log = flown("field")
+    momentum, rest = remainder(log)
+    size = np.linalg.norm(momentum.wheels, axis=1).max()
+    assert size > 10.0
+    assert np.linalg.norm(momentum.outside[-1]) > 1e-3
+    assert np.abs(rest).max() < 1e-13 * size
+    found = analyze(log)["momentum"]
+    assert found["drift"]["n_m_s"] == pytest.approx(np.linalg.norm(rest, axis=1).max())
+    assert found["peak_n_m_s"]["outside"] == np.linalg.norm(momentum.outside, axis=1).max()
+    other = replace(log, applied_torque=log.applied_torque.copy())
+    axes = np.array([[1, 1, 1], [-1, 1, 1], [-1, -1, 1], [1, -1, 1]]) / np.sqrt(3.0)
+    other.applied_torque[:, :3] = -log.wheel_torques @ axes
+    lost = np.linalg.norm(remainder(other)[1][-1])
+    dipoles = log.actuator_commands[:-1, 4:]
+    held = np.cross(dipoles, log.magnetic_field[:-1]).sum(axis=0) * log.timebase.period
+    assert lost == pytest.approx(np.linalg.norm(held), rel=1e-3)  # on base axes, nearly inertial
+
+
+@pytest.mark.parametrize("period", [5e-4, 2e-3])
+def test_what_remains_with_gravity_is_that_its_torque_is_held(period: float) -> None:
+    """It is computed every 20 ticks and summed as if it stayed the same until then.
+
+    The sum of a torque that grows lags by half of that time: by 10 periods times what it grew.
+    """
+    log = flown("gravity", period, 4.0)
+    rest = remainder(log)[1]
+    gravity = log.external_torques[:, :3]
+    last = (log.ticks - 1) // REPORT_TICKS * REPORT_TICKS
+    lag = 0.5 * REPORT_TICKS * period * (gravity[last] - gravity[0])
+    size = np.linalg.norm(lag)
+    assert size > 1e-7
+    np.testing.assert_allclose(rest[last], lag, rtol=0.0, atol=0.01 * size)
+    assert np.linalg.norm(rest[-1]) < 1e-6 * np.linalg.norm(log.wheel_velocities[0])
+
+
+@pytest.mark.parametrize("case", ["1", "3"])
+def test_the_report_has_the_columns_of_the_log_by_source(case: str) -> None:
+    """And the sines of case 3: ``-0.01 (sin(pi t) + sin(1.5 pi t))`` on each inertial axis."""
+    log = flown("all", case=case)
+    found = analyze(log)["disturbance_by_source"]
+    torques = {name: log.external_torques[:, 3 * k : 3 * k + 3] for k, name in enumerate(SOURCES)}
+    if case == "3":
+        wave = -0.01 * (np.sin(np.pi * log.time) + np.sin(1.5 * np.pi * log.time))
+        torques["sines"] = np.repeat(wave[:, np.newaxis], 3, axis=1)
+    assert tuple(found) == tuple(torques)
+    for name, torque in torques.items():
+        sizes = np.linalg.norm(torque, axis=1)
+        impulse = np.linalg.norm(log.timebase.period * np.cumsum(torque, axis=0), axis=1)
+        expected = {
+            "rms_n_m": np.sqrt(np.mean(sizes**2)),
+            "max_n_m": sizes.max(),
+            "impulse_n_m_s": impulse.max(),
+        }
+        assert found[name] == pytest.approx(expected, rel=1e-12), name
+        assert found[name]["rms_n_m"] > 0.0
+
+
+def without_table(log: FlightLog) -> FlightLog:
+    """The same flight whose bag does not tell of the disturbance's table."""
+    flight: Any = copy.deepcopy(dict(log.flight))
+    flight["parameters"]["plant"]["disturbance.table"] = ""
+    del flight["disturbance"]
+    return replace(log, flight=flight)
+
+
+def test_momentum_with_wheels_is_kept_but_for_the_users_impulse() -> None:
+    log = Scenario(actuators="wheels", disturbance=WIND, duration=1.0).fly().log
+    aware, unaware = (
+        analyze(each)["momentum"]["drift"]["n_m_s"] for each in (log, without_table(log))
+    )
+    assert unaware > 0.1
+    assert aware < 1e-5 * unaware
+
+
+def test_the_users_torque_is_a_source_among_those_of_an_orbit() -> None:
+    """About the common centre of mass, on inertial axes, as the attitude and the places say."""
+    scenario = Scenario(orbit="iss", disturbance=WIND, duration=1.0)
+    log = scenario.fly().log
+    report = analyze(log)
+    assert report["disturbance_by_source"]["own"]["max_n_m"] > 0.3 / 2.0
+    assert "own" in str(comparison_table({"a": report}))
+    assert "own" not in analyze(without_table(log))["disturbance_by_source"]
+    torque = np.interp(log.time, WIND["time"], WIND["base_torque_x"], left=0.0, right=0.0)
+    torque[log.time >= 0.8 - 1e-9] = 0.0
+    pure = {key: WIND[key] for key in ("time", "base_torque_x")}
+    own = analyze(scenario.replace(disturbance=pure).fly().log)["disturbance_by_source"]["own"]
+    assert own["max_n_m"] == pytest.approx(0.3, rel=1e-9)
+    assert own["rms_n_m"] == pytest.approx(np.sqrt(np.mean(torque**2)), rel=1e-9)
+    impulse = np.max(np.abs(np.cumsum(torque))) * 0.0005
+    assert own["impulse_n_m_s"] == pytest.approx(impulse, rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("lost", "stretch"), [(0, (0.01, 0.1)), (4, (0.05, 0.1)), (9, (0.0, 0.09))]
+)
+def test_ticks_whose_torques_are_lost_are_left_out(
+    lost: int, stretch: tuple[float, float], tmp_path: Path
+) -> None:
+    """As of a plant that was killed: its last ticks were not told yet.
+
+    Their impulse is not known, so that a budget beyond them would be wrong without a word.
+    """
+    scenario = Scenario(actuators="wheels_and_torquers", orbit="iss", duration=0.1)
+    flight = scenario.fly(tmp_path / "whole")
+    whole = open_bag(tmp_path / "whole")
+    described = json.loads(whole.custom_data()["space_robot.flight"])
+    recorder, chunk = BagRecorder(tmp_path / "bag", described, flight.flight.timebase), -1
+    for name, data in whole.messages(*topics.ALL):
+        chunk += name == topics.TRUTH_ORBIT.full_name
+        if name != topics.TRUTH_ORBIT.full_name or chunk != lost:
+            recorder.record(topics.BY_NAME[name], data)
+    recorder.close()
+    report = analyze(read_flight(tmp_path / "bag"))
+    json.dumps([report["momentum"], report["disturbance_by_source"]], allow_nan=False)
+    assert report["momentum"]["peak_n_m_s"]["outside"] > 0.0
+    assert (report["from_s"], report["to_s"]) == stretch
+    share = (stretch[1] - stretch[0]) / 0.1
+    assert analyzed(report).startswith(f"{share:.1%} of the flight, {report['ticks']} of 200 ticks")

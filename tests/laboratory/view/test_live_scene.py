@@ -1,0 +1,143 @@
+"""The live scene: what is shown of a graph are the states that its bag has."""
+
+from __future__ import annotations
+
+import signal
+import threading
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from flights import forked_space_robot, space_robot_here
+from scipy.spatial.transform import Rotation
+
+from space_robot.view.live import serve as serving
+from space_robot.view.live.listener import Sample
+from space_robot.view.live.serve import LiveOptions, serve
+from space_robot.view.live.view import LiveView
+from space_robot.view.wheels import slowdown_of
+from space_robot_model.robot.transforms import joint_transforms
+from space_robot_msgs_py.bag.reader import read_flight
+
+TIMEOUT_S = 120.0
+Z = np.array([0.0, 0.0, 1.0])
+
+
+class EndedError(Exception):
+    """The test has seen enough."""
+
+
+class Server(threading.Thread):
+    """Serves one flight in a thread."""
+
+    def __init__(self, domain: int) -> None:
+        super().__init__(daemon=True)
+        self._options = LiveOptions(domain=domain, port=0)
+        self.lines: list[str] = []
+        self.waits = threading.Event()
+        self.ended = False
+
+    def run(self) -> None:
+        try:
+            serve(self._options, self._say, lambda address: None)
+        except EndedError:
+            self.ended = True
+
+    def _say(self, line: str) -> None:
+        self.lines.append(line)
+        if line == serving.WAITING:
+            if self.waits.is_set():
+                raise EndedError
+            self.waits.set()
+
+
+class Seen(LiveView):
+    """Keeps what it has shown."""
+
+    samples: list[Sample]
+    last: Any
+
+    def show(self, sample: Sample) -> None:
+        super().show(sample)
+        type(self).samples.append(sample)
+        type(self).last = self
+
+
+def axes_of(node: Any) -> Rotation:
+    return Rotation.from_quat(np.asarray(node.wxyz), scalar_first=True)
+
+
+def test_a_flight_is_shown_as_it_is_in_truth(
+    tmp_path: Path, free_domain: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """In orbit, with wheels, and sensors so far off that their poses are none of the truth's."""
+    Seen.samples = []
+    monkeypatch.setattr(serving, "LiveView", Seen)
+    server = Server(free_domain)
+    server.start()
+    assert server.waits.wait(TIMEOUT_S)
+    what = ("--orbit", "iss", "--actuators", "wheels", "--sensors", "tactical")
+    how = ("--paused", "--realtime", "--duration", "1", "--bag", str(tmp_path / "bag"))
+    where = ("--domain", str(free_domain))
+    with forked_space_robot("fly", *what, *how, *where) as process:
+        until = time.monotonic() + TIMEOUT_S
+        while not Seen.samples:  # it steps until the first state is shown
+            assert time.monotonic() < until
+            space_robot_here("sim", "step", "--ticks", "20", *where)
+        assert space_robot_here("sim", "resume", *where).returncode == 0
+        _, errors = process.communicate(timeout=TIMEOUT_S)
+    assert process.returncode == 0, errors
+    server.join(TIMEOUT_S)
+    assert server.ended
+    assert [line.partition(" from")[0] for line in server.lines if "still " not in line] == [
+        serving.WAITING,
+        f"following the flight in ROS domain {free_domain}",
+        "its robot is paper; waiting for its first state",
+        "showing it",
+        serving.OVER,
+        serving.WAITING,
+    ]
+    log, view = read_flight(tmp_path / "bag"), Seen.last
+    rows = [round(sample.time / log.timebase.period) for sample in Seen.samples]
+    assert len(set(rows)) > 3
+    assert rows == sorted(rows)
+    for row, sample in zip(rows, Seen.samples, strict=True):
+        np.testing.assert_array_equal(sample.base_position, log.base_position[row])
+        np.testing.assert_array_equal(sample.base_quaternion, log.quaternion[row])
+        np.testing.assert_array_equal(sample.angles, log.joint_positions[row])
+        np.testing.assert_allclose(sample.torque, log.applied_torque[row], atol=1e-9)
+    row, sample = rows[-1], Seen.samples[-1]
+    close = {"rtol": 0.0, "atol": 3e-5}  # viser sends no smaller changes
+    base = view._scene.base
+    np.testing.assert_allclose(base.position, log.base_position[row], **close)
+    np.testing.assert_allclose(base.wxyz, log.quaternion[row], **close)
+    for link in joint_transforms(view._robot, log.joint_positions[[row, row]]):
+        shown = view._scene._frames[link.child].wxyz
+        np.testing.assert_allclose(shown, link.quaternion[0], **close)
+    assert sample.orbit is not None
+    away = sample.orbit[:3] / np.linalg.norm(sample.orbit[:3])
+    np.testing.assert_allclose(axes_of(view._orbit._arrows._nodes[0]).apply(Z), -away, **close)
+    newest = np.abs(log.orbit_position - sample.orbit[:3]).max(axis=1)
+    assert newest.min() == 0.0
+    assert abs(int(newest.argmin()) - row) < 50
+    actuators = view._actuators
+    assert actuators._slowdown == slowdown_of(20.0 / 0.0318)  # of config/actuators/wheels.yaml
+    turned = log.timebase.period * np.cumsum(log.wheel_velocities, axis=0) / actuators._slowdown
+    wrong = np.abs(turned - actuators._angles).max(axis=1)
+    assert wrong.min() < 0.1 * np.abs(turned[-1]).max() + 1e-3
+    assert int(wrong.argmin()) > log.ticks // 2
+
+
+def test_ctrl_c_ends_it(free_domain: int) -> None:
+    options = ("--live", "--no-open", "--port", "0", "--domain", str(free_domain))
+    with forked_space_robot("view", *options) as process:
+        assert process.stderr is not None
+        assert process.stderr.readline().strip() == "starting the scene ..."
+        address, waiting = process.stderr.readline(), process.stderr.readline()
+        assert address.startswith("the scene is at http://127.0.0.1:")
+        assert waiting.strip() == serving.WAITING
+        process.send_signal(signal.SIGINT)
+        assert process.communicate(timeout=TIMEOUT_S)[1].strip() == "ended"
+        assert process.returncode == 0
