@@ -67,16 +67,9 @@ class Measured(NamedTuple):
 
 def product(left: Array, right: Array) -> Array:
     """Of quaternions (..., 4), w first."""
-    a, b = np.moveaxis(left, -1, 0), np.moveaxis(right, -1, 0)
-    return np.stack(
-        [
-            a[0] * b[0] - a[1] * b[1] - a[2] * b[2] - a[3] * b[3],
-            a[0] * b[1] + a[1] * b[0] + a[2] * b[3] - a[3] * b[2],
-            a[0] * b[2] - a[1] * b[3] + a[2] * b[0] + a[3] * b[1],
-            a[0] * b[3] + a[1] * b[2] - a[2] * b[1] + a[3] * b[0],
-        ],
-        -1,
-    )
+    (a, u), (b, v) = (np.split(q, [1], axis=-1) for q in np.broadcast_arrays(left, right))
+    scalar = a * b - np.sum(u * v, axis=-1, keepdims=True)
+    return np.concatenate([scalar, a * v + b * u + np.cross(u, v)], axis=-1)
 
 
 def exponential(rotation: Array) -> Array:
@@ -139,10 +132,8 @@ class Estimated(NamedTuple):
 
 def filtered(case: Case, measured: Measured, filter: AttitudeFilter | None = None) -> Estimated:
     """Run a filter over all ticks."""
-    ticks = len(measured.gyro)
-    out = Estimated(
-        np.empty((ticks, 4)), np.empty((ticks, 4)), np.empty((ticks, 3)), np.empty((ticks, 6, 6))
-    )
+    shapes = ((4,), (4,), (3,), (6, 6))
+    out = Estimated(*(np.empty((len(measured.gyro), *shape)) for shape in shapes))
     run(filter or case.filter(), measured.quaternions, measured.gyro, case.period, *out)
     return out
 

@@ -1,142 +1,73 @@
-"""H and c of (7) against Pinocchio, and against the laws of mechanics."""
+"""Equations of motion against Pinocchio and MuJoCo: also of a free base, and with rotors."""
 
 from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
+from hypothesis import strategies as st
 from numpy.typing import NDArray
 from oracles import (
+    TreeOracle,
+    assert_close,
+    assert_same_dynamics,
+    mujoco_acceleration,
+    mujoco_forward_dynamics,
+    pinocchio_acceleration,
     pinocchio_bias_force,
+    pinocchio_forward_dynamics,
     pinocchio_mass_matrix,
-    quaternion_of,
+    pinocchio_tree,
     rotation_of,
-    to_base_axes,
     turned,
 )
-from random_robots import Case, State, cases, random_quaternion, random_state
+from oracles.rotors import (
+    RotorEquations,
+    mount,
+    mujoco_with_wheels,
+    pinocchio_with_wheels,
+    random_motor_rotors,
+    random_rotors,
+    turns,
+)
+from robots import mounted
+from strategies import (
+    BASE,
+    SEEDS,
+    Case,
+    State,
+    branched_cases,
+    cases,
+    random_bodies,
+    random_gears,
+    random_quaternion,
+    random_robot,
+    random_state,
+)
 
+from space_robot_model.dynamics.aba import aba
+from space_robot_model.dynamics.free_floating import free_floating_into
+from space_robot_model.dynamics.kinematics import forward_kinematics, spatial_velocities
+from space_robot_model.dynamics.model import Data
+from space_robot_model.dynamics.rho_space import RhoSpaceModel
 from space_robot_model.robot import Robot
-from space_robot_model.robot.dynamics import bias_force, forward_dynamics, mass_matrix
+from space_robot_model.robot.dynamics import (
+    bias_force,
+    forward_dynamics,
+    free_inverse_dynamics,
+    inverse_dynamics,
+    mass_matrix,
+)
+from space_robot_model.robot.tree import Body
+from space_robot_msgs_py.compiled.records import Block
+from space_robot_msgs_py.samples import MOST_WHEELS, Reference, ReferenceChunk
 
 Array = NDArray[np.float64]
-
 FEW = settings(max_examples=40)
-RELATIVE = 1e-10
-
-
-def assert_relative(actual: Array, expected: Array, tolerance: float = RELATIVE) -> None:
-    """Every element agrees to ``tolerance`` of the largest."""
-    np.testing.assert_allclose(
-        actual, expected, rtol=0.0, atol=tolerance * max(np.abs(expected).max(), 1e-3)
-    )
-
-
-def inertia_of(robot: Robot, state: State) -> Array:
-    return mass_matrix(robot, state.quaternion, state.theta)
-
-
-def bias_of(robot: Robot, state: State) -> Array:
-    return bias_force(robot, state.quaternion, state.theta, state.w0, state.rate)
-
-
-def inertia_rate(robot: Robot, state: State, step: float = 1e-5) -> Array:
-    """Hdot along the state's motion: fourth-order central difference."""
-
-    def at(time: float) -> Array:
-        return mass_matrix(
-            robot, turned(state.quaternion, time * state.w0), state.theta + time * state.rate
-        )
-
-    return (8 * (at(step) - at(-step)) - (at(2 * step) - at(-2 * step))) / (12 * step)
-
-
-@pytest.mark.parametrize("name", ["paper_robot", "seven_joint_robot"])
-def test_shipped_robots_agree_with_pinocchio(name: str, request: pytest.FixtureRequest) -> None:
-    """H and c of both robots, in 20 random states each."""
-    robot, rng = request.getfixturevalue(name), np.random.default_rng(1)
-    for _ in range(20):
-        state = random_state(rng, robot.n)
-        assert_relative(inertia_of(robot, state), pinocchio_mass_matrix(robot, state))
-        assert_relative(bias_of(robot, state), pinocchio_bias_force(robot, state))
-
-
-@FEW
-@given(cases())
-def test_mass_matrix_agrees_with_pinocchio_for_any_robot_wherever_the_base_stands(
-    case: Case,
-) -> None:
-    """Pinocchio is given a base position; H has none to be given."""
-    position = 100.0 * case.rng.normal(size=3)
-    expected = pinocchio_mass_matrix(case.robot, case.state, position)
-    assert_relative(inertia_of(case.robot, case.state), expected)
-
-
-@FEW
-@given(cases())
-def test_bias_force_agrees_with_pinocchio_for_any_robot_however_fast_the_base_drifts(
-    case: Case,
-) -> None:
-    """Pinocchio is given position and velocity of the base; c does not depend on either."""
-    position = 100.0 * case.rng.normal(size=3)
-    expected = pinocchio_bias_force(case.robot, case.state, position)
-    assert_relative(bias_of(case.robot, case.state), expected)
-
-
-@FEW
-@given(cases())
-def test_mass_matrix_is_symmetric_positive_definite(case: Case) -> None:
-    inertia = inertia_of(case.robot, case.state)
-    np.testing.assert_array_equal(inertia, inertia.T)
-    assert np.linalg.eigvalsh(inertia)[0] > 0.0
-
-
-@FEW
-@given(cases())
-def test_mass_matrix_begins_with_the_total_mass(case: Case) -> None:
-    """H11 = M E, which the elimination of the translation builds on."""
-    total = case.robot.mass.sum()
-    assert_relative(inertia_of(case.robot, case.state)[:3, :3], total * np.eye(3), 1e-14)
-
-
-@FEW
-@given(cases())
-def test_bias_force_vanishes_at_rest(case: Case) -> None:
-    n = case.robot.n
-    at_rest = bias_force(
-        case.robot, case.state.quaternion, case.state.theta, np.zeros(3), np.zeros(n)
-    )
-    np.testing.assert_array_equal(at_rest, np.zeros(n + 6))
-
-
-@FEW
-@given(cases())
-def test_bias_force_is_quadratic_in_the_velocities(case: Case) -> None:
-    s = case.state
-    twice = s._replace(w0=-3.0 * s.w0, rate=-3.0 * s.rate)
-    assert_relative(bias_of(case.robot, twice), 9.0 * bias_of(case.robot, s), 1e-13)
-
-
-@FEW
-@given(cases())
-def test_bias_force_does_half_the_work_of_the_changing_inertia(case: Case) -> None:
-    """``qdot.c = qdot.Hdot qdot / 2``: (Hdot - 2C) takes and gives no energy."""
-    velocity = case.state.velocity
-    expected = 0.5 * velocity @ inertia_rate(case.robot, case.state) @ velocity
-    scale = np.abs(velocity) @ np.abs(bias_of(case.robot, case.state))
-    assert velocity @ bias_of(case.robot, case.state) == pytest.approx(expected, abs=1e-7 * scale)
-
-
-@FEW
-@given(cases())
-def test_bias_force_on_the_base_is_the_momentum_that_the_changing_inertia_moves(case: Case) -> None:
-    """``c1 = Hdot1 qdot``; about the moving base CoM ``c2 = Hdot2 qdot + v0 x p``."""
-    velocity = case.state.velocity
-    rate = inertia_rate(case.robot, case.state)[:6] @ velocity
-    momentum = inertia_of(case.robot, case.state)[:3] @ velocity
-    rate[3:] += np.cross(case.state.v0, momentum)
-    scale = max(np.abs(rate).max(), np.abs(momentum).max())
-    np.testing.assert_allclose(bias_of(case.robot, case.state)[:6], rate, atol=1e-7 * scale)
 
 
 @FEW
@@ -158,36 +89,280 @@ def test_power_of_the_force_is_the_rate_of_the_kinetic_energy(case: Case) -> Non
     assert rate == pytest.approx(s.velocity @ force, abs=1e-6 * scale)
 
 
+def references_of(states: list[State], accelerations: Array) -> Block:
+    """``accelerations``: (N, n+3), of the base about inertial axes, then of the joints."""
+    found = np.empty(len(states), Reference.dtype(states[0].theta.size))
+    for row, state, acceleration in zip(found, states, accelerations, strict=True):
+        back = rotation_of(state.quaternion).as_matrix().T
+        row["quaternion"], row["joint_positions"] = state.quaternion, state.theta
+        row["omega_base"], row["joint_velocities"] = back @ state.w0, state.rate
+        row["alpha_base"], row["joint_accelerations"] = back @ acceleration[:3], acceleration[3:]
+    return found
+
+
+def in_inertial(state: State, torque: Array) -> Array:
+    """The force (n+6,) on inertial axes of a torque on the base's axes and the joints."""
+    base = rotation_of(state.quaternion).as_matrix() @ torque[:3]
+    return np.concatenate([np.zeros(3), base, torque[3:]])
+
+
 @FEW
-@given(cases())
-def test_turning_the_whole_robot_turns_the_base_blocks_only(case: Case) -> None:
-    """Attitude p*q and R(p) w0: H and c turn their base parts by R(p), joint parts stay."""
+@given(cases() | branched_cases())
+def test_it_is_what_moves_pinocchios_robot_so(case: Case) -> None:
+    """And the base's CoM is free: no force holds it."""
+    robot, rng = case.robot, case.rng
+    states = [case.state, random_state(rng, robot.n)]
+    accelerations = rng.normal(size=(2, robot.n + 3))
+    torques = inverse_dynamics(robot, references_of(states, accelerations))
+    for state, torque, wanted in zip(states, torques, accelerations, strict=True):
+        moved = pinocchio_forward_dynamics(robot, state, in_inertial(state, torque))
+        np.testing.assert_allclose(moved[3:], wanted, atol=1e-8 * (1.0 + np.abs(moved).max()))
+
+
+def free_floating(robot: Robot, s: State) -> tuple[Array, Array]:
+    """The model by the code under test, base axes included."""
+    out = RhoSpaceModel.allocate(robot.n)
+    omega_base = rotation_of(s.quaternion).inv().apply(s.w0)
+    free_floating_into(robot.model, s.quaternion, s.theta, omega_base, s.rate, out)
+    return out.inertia, out.bias
+
+
+def half_turned(s: State) -> State:
+    """The state with its base turned by 180 degrees, where J0 is singular."""
+    axis = s.quaternion[1:] / np.linalg.norm(s.quaternion[1:])
+    return s._replace(quaternion=np.concatenate([[0.0], axis]))
+
+
+@FEW
+@given(cases() | branched_cases())
+def test_joints_are_the_schur_complement_of_pinocchios_h_and_c(case: Case) -> None:
+    """At any attitude, half a turn included; the base's axes stand apart."""
+    robot = case.robot
+    for s in (case.state, half_turned(case.state)):
+        h, c = pinocchio_mass_matrix(robot, s), pinocchio_bias_force(robot, s)
+        share = h[6:, :6] @ np.linalg.inv(h[:6, :6])
+        h_f, c_f = h[6:, 6:] - share @ h[:6, 6:], c[6:] - share @ c[:6]
+        inertia, bias = free_floating(robot, s)
+        np.testing.assert_allclose(inertia[3:, 3:], h_f, rtol=0, atol=1e-11 * np.abs(h).max())
+        np.testing.assert_allclose(bias[3:], c_f, rtol=0, atol=1e-10 * np.abs(c).max())
+        apart = np.hstack([np.eye(3), np.zeros((3, robot.n))])
+        np.testing.assert_array_equal(inertia[:3], apart)
+        np.testing.assert_array_equal(inertia[:, :3], apart.T)
+        np.testing.assert_array_equal(bias[:3], 0.0)
+
+
+@FEW
+@given(cases() | branched_cases())
+def test_inverse_dynamics_is_pinocchios_without_momentum(case: Case) -> None:
+    """The base turns as momentum asks, and its axes get nothing."""
     robot, s, rng = case
-    turn = rotation_of(random_quaternion(rng))
-    quaternion = quaternion_of(turn * rotation_of(s.quaternion))
-    moved = s._replace(quaternion=quaternion, w0=turn.apply(s.w0))
-    spread = to_base_axes(quaternion_of(turn), robot.n + 6).T
-    assert_relative(inertia_of(robot, moved), spread @ inertia_of(robot, s) @ spread.T, 1e-13)
-    assert_relative(bias_of(robot, moved), spread @ bias_of(robot, s), 1e-12)
+    accelerations = rng.normal(size=robot.n)
+    joints = np.stack([s.theta, s.rate, accelerations])[np.newaxis]
+    base = np.concatenate([s.quaternion, rng.normal(size=6)])[np.newaxis]
+    torque = free_inverse_dynamics(robot, ReferenceChunk(0, joints, base).references())[0]
+    assert (torque[:3] == 0.0).all()
+    h = pinocchio_mass_matrix(robot, s)
+    turning = -np.linalg.solve(h[:6, :6], h[:6, 6:] @ s.rate)
+    moving = s._replace(v0=turning[:3], w0=turning[3:])
+    found = pinocchio_forward_dynamics(robot, moving, np.concatenate([np.zeros(3), torque]))[6:]
+    size = 1.0 + np.abs(np.linalg.inv(free_floating(robot, s)[0])).max() * np.abs(torque).max()
+    np.testing.assert_allclose(found, accelerations, rtol=0, atol=1e-11 * size)
+
+
+SHAPES: dict[str, Callable[[int], int]] = {
+    "chain": lambda number: number - 1,
+    "star": lambda number: -1,
+    "comb": lambda number: number - 2 if number % 2 else number - 1,
+    "two arms": lambda number: number - 2 if number > 1 else -1,
+    "fork of forks": lambda number: (number - 1) // 2,
+}
+"""The number of each body's parent, -1 for the base."""
+
+
+def shaped(shape: str, count: int) -> list[Body]:
+    rng = np.random.default_rng(len(shape))
+    kinds = [("revolute", "prismatic", "passive revolute")[k % 3] for k in range(count)]
+    return [
+        replace(body, parent=_name(SHAPES[shape](int(body.name[1:])))) if body.joint else body
+        for body in random_bodies(rng, kinds)
+    ]
+
+
+def _name(number: int) -> str:
+    return BASE if number < 0 else f"b{number}"
+
+
+@pytest.mark.parametrize("shape", SHAPES)
+def test_any_shape_moves_as_pinocchio_says(shape: str) -> None:
+    bodies = shaped(shape, 14)
+    robot = Robot.of_tree(shape, bodies)
+    oracle = TreeOracle(pinocchio_tree(bodies), BASE, robot.all_joint_names, 7)
+    assert_same_dynamics(robot, oracle, 7)
+
+
+@pytest.mark.parametrize("shape", SHAPES)
+def test_nothing_is_left_behind(shape: str) -> None:
+    """The same memory gives the same bits again, and again after another motion."""
+    robot, rng = Robot.of_tree(shape, shaped(shape, 9)), np.random.default_rng(0)
+    n, data = robot.joint_count, Data.allocate(robot.joint_count)
+
+    def acceleration(motion: tuple[Array, ...]) -> Array:
+        out = np.empty(n + 6)
+        quaternion, positions, omega, velocities, force = motion
+        forward_kinematics(robot.model, quaternion, positions, data)
+        spatial_velocities(robot.model, omega, velocities, data)
+        aba(robot.model, omega, velocities, force, data, out)
+        return out
+
+    def random_motion() -> tuple[Array, ...]:
+        return (random_quaternion(rng), *(rng.normal(size=size) for size in (n, 3, n, n + 6)))
+
+    motion = random_motion()
+    first = acceleration(motion)
+    np.testing.assert_array_equal(acceleration(motion), first)
+    acceleration(random_motion())
+    np.testing.assert_array_equal(acceleration(motion), first)
+    assert not data.inwards[: n + 1].any()
 
 
 @FEW
+@given(cases() | branched_cases())
+def test_inertia_bias_and_acceleration_are_pinocchios(case: Case) -> None:
+    """Wherever the base is and however fast it drifts; Q and -Q are one attitude."""
+    robot, s, rng = case
+    position, force = 100.0 * rng.normal(size=3), 50.0 * rng.normal(size=robot.n + 6)
+    inertia = mass_matrix(robot, s.quaternion, s.theta)
+    motion = s.theta, s.w0, s.rate
+    bias = bias_force(robot, s.quaternion, *motion)
+    assert_close(inertia, pinocchio_mass_matrix(robot, s, position), 1e-10)
+    assert_close(bias, pinocchio_bias_force(robot, s, position), 1e-10)
+    assert_close(
+        forward_dynamics(robot, s.quaternion, *motion, force),
+        pinocchio_forward_dynamics(robot, s, force),
+        1e-10,
+    )
+    np.testing.assert_array_equal(inertia, inertia.T)
+    np.testing.assert_array_equal(mass_matrix(robot, -s.quaternion, s.theta), inertia)
+    np.testing.assert_array_equal(bias_force(robot, -s.quaternion, *motion), bias)
+    still = bias_force(robot, s.quaternion, s.theta, np.zeros(3), 0.0 * s.rate)
+    np.testing.assert_array_equal(still, np.zeros(robot.n + 6))
+
+
+@settings(max_examples=20)
 @given(cases())
-def test_both_signs_of_the_quaternion_are_one_attitude(case: Case) -> None:
-    s = case.state
-    other = s._replace(quaternion=-s.quaternion)
-    np.testing.assert_array_equal(inertia_of(case.robot, other), inertia_of(case.robot, s))
-    np.testing.assert_array_equal(bias_of(case.robot, other), bias_of(case.robot, s))
+def test_accelerations_are_mujocos(case: Case) -> None:
+    robot, s, rng = case
+    force = 50.0 * rng.normal(size=robot.n + 6)
+    actual = forward_dynamics(robot, s.quaternion, s.theta, s.w0, s.rate, force)
+    assert_close(actual, mujoco_forward_dynamics(robot, s, force), 1e-8)
 
 
-def test_wrong_shapes_and_quaternions_are_refused_by_name(paper_robot: Robot) -> None:
-    theta, still = np.zeros(6), np.zeros(3)
-    unit = [1.0, 0.0, 0.0, 0.0]
-    with pytest.raises(ValueError, match=r"joint_positions must have shape \(6,\), got \(5,\)"):
-        mass_matrix(paper_robot, unit, theta[:5])
-    with pytest.raises(ValueError, match=r"quaternion_wxyz must have norm 1, got 2"):
-        mass_matrix(paper_robot, [2.0, 0.0, 0.0, 0.0], theta)
-    with pytest.raises(ValueError, match=r"w0_inertial must have shape \(3,\)"):
-        bias_force(paper_robot, unit, theta, [0.0], theta)
-    with pytest.raises(ValueError, match=r"force must have shape \(12,\)"):
-        forward_dynamics(paper_robot, unit, theta, still, theta, np.zeros(9))
+@pytest.mark.parametrize(
+    ("function", "changed", "said"),
+    [
+        (mass_matrix, {1: np.zeros(5)}, r"joint_positions must have shape \(6,\), got \(5,\)"),
+        (mass_matrix, {0: [2.0, 0.0, 0.0, 0.0]}, "quaternion_wxyz must have norm 1, got 2"),
+        (bias_force, {2: [0.0]}, r"w0_inertial must have shape \(3,\)"),
+        (forward_dynamics, {4: np.zeros(9)}, r"force must have shape \(12,\)"),
+    ],
+)
+def test_wrong_shapes_and_quaternions_are_refused_by_name(
+    paper_robot: Robot, function: Callable[..., Array], changed: dict[int, Any], said: str
+) -> None:
+    right: list[Any] = [[1.0, 0.0, 0.0, 0.0], np.zeros(6), np.zeros(3), np.zeros(6), np.zeros(12)]
+    count = {mass_matrix: 2, bias_force: 4, forward_dynamics: 5}[function]
+    given = [changed.get(k, values) for k, values in enumerate(right[:count])]
+    with pytest.raises(ValueError, match=said):
+        function(paper_robot, *given)
+
+
+TREE = (
+    *("revolute", "passive revolute", "prismatic", "revolute", "fixed"),
+    *("revolute", "passive prismatic", "prismatic", "revolute"),
+)
+
+
+def accelerate(
+    model: Any, n: int, s: State, theta: Array, rates: Array, force: Array, locked: Array
+) -> tuple[Array, Array]:
+    """Accelerations, and the torques that hold what is locked, in the model's order."""
+    data, out = Data.allocate(n), np.empty(force.size)
+    forward_kinematics(model, s.quaternion, theta, data)
+    spatial_velocities(model, s.w0, rates, data)
+    data.locked[: locked.size] = locked
+    aba(model, s.w0, rates, force, data, out)
+    return out, data.holding[: locked.size].copy()
+
+
+@given(st.sampled_from([1, 6]), st.integers(1, MOST_WHEELS), SEEDS)
+@settings(max_examples=60)
+def test_wheels_accelerate_like_rotors_on_hinges(n: int, count: int, seed: int) -> None:
+    """Of any mass, anywhere in the base, at some 1000 rpm; some are held by brakes.
+
+    With the brakes' torques as forces on what is free, the bodies accelerate all the same.
+    """
+    rng = np.random.default_rng(seed)
+    robot = random_robot(rng, n)
+    rotors = random_rotors(rng, robot, count)
+    state = random_state(rng, n)._replace(
+        theta=rng.uniform(-np.pi, np.pi, n + count),
+        rate=np.concatenate([rng.normal(size=n), 100.0 * rng.normal(size=count)]),
+    )
+    model, force = robot.model.copy(), rng.normal(size=6 + n + count)
+    mount(model, rotors)
+    locked = np.concatenate([np.zeros(n, bool), rng.random(count) < 0.4])
+    found, holding = accelerate(model, n, state, state.theta[:n], state.rate, force, locked)
+    assert not found[6:][locked].any()
+    force[6:] -= np.where(locked, holding, 0.0)
+    bodies = pinocchio_with_wheels(robot, rotors)
+    size = np.abs(accelerate(model, n, state, state.theta[:n], state.rate, force, locked)[0]).max()
+    expected = pinocchio_acceleration(bodies, bodies.createData(), state, force)
+    np.testing.assert_allclose(found, expected, rtol=0.0, atol=1e-11 * (1.0 + size))
+    expected = mujoco_acceleration(mujoco_with_wheels(robot, rotors), state, force)
+    np.testing.assert_allclose(found, expected, rtol=0.0, atol=1e-9 * (1.0 + size))
+
+
+@given(st.sampled_from([1, 2, 3, 6, 7, 0, 0]), st.sampled_from([0.0, 0.4]), SEEDS)
+@settings(max_examples=120)
+def test_motors_accelerate_like_bodies_on_links(n: int, share: float, seed: int) -> None:
+    """In chains of ``n`` joints, or in a tree; each rotor's own acceleration. Some are held."""
+    rng = np.random.default_rng(seed)
+    robot = random_robot(rng, n) if n else Robot.of_tree("tree", random_bodies(rng, TREE))
+    robot = random_gears(rng, robot)
+    rotors, n, scale = random_motor_rotors(rng, robot), robot.joint_count, turns(robot)
+    count, state, model = len(rotors), random_state(rng, n), mounted(robot)
+    spins = 100.0 * rng.normal(size=count) / scale[6 + n :]
+    force = rng.normal(size=scale.size) * scale
+    rows = [*model.row[:n].astype(int), *range(n, n + count)]  # of the model, by joint
+
+    def found(locked: Array) -> tuple[Array, Array]:
+        theta, rates = np.empty(n), np.empty(n + count)
+        theta[rows[:n]], rates[rows] = state.theta, np.concatenate([state.rate, spins])
+        given, brakes = force.copy(), np.empty(locked.size, bool)
+        given[6:][rows], brakes[rows] = force[6:], locked
+        out, holding = accelerate(model, robot.n, state, theta, rates, given, brakes)
+        return np.concatenate([out[:6], out[6:][rows]]), holding[rows]
+
+    free, _ = found(np.zeros(n + count, bool))
+    locked = rng.random(n + count) < share
+    actual, holding = found(locked)
+    assert not actual[6:][locked].any()
+    force[6:] -= np.where(locked, holding, 0.0)
+    expected = RotorEquations(robot, rotors).accelerations(state, spins, force)
+    size = np.abs(free * scale).max() + np.abs(expected * scale).max()
+    np.testing.assert_allclose(actual * scale, expected * scale, rtol=0.0, atol=1e-11 * size)
+
+
+@given(st.sampled_from([1, 3, 6]), SEEDS)
+@settings(max_examples=20)
+def test_the_equations_that_flights_are_compared_with_are_their_own(n: int, seed: int) -> None:
+    """``M qdd + c = F`` by composite bodies and Newton and Euler, qdd by articulated bodies."""
+    rng = np.random.default_rng(seed)
+    robot = random_gears(rng, random_robot(rng, n))
+    rotors, state, scale = random_motor_rotors(rng, robot), random_state(rng, n), turns(robot)
+    equations, spins = RotorEquations(robot, rotors), rng.normal(size=len(rotors))
+    force = rng.normal(size=scale.size) * scale
+    velocity = np.concatenate([state.velocity, spins])
+    mass, bias = equations.matrices(state.quaternion, state.theta, velocity)
+    found = np.linalg.solve(mass, force - bias) * scale
+    assert_close(found, equations.accelerations(state, spins, force) * scale, 1e-11)

@@ -5,14 +5,12 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 from oracles import attitude_jacobian_base, attitude_jacobian_inertial, rotation_of, skew
-from paths import ROOT
-from random_robots import Case, branched_cases, cases, random_state
-from second_moment_model import frames, jacobians, missing, second_moments, vectors
+from oracles.second_moments import jacobians, missing, second_moments
+from strategies import Case, branched_cases, cases
 
 from space_robot_model.dynamics.regressor import (
     Regressor,
@@ -26,8 +24,6 @@ from space_robot_model.dynamics.rho_space import RhoSpaceModel, rho_space_into
 from space_robot_model.robot import Robot
 
 Array = NDArray[np.float64]
-
-ROBOTS = sorted(path.stem for path in (ROOT / "config/robots").glob("*.yaml"))
 FEW = settings(max_examples=25, deadline=None)
 SMALLEST_ETA = 0.1
 
@@ -73,44 +69,6 @@ def by_sweep(
     force_in_rho(work, force)
     product = np.array(work.sliding).T @ np.array(work.acceleration)
     return force, 0.5 * (product + product.T)
-
-
-@pytest.mark.parametrize("name", ROBOTS)
-def test_nominal_moments_give_the_model_of_every_robot(name: str) -> None:
-    robot, rng = (
-        Robot.from_yaml(ROOT / f"config/robots/{name}.yaml").nominal,
-        np.random.default_rng(1),
-    )
-    moments = second_moments(robot)
-    for _ in range(10):
-        case = Case(robot, random_state(rng, robot.n), rng)
-        quaternion, (rate, acceleration) = near_zero(case), rng.normal(size=(2, robot.n + 3))
-        inertia, bias = model_of(robot, quaternion, case.state.theta, rate)
-        expected = inertia @ acceleration + bias
-        motion = np.array([rate, rate, rate, acceleration])
-        force, _ = by_sweep(case, moments, quaternion, motion)
-        assert relative(force, expected) < 1e-12
-        dense = jacobians(robot, quaternion, case.state.theta, rate)
-        assert relative(dense.inertia(moments), inertia) < 1e-12
-        assert relative(dense.force(moments, rate, acceleration), expected) < 1e-12
-
-
-@FEW
-@given(cases() | branched_cases())
-def test_force_and_gradient_are_those_of_dense_jacobians(case: Case) -> None:
-    """Also for velocities v and s that the robot does not have, and for any D."""
-    quaternion, size = near_zero(case), 2 * case.robot.n + 3
-    motion = case.rng.normal(size=(4, case.robot.n + 3))
-    rate, s, v, v_rate = motion
-    root = case.rng.normal(size=(size, size))
-    force, gradient = by_sweep(case, root @ root.T, quaternion, motion)
-    dense = jacobians(case.robot, quaternion, case.state.theta, rate)
-    assert relative(force, dense.force(root @ root.T, v, v_rate)) < 1e-11
-    assert relative(gradient, dense.gradient(s, v, v_rate)) < 1e-11
-    change = case.rng.normal(size=(size, size))
-    change += change.T
-    by_difference = s @ (dense.force(root @ root.T + change, v, v_rate) - force)
-    assert np.sum(gradient * change) == pytest.approx(by_difference, rel=1e-7, abs=1e-9)
 
 
 def on_outer_axes(quaternion: Array, rate: Array, v: Array, v_rate: Array) -> tuple[Array, Array]:
@@ -163,87 +121,6 @@ def test_in_a_moving_frame_the_nominal_moments_give_the_model(case: Case) -> Non
     assert relative(force, inertia @ acceleration + bias) < 1e-11
     force, _ = by_sweep(case, moments, quaternion, motion)
     assert relative(force, inertia @ acceleration + bias) > 1e-6
-
-
-@FEW
-@given(cases() | branched_cases())
-def test_what_v_adds_to_the_force_is_skew_symmetric_in_a_moving_frame(case: Case) -> None:
-    """``s^T (Y(v + s, vdot + sdot) - Y(v, vdot)) pi = s^T H sdot + s^T C s``, and
-    ``s^T C s = s^T Hdot s / 2``: the proof of the law needs no more than this of any frame.
-
-    Hdot is that of the model's own inertia along the motion.
-    """
-    robot, rng, h = case.robot, case.rng, 1e-4
-    quaternion, moments = near_zero(case, 1.0), second_moments(robot)
-    frame, (rate, s, s_rate, v, v_rate) = rng.normal(size=(2, 3)), rng.normal(size=(5, robot.n + 3))
-    with_s, _ = by_sweep(
-        case, moments, quaternion, np.array([rate, s, v + s, v_rate + s_rate]), frame
-    )
-    without, _ = by_sweep(case, moments, quaternion, np.array([rate, s, v, v_rate]), frame)
-    inertias = []
-    for t in (-2 * h, -h, h, 2 * h):
-        epsilon = quaternion[1:] + t * rate[:3]
-        at = np.concatenate([[np.sqrt(1.0 - epsilon @ epsilon)], epsilon])
-        inertias.append(model_of(robot, at, case.state.theta + t * rate[3:], rate)[0])
-    inertia_rate = (inertias[0] - 8 * inertias[1] + 8 * inertias[2] - inertias[3]) / (12 * h)
-    inertia, _ = model_of(robot, quaternion, case.state.theta, rate)
-    expected = s @ inertia @ s_rate + 0.5 * s @ inertia_rate @ s
-    scale = np.abs(inertias).max() * (1.0 + np.abs([s, s_rate]).max()) ** 2
-    assert abs(s @ (with_s - without) - expected) < 1e-8 * scale * (1.0 + np.abs(rate).max())
-
-
-@FEW
-@given(cases([1, 3, 6]) | branched_cases([1, 3, 6]))
-def test_rate_of_inertia_less_twice_coriolis_is_skew_symmetric(case: Case) -> None:
-    """Hdot by central differences of the project's H_S along the motion."""
-    robot, state, h = case.robot, case.state, 1e-4
-    quaternion, moments = near_zero(case, 1.0), second_moments(case.robot)
-    rate = case.rng.normal(size=robot.n + 3)
-    inertias = []
-    for t in (-2 * h, -h, h, 2 * h):
-        # epsilon moves evenly, so its rate is constant along the way
-        epsilon = quaternion[1:] + t * rate[:3]
-        at = np.concatenate([[np.sqrt(1.0 - epsilon @ epsilon)], epsilon])
-        inertias.append(model_of(robot, at, state.theta + t * rate[3:], rate)[0])
-    inertia_rate = (inertias[0] - 8 * inertias[1] + 8 * inertias[2] - inertias[3]) / (12 * h)
-    coriolis = jacobians(robot, quaternion, state.theta, rate).coriolis(moments)
-    skew = inertia_rate - 2.0 * coriolis
-    assert np.abs(skew + skew.T).max() < 1e-8 * max(
-        np.abs(inertia_rate).max(), np.abs(inertias).max()
-    )
-
-
-def points_of(robot: Robot) -> list[tuple[float, int, Array]]:
-    """Mass points (mass, body, position in its frame) with the moments of every body."""
-    points = []
-    for i in range(robot.n + 1):
-        tensor, mass = robot.inertia[i], robot.mass[i]
-        second, axes = np.linalg.eigh(0.5 * np.trace(tensor) * np.eye(3) - tensor)
-        com = np.zeros(3) if i == 0 else robot.com[i]
-        for moment, axis in zip(second, axes.T, strict=True):
-            for side in (-1.0, 1.0):
-                points.append((mass / 6, i, com + side * np.sqrt(3 * moment / mass) * axis))
-    return points
-
-
-@FEW
-@given(cases([1, 3]) | branched_cases([3, 6]))
-def test_moments_are_those_of_mass_points(case: Case) -> None:
-    """The constants of every point follow from where it is in many postures."""
-    robot, rng, points = case.robot, case.rng, points_of(case.robot)
-    masses = np.array([mass for mass, _, _ in points])
-    rows, places = [], []
-    for _ in range(2 * robot.n + 6):
-        state = random_state(rng, robot.n)
-        at = frames(robot, state.quaternion, state.theta)
-        positions = np.array([at.origins[i] + at.axes[i] @ p for _, i, p in points])
-        places.append((positions - masses @ positions / masses.sum()).T)
-        rows.append(vectors(robot, state.quaternion, state.theta))
-    constants, *_ = np.linalg.lstsq(np.vstack(rows), np.vstack(places), rcond=1e-12)
-    expected = (constants * masses) @ constants.T
-    for k in missing(robot):
-        expected[k, k] = 1.0
-    assert relative(second_moments(robot), expected) < 1e-9
 
 
 def pseudo_inertia(robot: Robot, i: int) -> Array:

@@ -1,4 +1,4 @@
-"""Small matrices against NumPy and exact fractions; Fourier's transform; rotations by angles."""
+"""Small matrices, splines, spectra and rotations against NumPy, SciPy and exact fractions."""
 
 from __future__ import annotations
 
@@ -8,12 +8,17 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
+import scipy.linalg
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
+from scipy import interpolate
 from scipy.spatial.transform import Rotation
+from strategies import RNGS
 
 from space_robot_model.elementary.arctangent import angle_of, arctan2
+from space_robot_model.elementary.cholesky import cholesky_into, solve_cholesky
+from space_robot_model.elementary.definite import is_positive_definite, move_to_side
 from space_robot_model.elementary.fourier import squared_spectrum
 from space_robot_model.elementary.matrices import (
     dot_rows,
@@ -29,13 +34,13 @@ from space_robot_model.elementary.rotations import (
     rotation_of_rpy,
     rpy_of_rotation,
 )
+from space_robot_model.elementary.spline import CubicSpline
 from space_robot_model.elementary.symmetric import principal_axes
 
 Array = NDArray[np.float64]
-seeds = st.integers(0, 2**32 - 1).map(np.random.default_rng)
 
 
-@given(seeds, st.integers(1, 7), st.integers(0, 3))
+@given(RNGS, st.integers(1, 7), st.integers(0, 3))
 def test_products_are_numpys(rng: np.random.Generator, size: int, columns: int) -> None:
     """Of vectors, matrices and stacks; a length; a tensor on other axes."""
     a, b = rng.normal(size=(4, 3, size)), rng.normal(size=(size, columns) if columns else size)
@@ -62,7 +67,7 @@ def exact_solution(matrix: Array, right: Array) -> Array:
 
 
 @settings(max_examples=60)
-@given(seeds, st.integers(1, 7))
+@given(RNGS, st.integers(1, 7))
 def test_equations_are_solved_as_exactly_as_their_condition_lets(
     rng: np.random.Generator, size: int
 ) -> None:
@@ -84,7 +89,7 @@ def test_equations_are_solved_as_exactly_as_their_condition_lets(
 
 
 @settings(max_examples=40)
-@given(seeds, st.integers(1, 5), st.booleans())
+@given(RNGS, st.integers(1, 5), st.booleans())
 def test_principal_axes_diagonalise(
     rng: np.random.Generator, size: int, has_equal_ones: bool
 ) -> None:
@@ -124,7 +129,7 @@ def decimal_arctangent(t: float) -> Decimal:
     return angle
 
 
-@given(seeds, st.integers(1, 7))
+@given(RNGS, st.integers(1, 7))
 def test_rows_have_the_norms_of_vectors(rng: np.random.Generator, size: int) -> None:
     """Each row's is that of the vector alone, bit for bit; a row divided by it has length 1."""
     rows, others = rng.normal(size=(2, 5, size))
@@ -141,7 +146,7 @@ def test_an_arctangent_is_right_up_to_its_last_places(t: float) -> None:
         assert error < 2 * Decimal(math.ulp(math.atan(t)))
 
 
-@given(seeds)
+@given(RNGS)
 def test_angles_in_all_quarters_are_the_c_librarys(rng: np.random.Generator) -> None:
     """Also along the axes, with zeros of either sign; NaN of what is not finite."""
     y, x = rng.normal(size=(2, 2, 3)) * 10.0 ** rng.uniform(-8, 8, (2, 2, 3))
@@ -154,7 +159,7 @@ def test_angles_in_all_quarters_are_the_c_librarys(rng: np.random.Generator) -> 
     assert np.isnan(arctan2([np.nan, np.inf, 1.0], [1.0, 1.0, -np.inf])).all()
 
 
-@given(seeds, st.sampled_from([None, 0.5 * np.pi, -0.5 * np.pi, 0.5 * np.pi - 1e-9]))
+@given(RNGS, st.sampled_from([None, 0.5 * np.pi, -0.5 * np.pi, 0.5 * np.pi - 1e-9]))
 def test_roll_pitch_and_yaw_are_scipys(rng: np.random.Generator, pitch: float | None) -> None:
     """There and back; where pitch is a right angle the yaw is 0."""
     rpy = rng.uniform(-np.pi, np.pi, 3) * [1.0, 0.49, 1.0]
@@ -176,3 +181,109 @@ def test_right_angles_are_exact() -> None:
     np.testing.assert_array_equal(sines, [[0, 1, 0], [-1, 0, 1], [0, -1, 0]])
     np.testing.assert_array_equal(cosines, [[1, 0, -1], [0, 1, 0], [-1, 0, 1]])
     assert exact_sines_cosines(1e-9)[0] == 1e-9
+
+
+def positive(rng: np.random.Generator, size: int) -> Array:
+    """A symmetric positive definite matrix with rows of very different size, as of a robot."""
+    root = rng.normal(size=(size, size))
+    scale = 10.0 ** rng.uniform(-2.0, 2.0, size)
+    matrix: Array = scale[:, None] * (root @ root.T + np.eye(size)) * scale
+    return 0.5 * (matrix + matrix.T)
+
+
+@given(RNGS, st.integers(1, 10))
+def test_factor_and_solution_are_those_of_numpy(rng: np.random.Generator, size: int) -> None:
+    """The upper triangles are neither read nor written, and the matrix stays."""
+    matrix, right = positive(rng, size), rng.normal(size=size)
+    spoiled = np.tril(matrix) + np.triu(np.full((size, size), np.nan), 1)
+    kept, factor = spoiled.copy(), np.full((size, size), np.nan)
+    cholesky_into(spoiled, 0, factor)
+    np.testing.assert_array_equal(spoiled, kept)
+    assert np.isnan(factor[np.triu_indices(size, 1)]).all()
+    lower = np.tril(np.nan_to_num(factor))
+    scale = np.sqrt(np.diag(matrix))
+    units = scale[:, None]
+    np.testing.assert_allclose(lower / units, np.linalg.cholesky(matrix) / units, atol=1e-12)
+    solution = right.copy()
+    solve_cholesky(factor, solution)
+    # rows and columns scaled to a diagonal of ones, as the condition number then says
+    correlation = matrix / np.outer(scale, scale)
+    error = scale * (solution - np.linalg.solve(matrix, right))
+    condition = np.linalg.cond(correlation)
+    size_of = np.abs(scale * solution).max()
+    assert np.abs(error).max() <= 1e-14 * size * condition * (size_of + np.abs(right / scale).max())
+
+
+@given(RNGS, st.integers(1, 7))
+def test_a_block_of_a_matrix_is_solved_in_place(rng: np.random.Generator, size: int) -> None:
+    """As for the joints' part of an inertia and of an acceleration."""
+    matrix, right = positive(rng, size + 3), rng.normal(size=size + 3)
+    factor, whole = np.zeros((size, size)), right.copy()
+    cholesky_into(matrix, 3, factor)
+    solve_cholesky(factor, whole[3:])
+    np.testing.assert_array_equal(whole[:3], right[:3])
+    residual = matrix[3:, 3:] @ whole[3:] - right[3:]
+    size_of = np.abs(matrix[3:, 3:]) @ np.abs(whole[3:]) + np.abs(right[3:])
+    np.testing.assert_array_less(np.abs(residual), 1e-13 * size_of)
+
+
+def symmetric(rng: np.random.Generator, size: int) -> Array:
+    matrix = rng.normal(size=(size, size))
+    return matrix + matrix.T
+
+
+def definite(rng: np.random.Generator, size: int) -> Array:
+    root = rng.normal(size=(size, size))
+    return root @ root.T + 0.1 * np.eye(size)
+
+
+def root_of(matrix: Array) -> Array:
+    """Cholesky's factor."""
+    return np.asarray(np.linalg.cholesky(matrix), np.float64)
+
+
+@given(RNGS, st.integers(1, 8))
+def test_definite_matrices_have_positive_eigenvalues(rng: np.random.Generator, size: int) -> None:
+    matrix = symmetric(rng, size) + rng.uniform(0.0, 8.0) * np.eye(size)
+    expected = np.linalg.eigvalsh(matrix)[0] > 0.0
+    assert bool(is_positive_definite(matrix.copy())) == expected
+
+
+@given(RNGS, st.integers(1, 8), st.sampled_from([1.0, -1.0]))
+def test_move_is_the_projection_onto_the_cone(
+    rng: np.random.Generator, size: int, side: float
+) -> None:
+    matrix, bound, metric = symmetric(rng, size), symmetric(rng, size), definite(rng, size)
+    values, vectors = scipy.linalg.eigh(side * (matrix - bound), metric)
+    along = metric @ vectors
+    expected = matrix + side * (along * np.maximum(-values, 0.0)) @ along.T
+    actual, root = matrix.copy(), root_of(metric)
+    work, axes = np.zeros((2, size, size))
+    move_to_side(actual, bound, side, root, work, axes)
+    scale = np.abs(expected).max() + np.abs(bound).max()
+    np.testing.assert_allclose(actual, expected, rtol=0, atol=1e-9 * scale)
+    if values[0] > 0.0:
+        np.testing.assert_array_equal(actual, matrix)
+
+
+@given(st.integers(2, 40), st.integers(1, 5), st.integers(0, 2**31 - 1))
+@settings(deadline=None)
+def test_clamped_splines_are_scipys(knots: int, size: int, seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    times = np.cumsum(rng.uniform(0.05, 1.0, knots))
+    values, ends = rng.normal(size=(knots, size)), rng.normal(size=(2, size))
+    ours = CubicSpline(times, values, *ends)
+    theirs = interpolate.CubicSpline(times, values, bc_type=((1, ends[0]), (1, ends[1])))
+    at = np.sort(rng.uniform(times[0], times[-1], 50))
+    rows = ours.at(at)
+    for order in range(3):
+        expected = theirs(at, order)
+        scale = max(1.0, float(np.max(np.abs(expected))))
+        np.testing.assert_allclose(rows[:, order], expected, rtol=0.0, atol=1e-10 * scale)
+
+
+def test_outside_its_times_a_spline_rests_at_the_nearer_end() -> None:
+    spline = CubicSpline(np.array([1.0, 2.0]), np.array([[1.0], [3.0]]), 1.0, 1.0)
+    np.testing.assert_array_equal(
+        spline.at(np.array([0.0, 5.0]))[:, :, 0], [[1.0, 0.0, 0.0], [3.0, 0.0, 0.0]]
+    )

@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from itertools import product
-
 import numpy as np
 import pytest
-from actuator_sets import PYRAMID, flat, hardware, random_thrusters
-from allocation_bench import AllocationBench
+from benches import WHEEL_AXES as PYRAMID
+from benches import flat, hardware, random_thrusters
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.optimize import linprog
-from scipy.spatial import ConvexHull
+from strategies import SEEDS
 
 from space_robot_model.hardware.capability import (
     ThrusterTorques,
@@ -21,8 +19,6 @@ from space_robot_model.hardware.capability import (
     wheel_shares,
 )
 
-SEEDS = st.integers(0, 2**32 - 1)
-
 
 def test_three_wheels_have_their_own_limits_on_the_axes() -> None:
     wheels = {"axes": flat(np.eye(3)), "max_torque": [1.0, 2.0, 3.0], "max_momentum": [4.0, 5.0, 0]}
@@ -30,11 +26,6 @@ def test_three_wheels_have_their_own_limits_on_the_axes() -> None:
     np.testing.assert_allclose(largest_torque(found), [1.0, 2.0, 3.0])
     np.testing.assert_allclose(largest_momentum(found.wheels), [4.0, 5.0, np.inf])
     np.testing.assert_allclose(wheel_shares(found.wheels), np.eye(3), atol=1e-15)
-
-
-def test_a_pyramid_adds_up_along_all_axes() -> None:
-    found = hardware(wheels={"axes": PYRAMID, "max_torque": [0.2]})
-    np.testing.assert_allclose(largest_torque(found), 4.0 * 0.2 / np.sqrt(3.0))
 
 
 def test_thrusters_help_wheels() -> None:
@@ -54,19 +45,6 @@ def test_thrusters_help_wheels() -> None:
     assert largest_torque(hardware(wheels=wheels, thrusters=both))[0] == pytest.approx(11.0)
 
 
-@settings(deadline=None)
-@given(SEEDS)
-def test_the_share_of_thrusters_is_the_zonotopes(seed: int) -> None:
-    """All of 2^6 corners of what three pairs can give span the same body."""
-    rng = np.random.default_rng(seed)
-    thrusters = random_thrusters(rng, 3).thrusters
-    corners = np.array([*product((0.0, 1.0), repeat=6)]) @ thrusters.torques
-    body = ConvexHull(corners).equations
-    wanted = rng.normal(size=(20, 3)) * np.linalg.norm(thrusters.torques, axis=1).mean()
-    share = np.max(wanted @ (-body[:, :3] / body[:, 3:]).T, axis=1)
-    np.testing.assert_allclose(ThrusterTorques.of(thrusters).share(wanted), share, rtol=1e-6)
-
-
 @settings(deadline=None, max_examples=30)
 @given(SEEDS, st.integers(3, 12))
 def test_the_least_propellant_is_the_linear_programmes(seed: int, count: int) -> None:
@@ -82,42 +60,6 @@ def test_the_least_propellant_is_the_linear_programmes(seed: int, count: int) ->
         solved = linprog(rates, A_eq=torques.T, b_eq=torque, bounds=(0.0, None))
         assert rate == pytest.approx(solved.fun, rel=1e-6)
     assert ThrusterTorques.of(thrusters).propellant(np.zeros((1, 3))) == 0.0
-
-
-def test_a_torque_at_the_edge_is_the_whole_share() -> None:
-    """A pair of 10 N on levers of 1 m gives 20 N m, for 2 / (I_sp g_0) kg/s a newton."""
-    thrusters = hardware(
-        thrusters={
-            "positions": flat([sign * axis for axis in np.eye(3) for sign in (1, -1, 1, -1)]),
-            "directions": flat(
-                [sign * np.roll(axis, 1) for axis in np.eye(3) for sign in (1, -1, -1, 1)]
-            ),
-            "force": [10.0],
-            "specific_impulse": [200.0],
-        }
-    ).thrusters
-    found = ThrusterTorques.of(thrusters)
-    torque = np.vstack([20.0 * np.eye(3), -10.0 * np.eye(3), 20.0 * np.ones((1, 3))])
-    np.testing.assert_allclose(found.share(torque), [1.0, 1.0, 1.0, 0.5, 0.5, 0.5, 1.0])
-    rate = 20.0 / (200.0 * 9.80665)
-    np.testing.assert_allclose(
-        found.propellant(torque), rate * np.array([1.0, 1.0, 1.0, 0.5, 0.5, 0.5, 3.0])
-    )
-
-
-@given(st.integers(0, 2**32 - 1), st.integers(3, 8))
-def test_wheels_share_as_the_allocation_does(seed: int, count: int) -> None:
-    """Motors of unequal torques: `allocate` by least squares, and what sizing says of them."""
-    rng = np.random.default_rng(seed)
-    most, demand = rng.uniform(0.1, 5.0, count), rng.normal(size=3) * 1e-3
-    bench = AllocationBench(
-        rng.normal(size=(count, 3)), null_gain=0.0, wheels={"max_torque": most.tolist()}
-    )
-    bench.step(demand)
-    shares = wheel_shares(
-        hardware(wheels={"axes": flat(bench.axes), "max_torque": most.tolist()}).wheels
-    )
-    np.testing.assert_allclose(-shares @ demand, bench.command, rtol=1e-6, atol=1e-12)
 
 
 def test_wheels_turn_their_momentum_with_the_base() -> None:
@@ -184,3 +126,16 @@ def test_wheels_without_a_limit_are_asked_for_no_share() -> None:
     load = actuator_load(found, np.ones((2, 3)), np.ones((2, 3)), np.zeros((2, 3)))
     np.testing.assert_array_equal(load.torque_share, 0.0)
     np.testing.assert_array_equal(load.momentum_share, 0.0)
+
+
+@given(SEEDS, st.integers(3, 8))
+def test_wheels_share_a_torque_by_least_squares_of_what_each_can_give(
+    seed: int, count: int
+) -> None:
+    """``W A^T (A W A^T)^-1`` with the squares of the motors' torques as weights W."""
+    rng = np.random.default_rng(seed)
+    most, axes = rng.uniform(0.1, 5.0, count), rng.normal(size=(count, 3))
+    found = hardware(wheels={"axes": flat(axes), "max_torque": most.tolist()}).wheels
+    weighted = found.unit_axes.T * most**2
+    expected = weighted.T @ np.linalg.inv(weighted @ found.unit_axes)
+    np.testing.assert_allclose(wheel_shares(found), expected, rtol=1e-7, atol=1e-9)

@@ -1,25 +1,66 @@
-"""A robot by its name or its files, and where its mission and its gains are."""
+"""A robot by its name or its files; its mission and gains; a trajectory or a start in a file."""
 
 from __future__ import annotations
 
+import json
+import math
+import re
 import shutil
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import pytest
-from paths import CONFIG
+import yaml
+from hypothesis import given
+from hypothesis import strategies as st
+from paths import CONFIG, DATA
 
 from space_robot.flight.plan import Flight, FlightPlan, resolve
 from space_robot_control.controller.gains import gain_files
 from space_robot_control.controller.settings import ControllerNodeSettings, set_file
 from space_robot_control.laws import laws
+from space_robot_model.robot.choice import RobotChoice, split_choice, with_choice
 from space_robot_model.robot.find import (
     find_robot,
     mission_file,
+    new_command,
     robot_as_path,
     robot_files,
     robot_names,
 )
+from space_robot_model.robot.mission_document import mission_layer
+from space_robot_msgs_py.config.trees import Tree
 from space_robot_msgs_py.errors import InputError
+
+ARM = str(DATA / "arm.urdf")
+LINKS = st.one_of(st.none(), st.text(min_size=1).filter(lambda text: text.isprintable()))
+
+
+@given(
+    name=st.sampled_from(["my.urdf", "a b/c?d.urdf", "what?.xacro", "mine/", "x?base=.urdf"]),
+    base=LINKS,
+    repair=st.booleans(),
+)
+def test_it_is_taken_apart_again(name: str, base: str | None, repair: bool) -> None:
+    assert split_choice(with_choice(name, base, repair)) == RobotChoice(name, base, repair)
+
+
+@given(st.text())
+def test_any_text_is_a_name(text: str) -> None:
+    assert text.startswith(split_choice(text).name)
+
+
+@pytest.mark.parametrize(
+    ("name", "base"), [(ARM, "hull"), (f"{ARM}?base=fore", "fore"), (f"{ARM}?repair", "hull")]
+)
+def test_a_robot_is_found_by_it(name: str, base: str) -> None:
+    assert find_robot(name).mass[0] == {"hull": 300.0, "fore": 10.0}[base]
+    assert robot_files(name).name == "arm"
+    assert robot_as_path(name) == name
+
+
+def test_what_makes_a_mission() -> None:
+    assert new_command(f"{ARM}?base=fore&repair").endswith("arm.urdf --base fore --repair")
 
 
 @pytest.fixture
@@ -64,13 +105,6 @@ def test_a_folder_is_known_by_its_bare_name_on_the_command_line_alone(
     assert robot_as_path("paper") == "paper", "a shipped one comes first"
 
 
-def test_the_description_tells_all_of_a_robot_that_is_not_shipped(folder: Path) -> None:
-    said = Flight(resolve(FlightPlan(robot=str(folder), duration=0.1))).description
-    assert said["robot_file"]["robot"]["base"]["mass"] == 420.0
-    assert said["parameters"]["plant"]["initial_joints_deg"][1] == 30.0
-    assert said["parameters"]["mission"]["waypoint_times"] == [0.0, 12.0, 30.0]
-
-
 def test_what_is_not_there_is_said_in_one_line(
     folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -105,3 +139,87 @@ def test_gains_need_no_sets(folder: Path) -> None:
     (folder / "flat").rename(folder / "gains")
     assert set(gain_files(f"{folder}/", "default")) == set(laws())
     assert set_file(f"{folder}/", "default") == [folder / "gains/controller.yaml"]
+
+
+REFUSALS = yaml.safe_load((DATA / "refusals/robots.yaml").read_text("utf-8"))
+HEADER = "time,joint1,joint2,joint3,joint4,joint5,joint6"
+ROWS = ("0,0.1,2.0,3.8,0.0,-0.2,0.0", "1,0.15,2.0,3.8,0.0,-0.2,0.0", "2,0.2,2.0,3.8,0.0,-0.2,0.0")
+
+
+def written(path: Path, *lines: str) -> Path:
+    path.write_text("\n".join(lines) + "\n")
+    return path
+
+
+def test_it_starts_at_the_first_row(tmp_path: Path) -> None:
+    path = written(tmp_path / "my.csv", HEADER, *ROWS)
+    of_plant, of_mission = (mission_layer(path, node, "paper") for node in ("plant", "mission"))
+    start = [math.degrees(angle) for angle in (0.1, 2.0, 3.8, 0.0, -0.2, 0.0)]
+    assert of_plant["initial_joints_deg"] == pytest.approx(start)
+    assert of_plant["initial_quaternion"] == [1.0, 0.0, 0.0, 0.0]
+    (segment,) = of_mission["segments"]
+    assert json.loads(segment)["trajectory"]["joint1"] == [0.1, 0.15, 0.2]
+
+
+def test_joints_that_slide_are_in_metres_and_the_base_has_its_attitude(tmp_path: Path) -> None:
+    boom = find_robot("boom")
+    names = ",".join(boom.joint_names[: boom.n])
+    values = [0.1 * (joint + 1) for joint in range(boom.n)]
+    row = ",".join(f"{value}" for value in values)
+    path = written(
+        tmp_path / "my.csv", f"time,{names},q_w,q_x,q_y,q_z", f"0,{row},0,1,0,0", f"1,{row},0,1,0,0"
+    )
+    layer = mission_layer(path, "plant", "boom")
+    wanted = [
+        value if slides else math.degrees(value)
+        for value, slides in zip(values, boom.is_prismatic, strict=False)
+    ]
+    assert any(boom.is_prismatic[: boom.n])
+    assert layer["initial_joints_deg"] == pytest.approx(wanted)
+    assert layer["initial_quaternion"] == [0.0, 1.0, 0.0, 0.0]
+
+
+@pytest.mark.parametrize(("lines", "said"), REFUSALS["trajectories"])
+def test_wrong_files_are_named(tmp_path: Path, lines: list[str], said: str) -> None:
+    path = written(tmp_path / "my.csv", *lines)
+    with pytest.raises(InputError, match=said) as error:
+        mission_layer(path, "mission", "paper")
+    assert str(path) in str(error.value)
+
+
+def test_a_robot_without_file_is_refused(tmp_path: Path) -> None:
+    path = written(tmp_path / "my.csv", HEADER, *ROWS)
+    with pytest.raises(InputError, match="robot with a file or name"):
+        mission_layer(path, "mission", "given")
+
+
+def layers(start: str) -> tuple[Tree, Tree]:
+    """Return the parameters of plant and mission of a document with a start."""
+    with TemporaryDirectory() as folder:
+        text = f"mission: {{start: {{joints_deg: [0, 0], {start}}}, segments: [{{hold: 1}}]}}"
+        path = written(Path(folder) / "my.yaml", text)
+        plant, mission = (mission_layer(path, node, "paper") for node in ("plant", "mission"))
+        return plant, mission
+
+
+def test_a_start_may_have_a_rate_and_then_needs_no_attitude() -> None:
+    plant, mission = layers("base: {rate_deg_s: [0, 0.5, -1]}")
+    assert plant["initial_rate_deg_s"] == mission["base_rate_deg_s"] == [0.0, 0.5, -1.0]
+    assert plant["initial_quaternion"] == mission["base_quaternion"] == [1.0, 0.0, 0.0, 0.0]
+    plant, mission = layers("base: {rpy_deg: [0, 0, 180]}")
+    assert not {"initial_rate_deg_s", "base_rate_deg_s"} & {*plant, *mission}
+    assert abs(plant["initial_quaternion"][3]) == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize("base", ["nadir", "{point: nadir}"])
+def test_the_attitude_of_a_start_that_points_follows_from_the_orbit(base: str) -> None:
+    plant, mission = layers(f"base: {base}")
+    assert set(plant) == {"initial_joints_deg"}
+    assert json.loads(mission["base_point"]) == {"point": "nadir"}
+    assert "base_quaternion" not in mission
+
+
+@pytest.mark.parametrize(("base", "said"), REFUSALS["starts"])
+def test_a_wrong_start_is_refused(base: str, said: str) -> None:
+    with pytest.raises(InputError, match=re.escape(said)):
+        layers(f"base: {base}")

@@ -1,21 +1,30 @@
-"""Momentum of whole flights against Pinocchio's, and what any momentum must fulfil."""
+"""Momentum and inertia of robots, of motors behind gears too, against Pinocchio."""
 
 from __future__ import annotations
 
 import numpy as np
 import pinocchio as pin
 import pytest
-from conservation import momentum
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from oracles import pinocchio_model, pinocchio_state, rotation_of
-from random_robots import random_robot, random_state
+from oracles.rotors import RotorEquations, pinocchio_momentum, random_motor_rotors
+from robots import oscillator
+from strategies import (
+    SEEDS,
+    random_bodies,
+    random_gears,
+    random_quaternion,
+    random_robot,
+    random_state,
+    with_gears,
+)
 
 from space_robot_model.robot import Robot
+from space_robot_model.robot.frames import body_frames
+from space_robot_model.robot.gears import flexible_model, geared_joints, motor_momentum, rotor_rows
 from space_robot_model.robot.momentum import Motion, robot_momentum
-from space_robot_msgs_py.samples import RobotState
-
-SEEDS = st.integers(0, 2**32 - 1)
+from space_robot_model.robot.tree import Gear
 
 
 def motion_of(states: list) -> Motion:
@@ -65,22 +74,76 @@ def test_of_a_rigid_body_it_is_inertia_times_rate(paper_robot: Robot) -> None:
     np.testing.assert_allclose(faster, 2.0 * inertia, rtol=1e-13)
 
 
-def test_it_is_that_of_a_single_state(paper_robot: Robot) -> None:
-    """The plant's own momentum is about the inertial origin: less what its CoM carries."""
-    rng = np.random.default_rng(3)
-    state = random_state(rng, 6)
-    motion = motion_of([state])
-    single = RobotState.allocate(6)
-    single.quaternion[:], single.omega_base[:] = state.quaternion, motion.omega_base[0]
-    single.joint_positions[:], single.joint_velocities[:] = state.theta, state.rate
-    single.base_position[:], single.base_velocity[:] = rng.normal(size=3), state.v0
-    found = robot_momentum(paper_robot, motion)
-    linear, angular = momentum(paper_robot, single)
-    about_com = angular - np.cross(single.base_position + found.centre_of_mass[0], linear)
-    np.testing.assert_allclose(found.angular[0], about_com, rtol=1e-10, atol=1e-9)
-
-
 def test_wrong_shapes_are_named(paper_robot: Robot) -> None:
     still = Motion(np.zeros((2, 4)), np.zeros((2, 3)), np.zeros((2, 6)), np.zeros((2, 5)))
     with pytest.raises(ValueError, match=r"joint_velocities: shape \(2, 6\)"):
         robot_momentum(paper_robot, still)
+
+
+TREE = ("revolute", "passive revolute", "prismatic", "revolute", "fixed", "passive prismatic")
+
+
+def tree(seed: int) -> tuple[Robot, np.random.Generator]:
+    rng = np.random.default_rng(seed)
+    return random_gears(rng, Robot.of_tree("tree", random_bodies(rng, TREE))), rng
+
+
+@given(SEEDS)
+@settings(max_examples=40)
+def test_couplings_of_rotors_are_those_of_the_inertia_matrix(seed: int) -> None:
+    """In any attitude and posture; and all of it at rest upright."""
+    robot, rng = tree(seed)
+    equations, n = RotorEquations(robot, random_motor_rotors(rng, robot)), robot.joint_count
+    quaternion, theta = random_quaternion(rng), rng.uniform(-3.0, 3.0, n)
+    expected, _ = equations.matrices(quaternion, theta, np.zeros(equations.size))
+    upright, _ = equations.matrices(np.eye(4)[0], theta, np.zeros(equations.size))
+    size = 1e-12 * np.abs(expected).max()
+    model = flexible_model(robot, theta)
+    np.testing.assert_allclose(model.inertia, upright, rtol=0.0, atol=size)
+    axes = rotation_of(quaternion).as_matrix().T[:, :, np.newaxis]
+    frames = body_frames(robot, (axes[0], axes[1], axes[2]), theta[:, np.newaxis])
+    rows, reflected = rotor_rows(robot, {frame.body: frame for frame in frames})
+    np.testing.assert_allclose(
+        rows, expected[6 + n :, : 6 + n], rtol=0.0, atol=1e-12 * np.abs(rows).max()
+    )
+    np.testing.assert_allclose(
+        np.diag(reflected), expected[6 + n :, 6 + n :], rtol=0.0, atol=1e-12 * reflected.max()
+    )
+
+
+@given(SEEDS)
+@settings(max_examples=30)
+def test_robot_and_motors_have_the_momentum_of_all_bodies(seed: int) -> None:
+    """By Pinocchio, about the common centre of mass."""
+    robot, rng = tree(seed)
+    rotors, state = random_motor_rotors(rng, robot), random_state(rng, robot.joint_count)
+    speeds = 10.0 * rng.normal(size=len(rotors))
+    _, expected = pinocchio_momentum(robot, rotors, state, speeds)
+    quaternion, theta = state.quaternion[None], state.theta[None]
+    omega = rotation_of(state.quaternion).inv().apply(state.w0)
+    motion = Motion(quaternion, omega[None], theta, state.rate[None])
+    motors = motor_momentum(robot, quaternion, theta, speeds[None])
+    actual = (robot_momentum(robot, motion).angular + motors)[0]
+    np.testing.assert_allclose(actual, expected, rtol=0.0, atol=1e-12 * np.abs(expected).max())
+
+
+@pytest.mark.parametrize("damping", [0.0, 0.4, 1e4])
+def test_the_fastest_motion_is_the_two_masses(damping: float) -> None:
+    """Absolute roots of ``s^2 + (1/B + 1/I) (D s + K)``."""
+    gear, link = Gear(2e-5, 100.0, 150.0, damping), 0.5
+    lighter = 1.0 / gear.reflected_inertia + 1.0 / link
+    roots = np.roots([1.0, lighter * damping, lighter * gear.stiffness])
+    fastest = flexible_model(oscillator(gear, link), np.zeros(1)).fastest
+    assert fastest == pytest.approx(np.abs(roots).max(), rel=1e-9)
+
+
+def test_stiffness_stands_between_joint_and_motor() -> None:
+    rng = np.random.default_rng(3)
+    robot = with_gears(
+        random_robot(rng, 3), [Gear(1e-3, 10.0, 7.0, 2.0), None, Gear(1e-3, 5.0, 9.0)]
+    )
+    assert geared_joints(robot) == [0, 2]
+    model, stretch = flexible_model(robot, np.zeros(3)), np.zeros((2, 11))
+    stretch[0, [6, 9]] = stretch[1, [8, 10]] = -1.0, 1.0
+    for matrix, values in ((model.stiffness, [7.0, 9.0]), (model.damping, [2.0, 0.0])):
+        np.testing.assert_array_equal(matrix, stretch.T @ np.diag(values) @ stretch)

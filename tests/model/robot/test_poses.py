@@ -1,4 +1,4 @@
-"""The poses that /tf tells, put together along the tree, are those of Pinocchio."""
+"""Frames, tools and their Jacobians are where Pinocchio has them, whoever asks for them."""
 
 from __future__ import annotations
 
@@ -6,65 +6,213 @@ import itertools
 
 import numpy as np
 import pinocchio as pin
-from hypothesis import given
+import pytest
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
-from oracles import rotation_of
-from random_robots import random_quaternion
-from random_trees import BASE, KINDS, random_bodies
-from tree_oracle import TreeOracle, pinocchio_tree
+from oracles import TreeOracle, assert_close, pinocchio_tree, rotation_of
+from scipy.spatial.transform import Rotation
+from strategies import BASE, SEEDS, TREES, random_bodies, random_quaternion, random_rotation
 
 from space_robot_model.robot import Robot
+from space_robot_model.robot.base_axes import base_axes
+from space_robot_model.robot.find import find_robot
+from space_robot_model.robot.frame_names import frame_names
+from space_robot_model.robot.frames import body_frames
+from space_robot_model.robot.kinematics import (
+    manipulability,
+    reaction_null_space,
+    tool_jacobian,
+    tool_state,
+)
 from space_robot_model.robot.poses import RobotPoses, tool_poses
+from space_robot_model.robot.tool import tool_pose
+from space_robot_model.robot.transforms import joint_transforms, tool_transforms, wxyz
+from space_robot_model.robot.tree import Body
+from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.samples import RobotState
 from space_robot_msgs_py.topics import INERTIAL_FRAME
 
 Array = NDArray[np.float64]
+UPRIGHT = [1.0, 0.0, 0.0, 0.0]
 
 
-def placement(pose: Array) -> pin.SE3:
-    return pin.XYZQUATToSE3(pose)
+def placed(oracle: TreeOracle, quaternion: Array, theta: Array) -> dict[str, pin.SE3]:
+    """Pinocchio's frames by their names, the base's CoM at the origin."""
+    model, data, step = oracle.model, oracle.data, np.zeros(oracle.model.nv)
+    step[oracle.columns] = theta
+    q = pin.integrate(model, pin.neutral(model), step)
+    q[3:7] = rotation_of(quaternion).as_quat()
+    pin.framesForwardKinematics(model, data, q)
+    com = data.oMf[oracle.frame].translation
+    return {
+        frame.name: pin.SE3(place.rotation, place.translation - com)
+        for frame, place in zip(model.frames, data.oMf, strict=True)
+    }
 
 
-@given(seed=st.integers(0, 2**32 - 2), kinds=st.lists(st.sampled_from(KINDS), max_size=9))
-def test_tools_are_where_pinocchio_has_them(seed: int, kinds: list[str]) -> None:
-    """By every joint, prismatic and passive ones too; one state after the other."""
+def assert_same_place(here: pin.SE3, there: pin.SE3) -> None:
+    np.testing.assert_allclose(here.homogeneous, there.homogeneous, atol=1e-11)
+
+
+@settings(max_examples=60)
+@given(seed=SEEDS, kinds=TREES)
+def test_bodies_and_tools_are_where_pinocchio_has_them(seed: int, kinds: list[str]) -> None:
+    """For a state of a flight, for tf, and for all ticks of a log; merged bodies too."""
     rng = np.random.default_rng(seed)
-    bodies = random_bodies(rng, ["revolute", *kinds])
-    robot, model = Robot.of_tree("tree", bodies), pinocchio_tree(bodies)
-    oracle, poses = TreeOracle(model, BASE, robot.all_joint_names, seed), RobotPoses(robot)
-    state, passive = RobotState.allocate(robot.n), robot.joint_count - robot.n
+    bodies = random_bodies(rng, kinds)
+    robot, ticks = Robot.of_tree("tree", bodies), 3
+    oracle = TreeOracle(pinocchio_tree(bodies), BASE, robot.all_joint_names, seed)
+    quaternion = np.array([random_quaternion(rng) for _ in range(ticks)])
+    theta = rng.uniform(-4.0, 4.0, (ticks, robot.joint_count))
+    frames = {f.body: f for f in body_frames(robot, base_axes(quaternion.T), theta.T)}
+    transforms = joint_transforms(robot, theta)
+    rotation, position = tool_pose(robot, quaternion, theta)
+    poses, state = RobotPoses(robot), RobotState.allocate(robot.n)
     tool_frames, on_bodies = tool_poses(robot)
-    for _ in range(2):
-        theta = rng.uniform(-4.0, 4.0, robot.joint_count)
-        state.joint_positions[:], state.passive_positions[:passive] = (
-            theta[: robot.n],
-            theta[robot.n :],
-        )
-        state.base_position[:], state.quaternion[:] = rng.normal(size=3), random_quaternion(rng)
-        where = {INERTIAL_FRAME: pin.SE3.Identity()}
+    assert sorted(frames) == list(range(robot.joint_count + 1))
+    assert [(t.parent, t.child) for t in transforms] == list(poses.frames[1:])
+    for k in range(ticks):
+        there = placed(oracle, quaternion[k], theta[k])
+        passive = robot.joint_count - robot.n
+        state.joint_positions[:], state.passive_positions[:passive] = np.split(theta[k], [robot.n])
+        state.base_position[:], state.quaternion[:] = rng.normal(size=3), quaternion[k]
+        where = {INERTIAL_FRAME: pin.SE3(np.eye(3), -state.base_position)}
         for (parent, child), pose in zip(poses.frames, poses.at(state), strict=True):
-            where[child] = where[parent] * placement(pose)
-        step = np.zeros(model.nv)
-        step[oracle.columns] = theta
-        q = pin.integrate(model, pin.neutral(model), step)
-        q[3:7] = rotation_of(state.quaternion).as_quat()
-        pin.framesForwardKinematics(model, oracle.data, q)
-        shift = state.base_position - oracle.data.oMf[oracle.frame].translation
+            where[child] = where[parent] * pin.XYZQUATToSE3(pose)
+        by_tf = {transforms[0].parent: where[transforms[0].parent]} if transforms else {}
+        for t in transforms:
+            at, turn = (part[min(k, len(part) - 1)] for part in (t.position, t.quaternion))
+            by_tf[t.child] = by_tf[t.parent] * pin.SE3(rotation_of(turn).as_matrix(), at)
+        for name, body in zip(frame_names(robot).bodies, robot.body_names, strict=True):
+            assert_same_place(by_tf[name], where[name])
+            joint = next(b.joint for b in bodies if b.name == body)
+            if joint and joint.kind != "fixed":
+                frame = frames[robot.body_names.index(body)]
+                axis = there[body].rotation @ joint.axis
+                np.testing.assert_allclose(frame.z[:, k], axis, atol=1e-13)
+        own = {body.tools[0].name: (body.name, body.tools[0]) for body in bodies}
         for tool, (parent, _), pose in zip(robot.tools, tool_frames, on_bodies, strict=True):
-            (body,) = (body for body in bodies if body.tools[0].name == tool.name)
-            own = body.tools[0]
-            frame = oracle.data.oMf[model.getFrameId(body.name, pin.FrameType.BODY)]
-            there, here = (
-                frame * pin.SE3(own.rotation, own.position),
-                where[parent] * placement(pose),
-            )
-            np.testing.assert_allclose(here.translation, there.translation + shift, atol=1e-11)
-            np.testing.assert_allclose(here.rotation, there.rotation, atol=1e-12)
+            name, local = own[tool.name]
+            expected = there[name] * pin.SE3(local.rotation, local.position)
+            frame = frames[tool.body]
+            axes = np.array([frame.x[:, k], frame.y[:, k], frame.z[:, k]]).T
+            origin = (frame.origin + frame.on_outer_axes(tool.position))[:, k]
+            assert_same_place(pin.SE3(axes @ tool.rotation, origin), expected)
+            assert_same_place(where[parent] * pin.XYZQUATToSE3(pose), expected)
+            if tool is robot.tool:
+                assert_same_place(pin.SE3(rotation[k], position[k]), expected)
+    for tool, link in zip(robot.tools, tool_transforms(robot), strict=True):
+        assert link.child == frame_names(robot).tools[robot.tools.index(tool)]
+        np.testing.assert_array_equal(link.position, [tool.position])
+        turn = rotation_of(link.quaternion[0]).as_matrix()
+        np.testing.assert_allclose(turn, tool.rotation, atol=1e-15)
 
 
-def test_frames_are_a_chain_from_the_inertial_one(paper_robot: Robot) -> None:
-    frames = RobotPoses(paper_robot).frames
+def test_frames_are_a_chain_and_what_does_not_change_is_told_once(paper_robot: Robot) -> None:
     names = [INERTIAL_FRAME, "base_link", *(f"link{i}" for i in range(1, 7))]
-    assert list(frames) == list(itertools.pairwise(names))
+    assert list(RobotPoses(paper_robot).frames) == list(itertools.pairwise(names))
     assert tool_poses(paper_robot)[0] == (("link6", "tool"),)
+    for transform in joint_transforms(paper_robot, np.zeros((7, 6))):
+        assert (transform.position.shape, transform.quaternion.shape) == ((1, 3), (7, 4))
+
+
+@given(SEEDS)
+def test_quaternions_are_scipys(seed: int) -> None:
+    """Half turns, where a plain formula divides by zero, among them."""
+    turn = random_rotation(np.random.default_rng(seed))
+    found, there = wxyz(turn), Rotation.from_matrix(turn).as_quat()[[3, 0, 1, 2]]
+    np.testing.assert_allclose(found * np.sign(found @ there), there, atol=1e-15)
+
+
+def test_of_many_ticks_each_tool_is_that_of_its_own(paper_robot: Robot) -> None:
+    rng = np.random.default_rng(3)
+    quaternion = np.array([random_quaternion(rng) for _ in range(10_000)])
+    theta = rng.uniform(-np.pi, np.pi, (10_000, 6))
+    rotation, position = tool_pose(paper_robot, quaternion, theta)
+    for k in (0, 8191, 8192, 9_999):
+        alone = tool_pose(paper_robot, quaternion[k : k + 1], theta[k : k + 1])
+        np.testing.assert_array_equal(rotation[k], alone[0][0])
+        np.testing.assert_array_equal(position[k], alone[1][0])
+    with pytest.raises(ValueError, match=r"\(N, 6\).*\(2, 5\)"):
+        tool_pose(paper_robot, np.ones((2, 4)), np.ones((2, 5)))
+
+
+class ToolOracle(TreeOracle):
+    """Pinocchio's motion of a tree with zero momenta, and of one of its tools."""
+
+    def __init__(self, robot: Robot, bodies: list[Body], tool: str, seed: int) -> None:
+        super().__init__(pinocchio_tree(bodies), BASE, robot.all_joint_names, seed)
+        name = tool.removeprefix("tool of ")
+        frame = next(body for body in bodies if body.name == name).tools[0]
+        carrier = self.model.frames[self.model.getFrameId(name, pin.FrameType.BODY)]
+        at = carrier.placement * pin.SE3(frame.rotation, frame.position)
+        self.tool = self.model.addFrame(
+            pin.Frame(tool, carrier.parentJoint, at, pin.FrameType.OP_FRAME)
+        )
+        self.data = self.model.createData()
+        pin.framesForwardKinematics(self.model, self.data, self.q)
+        self.map = pin.computeCentroidalMap(self.model, self.data, self.q).copy()
+
+    def jacobian_of(self, attitude: str) -> Array:
+        """Twist of the tool by joint velocities: the base moves as the momenta ask for."""
+        base, joints = self.map[:, :6], self.map[:, self.columns]
+        if attitude == "held":  # Pinocchio's base velocity is linear first
+            base, joints = base[:3, :3], joints[:3]
+        velocity = np.zeros((self.model.nv, len(self.columns)))
+        velocity[self.columns] = np.eye(len(self.columns))
+        velocity[: len(base)] = -np.linalg.solve(base, joints)
+        rows: Array = pin.computeFrameJacobian(
+            self.model, self.data, self.q, self.tool, pin.LOCAL_WORLD_ALIGNED
+        )
+        return rows @ velocity
+
+
+@settings(max_examples=50)
+@given(TREES, st.integers(0, 2**31 - 1))
+def test_jacobians_of_all_tools_are_pinocchios_at_zero_momentum(
+    kinds: list[str], seed: int
+) -> None:
+    bodies = random_bodies(np.random.default_rng(seed), kinds)
+    robot = Robot.of_tree("tree", bodies)
+    for tool in robot.tools:
+        oracle = ToolOracle(robot, bodies, tool.name, seed)
+        posture = oracle.attitude(), oracle.positions
+        state, place = tool_state(robot, *posture, tool.name), oracle.data.oMf[oracle.tool]
+        com = pin.centerOfMass(oracle.model, oracle.data, oracle.q)
+        assert_same_place(pin.SE3(state.rotation, state.position + com), place)
+        for attitude in ("held", "free"):
+            ours = tool_jacobian(robot, *posture, attitude, tool.name)
+            assert_close(ours, oracle.jacobian_of(attitude), 1e-11)
+        of_base, of_joints = oracle.map[:, :3], oracle.map[:, oracle.columns]
+        coupling = of_joints[3:] - of_base[3:] @ np.linalg.solve(of_base[:3], of_joints[:3])
+        assert_close(state.coupling, coupling, 1e-10)
+
+
+def test_the_base_moves_the_whole_as_a_rigid_body_and_a_null_space_does_not_move_it() -> None:
+    robot = find_robot("seven_joint")
+    posture = UPRIGHT, np.linspace(-1.0, 1.0, robot.joint_count)
+    state, omega = tool_state(robot, *posture), np.array([0.1, -0.2, 0.3])
+    twist = state.attitude @ omega  # the whole turns about its centre of mass
+    np.testing.assert_allclose(twist[:3], np.cross(omega, state.position), atol=1e-14)
+    np.testing.assert_allclose(twist[3:], omega)
+    basis = reaction_null_space(robot, *posture)
+    assert basis.shape == (7, 4)
+    np.testing.assert_allclose(basis.T @ basis, np.eye(4), atol=1e-12)
+    scale = float(np.max(np.abs(state.coupling)))
+    np.testing.assert_allclose(state.coupling @ basis, 0.0, atol=1e-12 * scale)
+    np.testing.assert_allclose(state.free @ basis, state.held @ basis, atol=1e-12)
+
+
+def test_manipulability_is_the_product_of_the_singular_values() -> None:
+    jacobian = tool_jacobian(find_robot("paper"), UPRIGHT, np.full(6, 0.4), "free")
+    expected = np.prod(np.linalg.svd(jacobian, compute_uv=False))
+    assert manipulability(jacobian) == pytest.approx(expected, rel=1e-9)
+
+
+def test_unknown_names_are_refused_in_one_line() -> None:
+    robot = find_robot("paper")
+    with pytest.raises(InputError, match="unknown attitude 'led'"):
+        tool_jacobian(robot, UPRIGHT, np.zeros(6), "led")  # type: ignore[arg-type]
+    with pytest.raises(InputError, match=r"'hand': choose one of .*; `tools: \[\.\.\.\]` in"):
+        tool_state(robot, UPRIGHT, np.zeros(6), "hand")

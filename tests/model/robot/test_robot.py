@@ -1,22 +1,32 @@
-"""Robot files: what is read, and what every error says."""
+"""Robot files: what is read, what every error says, and a robot's own numbers as a file again."""
 
 from __future__ import annotations
 
-import copy
-from collections.abc import Callable
+import json
+from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pinocchio as pin
 import pytest
 import yaml
-from random_robots import random_robot_file
+from hypothesis import given
+from hypothesis import strategies as st
+from oracles import TreeOracle, assert_same_dynamics
+from paths import CONFIG, DATA
 from scipy.spatial.transform import Rotation
+from strategies import random_bodies, random_robot, random_robot_file
 
 from space_robot_model.robot import Robot
-from space_robot_msgs_py.errors import InputError, SpaceRobotError
+from space_robot_model.robot.file import MOST_LINKS
+from space_robot_model.robot.find import find_robot
+from space_robot_model.robot.source import document_of
+from space_robot_model.robot.tree.bodies import JointLimits
+from space_robot_msgs_py.config.validation import read_yaml
+from space_robot_msgs_py.errors import InputError
 
-Edit = Callable[[dict[str, Any]], None]
+REFUSALS = yaml.safe_load((DATA / "refusals/robots.yaml").read_text("utf-8"))
 
 
 @pytest.fixture
@@ -84,16 +94,6 @@ def test_model_is_exact_at_right_angles(paper_robot: Robot) -> None:
     np.testing.assert_array_equal(rotation[:4, 7], np.sin(twists))
 
 
-def test_with_last_link_changes_that_link_only(paper_robot: Robot) -> None:
-    loaded = paper_robot.with_last_link(10.0, [1.2, 0.6, 1.0, 0.1, 0.0, 0.0])
-    np.testing.assert_array_equal(loaded.mass, [750, 20, 35, 20, 10, 20, 10])
-    np.testing.assert_array_equal(loaded.inertia[6], [[1.2, 0.1, 0], [0.1, 0.6, 0], [0, 0, 1]])
-    np.testing.assert_array_equal(loaded.inertia[:6], paper_robot.inertia[:6])
-    np.testing.assert_array_equal(loaded.com, paper_robot.com)
-    assert paper_robot.mass[6] == 5.0
-    assert paper_robot.inertia[6, 0, 0] == 0.8
-
-
 def test_triangle_inequality_admits_a_flat_plate(content: dict[str, Any]) -> None:
     """Izz = Ixx + Iyy holds with equality there, whatever axes it is given on."""
     axes = Rotation.from_euler("xyz", [0.3, 1.1, -0.7]).as_matrix()
@@ -101,130 +101,6 @@ def test_triangle_inequality_admits_a_flat_plate(content: dict[str, Any]) -> Non
     plate = [t[0, 0], t[1, 1], t[2, 2], t[0, 1], t[0, 2], t[1, 2]]
     content["robot"]["base"]["inertia"] = [float(value) for value in plate]
     assert Robot.from_dict(content).n == 3
-
-
-def in_base(key: str, value: Any) -> Edit:
-    return lambda content: content["robot"]["base"].__setitem__(key, value)
-
-
-def in_link(index: int, key: str, value: Any) -> Edit:
-    return lambda content: content["robot"]["links"][index].__setitem__(key, value)
-
-
-def without(*keys: Any) -> Edit:
-    def edit(content: dict[str, Any]) -> None:
-        for key in keys[:-1]:
-            content = content[key]
-        del content[keys[-1]]
-
-    return edit
-
-
-FAULTS: dict[str, tuple[Edit, list[str]]] = {
-    "negative mass": (in_base("mass", -3.0), ["robot.base.mass", "-3.0", "greater than 0"]),
-    "massless link": (in_link(1, "mass", 0.0), ["robot.links.1.mass", "0.0", "greater than 0"]),
-    "mass is text": (in_base("mass", "heavy"), ["robot.base.mass", "'heavy'", "number"]),
-    "mass is NaN": (in_base("mass", float("nan")), ["robot.base.mass", "nan", "finite"]),
-    "mass is infinite": (in_base("mass", float("inf")), ["robot.base.mass", "inf", "finite"]),
-    "com has NaN": (in_link(0, "com", [0, float("nan"), 0]), ["robot.links.0.com.1", "nan"]),
-    "indefinite inertia": (
-        in_link(2, "inertia", [1.0, 1.0, 1.0, 2.0, 0.0, 0.0]),
-        ["robot.links.2.inertia", "[1.0, 1.0, 1.0, 2.0, 0.0, 0.0]", "positive definite", "-1"],
-    ),
-    "triangle inequality": (
-        in_base("inertia", [1.0, 1.0, 2.5, 0.0, 0.0, 0.0]),
-        ["robot.base.inertia", "triangle inequality", "1, 1, 2.5"],
-    ),
-    "triangle inequality on turned axes": (
-        in_base("inertia", [1.75, 1.75, 1.0, 0.75, 0.0, 0.0]),
-        ["robot.base.inertia", "triangle inequality", "1, 1, 2.5"],
-    ),
-    "inertia too short": (
-        in_base("inertia", [1.0, 1.0, 1.0]),
-        ["robot.base.inertia", "at least 6", "[1.0, 1.0, 1.0]"],
-    ),
-    "com too long": (
-        in_link(1, "com", [1.0, 2.0, 3.0, 4.0]),
-        ["robot.links.1.com", "at most 3", "[1.0, 2.0, 3.0, 4.0]"],
-    ),
-    "unknown key": (
-        in_link(0, "weight", 5.0),
-        ["robot.links.0.weight", "5.0", "unknown key", "choose one of a, alpha_deg, axis, com, d"],
-    ),
-    "missing key": (without("robot", "links", 1, "mass"), ["robot.links.1.mass", "required"]),
-    "no links": (
-        lambda content: content["robot"].__setitem__("links", []),
-        ["robot.links", "[]", "at least 1"],
-    ),
-    "no robot": (without("robot"), ["robot", "required"]),
-    "duplicate names": (
-        in_link(2, "name", "joint1"),
-        ["robot.links", "must differ", "'joint1' occurs twice"],
-    ),
-    "name of a base axis": (in_link(0, "name", "base_y"), ["robot.links", "'base_y'"]),
-    **{
-        f"{name!r} means something else": (
-            in_link(0, "name", name),
-            ["robot.links", f"joint {name!r} needs another name: it is {meaning}"],
-        )
-        for name, meaning in {
-            "*": "the pattern of all joints",
-            "2": "the number of a joint",
-            "all": "a group of axes",
-            "base": "the name of the base",
-            "time": "a column of trajectories",
-            "base_torque_z": "a column of disturbances",
-            "wheel_1": "the name of an actuator",
-            "joint2_rate": "the column of the rate of 'joint2'",
-        }.items()
-    },
-    "tool on no link": (
-        lambda content: content["robot"].__setitem__("tool", {"link": "join6"}),
-        ["robot.tool", "unknown link 'join6' of tool 0: choose one of base, joint1"],
-    ),
-    "one of several tools on no link": (
-        lambda content: content["robot"].update(tool=None, tools=[{}, {"name": "b", "link": "c"}]),
-        ["robot.tools", "unknown link 'c' of tool 1"],
-    ),
-    "tool and tools": (
-        lambda content: content["robot"].update(tool={}, tools=[{"name": "camera"}]),
-        ["robot.tools", "either tool or tools"],
-    ),
-    "two tools of a name": (
-        lambda content: content["robot"].update(tool=None, tools=[{}, {"link": "joint2"}]),
-        ["robot.tools", "tool names must differ, 'tool' occurs twice"],
-    ),
-    "empty name": (in_link(0, "name", ""), ["robot.links.0.name", "''", "at least 1"]),
-}
-
-
-@pytest.mark.parametrize("fault", FAULTS)
-def test_error_names_file_key_given_and_allowed(
-    fault: str, tmp_path: Path, content: dict[str, Any]
-) -> None:
-    edit, expected = FAULTS[fault]
-    faulty = copy.deepcopy(content)
-    edit(faulty)
-    text = error_of(write(tmp_path, faulty))
-    for part in expected:
-        assert part in text
-
-
-@pytest.mark.parametrize(
-    ("text", "expected"),
-    [
-        ("robot: {name: ]\n", ["line 1", "not YAML"]),
-        ("robot:\n  name: a\n base: 3\n", ["line 3", "not YAML"]),
-        ("- 1\n- 2\n", ["a mapping was expected", "list"]),
-        ("", ["a mapping was expected", "NoneType"]),
-    ],
-)
-def test_error_says_where_a_file_is_no_yaml_mapping(
-    text: str, expected: list[str], tmp_path: Path
-) -> None:
-    message = error_of(write(tmp_path, text))
-    for part in expected:
-        assert part in message
 
 
 def test_error_names_a_missing_file_and_an_unreadable_one(tmp_path: Path) -> None:
@@ -235,8 +111,172 @@ def test_error_names_a_missing_file_and_an_unreadable_one(tmp_path: Path) -> Non
     assert "cannot be read" in error_of(binary)
 
 
-def test_input_errors_are_project_errors_with_exit_code_2(tmp_path: Path) -> None:
-    with pytest.raises(SpaceRobotError) as caught:
-        Robot.from_yaml(tmp_path / "none.yaml")
-    assert caught.value.exit_code == 2
-    assert isinstance(caught.value, ValueError)
+SOME_KINDS = ("revolute", "prismatic", "fixed", "passive revolute", "passive prismatic", "revolute")
+
+
+def same(one: Robot, other: Robot) -> None:
+    for field in fields(Robot):
+        if field.name in ("repairs", "source"):
+            continue
+        a, b = getattr(one, field.name), getattr(other, field.name)
+        if isinstance(a, np.ndarray):
+            assert a.tobytes() == b.tobytes(), field.name
+        else:
+            assert repr(a) == repr(b), field.name
+
+
+@given(st.integers(0, 2**32 - 1))
+def test_trees_come_back_to_the_bit(seed: int) -> None:
+    bodies = [  # the tools in another order than their bodies
+        replace(body, tools=tuple(replace(tool, rank=-number) for tool in body.tools))
+        for number, body in enumerate(random_bodies(np.random.default_rng(seed), SOME_KINDS))
+    ]
+    tree = Robot.of_tree("tree", bodies)
+    for robot in (tree, tree.nominal, random_robot(np.random.default_rng(seed), 3)):
+        content = json.loads(json.dumps(robot.content))
+        again = Robot.from_dict(content)
+        same(robot, again)
+        assert again.model.tobytes() == robot.model.tobytes()
+        assert again.content == robot.content
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "said"), [("weight", 1.0, "weight: unknown key"), ("bodies", [], "bodies")]
+)
+def test_wrong_numbers_are_refused(paper_robot: Robot, key: str, value: Any, said: str) -> None:
+    content = paper_robot.content
+    content["robot"][key] = value
+    with pytest.raises(InputError) as caught:
+        Robot.from_dict(content)
+    assert said in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_robot_file_made_of_a_robot_has_its_limits(paper_robot: Robot) -> None:
+    limits = [
+        JointLimits(-1.0, 2.0, 0.5, 30.0),
+        JointLimits(),
+        JointLimits(effort=7.0),
+        JointLimits(velocity=0.25),
+        *paper_robot.limits[4:],
+    ]
+    robot = replace(paper_robot, limits=tuple(limits))
+    again = Robot.from_dict(json.loads(json.dumps(document_of(robot))))
+    for before, after in zip(robot.limits, again.limits, strict=True):
+        assert after == pytest.approx(before)
+
+
+def test_shapes_are_part_of_the_numbers() -> None:
+    """So drag and sunlight act on the same plates, whatever a robot is built from."""
+    robot = Robot.from_urdf(DATA / "arm.urdf")
+    assert {shape.shape for shape in robot.visuals} >= {"box", "cylinder", "sphere", "mesh"}
+    exact = Robot.from_dict(json.loads(json.dumps(robot.content)))
+    assert repr(exact.visuals) == repr(robot.visuals)
+    written = Robot.from_dict(yaml.safe_load(yaml.safe_dump(document_of(robot))))
+    for before, after in zip(robot.visuals, written.visuals, strict=True):
+        assert (after.shape, after.body, after.size) == (before.shape, before.body, before.size)
+        assert (after.mesh, after.colour) == (before.mesh, before.colour)
+        np.testing.assert_allclose(after.rotation, before.rotation, atol=1e-15)
+        np.testing.assert_allclose(after.position, before.position, atol=1e-15)
+
+
+MATTER = (
+    '<inertial><mass value="1"/>'
+    '<inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial>'
+)
+
+
+def urdf(links: int, kind: str, matter: str = MATTER) -> str:
+    """A chain."""
+    joints = "".join(
+        f'<link name="l{k}">{matter}</link><joint name="j{k}" type="{kind}"><parent link="l{k - 1}"'
+        f'/><child link="l{k}"/></joint>'
+        for k in range(1, links)
+    )
+    return f'<robot name="long"><link name="l0">{MATTER}</link>{joints}</robot>'
+
+
+def test_a_yaml_is_counted_before_its_links_are_compared() -> None:
+    link = {"mass": 1.0, "inertia": [1.0] * 3 + [0.0] * 3, "com": [0.0] * 3}
+    content: dict[str, Any] = {
+        "name": "long",
+        "base": {"mass": 1.0, "inertia": link["inertia"]},
+        "links": [{"name": f"j{k}", **link} for k in range(MOST_LINKS + 1)],
+    }
+    with pytest.raises(InputError, match="links: List should have at most 4000 items"):
+        Robot.from_dict({"robot": content})
+
+
+def edited(content: dict[str, Any], changes: dict[str, Any]) -> None:
+    for path, value in changes.items():
+        *way, last = ["robot", *filter(None, path.split("."))]
+        place: Any = content
+        for key in way:
+            place = place[int(key) if key.isdigit() else key]
+        if value is None:
+            del place[last]
+        else:
+            place[last] = value
+
+
+@pytest.mark.parametrize(("changes", "said"), REFUSALS["files"])
+def test_error_names_file_key_given_and_allowed(
+    changes: dict[str, Any], said: list[str], tmp_path: Path, content: dict[str, Any]
+) -> None:
+    edited(content, changes)
+    text = error_of(write(tmp_path, content))
+    assert all(part in text for part in said)
+
+
+@pytest.mark.parametrize(("text", "said"), REFUSALS["texts"])
+def test_error_says_where_a_file_is_no_yaml_mapping(
+    text: str, said: list[str], tmp_path: Path
+) -> None:
+    message = error_of(write(tmp_path, text))
+    assert all(part in message for part in said)
+
+
+Array = np.ndarray
+NAMES = ("canadarm", "canadarm2")
+
+
+def shipped(name: str) -> dict[str, Any]:
+    robot: dict[str, Any] = read_yaml(CONFIG / f"robots/{name}.yaml")["robot"]
+    return robot
+
+
+def inertia_matrix(numbers: list[float]) -> Array:
+    xx, yy, zz, xy, xz, yz = numbers
+    return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+
+
+def placement(origin: dict[str, list[float]]) -> pin.SE3:
+    turns = np.radians(origin.get("rpy_deg", [0.0, 0.0, 0.0]))
+    return pin.SE3(pin.rpy.rpyToMatrix(*turns), np.array(origin["xyz"]))
+
+
+def pinocchio_model(robot: dict[str, Any]) -> pin.Model:
+    """A chain on a free base; a fixed link belongs to what carries it."""
+    model = pin.Model()
+    carrier = model.addJoint(0, pin.JointModelFreeFlyer(), pin.SE3.Identity(), "root")
+    model.addBodyFrame("base", carrier, pin.SE3.Identity(), 0)
+    place = pin.SE3.Identity()
+    for link in [{**robot["base"], "com": [0.0, 0.0, 0.0]}, *robot["links"]]:
+        if "origin" in link:
+            place = place * placement(link["origin"])
+            if link.get("joint") != "fixed":
+                kind = pin.JointModelRevoluteUnaligned(np.array(link.get("axis", [0.0, 0.0, 1.0])))
+                carrier = model.addJoint(carrier, kind, place, link["name"])
+                place = pin.SE3.Identity()
+        inertia = pin.Inertia(link["mass"], np.array(link["com"]), inertia_matrix(link["inertia"]))
+        model.appendBodyToJoint(carrier, inertia, place)
+    return model
+
+
+@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("seed", range(5))
+def test_dynamics_are_pinocchios_of_the_same_file(name: str, seed: int) -> None:
+    robot = find_robot(name)
+    model = pinocchio_model(shipped(name))
+    oracle = TreeOracle(model, "base", robot.all_joint_names, seed)
+    assert_same_dynamics(robot, oracle, seed)

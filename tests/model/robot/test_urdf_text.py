@@ -13,27 +13,22 @@ import pinocchio as pin
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from numpy.typing import NDArray
-from oracles import quaternion_of
+from oracles import TreeOracle, assert_same_dynamics, quaternion_of
 from paths import DATA
-from random_trees import KINDS, random_bodies
 from scipy.spatial.transform import Rotation
-from tree_oracle import TreeOracle, assert_same_dynamics
+from strategies import KINDS, SEEDS, random_bodies
 
-from space_robot_model.elementary.rotations import rotation_of_rpy, rpy_of_rotation
 from space_robot_model.robot import Robot
 from space_robot_model.robot.find import find_robot, robot_names
 from space_robot_model.robot.frame_names import frame_names
 from space_robot_model.robot.shapes import shapes_of
 from space_robot_model.robot.transforms import joint_transforms, tool_transforms
-from space_robot_model.robot.tree import Body, Joint, JointFriction, JointLimits, Tool, Visual
+from space_robot_model.robot.tree import Body, Joint, JointLimits, Tool, Visual
 from space_robot_model.robot.urdf_text import urdf_text
 from space_robot_msgs_py.topics import INERTIAL_FRAME
 
-Array = NDArray[np.float64]
-SEEDS = st.integers(0, 2**32 - 2)
 ROBOTS = [*robot_names(), str(DATA / "arm.urdf")]
-TREES = st.lists(st.sampled_from(KINDS), max_size=9)
+SOME_TREES = st.lists(st.sampled_from(KINDS), max_size=9)
 
 
 def random_tree(seed: int, kinds: list[str]) -> Robot:
@@ -113,7 +108,7 @@ def assert_frames_of_transforms(robot: Robot, oracle: TreeOracle) -> None:
 
 
 @settings(max_examples=40)
-@given(seed=SEEDS, kinds=TREES)
+@given(seed=SEEDS, kinds=SOME_TREES)
 def test_random_trees(seed: int, kinds: list[str]) -> None:
     """Branches, prismatic and passive joints, tools on all bodies, limits in part."""
     robot = random_tree(seed, kinds)
@@ -260,30 +255,3 @@ def test_meshes_are_told_by_addresses(tmp_path: Path) -> None:
     ]
     found = Robot.from_dict({"robot": {"urdf_text": text}})
     assert [shape.mesh for shape in found.visuals] == [str(mesh), "package://gone/b.dae"]
-
-
-def test_friction_and_damping() -> None:
-    """A joint that does not tell its friction has none in the text; springs tell their damping."""
-    robot = find_robot("flexible_panels")
-    own = (JointFriction(0.2, 0.7), *robot.friction[1:])
-    root = ElementTree.fromstring(urdf_text(replace(robot, friction=own)))
-    told = {
-        joint.attrib["name"]: element.attrib
-        for joint in root.iter("joint")
-        for element in joint.iter("dynamics")
-    }
-    dampings = {
-        name: str(spring.damping)
-        for name, spring in zip(robot.passive_names, robot.springs, strict=True)
-    }
-    assert told.pop(robot.joint_names[0]) == {"damping": "0.7", "friction": "0.2"}
-    assert {name: attributes["damping"] for name, attributes in told.items()} == dampings
-
-
-@given(seed=SEEDS, pitch=st.floats(-9.0, -1.0), there=st.sampled_from([-1.0, 1.0]))
-def test_angles_beside_gimbal_lock(seed: int, pitch: float, there: float) -> None:
-    """Roll and yaw are uncertain there, but together they are the turn."""
-    rng = np.random.default_rng(seed)
-    near = there * (0.5 * np.pi - 10.0**pitch)
-    turn = Rotation.from_euler("xyz", (rng.uniform(-3, 3), near, rng.uniform(-3, 3))).as_matrix()
-    np.testing.assert_allclose(rotation_of_rpy(rpy_of_rotation(turn)), turn, atol=1e-14)

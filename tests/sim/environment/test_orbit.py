@@ -1,7 +1,9 @@
-"""Orbits of the plant, air, light and magnetic field at a place, against formulas written out."""
+"""What acts in orbit: gravity's gradient, light, magnetic field, drag and sunlight on plates."""
 
 from __future__ import annotations
 
+from decimal import localcontext
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -9,33 +11,44 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import ArrayLike, NDArray
-from orbiting_robots import (
+from oracles.orbit import (
+    DIGITS,
     EARTH_RADIUS,
     EARTH_RATE,
-    KEPLER,
+    J2,
     MU,
-    coast,
+    body_motions,
+    body_places,
+    centre_of_mass,
+    exact,
+    exact_gravity,
+    free_path,
     mean_motion,
-    orbiting_plant,
-    rigid_robot,
-    set_motion,
-    set_orbit,
+    plus,
+    whole_momenta,
 )
+from paths import CONFIG
+from robots import MOTORS, NO_FRICTION, coast, orbiting_plant, rigid_robot, set_motion, set_orbit
 from scipy.spatial.transform import Rotation
+from strategies import random_quaternion, random_robot_file
 
-from space_robot_sim.environment.orbit import Orbit, density_at, magnetic_field
+from space_robot_model.dynamics.model import Data
+from space_robot_model.robot import Robot
+from space_robot_msgs_py.errors import InputError
+from space_robot_msgs_py.samples import RobotState
+from space_robot_sim.environment.gravity_gradient import add_gravity_gradient
+from space_robot_sim.environment.orbit import Orbit, magnetic_field
+from space_robot_sim.environment.orbit_file import orbit_layers, read_orbit
 from space_robot_sim.environment.orbit_settings import OrbitSettings
 from space_robot_sim.plant.plant import Plant
 
 Array = NDArray[np.float64]
-
 ROBOT = rigid_robot(
     20.0,
     [1.0, 1.0, 1.0],
     plates=[{"area": 2.0, "normal": [0.0, 0.0, side]} for side in (1.0, -1.0)],
 )
 """With a disk that the Sun shines on wherever it is, but in the disk's plane."""
-ANGLE = st.floats(-360.0, 360.0)
 FIELD = {"strength": 2.98e-5, "tilt_deg": 9.41, "pole_deg": -72.68}
 
 
@@ -45,56 +58,11 @@ def orbit_of(**groups: Any) -> Orbit:
     return Orbit.build(6, OrbitSettings.model_validate({**elements, **groups}))
 
 
-@pytest.mark.parametrize("e", [0.0, 0.3, 0.7])
-def test_an_orbit_returns_after_its_period_with_its_energy(e: float) -> None:
-    """``2 pi sqrt(a^3 / mu)`` and ``-mu / (2 a)``; the integrator's steps are those of an orbit."""
-    a = (EARTH_RADIUS + 300e3) / (1.0 - e)
-    elements = {"height": a - EARTH_RADIUS, "eccentricity": e, "inclination_deg": 30.0}
-    ticks = round(6000.0 / (1.0 - e) ** 1.5)
-    period = 2.0 * np.pi / mean_motion(a) / ticks
-    plant = orbiting_plant(ROBOT, period, orbital_elements=elements)
-    start = plant.truth.copy()
-    energies = []
-    for _ in range(10):
-        state = coast(plant, ticks // 10)
-        v, r = state.orbit_velocity, state.orbit_position
-        energies.append(0.5 * v @ v - MU / np.linalg.norm(r))
-    np.testing.assert_allclose(energies, -0.5 * MU / a, rtol=1e-11)
-    state = coast(plant, ticks - plant.tick)
-    np.testing.assert_allclose(state.orbit_position, start.orbit_position, rtol=0, atol=1e-2)
-    np.testing.assert_allclose(state.orbit_velocity, start.orbit_velocity, rtol=0, atol=1e-5)
-
-
-@settings(max_examples=60)
-@given(st.floats(100e3, 4e7), st.floats(10e3, 300e3))
-def test_density_is_exponential(height: float, scale: float) -> None:
-    air = {"density": 3.725e-12, "at_height": 400e3, "scale_height": scale}
-    expected = 3.725e-12 * np.exp(-(height - 400e3) / scale)
-    assert density_at(orbit_of(atmosphere=air), EARTH_RADIUS + height) == pytest.approx(
-        expected, rel=1e-12, abs=1e-300
-    )
-
-
 def field(position: ArrayLike, time: float = 0.0, **magnetism: float) -> Array:
     """Return the field (3,) at a place, T."""
     out = np.empty(3)
     magnetic_field(orbit_of(magnetism={**FIELD, **magnetism}), np.array(position), time, out)
     return out
-
-
-def test_an_upright_dipole_at_equator_and_poles() -> None:
-    """North at the equator, into the ground at the north pole and twice as strong there."""
-    strength, r = 2.98e-5, EARTH_RADIUS
-    upright = {"tilt_deg": 0.0}
-    np.testing.assert_allclose(field([r, 0.0, 0.0], **upright), [0.0, 0.0, strength], atol=1e-20)
-    np.testing.assert_allclose(field([0.0, r, 0.0], **upright), [0.0, 0.0, strength], atol=1e-20)
-    for side in (r, -r):
-        np.testing.assert_allclose(
-            field([0.0, 0.0, side], **upright), [0.0, 0.0, -2.0 * strength], atol=1e-20
-        )
-    np.testing.assert_allclose(
-        field([2.0 * r, 0.0, 0.0], **upright), [0.0, 0.0, strength / 8.0], atol=1e-20
-    )
 
 
 def test_the_field_is_the_dipole_of_the_geomagnetic_reference_field() -> None:
@@ -167,26 +135,271 @@ def test_the_shadow_begins_where_the_earths_cylinder_is(beta: float) -> None:
     assert sunlit(a, 0.0, beta_angle_deg=beta)
 
 
-def test_there_is_no_shadow_where_the_sun_stands_high_above_the_orbit() -> None:
-    a = EARTH_RADIUS + 700e3
-    limit = np.degrees(np.arcsin(EARTH_RADIUS / a))
-    assert sunlit(a, np.pi, beta_angle_deg=limit + 1e-6)
-    assert not sunlit(a, np.pi, beta_angle_deg=limit - 1e-6)
+SHIPPED = sorted((CONFIG / "orbits").glob("*.yaml"))
 
 
-def air_speed(plant: Plant) -> Array:
-    """Return the velocity against the air at the present tick, m/s."""
-    return np.array(plant.memory.environment.orbit.wind)
+@pytest.mark.parametrize("path", SHIPPED, ids=lambda path: path.stem)
+def test_shipped_orbits_stay_above_the_air_that_would_stop_them(path: Path) -> None:
+    orbit = read_orbit(path)
+    assert orbit.has_orbit == (path.stem != "none")
+    if orbit.has_orbit:
+        elements = orbit.orbital_elements
+        perigee = elements.semi_major_axis * (1.0 - elements.eccentricity) - 6378137.0
+        assert perigee > 200e3
+    else:
+        assert orbit == OrbitSettings()
 
 
-def test_the_air_turns_with_the_earth() -> None:
-    """``V + v - w x (R + d)`` of the base's centre of mass."""
-    air = {"density": 1e-12}
-    elements = {"height": 400e3, "inclination_deg": 60.0, "anomaly_deg": 77.0}
-    plant = orbiting_plant(ROBOT, 1.0, orbital_elements=elements, atmosphere=air, gravity=KEPLER)
-    place, motion = np.array([50.0, -80.0, 20.0]), np.array([3.0, 2.0, -1.0])
-    set_motion(plant, position=place, velocity=motion)
-    state = plant.truth
-    turning = np.cross([0.0, 0.0, EARTH_RATE], state.orbit_position + place)
-    expected = state.orbit_velocity + motion - turning
-    np.testing.assert_allclose(air_speed(plant), expected, rtol=0, atol=1e-11)
+def test_no_file_is_read_without_an_orbit() -> None:
+    """So a resolved scenario flies where there are no files."""
+    assert orbit_layers("none") == orbit_layers("given") == []
+    assert [path.stem for path in orbit_layers("iss")] == ["iss"]
+
+
+@pytest.mark.parametrize("section", ["/**", "plant_node", "/plant_node", "/**/plant_node"])
+def test_sections_are_those_that_ros_would_apply(section: str, tmp_path: Path) -> None:
+    path = tmp_path / "mine.yaml"
+    text = "{ros__parameters: {orbital_elements.height: 5.0e5, sunlight: {pressure: 4.56e-6}}}"
+    path.write_text(f"{section}: {text}\n")
+    orbit = read_orbit(path)
+    assert orbit.orbital_elements.height == 5e5
+    assert orbit.sunlight.pressure == 4.56e-6
+
+
+def test_settings_without_an_orbit_are_refused_by_their_key() -> None:
+    OrbitSettings().check_orbit("here")
+    with pytest.raises(InputError, match=r"^here: magnetism: without an orbit"):
+        OrbitSettings.model_validate({"magnetism": {"strength": 3e-5}}).check_orbit("here")
+
+
+POINT = rigid_robot(2.0, [1.0, 1.0, 1.0])
+DIRECTION = st.tuples(*[st.floats(-1.0, 1.0)] * 3).filter(lambda d: np.linalg.norm(d) > 0.1)
+HEIGHTS = st.floats(200e3, 4e7)
+DISTANCES = st.floats(-3.0, 5.0).map(lambda power: 10.0**power)
+FEW = settings(max_examples=200)
+
+
+def vector(direction: tuple[float, ...], length: float) -> Array:
+    """Return a vector (3,) of that length."""
+    return np.asarray(length * np.array(direction) / np.linalg.norm(direction))
+
+
+def exact_difference(r: Array, d: Array, has_j2: bool) -> Array:
+    """Return ``g(r + d) - g(r)``, rounded at the end."""
+    with localcontext() as context:
+        context.prec = DIGITS
+        at = exact(r)
+        end, begin = exact_gravity(plus(at, exact(d)), has_j2), exact_gravity(at, has_j2)
+        return np.array([float(a - b) for a, b in zip(end, begin, strict=True)])
+
+
+def difference(r: Array, d: Array, has_j2: bool) -> Array:
+    """Return the same by the kernel, as the force on a body without extent over its mass."""
+    data = Data.allocate(POINT.n)
+    data.first_moment[:], data.inertia[:], data.bias[:] = 0.0, 0.0, 0.0
+    add_gravity_gradient(POINT.model, r, d, float(has_j2), data)
+    np.testing.assert_array_equal(data.bias[0, :3], np.zeros(3))
+    return np.asarray(-data.bias[0, 3:] / POINT.model.mass[0])
+
+
+@FEW
+@given(DIRECTION, HEIGHTS, DIRECTION, DISTANCES, st.booleans())
+def test_gravity_difference_loses_no_digits(
+    direction: tuple[float, ...],
+    height: float,
+    aside: tuple[float, ...],
+    distance: float,
+    has_j2: bool,
+) -> None:
+    """Between 1 mm and 100 km from the point, relative to ``mu d / r^3``."""
+    r, d = vector(direction, EARTH_RADIUS + height), vector(aside, distance)
+    size = MU * distance / (EARTH_RADIUS + height) ** 3
+    expected = exact_difference(r, d, has_j2)
+    np.testing.assert_allclose(difference(r, d, has_j2), expected, rtol=0, atol=1e-14 * size)
+
+
+def node_of(position: Array, velocity: Array) -> float:
+    """Return the right ascension of the ascending node, rad."""
+    normal = np.cross(position, velocity)
+    return float(np.arctan2(normal[0], -normal[1]))
+
+
+@pytest.mark.parametrize("inclination_deg", [51.64, 98.19])
+def test_j2_turns_the_node_at_the_secular_rate(inclination_deg: float) -> None:
+    """``-3/2 n J2 (R_E / a)^2 cos i`` over eight orbits, to the next order, which is J2 itself.
+
+    There, a is the mean semi-major axis: at a node, that of the elements is larger by
+    ``3/2 J2 R_E^2 / a sin^2 i`` (Brouwer 1959). Beside it, the same orbit by SciPy.
+    """
+    a, inclination = EARTH_RADIUS + 700e3, np.radians(inclination_deg)
+    elements = {"height": 700e3, "inclination_deg": inclination_deg, "raan_deg": 40.0}
+    period = 2.0
+    plant = orbiting_plant(
+        POINT, period, orbital_elements=elements, gravity={"gradient": False, "j2": True}
+    )
+    start = np.concatenate([plant.truth.orbit_position, plant.truth.orbit_velocity])
+    nodes = []  # at the ascending nodes, where what J2 does within an orbit is the same
+    state, z = plant.truth, 0.0
+    while len(nodes) < 9:
+        before, z = z, coast(plant, 1).orbit_position[2]
+        if before < 0.0 <= z:
+            nodes.append((plant.tick * period, node_of(state.orbit_position, state.orbit_velocity)))
+    (first, node), (last, end) = nodes[0], nodes[-1]
+    rate = (end - node) / (last - first)
+    mean = a - 1.5 * J2 * EARTH_RADIUS**2 / a * np.sin(inclination) ** 2
+    secular = -1.5 * mean_motion(mean) * J2 * (EARTH_RADIUS / mean) ** 2 * np.cos(inclination)
+    assert rate == pytest.approx(secular, rel=2.0 * J2)
+
+    (expected,) = free_path(start[:3], start[3:], last, has_j2=True)
+    flown = np.concatenate([state.orbit_position, state.orbit_velocity])
+    np.testing.assert_allclose(flown[:3], expected[:3], rtol=0, atol=1e-3)
+    np.testing.assert_allclose(flown[3:], expected[3:], rtol=0, atol=1e-6)
+
+
+PERIOD = 0.1
+NO_GRAVITY = {"gradient": False, "j2": False}
+ELEMENTS = {"height": 400e3, "inclination_deg": 51.6, "raan_deg": 20.0, "anomaly_deg": 33.0}
+DENSITY, PRESSURE = 3e-12, 4.56e-6
+AIR = {"density": DENSITY, "at_height": 400e3, "scale_height": 58.5e3}
+SUN = {"pressure": PRESSURE, "beta_angle_deg": 30.0, "noon_deg": 40.0}
+
+
+def plates_of_box(edges: tuple[float, float, float], link: str, **shares: float) -> list[Any]:
+    """Return the six sides of a box at a link's origin, as a robot's file has them."""
+    sides = []
+    for axis in range(3):
+        area = edges[axis - 1] * edges[axis - 2]
+        for side in (1.0, -1.0):
+            normal = [0.0] * 3
+            normal[axis] = side
+            centre = [0.5 * edges[axis] * x + 0.1 for x in normal]
+            sides.append({"link": link, "area": area, "normal": normal, "centre": centre, **shares})
+    return sides
+
+
+def box_robot(seed: int, **shares: float) -> Robot:
+    """Return an arm of six joints whose base and links are boxes."""
+    rng = np.random.default_rng(seed)
+    content = random_robot_file(rng, MOTORS)
+    names = ["base", *(f"joint{k + 1}" for k in range(MOTORS))]
+    content["robot"]["plates"] = [
+        plate
+        for name in names
+        for plate in plates_of_box(tuple(rng.uniform(0.1, 2.0, 3)), name, **shares)
+    ]
+    return Robot.from_dict(content)
+
+
+def flying(robot: Robot, seed: int, **options: Any) -> Plant:
+    """Return a plant in any posture and motion, the boxes in wind and light."""
+    rng = np.random.default_rng(seed)
+    usual = {"orbital_elements": ELEMENTS, "gravity": NO_GRAVITY, "friction": NO_FRICTION}
+    plant = orbiting_plant(
+        robot,
+        PERIOD,
+        initial_quaternion=random_quaternion(rng).tolist(),
+        initial_joints_deg=rng.uniform(-180.0, 180.0, robot.n).tolist(),
+        **{**usual, **options},
+    )
+    omega, rates = 0.01 * rng.normal(size=3), 0.01 * rng.normal(size=robot.n)
+    set_motion(plant, 10.0 * rng.normal(size=3), rng.normal(size=3), omega, rates)
+    return plant
+
+
+def wind_of(state: RobotState) -> Array:
+    """Return the velocity of the base against the air, m/s."""
+    place = state.orbit_position + state.base_position
+    return np.asarray(
+        state.orbit_velocity + state.base_velocity - np.cross([0.0, 0.0, EARTH_RATE], place)
+    )
+
+
+def density_of(state: RobotState) -> float:
+    """Return the density of `AIR`, kg/m3."""
+    height = np.linalg.norm(state.orbit_position + state.base_position) - EARTH_RADIUS
+    return float(DENSITY * np.exp(-(height - 400e3) / 58.5e3))
+
+
+def sun() -> Array:
+    """Return the direction of the Sun of `SUN`, by rotation matrices."""
+    plane = (ELEMENTS["raan_deg"], ELEMENTS["inclination_deg"], SUN["noon_deg"])
+    beta = np.radians(SUN["beta_angle_deg"])
+    turn = Rotation.from_euler("ZXZ", plane, degrees=True)
+    return np.asarray(turn.apply([np.cos(beta), 0.0, np.sin(beta)]))
+
+
+def wrenches(robot: Robot, state: RobotState) -> tuple[Array, Array, Array, Array]:
+    """Return force and moment about the orbit's point of drag, then of sunlight."""
+    v, s = wind_of(state), sun()
+    speed = float(np.linalg.norm(v))
+    u = v / speed
+    drag, light = np.zeros((2, 3)), np.zeros((2, 3))
+    places = body_places(robot, state)
+    for plate in robot.plates:
+        axes, origin = places[plate.body]
+        n, at = axes @ plate.normal, origin + axes @ plate.centre
+        if n @ u > 0.0:
+            pull = 0.5 * density_of(state) * speed**2 * plate.drag_coefficient * plate.area
+            force = -pull * (n @ u) * u
+            drag += force, np.cross(at, force)
+        cosine = n @ s
+        if cosine > 0.0:
+            absorbed = 1.0 - plate.specular - plate.diffuse
+            force = absorbed * -s  # what comes is kept
+            force += plate.specular * -2.0 * cosine * n  # it is turned back at the same angle
+            force += plate.diffuse * -(s + 2.0 / 3.0 * n)  # it goes out as from a Lambert surface
+            force *= PRESSURE * plate.area * cosine
+            light += force, np.cross(at, force)
+    return drag[0], drag[1], light[0], light[1]
+
+
+@settings(max_examples=25)
+@given(st.integers(0, 10**6), st.sampled_from([(0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (0.3, 0.5)]))
+def test_wrenches_on_boxes_agree_with_the_formulas(seed: int, shares: tuple[float, float]) -> None:
+    """Of any posture; absorbed, specular and diffuse light, and between them."""
+    specular, diffuse = shares
+    robot = box_robot(seed, specular=specular, diffuse=diffuse, drag_coefficient=2.1)
+    plant = flying(robot, seed, atmosphere=AIR, sunlight=SUN)
+    state, surfaces = plant.truth, plant.memory.environment.surfaces
+    drag, drag_moment, light, light_moment = wrenches(robot, state)
+    for wrench, force, moment in (
+        (surfaces.drag, drag, drag_moment),
+        (surfaces.sunlight, light, light_moment),
+    ):
+        size = np.linalg.norm(force)
+        assert size > 1e-6
+        about_base = moment - np.cross(state.base_position, force)
+        np.testing.assert_allclose(wrench[3:], force, rtol=0, atol=1e-11 * size)
+        np.testing.assert_allclose(wrench[:3], about_base, rtol=0, atol=1e-10 * size)
+    com = centre_of_mass(robot, state)
+    reported = state.external_torques.reshape(4, 3)
+    for torque, force, moment in (
+        (reported[1], drag, drag_moment),
+        (reported[2], light, light_moment),
+    ):
+        size = np.linalg.norm(force)
+        np.testing.assert_allclose(torque, moment - np.cross(com, force), rtol=0, atol=1e-10 * size)
+
+
+def test_momentum_is_what_air_and_light_give() -> None:
+    """``F T`` and ``M T`` about the orbit's point, summed over the ticks, of an arm that moves."""
+    robot = box_robot(3)
+    plant = flying(robot, 3, atmosphere={**AIR, "density": 1e-10}, sunlight=SUN)
+
+    linear, angular = whole_momenta(body_motions(robot, plant.truth))
+    impulse, turn = np.zeros(3), np.zeros(3)
+    surfaces = plant.memory.environment.surfaces
+    for _ in range(200):
+        wrench = surfaces.drag + surfaces.sunlight
+        # the base moves by velocity times half a tick while the moment about it is held
+        middle = plant.truth.base_position + 0.5 * PERIOD * plant.truth.base_velocity
+        impulse += PERIOD * wrench[3:]
+        turn += PERIOD * (wrench[:3] + np.cross(middle, wrench[3:]))
+        coast(plant, 1)
+    end, end_angular = whole_momenta(body_motions(robot, plant.truth))
+    size = np.linalg.norm(impulse)
+    assert size > 1e-2
+    np.testing.assert_allclose(end - linear, impulse, rtol=0, atol=1e-8 * size)
+    np.testing.assert_allclose(
+        end_angular - angular, turn, rtol=0, atol=1e-8 * np.linalg.norm(turn)
+    )

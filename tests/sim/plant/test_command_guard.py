@@ -1,4 +1,4 @@
-"""The command in force: whatever comes, only a finite, timely one acts, and not for ever."""
+"""The command in force, and what passes between plant and controller in a tick."""
 
 from __future__ import annotations
 
@@ -7,10 +7,20 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
+from space_robot_model.robot import Robot
+from space_robot_msgs_py.samples import RobotNames, RobotState, Timebase
+from space_robot_msgs_py.wire.codecs import StateCodec
 from space_robot_sim.plant.command_guard import CommandGuard
+from space_robot_sim.plant.faults import FaultSettings
+from space_robot_sim.plant.messages import (
+    NONE,
+    FaultyExchange,
+    PlantMessages,
+    SentState,
+    exchange_of,
+)
 
 AXES, HOLD = 3, 10
-
 torques = st.lists(st.floats(width=64), min_size=AXES, max_size=AXES)
 """NaN, infinities and the largest numbers among them."""
 arrivals = st.lists(
@@ -54,24 +64,17 @@ def test_what_acts_is_the_newest_good_command_while_it_is_young(
     assert guard.refused.total() + len(good) - 1 == offered
 
 
-def test_a_command_is_held_and_then_none_acts() -> None:
-    guard = CommandGuard(AXES, HOLD)
-    assert offer(guard, 7, 7, 1.5)
-    torques = [guard.act(7 + held).torque[0] for held in range(HOLD + 5)]
-    assert torques == [1.5] * (HOLD + 1) + [0.0] * 4
-    assert offer(guard, 30, 30, 2.5)  # and back
-    assert guard.act(30).torque[0] == 2.5
-    assert not guard.is_safe
-
-
 def test_a_late_command_acts_only_for_what_is_left_of_its_time() -> None:
-    """One that comes after all of it does not bring the torque back."""
+    """One that comes after all of it does not bring the torque back; the next one does."""
     guard = CommandGuard(AXES, HOLD)
     assert offer(guard, 8, 0, 1.0)
     assert [guard.act(now).torque[0] for now in (8, HOLD, HOLD + 1)] == [1.0, 1.0, 0.0]
     assert offer(guard, 100, 50, 2.0)
     assert guard.act(100).torque[0] == 0.0
     assert guard.held_ticks(100) == 50
+    assert offer(guard, 130, 130, 2.5)
+    assert guard.act(130).torque[0] == 2.5
+    assert not guard.is_safe
 
 
 @pytest.mark.parametrize(
@@ -96,13 +99,6 @@ def test_a_refused_command_is_counted_and_changes_nothing(
     assert guard.answered == 5
 
 
-def test_unreadable_commands_are_counted() -> None:
-    guard = CommandGuard(AXES, HOLD)
-    guard.refuse("names")
-    guard.refuse("names")
-    assert guard.refused == {"names": 2}
-
-
 def test_released_there_is_no_torque_until_a_new_command() -> None:
     guard = CommandGuard(AXES, HOLD)
     assert offer(guard, 0, 0, 1.0)
@@ -112,8 +108,85 @@ def test_released_there_is_no_torque_until_a_new_command() -> None:
     assert guard.act(1).torque.all()
 
 
-def test_before_the_first_command_there_is_no_torque() -> None:
-    guard = CommandGuard(AXES, HOLD)
-    assert guard.answered == -1
-    assert not guard.act(0).torque.any()
-    assert guard.is_safe
+PERIOD = 5e-4
+
+
+class Way:
+    """An exchange whose controller answers each tick with the tick's number as its torque."""
+
+    def __init__(self, robot: Robot, *texts: str) -> None:
+        names = RobotNames(robot.joint_names, ("wheel_1", "wheel_2"), ("thruster_1",))
+        self.guard = CommandGuard(len(names.commanded), 10**6)
+        self.codec = StateCodec(names, Timebase(round(PERIOD * 1e9)))
+        settings = FaultSettings(faults=list(texts))
+        self.exchange = exchange_of(settings, names, PERIOD, self.codec, self.guard)
+        self.state = RobotState.allocate(robot.n)
+
+    def fly(self, ticks: int) -> tuple[list[list[int]], list[list[int]], list[int]]:
+        """Stamps sent, answers awaited, and the tick whose command acts, tick by tick."""
+        sent, awaited, acting = [], [], []
+        for tick in range(ticks):
+            self.state.tick = tick
+            states = list(self.exchange.send(self.state))
+            read = RobotState.allocate(len(self.state.joint_positions))
+            sent.append([self._read(state, read) for state in states])
+            awaited.append([s.answered_by for s in states if s.answered_by != NONE])
+            for stamp in awaited[-1]:
+                self.guard.offered.tick, self.guard.offered.torque[:] = stamp, stamp
+                self.exchange.take(tick)
+            self.exchange.end(tick)
+            acting.append(int(self.guard.act(tick).torque[0]) if self.guard.answered >= 0 else NONE)
+        return sent, awaited, acting
+
+    def _read(self, sent: SentState, state: RobotState) -> int:
+        """The stamp that all parts have."""
+        parts = zip(self.codec.topics, sent.messages, strict=True)
+        (stamp,) = {self.codec.decode(topic, data, state) for topic, data in parts}
+        return stamp
+
+
+TICKS = list(range(12))
+EACH = [[tick] for tick in TICKS]
+
+
+@pytest.mark.parametrize("texts", [(), ("noise_gyro@0:1",), ("drop_state@0:0", "nan_command@1")])
+def test_in_order_every_state_is_answered_and_every_command_acts(
+    paper_robot: Robot, texts: tuple[str, ...]
+) -> None:
+    way = Way(paper_robot, *texts)
+    assert way.fly(12) == (EACH, EACH, TICKS)
+    is_faulty = any("state" in text for text in texts)
+    assert type(way.exchange) is (FaultyExchange if is_faulty else PlantMessages)
+
+
+@pytest.mark.parametrize(
+    ("text", "sent", "awaited", "acting"),
+    [
+        ("drop_state@0.001-0.002", [[0], [1], [], [], [4]], None, [0, 1, 1, 1, 4]),
+        ("delay_state@0:2", [[], [], [0], [1], [2]], None, [NONE, NONE, 0, 1, 2]),
+        ("repeat_state@0", [[0], [0, 1], [1, 2], [2, 3], [3, 4]], EACH[:5], TICKS[:5]),
+        (
+            "stamp_jump@0.001-0.0015",
+            *([[0], [1], [1_000_002], [3], [4]], [[0], [1], [], [3], [4]], [0, 1, 1, 3, 4]),
+        ),
+        ("drop_command@0.001-0.002", EACH[:5], None, [0, 1, 1, 1, 4]),
+        ("delay_command@0:2", EACH[:5], None, [NONE, NONE, 0, 1, 2]),
+        ("nan_command@0.001-0.002", EACH[:5], None, [0, 1, 1, 1, 4]),
+        ("repeat_command@0", EACH[:5], None, TICKS[:5]),
+    ],
+)
+def test_what_is_sent_awaited_and_acts(
+    paper_robot: Robot,
+    text: str,
+    sent: list[list[int]],
+    awaited: list[list[int]] | None,
+    acting: list[int],
+) -> None:
+    assert Way(paper_robot, text).fly(5) == (sent, awaited or sent, acting)
+
+
+def test_spoilt_states_leave_the_plant_s_own_alone(paper_robot: Robot) -> None:
+    way = Way(paper_robot, "nan_state@0", "stamp_back@0")
+    way.fly(20)
+    assert way.state.tick == 19
+    assert np.isfinite(way.state.numbers).all()

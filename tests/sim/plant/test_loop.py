@@ -1,13 +1,12 @@
-"""The plant's loop by a clock of its own: lockstep, silence, pauses, the wall clock, the end.
-
-Only what carries messages is stood in for; plant, guard, codecs and control are those that fly.
-"""
+"""The plant's loop by a clock of its own: lockstep, silence, pauses, the wall clock, the end."""
 
 from __future__ import annotations
 
 import time
 from collections import deque
 from collections.abc import Callable
+from functools import partial
+from itertools import pairwise
 from types import SimpleNamespace
 from typing import Any
 
@@ -23,6 +22,7 @@ from space_robot_msgs_py.wire.clock import ClockCodec
 from space_robot_msgs_py.wire.codecs import CommandCodec, StateCodec
 from space_robot_sim.plant.plant import Plant
 from space_robot_sim.plant.settings import PlantNodeSettings
+from space_robot_sim.plant.wall_clock import REMARK_S, SLIP_S, WallClock
 
 pytest.importorskip("rclpy")
 
@@ -173,6 +173,14 @@ class Bench:
         return SimpleNamespace(get_domain_id=lambda: 7)
 
 
+Make = Callable[..., Bench]
+
+
+@pytest.fixture
+def make(paper_robot: Robot, monkeypatch: pytest.MonkeyPatch) -> Make:
+    return partial(Bench, paper_robot, monkeypatch)
+
+
 def torque(tick: int) -> Array:
     """Another one each tick."""
     return np.linspace(0.1, 0.9, 9) * (1 + tick % 5)
@@ -182,10 +190,8 @@ def always(tick: int) -> bool:
     return True
 
 
-def test_in_lockstep_every_tick_waits_for_its_answer_and_no_longer(
-    paper_robot: Robot, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    bench = Bench(paper_robot, monkeypatch, always)
+def test_in_lockstep_every_tick_waits_for_its_answer_and_no_longer(make: Make) -> None:
+    bench = make(always)
     bench.run()
     assert [tick for tick, _ in bench.states] == list(range(100))
     assert bench.waited_s == 0.0
@@ -201,11 +207,9 @@ def test_in_lockstep_every_tick_waits_for_its_answer_and_no_longer(
     assert health.values["held_ticks"] == 1
 
 
-def test_without_an_answer_it_asks_again_then_flies_by_the_clock_and_comes_back(
-    paper_robot: Robot, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_without_an_answer_it_asks_again_then_flies_by_the_clock_and_comes_back(make: Make) -> None:
     """Silent from tick 20 to 79: the last torque is held, then none; a tick lasts its period."""
-    bench = Bench(paper_robot, monkeypatch, lambda tick: not 20 <= tick < 80)
+    bench = make(lambda tick: not 20 <= tick < 80)
     bench.run(lambda: bench.tick == 21)
     asked = [when - 1000.0 for tick, when in bench.states if tick == 20]
     assert len(asked) == 1 + int(SILENCE_S / (ASK_AGAIN_S + loop.TIMEOUT_S))
@@ -233,11 +237,9 @@ def test_without_an_answer_it_asks_again_then_flies_by_the_clock_and_comes_back(
 
 
 @pytest.mark.parametrize("realtime", [False, True])
-def test_pauses_and_steps_leave_no_trace(
-    paper_robot: Robot, monkeypatch: pytest.MonkeyPatch, realtime: bool
-) -> None:
+def test_pauses_and_steps_leave_no_trace(make: Make, realtime: bool) -> None:
     """However long they last: no command is missed, no time is lost, none is asked for again."""
-    bench = Bench(paper_robot, monkeypatch, always, realtime=realtime)
+    bench = make(always, realtime=realtime)
     control = bench.loop.control
     bench.run(lambda: bench.tick == 30)
     for stop in (control.step, None):
@@ -267,12 +269,10 @@ def test_pauses_and_steps_leave_no_trace(
 
 
 @pytest.mark.parametrize("first", [1, 50])
-def test_by_the_wall_clock_a_late_command_acts_late(
-    paper_robot: Robot, monkeypatch: pytest.MonkeyPatch, first: int
-) -> None:
+def test_by_the_wall_clock_a_late_command_acts_late(make: Make, first: int) -> None:
     """The answers of ten ticks do not come; the one before them is held. Tick 0 alone waits."""
     late = range(first, first + 10)
-    bench = Bench(paper_robot, monkeypatch, lambda tick: tick not in late, realtime=True)
+    bench = make(lambda tick: tick not in late, realtime=True)
     bench.run()
     assert bench.loop.missed_deadlines == 10
     assert bench.now - 1000.0 == pytest.approx(99 * PERIOD, abs=3 * PERIOD)
@@ -280,9 +280,7 @@ def test_by_the_wall_clock_a_late_command_acts_late(
     np.testing.assert_array_equal(bench.numbers, expected)
 
 
-def test_what_is_no_good_command_is_counted_and_does_not_act(
-    paper_robot: Robot, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_what_is_no_good_command_is_counted_and_does_not_act(make: Make) -> None:
     """Answers to other ticks and bytes of anything are passed over; NaN is an answer, but none."""
 
     def answer(tick: int) -> bool:
@@ -294,7 +292,7 @@ def test_what_is_no_good_command_is_counted_and_does_not_act(
             bench.send(tick, np.full(9, np.nan))
         return tick != 20
 
-    bench = Bench(paper_robot, monkeypatch, answer)
+    bench = make(answer)
     bench.run()
     values = bench.loop.health().values
     refused = {k: v for k, v in values.items() if k.startswith("refused")}
@@ -307,10 +305,8 @@ def test_what_is_no_good_command_is_counted_and_does_not_act(
     np.testing.assert_array_equal(bench.numbers, expected)
 
 
-def test_at_the_end_the_actuators_are_left_at_zero(
-    paper_robot: Robot, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    bench = Bench(paper_robot, monkeypatch, lambda tick: tick < 40)
+def test_at_the_end_the_actuators_are_left_at_zero(make: Make) -> None:
+    bench = make(lambda tick: tick < 40)
     bench.run(lambda: bench.tick == 40)
     bench.loop.deactivate()
     assert bench.logged == ["flew 0.0200 s in 0.00 s"]
@@ -319,9 +315,9 @@ def test_at_the_end_the_actuators_are_left_at_zero(
 
 
 def test_a_controller_of_others_is_waited_for_and_discovered_by_all_before_the_first_state(
-    paper_robot: Robot, monkeypatch: pytest.MonkeyPatch
+    make: Make,
 ) -> None:
-    bench = Bench(paper_robot, monkeypatch, always, own_controller=True, join_timeout=9.0)
+    bench = make(always, own_controller=True, join_timeout=9.0)
     bench.run(lambda: bench.now > 1005.0)
     assert not bench.states
     assert bench.loop.health().mode == "waiting for a node that publishes command"
@@ -333,12 +329,10 @@ def test_a_controller_of_others_is_waited_for_and_discovered_by_all_before_the_f
 
 @pytest.mark.parametrize("publishers", [(), ("mine",)])
 def test_a_controller_of_others_that_does_not_come_ends_the_flight(
-    paper_robot: Robot, monkeypatch: pytest.MonkeyPatch, publishers: tuple[str, ...]
+    make: Make, publishers: tuple[str, ...]
 ) -> None:
     """Or comes and never answers."""
-    bench = Bench(
-        paper_robot, monkeypatch, lambda tick: False, own_controller=True, join_timeout=4.0
-    )
+    bench = make(lambda tick: False, own_controller=True, join_timeout=4.0)
     bench.publishers = publishers
     text = (
         r"no good command for tick 0 within 4 s \(join_timeout\): publishers of command in ROS "
@@ -352,18 +346,40 @@ def test_a_controller_of_others_that_does_not_come_ends_the_flight(
 
 @pytest.mark.parametrize("realtime", [False, True])
 def test_a_controller_of_others_that_falls_silent_ends_the_flight(
-    paper_robot: Robot, monkeypatch: pytest.MonkeyPatch, realtime: bool
+    make: Make, realtime: bool
 ) -> None:
     """As a controller that is killed does."""
-    bench = Bench(
-        paper_robot,
-        monkeypatch,
-        lambda tick: tick < 20,
-        own_controller=True,
-        realtime=realtime,
-        ticks=10_000,
-    )
+    bench = make(lambda tick: tick < 20, own_controller=True, realtime=realtime, ticks=10_000)
     bench.publishers = ("mine",)
     with pytest.raises(FlightError, match=r"no command for 1 s \(silence_timeout\) at .*: /mine"):
         bench.run()
     assert bench.tick * PERIOD == pytest.approx(1.0 if realtime else 0.01, abs=0.03)
+
+
+def test_deadlines_are_whole_periods_apart_and_slip_only_when_hopelessly_missed(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    now, period = 1000.0, 1e-3
+    monkeypatch.setattr(time, "monotonic", lambda: now)
+    clock = WallClock(period)
+    clock.start(7)
+    for later in (-20, 0, 1, 10**6):
+        assert clock.left(7 + later) == pytest.approx((later + 1) * period, abs=1e-6)
+    now += 0.9 * SLIP_S
+    assert (clock.slip(7), clock.lost_time_s) == (0.0, 0.0)
+    now += 0.2 * SLIP_S
+    behind = 1.1 * SLIP_S - period
+    assert clock.slip(7) == clock.lost_time_s == pytest.approx(behind)
+    assert clock.left(7) == pytest.approx(0.0, abs=1e-9), "due now"
+    assert clock.remark() == f"{behind:.3f} s behind the wall clock: time goes on from here"
+    assert clock.remark() == ""
+    moments, said, lost, in_all = [now], "", 0.0, clock.lost_time_s
+    while now < 1020.0:  # a machine that is too slow
+        now += 0.3
+        if clock.slip(7) and (remark := clock.remark()):
+            lost, in_all = clock.lost_time_s - in_all, clock.lost_time_s
+            moments.append(now)
+            said = remark.split(" behind")[0] + remark.split("clock")[1].split(":")[0]
+    assert len(moments) == 1 + int(20.0 / (REMARK_S + 0.3))
+    assert all(later - earlier >= REMARK_S for earlier, later in pairwise(moments))
+    assert said == f"{lost:.3f} s in {moments[-1] - moments[-2]:.1f} s, {in_all:.3f} s in all"

@@ -8,21 +8,15 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
-from conservation import kinetic_energy, momentum
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
-from oracles import (
-    pinocchio_acceleration,
-    pinocchio_bias_force,
-    pinocchio_mass_matrix,
-    pinocchio_model,
-    rotation_of,
-)
-from random_robots import State, random_quaternion, random_robot
-from scipy.integrate import quad, solve_ivp
+from oracles import pinocchio_bias_force, pinocchio_mass_matrix, rotation_of
+from oracles.momenta import kinetic_energy, momentum
+from oracles.rotors import RotorEquations
+from scipy.integrate import quad
+from strategies import State, random_quaternion, random_robot
 
-from space_robot_model.dynamics.attitude import quaternion_rate
 from space_robot_model.dynamics.model import Data
 from space_robot_model.robot import Robot
 from space_robot_msgs_py.samples import Command
@@ -33,7 +27,6 @@ from space_robot_sim.plant.plant import Plant, PlantSettings
 from space_robot_sim.plant.stick_slip import MOST_CUTS, integrate, slip_or_stick
 
 Array = NDArray[np.float64]
-
 PERIOD = 5e-4
 COULOMB = 0.7
 """N m; large beside the torques below, so that much sticks."""
@@ -120,11 +113,11 @@ def test_joints_stand_or_break_away_as_coulombs_law_has_it(n: int, seed: int) ->
 
 @pytest.mark.parametrize("substeps", [1, 3])
 def test_a_joint_held_below_its_friction_stands_still(paper_robot: Robot, substeps: int) -> None:
-    """For 1 s, to the last bit, though the base is turned and the torque changes."""
+    """To the last bit, though the base is turned and the torque changes."""
     plant = plant_of(paper_robot, 0.02, 0.2, substeps=substeps)
     start = plant.state.joint_positions.copy()
-    for tick in range(2_000):
-        torque = np.full(9, 0.019 * np.sin(0.01 * tick))
+    for tick in range(400):
+        torque = np.full(9, 0.019 * np.sin(0.05 * tick))
         torque[:3] *= 0.01
         plant.step(Command(tick, torque))
         assert not plant.state.joint_velocities.any()
@@ -135,29 +128,16 @@ def test_a_joint_held_below_its_friction_stands_still(paper_robot: Robot, subste
 def test_a_joint_comes_to_rest_when_and_where_it_should() -> None:
     """Thrown, it stops: against SciPy's events on Pinocchio's dynamics, to rounding."""
     rng = np.random.default_rng(5)
-    robot = random_robot(rng, 1)
-    plant = plant_of(robot, COULOMB)
+    plant = plant_of(random_robot(rng, 1), COULOMB)
     place(plant, rng, np.array([0.003]))
     plant.memory.x[8:14] *= 0.01
-    start = plant.memory.x[:15].copy()
-    model = pinocchio_model(robot)
-    data = model.createData()
-
-    def derivative(_: float, x: Array) -> Array:
-        now = State(x[3:7] / np.linalg.norm(x[3:7]), x[7:8], x[8:11], x[11:14], x[14:])
-        force = np.array([0.0] * 6 + [-COULOMB])
-        rate = np.empty(4)
-        quaternion_rate(x[3:7], x[11:14], rate)
-        acceleration = pinocchio_acceleration(model, data, now, force)
-        return np.concatenate([x[8:11], rate, x[14:], acceleration])
+    start, brake = plant.memory.x[:15].copy(), np.array([0.0] * 6 + [-COULOMB])
 
     def at_rest(_: float, x: Array) -> float:
         return float(x[14])
 
     at_rest.terminal = True  # type: ignore[attr-defined]
-    exact = solve_ivp(
-        derivative, (0.0, 1.0), start, "DOP853", events=at_rest, rtol=1e-12, atol=1e-14
-    )
+    exact = RotorEquations(plant.robot).fly(start, 0.0, 1.0, lambda t, x: brake, events=at_rest)
     stops_at = float(exact.t[-1])
     assert stops_at / PERIOD > 2.0
     assert abs(stops_at / PERIOD - round(stops_at / PERIOD)) > 0.01, "within a tick"
@@ -265,18 +245,6 @@ def test_beyond_the_most_cuts_the_rest_of_a_step_is_flown_uncut() -> None:
     np.testing.assert_allclose(angles[:MOST_CUTS], expected[:MOST_CUTS], rtol=0.0, atol=1e-9)
 
 
-def test_substeps_are_as_many_short_ticks() -> None:
-    """The disturbance goes on from one to the next."""
-    long, short = (balls(inner_amplitude=3.0) for _ in range(2))
-    long.period, long.memory.substeps = 4.0 * PERIOD, 4.0  # type: ignore[misc]
-    for tick in range(20):
-        long.step(Command(tick, np.ones(9)))
-        for k in range(4):
-            short.step(Command(4 * tick + k, np.ones(9)))
-    assert np.abs(long.state.joint_velocities[:3] / long.state.joint_velocities[3:]).max() < 0.9
-    np.testing.assert_allclose(long.memory.x, short.memory.x, rtol=1e-12, atol=1e-15)
-
-
 @given(st.sampled_from([1, 3, 6]), st.integers(0, 2**32 - 1), st.sampled_from([0.0, 0.2]))
 @settings(max_examples=25, deadline=None)
 def test_friction_never_adds_energy(n: int, seed: int, viscous: float) -> None:
@@ -294,52 +262,3 @@ def test_friction_never_adds_energy(n: int, seed: int, viscous: float) -> None:
         before = after
     for was, now in zip((linear, angular), momentum(plant.robot, plant.state), strict=True):
         np.testing.assert_allclose(now, was, rtol=0.0, atol=1e-11 * (1.0 + np.abs(was).max()))
-
-
-def test_a_joint_that_is_driven_through_rest_turns_on(paper_robot: Robot) -> None:
-    """It does not stick where its motor is the stronger; the friction changes sides."""
-    plant = plant_of(paper_robot, 0.02)
-    plant.memory.x[24] = 1e-4
-    smooth = plant_of(paper_robot, 0.0)
-    torque = np.zeros(9)
-    torque[8] = -0.5
-    rates = np.empty((10, 2))
-    for tick in range(10):
-        for k, flown in enumerate((plant, smooth)):
-            flown.step(Command(tick, torque))
-            rates[tick, k] = flown.state.joint_velocities[5]
-    assert rates[0, 0] < 0.0
-    braked, free = (np.diff(rates, axis=0) / PERIOD).T
-    np.testing.assert_allclose(braked / free, 0.48 / 0.5, rtol=1e-2)  # the other joints stand
-
-
-def test_without_friction_nothing_stands(paper_robot: Robot) -> None:
-    """A joint at rest that is pulled ever so little begins to turn."""
-    plant = plant_of(paper_robot, 0.0)
-    plant.step(Command(0, np.full(9, 1e-9)))
-    assert plant.state.joint_velocities.all()
-
-
-def test_locked_joints_are_as_if_welded(seven_joint_robot: Robot) -> None:
-    """Articulated bodies with locked joints, against the constrained equations of motion."""
-    rng = np.random.default_rng(8)
-    plant = plant_of(seven_joint_robot, 1e3)
-    n = seven_joint_robot.n
-    rates = rng.normal(size=n) * np.array([1.0, 0.0, 1.0, 0.0, 0.0, 1.0, 1.0])
-    state = place(plant, rng, rates)
-    torque = rng.normal(size=n + 3)
-    plant.memory.environment.friction.coulomb[: rates.size][rates != 0.0] = 0.0
-    stages = stand(plant, torque)
-    mass = pinocchio_mass_matrix(seven_joint_robot, state)
-    stands = 6 + np.flatnonzero(rates == 0.0)
-    force = np.concatenate(
-        [np.zeros(3), rotation_of(state.quaternion).apply(torque[:3]), torque[3:]]
-    ) - pinocchio_bias_force(seven_joint_robot, state)
-    saddle = np.zeros((mass.shape[0] + stands.size,) * 2)
-    saddle[: n + 6, : n + 6] = mass
-    saddle[n + 6 + np.arange(stands.size), stands] = 1.0
-    saddle[stands, n + 6 + np.arange(stands.size)] = 1.0
-    solution = np.linalg.solve(saddle, np.concatenate([force, np.zeros(stands.size)]))
-    np.testing.assert_allclose(stages.slope[0, 7 + n : 13 + 2 * n], solution[: n + 6], atol=1e-9)
-    holding = data_of(plant).holding[stands - 6]
-    np.testing.assert_allclose(holding, solution[n + 6 :], atol=1e-8)

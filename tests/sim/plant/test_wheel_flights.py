@@ -8,19 +8,13 @@ import mujoco
 import numpy as np
 import pinocchio as pin
 import pytest
-from conservation import kinetic_energy
 from numpy.typing import NDArray
 from oracles import pinocchio_mass_matrix, pinocchio_state
+from oracles.momenta import kinetic_energy
+from oracles.rotors import Rotor, mujoco_with_wheels, random_rotors, settings_of
 from paths import DATA
-from random_robots import State, random_robot
 from scipy.integrate import solve_ivp
-from wheel_oracles import (
-    Rotor,
-    mujoco_with_wheels,
-    pinocchio_with_wheels,
-    random_rotors,
-    settings_of,
-)
+from strategies import State, random_robot
 
 from space_robot_model.dynamics.attitude import quaternion_rate
 from space_robot_model.robot import Robot
@@ -31,7 +25,6 @@ from space_robot_sim.plant.plant import Plant, PlantSettings
 from space_robot_sim.plant.stick_slip import integrate
 
 Array = NDArray[np.float64]
-
 PERIOD = 5e-4
 N = 6
 """Joints; for so many the kernels are there."""
@@ -216,32 +209,3 @@ def test_wheels_of_a_robot_with_passive_joints_get_what_is_asked_of_them() -> No
         np.testing.assert_allclose(own(), expected, rtol=0.0, atol=1e-11)
     assert turned > 1e-3, "the base must be struck"
     assert np.abs(plant.truth.passive_positions[:2]).max() > 1e-4
-
-
-def test_internal_torques_leave_momentum_as_it_is(paper_robot: Robot) -> None:
-    """Of robot and wheels about their common centre of mass, by Pinocchio, over 10 s."""
-    rng = np.random.default_rng(1)
-    rotors = [
-        rotor._replace(spin=0.05, transverse=0.03) for rotor in random_rotors(rng, paper_robot, 4)
-    ]
-    flight = Flight(paper_robot, rotors, FrictionSettings(), initial_speed=[50.0], coulomb=[0.01])
-    model = pinocchio_with_wheels(paper_robot, rotors)
-    data = model.createData()
-
-    def momentum() -> Array:
-        found = pin.computeCentroidalMomentum(
-            model, data, *pinocchio_state(flight.state, flight.x[:3])
-        )
-        return np.concatenate([found.linear, found.angular])
-
-    before, speeds = momentum(), flight.speeds
-    amplitudes, phases = rng.uniform(0.1, 0.4, 10), rng.uniform(0.0, 2.0 * np.pi, 10)
-    worst = 0.0
-    for tick in range(20_000):
-        torque = amplitudes * np.sin(0.3 * tick * PERIOD + phases)
-        flight.step(np.zeros(3), torque[:6], torque[6:])
-        if tick % 1000 == 999:
-            worst = max(worst, float(np.abs(momentum() - before).max()))
-    assert np.abs(flight.speeds - speeds).min() > 3.0
-    assert np.abs(flight.state.theta[:6]).max() > 1.0
-    assert worst < 1e-12 * np.abs(before).max()

@@ -1,0 +1,247 @@
+"""Files of config/sensors and config/actuators, and what is said of wrong ones."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import yaml
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from paths import CONFIG, DATA
+
+from space_robot_control.allocation.assumed_actuators import assumed_actuators
+from space_robot_model.hardware.base_actuators import BaseActuatorSettings
+from space_robot_model.hardware.magnetic_torquers import MagneticTorquerSettings
+from space_robot_model.hardware.sensors import SensorSettings
+from space_robot_model.robot import Robot
+from space_robot_msgs_py.config.settings import leaves
+from space_robot_msgs_py.errors import InputError
+from space_robot_msgs_py.samples import MOST_TORQUERS, RobotNames
+from space_robot_sim.plant.plant import Plant
+from space_robot_sim.plant.settings import PlantNodeSettings
+
+FILES = {kind: [*(CONFIG / kind).glob("*.yaml")] for kind in ("sensors", "actuators")}
+PAPER = Robot.from_yaml(CONFIG / "robots/paper.yaml")
+PARTS = ("star_tracker", "gyro", "encoders")
+TORQUERS = ("torquer_1", "torquer_2", "torquer_3")
+REFUSALS: dict[str, list[tuple[str, str]]] = yaml.safe_load(
+    (DATA / "refusals/hardware.yaml").read_text("utf-8")
+)
+
+
+def resolved(**values: Any) -> PlantNodeSettings:
+    return PlantNodeSettings.resolve(values)
+
+
+@pytest.mark.parametrize(
+    ("kind", "text", "said"), [(kind, *row) for kind, rows in REFUSALS.items() for row in rows]
+)
+def test_a_wrong_file_is_refused_in_one_line_with_its_name(
+    tmp_path: Path, kind: str, text: str, said: str
+) -> None:
+    path, (kind, *whose) = tmp_path / "mine.yaml", kind.split()
+    path.write_text("plant_node: {ros__parameters: {" + text + "}}")
+    with pytest.raises(InputError) as caught:
+        Plant(PAPER, resolved(**{kind: str(path)}), 5e-4)
+    assert str(caught.value).startswith(f"{'actuators ' if whose else ''}{path}: {said}")
+    assert "\n" not in str(caught.value)
+    assert caught.value.exit_code == 2
+
+
+NO_FIELD = (
+    "actuators wheels_and_torquers: magnetic_torquers need an orbit with a magnetic field: "
+    "--orbit NAME, with magnetism.strength above 0"
+)
+IDEAL_ONLY = {"base_torque_limit": 1.0}, {"faults": ["saturate_base@1:0.5"]}
+
+
+@pytest.mark.parametrize(
+    ("values", "said"),
+    [
+        ({"sensors": "best"}, "unknown sensor 'best': choose one of coarse, fine, ideal"),
+        ({"actuators": "best"}, "unknown actuator 'best': choose one of ideal, none, small"),
+        ({"actuators": "none", **IDEAL_ONLY[0]}, "base_torque_limit is for base_actuation ideal"),
+        ({"actuators": "wheels", **IDEAL_ONLY[0]}, "base_torque_limit is for base_actuation ideal"),
+        ({"actuators": "thrusters", **IDEAL_ONLY[1]}, "fault saturate_base is for base_actuation"),
+        ({"actuators": "wheels_and_torquers"}, NO_FIELD),
+        ({"actuators": "wheels_and_torquers", "orbit": "iss", "magnetism.strength": 0.0}, NO_FIELD),
+    ],
+)
+def test_what_does_not_fit_is_refused_in_one_line(values: dict[str, Any], said: str) -> None:
+    with pytest.raises(InputError) as caught:
+        Plant(PAPER, resolved(**values), 5e-4)
+    assert said in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("part", "key", "zero_is_allowed"),
+    [
+        *(("wheels", key, True) for key in ("max_torque", "max_momentum", "coulomb", "viscous")),
+        ("wheels", "rotor_inertia", False),
+        ("magnetic_torquers", "max_dipole", False),
+        *(("thrusters", key, True) for key in ("shortest_pulse", "delay")),
+        *(("thrusters", key, False) for key in ("force", "specific_impulse")),
+    ],
+)
+def test_sizes_are_not_negative(part: str, key: str, zero_is_allowed: bool) -> None:
+    """The smallest number below zero is refused, and named; zero only where it means something."""
+    for value in (-5e-324, 0.0):
+        if value == 0.0 and zero_is_allowed:
+            resolved(**{f"{part}.{key}": [value]})
+            continue
+        with pytest.raises(InputError, match=rf"{part}\.{key}"):
+            resolved(**{f"{part}.{key}": [value]})
+
+
+def test_there_are_the_files_that_the_manual_names() -> None:
+    names = {kind: {path.stem for path in paths} for kind, paths in FILES.items()}
+    hardware = ("wheels", "small_wheels", "thrusters", "wheels_and_thrusters")
+    assert names["actuators"] == {"ideal", "none", *hardware, "wheels_and_torquers"}
+    assert names["sensors"] == {"ideal", "fine", "tactical", "coarse", "white_l1", "white_l2"}
+
+
+@pytest.mark.parametrize(
+    ("kind", "path"), [(kind, path) for kind in FILES for path in FILES[kind]], ids=str
+)
+def test_a_file_is_about_its_hardware_alone_and_makes_a_plant(kind: str, path: Path) -> None:
+    sections = yaml.safe_load(path.read_text("utf-8"))
+    allowed = {*PARTS} if kind == "sensors" else set(BaseActuatorSettings.model_fields)
+    assert set(sections) <= {"plant_node", "controller_node"}
+    assert set(sections["plant_node"]["ros__parameters"]) <= allowed
+    assert set(sections.get("controller_node", {}).get("ros__parameters", {})) <= {"allocation"}
+    settings = resolved(**{kind: path.stem, "orbit": "iss"})
+    plant, by_path = Plant(PAPER, settings, 5e-4), resolved(**{kind: str(path)})
+    assert plant.names.actuators == settings.names
+    assert (by_path.wheels, by_path.gyro) == (settings.wheels, settings.gyro)
+    if kind == "sensors":
+        assert plant.measures_truth is (path.stem == "ideal")
+    else:
+        assert (path.stem == "ideal") is (settings.base_actuation == "ideal")
+
+
+def test_without_a_choice_everything_is_ideal_and_single_numbers_come_over_a_file() -> None:
+    settings = resolved()
+    assert settings == resolved(actuators="ideal") == resolved(sensors="ideal")
+    for ideal in (BaseActuatorSettings(), SensorSettings()):
+        assert all(
+            getattr(settings, key) == getattr(ideal, key) for key in type(ideal).model_fields
+        )
+    more = {"wheels.max_torque": [1.0, 2.0, 3.0, 4.0], "star_tracker.delay": 0.3}
+    settings, plain = (resolved(sensors="fine", actuators="wheels", **own) for own in (more, {}))
+    assert settings.wheels.values("max_torque").tolist() == [1.0, 2.0, 3.0, 4.0]
+    assert settings.wheels.axes == plain.wheels.axes
+    assert settings.star_tracker.delay == 0.3
+    assert settings.star_tracker.rate == plain.star_tracker.rate
+
+
+def test_wheels_and_thrusters_may_span_together() -> None:
+    """Two wheels, and thrusters for the axis that is missing."""
+    found = resolved(actuators="thrusters", **{"wheels.axes": [1.0, 0.0, 0.0, 0.0, 1.0, 0.0]})
+    flat = found.thrusters.model_dump()
+    about_z = {key: flat[key][24:] for key in ("positions", "directions")}
+    parts = {"wheels": found.wheels.model_dump(), "thrusters": {**flat, **about_z}}
+    settings = BaseActuatorSettings.model_validate({"base_actuation": "hardware", **parts})
+    settings.check(PAPER, "mine")
+
+
+@given(st.integers(0, 8), st.integers(0, 24), st.integers(0, MOST_TORQUERS))
+def test_names_are_numbered_wheels_first_and_torquers_last(
+    wheels: int, thrusters: int, torquers: int
+) -> None:
+    """A command has its numbers in this order."""
+
+    def axes(count: int) -> list[float]:
+        return [1.0, 0.0, 0.0] * count or [0.0]
+
+    settings = BaseActuatorSettings.model_validate(
+        {
+            "base_actuation": "hardware",
+            "wheels": {"axes": axes(wheels)},
+            "thrusters": {"positions": axes(thrusters), "directions": axes(thrusters)},
+            "magnetic_torquers": {"axes": axes(torquers)},
+        }
+    )
+    names = settings.robot_names(PAPER)
+    for kind, name, count in (
+        (names.wheels, "wheel", wheels),
+        (names.thrusters, "thruster", thrusters),
+        (names.torquers, "torquer", torquers),
+    ):
+        assert kind == tuple(f"{name}_{k + 1}" for k in range(count))
+    assert settings.names == names.actuators == names.wheels + names.thrusters + names.torquers
+    assert names.commanded == (*names.axes, *names.actuators)
+    again = (PAPER.joint_names, settings.names, wheels)
+    assert RobotNames.of(*again, torquer_count=settings.torquer_count) == names
+
+
+def test_axes_of_torquers_are_directions_and_one_dipole_may_stand_for_all() -> None:
+    axes = [3.0, 0.0, 4.0, 0.0, -0.1, 0.0]
+    same = MagneticTorquerSettings(axes=axes, max_dipole=[30.0])
+    np.testing.assert_array_equal(same.unit_axes, [[0.6, 0.0, 0.8], [0.0, -1.0, 0.0]])
+    np.testing.assert_array_equal(same.largest, [30.0, 30.0])
+    each = MagneticTorquerSettings(axes=axes, max_dipole=[30.0, 20.0])
+    np.testing.assert_array_equal(each.largest, [30.0, 20.0])
+    assert MagneticTorquerSettings().unit_axes.shape == (0, 3)
+    with pytest.raises(ValueError, match="x, y, z of at most 6 vectors were expected"):
+        MagneticTorquerSettings(axes=[1.0, 0.0, 0.0] * 7)
+
+
+def test_the_file_of_torquers_has_the_wheels_of_the_other_file() -> None:
+    """The flight software needs no orbit to know its torquers: it reads a magnetometer."""
+    settings = resolved(actuators="wheels_and_torquers", orbit="iss")
+    wheels = resolved(actuators="wheels").wheels
+    assert settings.names[-3:] == TORQUERS
+    assert assumed_actuators("wheels_and_torquers", PAPER).names[-3:] == TORQUERS
+    np.testing.assert_array_equal(settings.magnetic_torquers.unit_axes, np.eye(3))
+    np.testing.assert_array_equal(settings.magnetic_torquers.largest, np.full(3, 400.0))
+    speeds = {"initial_speed": settings.wheels.initial_speed}
+    assert settings.wheels == wheels.model_copy(update=speeds)
+    stored = settings.wheels.spin_momenta(settings.wheels.values("initial_speed"))
+    np.testing.assert_allclose(stored, 0.25 * settings.wheels.values("max_momentum"), rtol=0.01)
+
+
+@pytest.mark.parametrize(
+    "orbit", [{"orbit": "gto"}, {"orbital_elements.height": 420e3, "magnetism.strength": 1e-12}]
+)
+def test_a_field_may_come_from_a_file_or_from_numbers(orbit: dict[str, Any]) -> None:
+    plant = Plant(PAPER, resolved(actuators="wheels_and_torquers", **orbit), 5e-4)
+    assert plant.names.torquers == plant.names.commanded[-3:] == TORQUERS
+    assert np.linalg.norm(plant.state.magnetic_field) > 0.0
+
+
+KEYS = [name for kind in (SensorSettings, BaseActuatorSettings) for name, _ in leaves(kind)]
+_NUMBERS = st.lists(st.integers(-2, 2) | st.floats(-1e3, 1e3), max_size=12)
+_LEAVES = st.none() | st.booleans() | st.integers() | st.floats() | st.text(max_size=5) | _NUMBERS
+_VALUES = st.recursive(
+    _LEAVES,
+    lambda inner: st.lists(inner, max_size=4) | st.dictionaries(st.text(max_size=9), inner),
+    max_leaves=8,
+)
+_SOME = st.dictionaries(
+    st.sampled_from([*KEYS, *PARTS, "wheels", "thrusters", "magnetic_torquers"])
+    | st.text(max_size=9),
+    _VALUES,
+    max_size=4,
+)
+
+
+@settings(max_examples=150)
+@given(_SOME, st.sampled_from(FILES["actuators"]), st.sampled_from(FILES["sensors"]))
+def test_any_file_makes_hardware_or_one_line(
+    content: dict[str, Any], actuators: Path, sensors: Path
+) -> None:
+    """Whatever stands in it, alone or over a good one: what cannot be flown is refused."""
+    content.pop("actuators", None)
+    own = {"actuators": actuators.stem, "sensors": sensors.stem, "orbit": "iss"}
+    said = ""
+    try:
+        settings = PlantNodeSettings.resolve({**own, **content})
+        settings.check(PAPER, actuators.stem)
+        Plant(PAPER, settings, 5e-4)
+    except InputError as error:
+        said = str(error)
+    assert "\n" not in said

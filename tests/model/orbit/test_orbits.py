@@ -1,0 +1,204 @@
+"""Elements, gravity and the flight software's propagation against SciPy and 50 digits."""
+
+from __future__ import annotations
+
+from decimal import Decimal, localcontext
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+from oracles.orbit import (
+    DIGITS,
+    EARTH_RADIUS,
+    MU,
+    earth_potential,
+    exact,
+    exact_gravity,
+    free_path,
+    plus,
+)
+from pydantic import ValidationError
+from scipy.optimize import brentq
+from scipy.spatial.transform import Rotation
+
+from space_robot_model.orbit.elements import ElementSettings, state_of, sun_of
+from space_robot_model.orbit.ephemeris import AssumedOrbit, Ephemeris
+from space_robot_model.orbit.gravity import gravity
+
+ANGLE = st.floats(-360.0, 360.0)
+
+
+@settings(max_examples=150)
+@given(st.floats(300e3, 4e7), st.floats(0.0, 0.95), st.floats(0.0, 180.0), ANGLE, ANGLE, ANGLE)
+def test_state_of_agrees_with_keplers_equation_and_rotation_matrices(
+    perigee: float, e: float, inclination: float, raan: float, argument: float, mean: float
+) -> None:
+    a = (EARTH_RADIUS + perigee) / (1.0 - e)
+    elements = ElementSettings(
+        height=a - EARTH_RADIUS,
+        eccentricity=e,
+        inclination_deg=inclination,
+        raan_deg=raan,
+        perigee_deg=argument,
+        anomaly_deg=mean,
+    )
+    anomaly = np.radians(mean)
+    eccentric = brentq(
+        lambda x: x - e * np.sin(x) - anomaly, anomaly - 1.0, anomaly + 1.0, xtol=1e-15, rtol=1e-15
+    )
+    true = 2.0 * np.arctan2(
+        np.sqrt(1.0 + e) * np.sin(eccentric / 2.0), np.sqrt(1.0 - e) * np.cos(eccentric / 2.0)
+    )
+    parameter = a * (1.0 - e**2)
+    radius = parameter / (1.0 + e * np.cos(true))
+    turn = Rotation.from_euler("ZXZ", [raan, inclination, argument], degrees=True)
+    position = turn.apply(radius * np.array([np.cos(true), np.sin(true), 0.0]))
+    speed = np.sqrt(MU / parameter)
+    velocity = turn.apply(speed * np.array([-np.sin(true), e + np.cos(true), 0.0]))
+    r, v = state_of(elements)
+    loss = 1e-14 / (1.0 - e) ** 2  # of the anomaly's digits, near the perigee
+    np.testing.assert_allclose(r, position, rtol=0, atol=(1e-14 + loss) * 2.0 * a)
+    np.testing.assert_allclose(v, velocity, rtol=0, atol=(1e-14 + loss) * speed * (1.0 + e) * 10.0)
+
+
+def test_an_orbit_through_the_earth_is_refused() -> None:
+    with pytest.raises(ValidationError, match="perigee must be outside"):
+        ElementSettings(height=1000e3, eccentricity=0.2)
+
+
+@given(st.floats(0.0, 180.0), ANGLE, st.floats(-90.0, 90.0), ANGLE)
+def test_the_sun_stands_above_the_orbit_and_at_noon(
+    inclination: float, raan: float, beta: float, noon: float
+) -> None:
+    """From the node along the orbit, then by the beta angle towards the normal."""
+    sun = sun_of(ElementSettings(inclination_deg=inclination, raan_deg=raan), beta, noon)
+    plane = Rotation.from_euler("ZXZ", [raan, inclination, noon], degrees=True)
+    b = np.radians(beta)
+    expected = plane.apply([np.cos(b), 0.0, np.sin(b)])
+    np.testing.assert_allclose(sun, expected, rtol=0, atol=1e-14)
+    assumed = {"inclination_deg": inclination, "raan_deg": raan}
+    known = ephemeris(orbital_elements=ISS | assumed, beta_angle_deg=beta, noon_deg=noon)
+    np.testing.assert_array_equal(known.sun, sun)
+
+
+Array = NDArray[np.float64]
+DIRECTION = st.tuples(*[st.floats(-1.0, 1.0)] * 3).filter(lambda d: np.linalg.norm(d) > 0.1)
+HEIGHTS = st.floats(200e3, 4e7)
+
+
+def vector(direction: tuple[float, ...], length: float) -> Array:
+    """Return a vector (3,) of that length."""
+    return np.asarray(length * np.array(direction) / np.linalg.norm(direction))
+
+
+ISS = {"height": 420e3, "inclination_deg": 51.6, "raan_deg": 30.0, "anomaly_deg": 200.0}
+GTO = {"height": 18e6, "eccentricity": 0.72, "inclination_deg": 7.0, "anomaly_deg": -10.0}
+TARGET = {"name": "target", "position": [30.0, -50.0, 20.0], "velocity": [0.01, 0.03, -0.02]}
+
+
+def ephemeris(**settings: object) -> Ephemeris:
+    """Return an ephemeris, by default of a station's orbit."""
+    return Ephemeris(AssumedOrbit.model_validate({"orbital_elements": ISS, **settings}))
+
+
+def period(elements: dict[str, float]) -> float:
+    """Return the time of an orbit, s."""
+    return float(2.0 * np.pi * np.sqrt((EARTH_RADIUS + elements["height"]) ** 3 / MU))
+
+
+@pytest.mark.parametrize("elements", [ISS, GTO])
+def test_without_j2_it_agrees_with_keplers_equation(elements: dict[str, float]) -> None:
+    """The elements' state of a later mean anomaly, to the digits of the perigee's time."""
+    known = ephemeris(orbital_elements=elements, j2=False)
+    times = np.linspace(0.0, 1.5 * period(elements), 31)
+    motion = known.motion(times)
+    for k, time in enumerate(times):
+        turned = elements["anomaly_deg"] + 360.0 * time / period(elements)
+        later = elements | {"anomaly_deg": float(np.remainder(turned, 360.0))}
+        position, velocity = state_of(ElementSettings.model_validate(later))
+        np.testing.assert_allclose(motion.position[k], position, rtol=0, atol=1e-4)
+        np.testing.assert_allclose(motion.velocity[k], velocity, rtol=0, atol=1e-7)
+
+
+@settings(max_examples=60)
+@given(st.floats(200e3, 4e7), st.floats(0.0, 180.0), st.floats(0.0, 20_000.0), st.booleans())
+def test_acceleration_and_jerk_are_those_of_gravity_at_the_place(
+    height: float, inclination: float, time: float, j2: bool
+) -> None:
+    """By decimal numbers, the jerk by central differences along the velocity."""
+    elements = {"height": height, "inclination_deg": inclination, "anomaly_deg": 77.0}
+    motion = ephemeris(orbital_elements=elements, j2=j2).motion(np.array([time]))
+    r, v = motion.position[0], motion.velocity[0]
+    with localcontext() as context:
+        context.prec = DIGITS
+        step = Decimal("1e-15")
+        x, y, z = (step * part for part in exact(v))
+        ahead = exact_gravity(plus(exact(r), (x, y, z)), j2)
+        behind = exact_gravity(plus(exact(r), (-x, -y, -z)), j2)
+        gravity = np.array([float(a) for a in exact_gravity(exact(r), j2)])
+        rate = np.array([float((a - b) / (2 * step)) for a, b in zip(ahead, behind, strict=True)])
+    atol = 1e-15 * np.linalg.norm(gravity)
+    np.testing.assert_allclose(motion.acceleration[0], gravity, rtol=0, atol=atol)
+    np.testing.assert_allclose(motion.jerk[0], rate, rtol=0, atol=2e-15 * np.linalg.norm(rate))
+
+
+def test_the_motion_is_the_same_to_the_bit_in_whatever_order_it_is_asked_for() -> None:
+    times = np.linspace(0.0, 3000.0, 1001)
+    whole, parts = ephemeris(target=TARGET), ephemeris(target=TARGET)
+    expected = np.array(whole.target_motion(times))
+    for chunk in (slice(0, 7), slice(400, 500), slice(7, 400), slice(500, None)):
+        got = np.array(parts.target_motion(times[chunk]))
+        np.testing.assert_array_equal(got, expected[:, chunk])
+
+
+def test_before_tick_0_it_is_where_it_is_then() -> None:
+    known = ephemeris()
+    np.testing.assert_array_equal(known.motion(np.array([-5.0])), known.motion(np.zeros(1)))
+    assert known.motion(np.empty(0)).position.shape == (0, 3)
+
+
+def test_errors_are_on_the_orbits_axes() -> None:
+    errors = {"radial": 3.0, "along": -200.0, "normal": 40.0}
+    rates = {"radial_velocity": 0.1, "along_velocity": -0.2, "normal_velocity": 0.3}
+    start = np.zeros(1)
+    right, wrong = ephemeris().motion(start), ephemeris(errors=errors | rates).motion(start)
+    r, v = right.position[0], right.velocity[0]
+    normal = np.cross(r, v) / np.linalg.norm(np.cross(r, v))
+    axes = np.column_stack([r / np.linalg.norm(r), v / np.linalg.norm(v), normal])
+    place, motion = wrong.position[0] - r, wrong.velocity[0] - v
+    np.testing.assert_allclose(place @ axes, [3.0, -200.0, 40.0], rtol=0, atol=1e-8)
+    np.testing.assert_allclose(motion @ axes, [0.1, -0.2, 0.3], rtol=0, atol=1e-11)
+
+
+@settings(max_examples=100)
+@given(DIRECTION, HEIGHTS, st.booleans())
+def test_gravity_is_the_textbooks_and_the_gradient_of_its_potential(
+    direction: tuple[float, ...], height: float, has_j2: bool
+) -> None:
+    """By decimal numbers; the gradient by central differences over a nanometre."""
+    r, out = vector(direction, EARTH_RADIUS + height), np.empty(3)
+    gravity(r, float(has_j2), out)
+    step = 1e-9
+    with localcontext() as context:
+        context.prec = 2 * DIGITS
+        expected = np.array([float(x) for x in exact_gravity(exact(r), has_j2)])
+        ahead, behind = (
+            [earth_potential(plus(exact(r), exact(d)), has_j2) for d in side * step * np.eye(3)]
+            for side in (1.0, -1.0)
+        )
+        fall = [float((b - a) / (2 * Decimal(step))) for a, b in zip(ahead, behind, strict=True)]
+    for wanted in (expected, np.array(fall)):
+        np.testing.assert_allclose(out, wanted, rtol=0, atol=1e-15 * np.linalg.norm(expected))
+
+
+def test_an_orbit_with_j2_and_a_target_beside_it_agree_with_scipy() -> None:
+    known, times = ephemeris(target=TARGET), np.linspace(0.0, period(ISS), 200)
+    r, v = state_of(known.assumed.orbital_elements)
+    expected = free_path(r, v, times, has_j2=True)
+    place, speed = np.array(TARGET["position"]), np.array(TARGET["velocity"])
+    apart = free_path(r + place, v + speed, times, has_j2=True) - expected
+    for motion, path in ((known.motion(times), expected), (known.target_motion(times), apart)):
+        np.testing.assert_allclose(motion.position, path[:, :3], rtol=0, atol=1e-5)
+        np.testing.assert_allclose(motion.velocity, path[:, 3:], rtol=0, atol=1e-8)

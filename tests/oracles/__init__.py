@@ -1,0 +1,364 @@
+"""Robots and trees of bodies in independent programs: Pinocchio, MuJoCo, SciPy, plain NumPy.
+
+Further ones: `rotors` (wheels, and motors behind gears), `momenta`, `orbit`, `second_moments`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple
+
+import mujoco
+import numpy as np
+import pinocchio as pin
+from numpy.typing import ArrayLike, NDArray
+from scipy.spatial.transform import Rotation
+from strategies import State
+
+from space_robot_model.robot import Robot
+from space_robot_model.robot.dynamics import bias_force, forward_dynamics, mass_matrix
+from space_robot_model.robot.tree import Body
+
+Array = NDArray[np.float64]
+
+
+def assert_close(actual: ArrayLike, expected: ArrayLike, tolerance: float) -> None:
+    """Every element agrees to ``tolerance`` of the largest."""
+    size = float(np.max(np.abs(expected), initial=0.0))
+    np.testing.assert_allclose(actual, expected, rtol=0.0, atol=tolerance * size)
+
+
+def skew(v: ArrayLike) -> Array:
+    """``skew(v) @ w = v x w``."""
+    x, y, z = np.asarray(v)
+    return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+
+
+def rotation_of(quaternion: ArrayLike) -> Rotation:
+    """SciPy's rotation of ``[w, x, y, z]``."""
+    return Rotation.from_quat(np.roll(quaternion, -1))
+
+
+def quaternion_of(rotation: Rotation) -> Array:
+    """``[w, x, y, z]`` of SciPy's rotation."""
+    return np.roll(rotation.as_quat(), 1)
+
+
+def multiplied(a: Array, b: Array) -> Array:
+    """Hamilton's product of two quaternions ``[w, x, y, z]`` of any norm."""
+    w = a[0] * b[0] - a[1:] @ b[1:]
+    return np.array([w, *(a[0] * b[1:] + b[0] * a[1:] + np.cross(a[1:], b[1:]))])
+
+
+class RelativeMotion(NamedTuple):
+    """A base relative to a desired frame D, by the product rule of quaternions."""
+
+    error: Array
+    """q_e = q_d* q, eta >= 0."""
+    rate: Array
+    """epsdot_e."""
+    second_rate: Callable[[Array], Array]
+    """epsdd_e for an angular acceleration (3,) of the base, on inertial axes."""
+
+    @classmethod
+    def of(cls, desired: Array, state: State) -> RelativeMotion:
+        """Of a reference (10,): q_d, omega_d and alpha_d on D's axes; ``state`` is inertial."""
+        q_d, omega, alpha = desired[:4], *(np.array([0.0, *desired[k : k + 3]]) for k in (4, 7))
+        w = np.array([0.0, *state.w0])
+        q = state.quaternion if state.quaternion @ q_d >= 0.0 else -state.quaternion
+        d_rate, q_rate = 0.5 * multiplied(q_d, omega), 0.5 * multiplied(w, q)
+        d_second = 0.5 * (multiplied(d_rate, omega) + multiplied(q_d, alpha))
+        back = [part * [1.0, -1.0, -1.0, -1.0] for part in (q_d, d_rate, d_second)]
+
+        def second_rate(acceleration: Array) -> Array:
+            own = multiplied(np.array([0.0, *acceleration]), q) + multiplied(w, q_rate)
+            second = multiplied(back[2], q) + 2.0 * multiplied(back[1], q_rate)
+            result: Array = (second + multiplied(back[0], 0.5 * own))[1:]
+            return result
+
+        rate = multiplied(back[1], q) + multiplied(back[0], q_rate)
+        return cls(multiplied(back[0], q), rate[1:], second_rate)
+
+
+def turned(quaternion: ArrayLike, angle_inertial: ArrayLike) -> Array:
+    """``quaternion`` turned by a rotation vector on inertial axes, on the same side."""
+    result = quaternion_of(
+        Rotation.from_rotvec(np.asarray(angle_inertial)) * rotation_of(quaternion)
+    )
+    return result if result @ np.asarray(quaternion) >= 0.0 else -result
+
+
+def attitude_jacobian_inertial(quaternion: ArrayLike) -> Array:
+    """``J0 = (eta E - skew(eps)) / 2``: epsdot from the angular velocity on inertial axes."""
+    q = np.asarray(quaternion)
+    return 0.5 * (q[0] * np.eye(3) - skew(q[1:]))
+
+
+def attitude_jacobian_base(quaternion: ArrayLike) -> Array:
+    """(1): ``J0 = (eta E + skew(eps)) / 2``, epsdot from the angular velocity in the base frame."""
+    return np.ascontiguousarray(attitude_jacobian_inertial(quaternion).T)
+
+
+def pinocchio_model(robot: Robot) -> pin.Model:
+    """The same robot in Pinocchio, without gravity: a free-flyer and joints of z.
+
+    Its joints are in the order of ``robot.order``, see `visited`.
+    """
+    model = pin.Model()
+    identity = pin.SE3.Identity()
+    joint = model.addJoint(0, pin.JointModelFreeFlyer(), identity, "base")
+    model.appendBodyToJoint(
+        joint, pin.Inertia(robot.mass[0], robot.com[0], robot.inertia[0]), identity
+    )
+    numbers = {0: joint}
+    for i in robot.order:
+        placement = pin.SE3(robot.rotation[i], robot.rotation[i] @ robot.offset[i])
+        kind = pin.JointModelPZ() if robot.is_prismatic[i] else pin.JointModelRZ()
+        joint = model.addJoint(numbers[robot.parent[i]], kind, placement, f"joint{i + 1}")
+        numbers[i + 1] = joint
+        inertia = pin.Inertia(robot.mass[i + 1], robot.com[i + 1], robot.inertia[i + 1])
+        model.appendBodyToJoint(joint, inertia, identity)
+    model.gravity = pin.Motion.Zero()
+    return model
+
+
+def visited(robot: Robot, state: State) -> State:
+    """The state with its joints in the order of Pinocchio's and MuJoCo's models of the robot."""
+    order = list(robot.order)
+    return state._replace(theta=state.theta[order], rate=state.rate[order])
+
+
+def pinocchio_state(state: State, position: ArrayLike = (0.0, 0.0, 0.0)) -> tuple[Array, Array]:
+    """Configuration and velocity as Pinocchio wants them: base twist in the base frame."""
+    q = state.quaternion
+    back = rotation_of(q).as_matrix().T
+    configuration = np.concatenate([np.asarray(position), q[1:], q[:1], state.theta])
+    return configuration, np.concatenate([back @ state.v0, back @ state.w0, state.rate])
+
+
+def to_base_axes(quaternion: ArrayLike, size: int) -> Array:
+    """blkdiag(R^T, R^T, E): base parts of a generalised vector from inertial to base axes."""
+    matrix = np.eye(size)
+    matrix[:3, :3] = matrix[3:6, 3:6] = rotation_of(quaternion).as_matrix().T
+    return matrix
+
+
+def pinocchio_mass_matrix(robot: Robot, state: State, position: ArrayLike = (0, 0, 0)) -> Array:
+    """H of (7) by composite rigid bodies."""
+    model = pinocchio_model(robot)
+    upper = np.triu(pin.crba(model, model.createData(), pinocchio_state(state, position)[0]))
+    to_base = to_base_axes(state.quaternion, robot.joint_count + 6)
+    return to_base.T @ (upper + np.triu(upper, 1).T) @ to_base
+
+
+def rho_space_inertia(robot: Robot, quaternion: Array, theta: Array) -> Array:
+    """H_S by Pinocchio, (25) and the elimination of the base's translation."""
+    zero = np.zeros(3)
+    h = pinocchio_mass_matrix(robot, State(quaternion, theta, zero, zero, 0.0 * theta))
+    reduced = h[3:, 3:] - h[3:, :3] @ np.linalg.solve(h[:3, :3], h[:3, 3:])
+    inverse = np.eye(robot.n + 3)
+    inverse[:3, :3] = np.linalg.inv(attitude_jacobian_inertial(quaternion))
+    return inverse.T @ reduced @ inverse
+
+
+def pinocchio_bias_force(robot: Robot, state: State, position: ArrayLike = (0, 0, 0)) -> Array:
+    """c of (7) by recursive Newton-Euler, where the base CoM's acceleration is zero."""
+    model = pinocchio_model(robot)
+    configuration, velocity = pinocchio_state(state, position)
+    spatial = np.zeros(robot.joint_count + 6)
+    spatial[:3] = -np.cross(velocity[3:6], velocity[:3])
+    force = pin.rnea(model, model.createData(), configuration, velocity, spatial)
+    return to_base_axes(state.quaternion, robot.joint_count + 6).T @ force
+
+
+def pinocchio_forward_dynamics(robot: Robot, state: State, force: Array) -> Array:
+    """``[v0dot, w0dot, thetadd]`` on inertial axes by Pinocchio's articulated bodies."""
+    model = pinocchio_model(robot)
+    return pinocchio_acceleration(model, model.createData(), state, force)
+
+
+def pinocchio_acceleration(model: Any, data: Any, state: State, force: Array) -> Array:
+    """`pinocchio_forward_dynamics` with a model made before."""
+    configuration, velocity = pinocchio_state(state)
+    to_base = to_base_axes(state.quaternion, force.size)
+    spatial = pin.aba(model, data, configuration, velocity, to_base @ force).copy()
+    spatial[:3] += np.cross(velocity[3:6], velocity[:3])
+    return to_base.T @ spatial
+
+
+def mujoco_numbers(values: Sequence[float] | Array) -> str:
+    """As MJCF has them, to the last digit."""
+    return " ".join(repr(float(value)) for value in values)
+
+
+def mujoco_inertial(com: Array, mass: float, tensor: Array) -> str:
+    """A body's inertia in MJCF, ``tensor`` about its centre of mass."""
+    full = [tensor[ij] for ij in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))]
+    return (
+        f'<inertial pos="{mujoco_numbers(com)}" mass="{float(mass)!r}" '
+        f'fullinertia="{mujoco_numbers(full)}"/>'
+    )
+
+
+def mujoco_model(robot: Robot, base: str = "", on_base: str = "") -> mujoco.MjModel:
+    """The same robot in MuJoCo, without gravity: a free joint, and hinges and slides of z.
+
+    In MJCF, ``base`` is another `mujoco_inertial` for the base, and ``on_base`` are more bodies on
+    it; their joints stand behind the robot's.
+    """
+
+    def inertial(body: int) -> str:
+        return mujoco_inertial(robot.com[body], robot.mass[body], robot.inertia[body])
+
+    def branch(body: int) -> str:
+        text = inertial(body)
+        for i in robot.order:
+            if robot.parent[i] != body:
+                continue
+            place = robot.rotation[i] @ robot.offset[i]
+            kind = "slide" if robot.is_prismatic[i] else "hinge"
+            turn = mujoco_numbers(quaternion_of(Rotation.from_matrix(robot.rotation[i])))
+            text += (
+                f'<body pos="{mujoco_numbers(place)}" quat="{turn}">'
+                f'<joint type="{kind}" axis="0 0 1"/>{branch(i + 1)}'
+                "</body>"
+            )
+        return text
+
+    text = branch(0).replace(inertial(0), base or inertial(0), 1)
+    text = f'<body name="base"><freejoint/>{text}{on_base}</body>'
+    return mujoco.MjModel.from_xml_string(
+        f'<mujoco><option gravity="0 0 0"/><worldbody>{text}</worldbody></mujoco>'
+    )
+
+
+def mujoco_forward_dynamics(robot: Robot, state: State, force: Array) -> Array:
+    """``[v0dot, w0dot, thetadd]`` on inertial axes by MuJoCo."""
+    return mujoco_acceleration(mujoco_model(robot), state, force)
+
+
+def mujoco_acceleration(model: mujoco.MjModel, state: State, force: Array) -> Array:
+    """`mujoco_forward_dynamics` with a model made before."""
+    data = mujoco.MjData(model)
+    rotation = rotation_of(state.quaternion).as_matrix()
+    data.qpos[3:7], data.qpos[7:] = state.quaternion, state.theta
+    data.qvel[:3], data.qvel[6:] = state.v0, state.rate
+    data.qvel[3:6] = rotation.T @ state.w0  # MuJoCo: base turn in the base frame, the rest inertial
+    data.qfrc_applied[:] = force
+    data.qfrc_applied[3:6] = rotation.T @ force[3:6]
+    mujoco.mj_forward(model, data)
+    acceleration = data.qacc.copy()
+    acceleration[3:6] = rotation @ acceleration[3:6]
+    return acceleration
+
+
+JOINTS = {
+    "revolute": pin.JointModelRevoluteUnaligned,
+    "prismatic": pin.JointModelPrismaticUnaligned,
+}
+
+
+def pinocchio_tree(bodies: Sequence[Body]) -> pin.Model:
+    """Bodies in any order in Pinocchio: joints about their own axes, fixed ones joined there.
+
+    Its frames have the names of the bodies.
+    """
+    model = pin.Model()
+    model.gravity = pin.Motion.Zero()
+    base = next(body for body in bodies if body.joint is None)
+    waiting = [(base, 0, pin.SE3.Identity())]
+    while waiting:  # down each branch: Pinocchio's algorithms want joints in that order
+        body, carrier, place = waiting.pop()
+        if body.joint is None:
+            carrier = model.addJoint(0, pin.JointModelFreeFlyer(), place, "root")
+        else:
+            joint = body.joint
+            place = place * pin.SE3(joint.rotation, joint.rotation @ joint.offset)
+            if joint.kind != "fixed":
+                kind = JOINTS[joint.kind](joint.axis)
+                carrier = model.addJoint(carrier, kind, place, joint.name)
+                place = pin.SE3.Identity()
+        if body.mass:
+            inertia = pin.Inertia(body.mass, body.com, body.inertia)
+            model.appendBodyToJoint(carrier, inertia, place)
+        model.addBodyFrame(body.name, carrier, place, 0)
+        waiting += [(child, carrier, place) for child in bodies if child.parent == body.name]
+    return model
+
+
+class TreeOracle:
+    """A Pinocchio model that moves about, seen from the CoM of one of its bodies.
+
+    Or from another place ``seen_from`` (3,) of the body, m.
+    """
+
+    def __init__(
+        self,
+        model: pin.Model,
+        base: str,
+        joint_names: Sequence[str],
+        seed: int,
+        seen_from: Array | None = None,
+    ) -> None:
+        rng = np.random.default_rng(seed)
+        self.model = model
+        self.model.gravity = pin.Motion.Zero()
+        self.v = rng.normal(size=self.model.nv)
+        angles = np.concatenate([np.zeros(6), rng.uniform(-3.0, 3.0, self.model.nv - 6)])
+        self.q = pin.integrate(self.model, pin.neutral(self.model), angles)
+        self.q[:3] = rng.normal(size=3)
+        self.q[3:7] = Rotation.random(random_state=seed).as_quat()
+        self.columns = [self.model.joints[self.model.getJointId(n)].idx_v for n in joint_names]
+        self.positions, self.rates = angles[self.columns], self.v[self.columns]
+        link = self.model.frames[self.model.getFrameId(base, pin.FrameType.BODY)]
+        body = self.model.inertias[link.parentJoint]  # with all that is fixed to it
+        place = pin.SE3(link.placement.rotation, body.lever if seen_from is None else seen_from)
+        self.frame = self.model.addFrame(
+            pin.Frame("seen from", link.parentJoint, place, pin.FrameType.OP_FRAME)
+        )
+        self.data = self.model.createData()
+
+    def jacobian(self) -> Array:
+        """From Pinocchio's velocities to ``[v0, w0, thetadot]`` on inertial axes."""
+        rows = pin.computeFrameJacobian(
+            self.model, self.data, self.q, self.frame, pin.LOCAL_WORLD_ALIGNED
+        )
+        return np.vstack([rows, np.eye(self.model.nv)[self.columns]])
+
+    def drift(self) -> Array:
+        """The acceleration of these if Pinocchio's velocities stay as they are."""
+        zero = np.zeros(self.model.nv)
+        pin.forwardKinematics(self.model, self.data, self.q, self.v, zero)
+        found = pin.getFrameClassicalAcceleration(
+            self.model, self.data, self.frame, pin.LOCAL_WORLD_ALIGNED
+        )
+        return np.concatenate([found.vector, np.zeros(len(self.columns))])
+
+    def attitude(self) -> Array:
+        """(4,) quaternion w, x, y, z of the body that is the base."""
+        pin.framesForwardKinematics(self.model, self.data, self.q)
+        return quaternion_of(Rotation.from_matrix(self.data.oMf[self.frame].rotation))
+
+
+def assert_same_dynamics(robot: Robot, oracle: TreeOracle, seed: int) -> None:
+    """H, c and the accelerations to 1e-12 of their largest."""
+    J, quaternion = oracle.jacobian(), oracle.attitude()
+    velocity = J @ oracle.v
+    motion = (quaternion, oracle.positions, velocity[3:6], oracle.rates)
+    H = mass_matrix(robot, quaternion, oracle.positions)
+    M = pin.crba(oracle.model, oracle.data, oracle.q)
+    M = np.triu(M) + np.triu(M, 1).T
+    np.testing.assert_allclose(J.T @ H @ J, M, rtol=0.0, atol=1e-12 * np.max(np.abs(M)))
+
+    c = bias_force(robot, *motion)
+    expected = pin.nonLinearEffects(oracle.model, oracle.data, oracle.q, oracle.v)
+    found = J.T @ (H @ oracle.drift() + c)
+    scale = np.max(np.abs(J.T @ H @ J) @ np.abs(oracle.v)) * np.max(np.abs(oracle.v))
+    np.testing.assert_allclose(found, expected, rtol=0.0, atol=1e-12 * scale)
+
+    force = np.random.default_rng(seed + 1).normal(size=len(c))
+    there = pin.aba(oracle.model, oracle.data, oracle.q, oracle.v, J.T @ force)
+    here = forward_dynamics(robot, *motion, force)
+    expected = J @ there + oracle.drift()
+    scale = np.max(np.abs(expected)) + np.linalg.norm(np.linalg.inv(H) @ c)
+    np.testing.assert_allclose(here, expected, rtol=0.0, atol=1e-12 * scale)
