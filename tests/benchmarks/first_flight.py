@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 
 import numpy as np
-from random_robots import random_robot
+from strategies import random_robot
 
 from space_robot.flight.closed_loop import close_loop
 from space_robot_control.controller.controller import Controller

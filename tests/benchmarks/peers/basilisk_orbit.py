@@ -20,7 +20,7 @@ from Basilisk.simulation import (
 from Basilisk.utilities import RigidBodyKinematics, SimulationBaseClass, simIncludeGravBody
 from numpy.typing import NDArray
 from oracles import quaternion_of, rotation_of
-from orbiting_robots import EARTH_RADIUS, EARTH_RATE, MU
+from oracles.orbit import EARTH_RADIUS, EARTH_RATE, MU
 from scipy.spatial.transform import Rotation
 
 from .orbiting import ORBIT, SOURCES, Moment, Orbiting, OurSatellite

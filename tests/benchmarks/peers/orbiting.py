@@ -12,7 +12,8 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 from oracles import rotation_of
-from orbiting_robots import body_places, centre_of_mass, orbiting_plant, set_motion, whole_inertia
+from oracles.orbit import body_places, centre_of_mass, whole_inertia
+from robots import orbiting_plant, set_motion
 
 from space_robot_model.robot import Robot
 from space_robot_model.robot.plates import plates_of

@@ -20,7 +20,7 @@ from oracles import (
     pinocchio_state,
     rotation_of,
 )
-from random_robots import State
+from strategies import State
 
 from space_robot_model.dynamics.attitude import quaternion_rate
 from space_robot_model.robot import Robot

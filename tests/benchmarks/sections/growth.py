@@ -7,7 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
-from random_robots import random_robot
+from strategies import random_robot
 
 from ..measure import Competitor, Options, interleave
 from ..peers import is_installed

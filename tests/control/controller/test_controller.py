@@ -11,7 +11,7 @@ from closed_loop import GAINS, PERIOD, Loop, law_of
 from hypothesis import assume, given, settings
 from numpy.typing import NDArray
 from oracles import RelativeMotion, multiplied, pinocchio_forward_dynamics, rotation_of
-from random_robots import Case, cases, random_quaternion
+from strategies import Case, cases, random_quaternion
 
 from space_robot_control.allocation.settings import AllocationSettings
 from space_robot_control.controller.controller import Controller

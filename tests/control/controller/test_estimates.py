@@ -20,7 +20,7 @@ from oracles import (
     rotation_of,
     skew,
 )
-from random_robots import Case, cases
+from strategies import Case, cases
 
 from space_robot_control.controller.controller import Controller
 from space_robot_control.controller.gains import NOMINAL, check_gains, read_gains

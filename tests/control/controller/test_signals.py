@@ -15,8 +15,8 @@ from hypothesis import strategies as st
 from law_equations import random_gains
 from numpy.typing import NDArray
 from oracles import attitude_jacobian_base, quaternion_of, rotation_of
-from random_robots import random_quaternion, random_robot
 from scipy.spatial.transform import Rotation
+from strategies import random_quaternion, random_robot
 
 from space_robot import Scenario
 from space_robot_control.controller.controller import Controller

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from numpy.polynomial import Polynomial
 from numpy.typing import NDArray
 from paths import DATA
-from random_robots import random_robot
+from strategies import random_robot
 
 from space_robot.tuning.warning import limit_remarks
 from space_robot_control.guidance.limits import too_fast, too_strong

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import ArrayLike, NDArray
-from orbiting_robots import EARTH_RADIUS, MU
+from oracles.orbit import EARTH_RADIUS, MU
 from scipy.spatial.transform import Rotation
 
 from space_robot_control.guidance.courses import Course, Slew, turn_between

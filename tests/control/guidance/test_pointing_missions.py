@@ -10,8 +10,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
-from random_robots import random_quaternion
 from scipy.spatial.transform import Rotation
+from strategies import random_quaternion
 
 from space_robot_control.guidance.courses import Slew
 from space_robot_control.guidance.live import TrajectoryPoint

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 import yaml
 from paths import DATA
-from random_robots import random_robot
+from strategies import random_robot
 
 from space_robot_control.guidance.mission import Mission, MissionSettings
 from space_robot_control.guidance.trajectory_file import with_columns

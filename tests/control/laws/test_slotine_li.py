@@ -12,9 +12,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 from oracles import attitude_jacobian_base, rotation_of
-from random_robots import Case, branched_cases, cases, random_robot, random_state
+from oracles.second_moments import Jacobians, jacobians, second_moments
 from scipy.integrate import solve_ivp
-from second_moment_model import Jacobians, jacobians, second_moments
+from strategies import Case, branched_cases, cases, random_robot, random_state
 
 from space_robot_control.laws import Signals
 from space_robot_control.laws.slotine_li import SlotineLi

@@ -7,10 +7,11 @@ from typing import Any
 
 import numpy as np
 import pytest
+from benches import SensorBench as Bench
+from benches import a_state
 from closed_loop import NAVIGATION
 from oracles import rotation_of
-from random_robots import random_quaternion
-from sensor_bench import Bench, a_state
+from strategies import random_quaternion
 
 from space_robot_control.navigation.assumed_sensors import (
     LEAST,

@@ -10,8 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 from oracles import quaternion_of, rotation_of
-from random_robots import random_quaternion
 from scipy.spatial.transform import Rotation
+from strategies import random_quaternion
 
 from space_robot_control.navigation.navigation import LONGEST_BRIDGE, Navigation, navigate
 from space_robot_control.navigation.quaternions import multiply, small_angle, turn

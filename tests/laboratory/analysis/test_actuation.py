@@ -7,10 +7,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-from actuator_sets import PYRAMID, flat, hardware, still_log
+from benches import WHEEL_AXES as PYRAMID
+from benches import flat, hardware, still_log
 from hypothesis import given
 from hypothesis import strategies as st
-from random_logs import random_log
+from strategies import random_log
 
 from space_robot import Scenario
 from space_robot.analysis import analyze

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 from oracles import rotation_of
-from random_logs import random_log
+from strategies import random_log
 
 from space_robot import Scenario
 from space_robot.analysis import analyze, excerpt, tracking_error

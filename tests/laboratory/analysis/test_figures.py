@@ -10,7 +10,8 @@ from typing import Any
 import matplotlib
 import numpy as np
 import pytest
-from actuator_sets import PYRAMID, flat, hardware, still_log
+from benches import WHEEL_AXES as PYRAMID
+from benches import flat, hardware, still_log
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
@@ -22,9 +23,8 @@ from matplotlib.lines import Line2D
 from matplotlib.transforms import Bbox
 from numpy.typing import NDArray
 from PIL import Image
-from random_logs import random_log
-from random_robots import random_robot
 from scipy import signal
+from strategies import random_log, random_robot
 
 from space_robot import Scenario
 from space_robot.analysis import excerpt, tracking_error

@@ -13,9 +13,9 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from numpy.typing import NDArray
 from oracles import rotation_of
-from random_logs import random_log
 from scipy.signal import periodogram
 from scipy.spatial.transform import Rotation
+from strategies import random_log
 
 from space_robot.analysis import analyze, tracking_error
 from space_robot.analysis.attitude_drift import AttitudeDrift, attitude_drift, controls_base

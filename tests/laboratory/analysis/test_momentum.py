@@ -13,7 +13,8 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 import pytest
-from actuator_sets import PYRAMID, flat, hardware, still_log
+from benches import WHEEL_AXES as PYRAMID
+from benches import flat, hardware, still_log
 from numpy.typing import NDArray
 from oracles import pinocchio_model, rotation_of
 from scipy.integrate import quad, solve_ivp

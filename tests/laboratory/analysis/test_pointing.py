@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from oracles import quaternion_of, rotation_of
-from random_robots import random_quaternion, random_robot
 from scipy.spatial.transform import Rotation
+from strategies import random_quaternion, random_robot
 
 from space_robot import Scenario
 from space_robot.analysis import analyze

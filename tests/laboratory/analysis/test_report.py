@@ -12,11 +12,11 @@ from typing import Any
 import numpy as np
 import pytest
 import yaml
-from driven_robots import PLATES, driven_paper
 from flights import space_robot_here
 from numpy.typing import NDArray
 from paths import CONFIG, DATA
-from random_logs import random_log
+from robots import PLATES, driven_paper
+from strategies import random_log
 
 from space_robot import Scenario
 from space_robot.analysis import Analysis, analyze

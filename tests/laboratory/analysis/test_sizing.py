@@ -6,7 +6,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from actuator_sets import PYRAMID, flat, hardware, still_log
+from benches import WHEEL_AXES as PYRAMID
+from benches import flat, hardware, still_log
 from oracles import quaternion_of
 from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation

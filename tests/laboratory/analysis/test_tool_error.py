@@ -10,8 +10,8 @@ import yaml
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from paths import CONFIG
-from random_robots import random_quaternion, random_robot
 from scipy.spatial.transform import Rotation
+from strategies import random_quaternion, random_robot
 
 import space_robot as sr
 from space_robot.analysis.described import assumed_robot_of, captures_of

@@ -10,8 +10,8 @@ from typing import Any
 import pytest
 import yaml
 from click.testing import CliRunner, Result
-from geared_robots import geared_paper_arm
 from paths import CONFIG
+from robots import geared_paper_arm
 
 from space_robot.cli.main import cli
 from space_robot.flight.plan import Flight, FlightPlan, resolve

@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 import pytest
 from command import Run
-from driven_robots import driven_paper
 from exported_kernels import needs_compiler
+from robots import driven_paper
 
 from space_robot.export.folder import write_folder
 from space_robot.export.recorded import recorded_flights

@@ -11,12 +11,12 @@ import numpy as np
 import pytest
 import yaml
 from command import Run
-from conservation import momentum
 from flights import planned
-from meeting_targets import held_place, meeting_target, target_of
 from numpy.typing import NDArray
-from orbiting_robots import centre_of_mass
+from oracles.momenta import momentum
+from oracles.orbit import centre_of_mass
 from paths import CONFIG
+from robots import held_place, meeting_target, target_of
 
 import space_robot as sr
 from space_robot.analysis import analyze

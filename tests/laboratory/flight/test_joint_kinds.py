@@ -8,11 +8,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-from conservation import momentum
 from flights import planned
-from geared_robots import geared_paper_arm, with_gears
 from numpy.typing import NDArray
-from passive_robot import PASSIVE_ROBOT
+from oracles.momenta import momentum
+from robots import PASSIVE_ROBOT, geared_paper_arm
+from strategies import with_gears
 
 import space_robot as sr
 from space_robot.analysis import analyze

@@ -14,7 +14,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 from oracles import pinocchio_model
-from orbiting_robots import EARTH_RADIUS, MU
+from oracles.orbit import EARTH_RADIUS, MU
 from scipy.spatial.transform import Rotation
 
 import space_robot as sr

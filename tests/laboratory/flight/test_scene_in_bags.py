@@ -10,7 +10,7 @@ import pytest
 from flights import planned
 from mcap.reader import make_reader
 from numpy.typing import NDArray
-from passive_robot import PASSIVE_ROBOT
+from robots import PASSIVE_ROBOT
 from rosbags.highlevel import AnyReader
 
 from space_robot.flight.plan import Flight, FlightPlan, resolve

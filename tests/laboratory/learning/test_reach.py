@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from driven_robots import driven_paper
+from robots import driven_paper
 
 import space_robot as sr
 from space_robot_msgs_py.errors import InputError

@@ -10,7 +10,7 @@ import yaml
 from closed_loop import GAINS, H_BAR
 from hypothesis import given, settings
 from oracles import rho_space_inertia
-from random_robots import Case, cases
+from strategies import Case, cases
 
 from space_robot.analysis.generalised_motion import continuous_error, mean_acceleration
 from space_robot.flight.plan import Flight, FlightPlan, resolve

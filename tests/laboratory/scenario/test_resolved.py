@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 import pytest
 import yaml
-from driven_robots import driven_paper
 from flights import space_robot_here
+from robots import driven_paper
 
 from space_robot.api import Scenario
 from space_robot.flight.plan import Flight, resolve

@@ -9,8 +9,8 @@ from typing import Any
 import pytest
 import yaml
 from command import Run
-from driven_robots import driven_paper
 from paths import CONFIG
+from robots import driven_paper
 
 from space_robot.flight.plan import Flight, FlightPlan, resolve
 from space_robot.flight.simulate import simulate

@@ -12,18 +12,18 @@ import numpy as np
 import pinocchio as pin
 import pytest
 import scipy.linalg
-from geared_robots import HEAVY, REFLECTED, oscillator, random_gears, with_gears
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
-from random_robots import State, random_robot
-from rotor_oracles import (
+from oracles.rotors import (
     order_of,
     pinocchio_motion,
     pinocchio_with_rotors,
     random_motor_rotors,
     turns,
 )
+from robots import HEAVY, REFLECTED, oscillator
+from strategies import State, random_gears, random_robot, with_gears
 
 from space_robot.flight.plan import Flight, FlightPlan, resolve
 from space_robot.flight.simulate import simulate

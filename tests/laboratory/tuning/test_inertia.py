@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from oracles import pinocchio_mass_matrix, rho_space_inertia
-from passive_robot import PASSIVE_ROBOT
-from random_robots import State, random_quaternion, random_robot
+from robots import PASSIVE_ROBOT
+from strategies import State, random_quaternion, random_robot
 
 from space_robot.flight.plan import Flight, FlightPlan, resolve
 from space_robot.tuning.inertia import (

@@ -13,9 +13,9 @@ import pinocchio as pin
 import pytest
 from moving_logs import moving_log
 from numpy.typing import NDArray
-from random_trees import random_bodies
+from oracles import pinocchio_tree
 from scene_pages import Scene, page_of, plot_data, quiet
-from tree_oracle import pinocchio_tree
+from strategies import random_bodies
 
 from space_robot import FlownFlight, Scenario
 from space_robot.analysis import excerpt

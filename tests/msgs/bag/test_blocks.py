@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from random_logs import random_log
+from strategies import random_log
 
 from space_robot.analysis import Analysis, analyze
 from space_robot.flight.plan import Flight, FlightPlan, resolve

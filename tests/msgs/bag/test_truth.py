@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 from bags import messages_of, read_accounts
+from benches import SensorBench as Bench
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from sensor_bench import Bench
 
 from space_robot.analysis import Analysis, analyze, excerpt
 from space_robot.flight.plan import Flight, FlightPlan, resolve

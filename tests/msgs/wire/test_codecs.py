@@ -9,7 +9,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
-from random_robots import JOINTS as JOINT_COUNTS
 from random_samples import (
     BASE,
     BASE_AXES,
@@ -23,6 +22,7 @@ from random_samples import (
     state_codec,
 )
 from rosbags.typesys import Stores, get_typestore
+from strategies import JOINTS as JOINT_COUNTS
 
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.errors import MessageError

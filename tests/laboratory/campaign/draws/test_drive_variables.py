@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from driven_robots import DRIVE, PLATES, driven_paper
+from robots import DRIVE, PLATES, driven_paper
 
 from space_robot.campaign.draws import Draws
 from space_robot.campaign.study import Study

@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 import yaml
-from driven_robots import driven_paper
+from robots import driven_paper
 
 from space_robot.campaign.flown import Campaign, FlownCampaign
 

@@ -15,10 +15,10 @@ import numpy as np
 import pytest
 import yaml
 from bags import messages_of
-from driven_robots import driven_paper
 from flights import Flown, planned, simulated, space_robot_here
 from mcap.reader import make_reader
 from paths import CONFIG
+from robots import driven_paper
 from rosbags.rosbag2 import Reader
 
 from space_robot.analysis import analyze

@@ -1,3 +1,0 @@
-"""Old name of `oracles.momenta`."""
-
-from oracles.momenta import *  # noqa: F403

@@ -1,3 +1,0 @@
-"""Old name of `robots`."""
-
-from robots import *  # noqa: F403

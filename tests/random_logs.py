@@ -1,3 +1,0 @@
-"""Old name of `strategies`."""
-
-from strategies import *  # noqa: F403

@@ -1,3 +1,0 @@
-"""Old name of `oracles.rotors`."""
-
-from oracles.rotors import *  # noqa: F403

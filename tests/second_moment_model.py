@@ -1,3 +1,0 @@
-"""Old name of `oracles.second_moments`."""
-
-from oracles.second_moments import *  # noqa: F403

@@ -1,3 +1,0 @@
-"""Old name of `oracles`."""
-
-from oracles import *  # noqa: F403
