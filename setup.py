@@ -87,7 +87,7 @@ setup(
         # pyarrow 26 does not work
         "apt": ["colcon-common-extensions", "numpy<2", "pyarrow<26"],
         # tools/benchmarks; bsk (Basilisk) holds back numpy and matplotlib, so a venv of its own
-        "bench": ["bsk", "hypothesis", "mujoco", "pin", "psutil>=5.9"],
+        "bench": ["bsk", "hypothesis", "mujoco", "pin"],
         "campaign": ["pandas>=2.1", "pyarrow>=14"],  # tables of `campaign`
         "dask": ["distributed>=2024.1"],  # `campaign run --scheduler`
         "dist": ["build>=1.2"],  # `make dist`

@@ -84,13 +84,22 @@ def _numba(plan: dict[str, Any], flown: tuple[Any, ...]) -> Competitor:
     assert isinstance(law, CompiledLaw)
     blocks = Supervisor(controller, hold_ticks=200).block, controller.block, law.memory_block
     start = [block.copy() for block in blocks]
-    code = law.code, controller.allocate
+    states, references = flown[:2]
+    supervision, memory = blocks[:2]
 
     def run(loops: int) -> None:
         for _ in range(loops):
             for block, before in zip(blocks, start, strict=True):
                 block[:] = before
-            answered_states(*blocks[:2], *code, *flown[:2], controller.period)
+            answered_states(
+                supervision,
+                memory,
+                law.code,
+                controller.allocate,
+                states,
+                references,
+                controller.period,
+            )
 
     return run
 

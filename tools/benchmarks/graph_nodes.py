@@ -78,7 +78,8 @@ def _timed(loop: Any, parts: list[str], file: str) -> Any:
 
         def close(self) -> None:
             super().close()
-            np.savez(file, **{part: np.array(times) for part, times in durations.items()})
+            arrays: dict[str, Any] = {part: np.array(times) for part, times in durations.items()}
+            np.savez(file, **arrays)
 
     return Timed
 

@@ -118,7 +118,7 @@ class Ours:
     @property
     def x(self) -> Array:
         """The state reached."""
-        return self._x.copy()
+        return np.array(self._x)
 
 
 class MuJoCo:

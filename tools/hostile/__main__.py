@@ -127,8 +127,9 @@ def kill(victim: str, phase: str, number: signal.Signals, domain: int) -> list[s
     }
     if trial.wait(reached[phase]):
         process = psutil.Process(trial.process.pid) if victim == "fly" else trial.node(victim)
-        with suppress(psutil.Error, AttributeError):  # it may have ended
-            process.send_signal(number)
+        with suppress(psutil.Error):
+            if process:  # else it has ended
+                process.send_signal(number)
     _, wrong = trial.end(loses_bag=victim == "recorder" and number == signal.SIGKILL)
     code, then = Trial(domain, duration=0.1).end()
     did_fly = [] if code == 0 else [f"the next flight did not fly: exit code {code}"]
@@ -153,8 +154,8 @@ def restart(victim: str, domain: int) -> list[str]:
             process.send_signal(signal.SIGINT)
         _, left = psutil.wait_procs(nodes.values(), TIMEOUT_S)
         wrong += [f"{node} ended with {p.poll()}" for node, p in nodes.items() if p.poll() != 0]
-        for process in left:
-            process.kill()
+        for hanging in left:
+            hanging.kill()
         if not open_bag(folder / ("two" if victim == "recorder" else "one")).finished:
             wrong.append("the bag was not closed")
     return wrong
