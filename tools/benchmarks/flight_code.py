@@ -84,22 +84,14 @@ def _numba(plan: dict[str, Any], flown: tuple[Any, ...]) -> Competitor:
     assert isinstance(law, CompiledLaw)
     blocks = Supervisor(controller, hold_ticks=200).block, controller.block, law.memory_block
     start = [block.copy() for block in blocks]
-    states, references = flown[:2]
-    supervision, memory = blocks[:2]
+    code, rows = (law.code, controller.allocate), flown[:2]
+    arguments: list[Any] = [*blocks[:2], *code, *rows, controller.period]
 
     def run(loops: int) -> None:
         for _ in range(loops):
             for block, before in zip(blocks, start, strict=True):
                 block[:] = before
-            answered_states(
-                supervision,
-                memory,
-                law.code,
-                controller.allocate,
-                states,
-                references,
-                controller.period,
-            )
+            answered_states(*arguments)
 
     return run
 

@@ -1,7 +1,7 @@
 """Compiled kernels of a copy of the tree, of which a mutant has those that it cannot have changed.
 
-Run as a script in a copy, it prints the sources of each kernel: of all functions compiled into it,
-and the modules from which these import what is no function.
+As a script it prints the sources of each kernel: of all functions compiled into it, and the modules
+from which these import what is no function.
 """
 
 from __future__ import annotations
@@ -12,8 +12,10 @@ import importlib.util
 import json
 import pkgutil
 import shutil
+import subprocess
 import sys
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -22,8 +24,20 @@ from areas import PACKAGES, ROOT
 
 COMPILER = "compiled"
 """Folder of what all kernels are compiled with."""
-Sources = dict[str, list[str]]
-"""Modules (relative to the root) compiled into a kernel, by its files' ``room_hash/name``."""
+
+
+@cache
+def sources() -> dict[str, list[str]]:
+    """Return the modules compiled into each kernel, by its folder and the name of its files."""
+    output = subprocess.check_output([sys.executable, __file__], cwd=ROOT)
+    return dict(json.loads(output))
+
+
+@cache
+def folders() -> list[Path]:
+    """Return the folders with modules, relative to the root."""
+    files = (file for package in PACKAGES.values() for file in ROOT.glob(f"{package}/**/*.py"))
+    return sorted({file.parent.relative_to(ROOT) for file in files})
 
 
 def subfolder(folder: Path) -> str:
@@ -35,22 +49,20 @@ def seed(kernels: Path, tree: Path, known: Path) -> None:
     """Fill the cache of a copy in ``tree`` with what is compiled here, which is in ``known``."""
     for mark in known.glob("*.*"):  # what has been compiled as a whole
         shutil.copy2(mark, kernels)
-    files = (file for package in PACKAGES.values() for file in tree.glob(f"{package}/**/*.py"))
-    for folder in {file.parent for file in files}:
-        origin = known / subfolder(ROOT / folder.relative_to(tree))
-        if origin.is_dir():
-            shutil.copytree(origin, kernels / subfolder(folder), dirs_exist_ok=True)
+    for folder in folders():
+        if (origin := known / subfolder(ROOT / folder)).is_dir():
+            shutil.copytree(origin, kernels / subfolder(tree / folder), dirs_exist_ok=True)
 
 
-def reuse(known: Path, kernels: Path, sources: Sources, module: Path) -> None:
-    """Fill a mutant's cache with the kernels that do not contain its module."""
-    if module.parent.name == COMPILER:
-        return
-    for file in known.glob("*/*"):
-        name = f"{file.parent.name}/{file.name.split('.py3')[0]}"
-        if name in sources and str(module) not in sources[name]:
-            (kernels / file.parent.name).mkdir(exist_ok=True)
-            (kernels / file.parent.name / file.name).hardlink_to(file)
+def reuse(known: Path, tree: Path, kernels: Path, module: Path) -> None:
+    """Fill a mutant's cache with the kernels of a copy that do not contain its module."""
+    for folder in folders() if module.parent.name != COMPILER else ():
+        name = subfolder(tree / folder)
+        for file in (known / name).glob("*"):
+            kernel = f"{folder}/{file.name.split('.py3')[0]}"
+            if str(module) not in sources().get(kernel, [str(module)]):
+                (kernels / name).mkdir(exist_ok=True)
+                (kernels / name / file.name).hardlink_to(file)
 
 
 def _modules() -> Iterator[ModuleType]:
@@ -99,19 +111,21 @@ def _origins(file: Path) -> set[Path]:
 
 def main() -> None:
     """Print the sources of each kernel, as JSON."""
-    here, sources = Path.cwd(), Sources()
+    here, kernels = Path.cwd(), dict[str, list[str]]()
     sys.path.insert(0, str(here))
     for module in list(_modules()):
         for kernel in vars(module).values():
-            cache = getattr(getattr(kernel, "_cache", None), "_cache_file", None)
-            if cache and hasattr(kernel, "py_func"):
+            store = getattr(getattr(kernel, "_cache", None), "_cache_file", None)
+            if store and hasattr(kernel, "py_func"):
                 files = {Path(f.py_func.__code__.co_filename) for f in _compiled_into(kernel)}
                 files |= {origin for file in files for origin in _origins(file)}
-                index = Path(cache._index_path)
-                sources[f"{index.parent.name}/{index.name.split('.py3')[0]}"] = sorted(
-                    str(file.relative_to(here)) for file in files if file.is_relative_to(here)
-                )
-    print(json.dumps(sources))
+                folder = Path(kernel.py_func.__code__.co_filename).parent
+                if folder.is_relative_to(here):
+                    stem = Path(store._index_path).name.split(".py3")[0]
+                    kernels[f"{folder.relative_to(here)}/{stem}"] = sorted(
+                        str(file.relative_to(here)) for file in files if file.is_relative_to(here)
+                    )
+    print(json.dumps(kernels))
 
 
 if __name__ == "__main__":

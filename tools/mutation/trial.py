@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 import re
 import shutil
@@ -55,9 +54,6 @@ class Copy:
         here = subprocess.check_output([sys.executable, "-c", CACHE], cwd=ROOT, text=True)
         self._known = self._cache()
         kernel_cache.seed(self._known, self._tree, Path(here.strip()))
-        listing = [sys.executable, kernel_cache.__file__]
-        sources = subprocess.check_output(listing, cwd=self._tree, env=self._environment())
-        self._sources: kernel_cache.Sources = json.loads(sources)
 
     def trial(self, mutant: Mutant, tests: Sequence[str], marks: str) -> Outcome:
         """Run the tests on a mutant."""
@@ -81,7 +77,7 @@ class Copy:
             with suppress(subprocess.CalledProcessError):
                 cache = self._cache()
             if cache != self._known:
-                kernel_cache.reuse(self._known, cache, self._sources, mutant.module)
+                kernel_cache.reuse(self._known, self._tree, cache, mutant.module)
             return self._test(tests, marks)
         finally:
             os.replace(self._saved, module)  # with its time, by which Numba knows its kernels
