@@ -25,7 +25,7 @@ export PYTHONPYCACHEPREFIX := $(CURDIR)/$(VENV)/pycache
 export ROS_AUTOMATIC_DISCOVERY_RANGE ?= LOCALHOST
 export FASTDDS_BUILTIN_TRANSPORTS ?= UDPv4
 
-.PHONY: help setup fly test test-docs check quick coverage hooks lint kernels docs dist bench mutation soak notebooks \
+.PHONY: help setup fly test test-docs check quick coverage hooks lint kernels docs dist bench mutation notebooks \
   newest constraints clean
 
 help:
@@ -43,7 +43,6 @@ help:
 	@echo "make dist                a wheel and a source distribution in dist/"
 	@echo "make bench [ARGS=...]    how fast it is, e.g. make bench ARGS='plant laws'; --help tells more"
 	@echo "make mutation [ARGS=...] small faults put in, one at a time: do the tests notice?"
-	@echo "make soak [ARGS=...]     random flights with faults, e.g. make soak ARGS='--minutes 5'"
 	@echo "make notebooks           run docs/notebooks and keep what they show"
 	@echo "make newest [ARGS=...]   make check with the newest versions of everything, in .venv-newest"
 	@echo "make constraints         write constraints.txt anew: the newest versions that fit together"
@@ -100,14 +99,12 @@ dist: $(VENV)/.made
 	@ls dist/*
 
 bench: $(VENV)/.tests
-	@$(VENV)/bin/python tests/benchmarks $(ARGS)
+	@$(VENV)/bin/python tools/benchmarks $(ARGS)
 
-mutation: $(VENV)/.tests
+# What is compiled here, no mutant compiles again.
+mutation: kernels $(VENV)/.tests
 	@$(PIP_INSTALL) --editable '.[ros,test,mutation]'
-	$(VENV)/bin/python tests/mutation $(ARGS)
-
-soak: $(VENV)/.tests
-	$(VENV)/bin/python tests/soak $(ARGS)
+	$(VENV)/bin/python tools/mutation $(ARGS)
 
 notebooks: $(VENV)/.tests
 	$(VENV)/bin/python docs/notebooks/execute.py

@@ -86,8 +86,8 @@ setup(
         # beside ROS 2 Jazzy from apt: its messages are compiled for Ubuntu's NumPy 1.26, with which
         # pyarrow 26 does not work
         "apt": ["colcon-common-extensions", "numpy<2", "pyarrow<26"],
-        # tests/benchmarks; bsk (Basilisk) holds back numpy and matplotlib, so a venv of its own
-        "bench": ["bsk", "hypothesis", "mujoco", "pin", "psutil>=5.9"],
+        # tools/benchmarks; bsk (Basilisk) holds back numpy and matplotlib, so a venv of its own
+        "bench": ["bsk", "hypothesis", "mujoco", "pin"],
         "campaign": ["pandas>=2.1", "pyarrow>=14"],  # tables of `campaign`
         "dask": ["distributed>=2024.1"],  # `campaign run --scheduler`
         "dist": ["build>=1.2"],  # `make dist`
@@ -103,7 +103,7 @@ setup(
         ],
         "gym": ["gymnasium>=1.0"],  # space_robot.api.gymnasium_env
         "mpc": ["daqp>=0.8"],  # examples/mpc_law.py
-        "mutation": ["cosmic-ray"],  # tests/mutation
+        "mutation": ["cosmic-ray"],  # tools/mutation
         "notebooks": ["ipykernel", "pandas>=2.1", "pyarrow>=14"],  # docs/notebooks
         "parquet": ["pyarrow>=14"],  # `analyze --parquet`
         # ROS 2 Jazzy from wheels; never a requirement, for apt's ROS must stay untouched

@@ -89,7 +89,6 @@ OF_ROS = {"domain", "free_domain", "fly", "start", "ground"}
 """Fixtures of tests that start ROS processes, or are a node of their own."""
 WITH_ROS = (
     "control/controller/test_law_changes.py",
-    "control/controller/test_safe_modes.py",
     "laboratory/flight/graph/",
     "laboratory/flight/replay/",
 )

@@ -11,7 +11,6 @@ from space_robot.cli.main import cli
 @pytest.mark.parametrize(
     ("line", "instead"),
     [
-        ("soak --minutes 5 --json", "make soak ARGS=... in the repository"),
         ("sweep", "space-robot campaign run sensor_grades --out campaigns/sensor_grades"),
         (
             "sweep --draws 2 --seed 7 --jobs 1 --out a",
