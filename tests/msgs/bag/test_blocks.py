@@ -1,8 +1,9 @@
-"""Flights analyzed block by block: the same figures, wherever the blocks are cut."""
+"""Flights block by block, and the laws that flew: the same figures, wherever blocks are cut."""
 
 from __future__ import annotations
 
 import itertools
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -13,13 +14,18 @@ from hypothesis import strategies as st
 from random_logs import random_log
 
 from space_robot.analysis import Analysis, analyze
+from space_robot.analysis.described_estimator import estimator
+from space_robot.analysis.estimate_error import EstimateErrors, HBar
+from space_robot.analysis.excerpt import excerpt
 from space_robot.flight.plan import Flight, FlightPlan, resolve
+from space_robot.flight.replay.run import RecordedLaws
 from space_robot.flight.simulate import fly_blocks, simulate
 from space_robot_msgs_py.bag import blocks
 from space_robot_msgs_py.bag.blocks import BLOCK_TICKS, block_bounds, blocks_of, joined, last_rows
 from space_robot_msgs_py.bag.flight_log import REFERENCE, FlightLog
+from space_robot_msgs_py.bag.law_history import LawChange, as_data, in_words, same, within
 from space_robot_msgs_py.bag.reader import read_flight
-from space_robot_msgs_py.samples import STATE_FIELDS
+from space_robot_msgs_py.samples import STATE_FIELDS, LawInForce, Timebase, in_order
 
 COLUMNS = (*STATE_FIELDS, *REFERENCE, "commanded_torque")
 
@@ -115,3 +121,124 @@ def test_a_flight_whole_from_blocks_and_from_its_bag_is_the_same(
     np.testing.assert_array_equal(log.telemetry, FLOWN.telemetry)
     assert [block.ticks for block in blocks_of(FLOWN)] == [150] * 4
     assert analysis.report() == analyze(FLOWN) == analyze(read)
+
+
+TIMEBASE = Timebase(500_000)
+
+
+def law(tick: int, name: str, is_first: bool = False, **gains: float) -> LawInForce:
+    return LawInForce(tick, name, {gain: (value,) for gain, value in gains.items()}, is_first)
+
+
+LAWS = (
+    law(0, "tde_stc", is_first=True, k_1=1.0, k_2=2.0),
+    law(2469, "tde_tsmc", k_1=3.0),
+    law(4000, "tde_tsmc", k_1=4.0),
+    law(5000, "tde_stc", k_1=1.0, k_2=2.5),
+    law(6000, "tde_stc", is_first=True, k_1=1.0, k_2=2.0),
+)
+
+
+def test_in_words_every_change_is_told_with_its_time() -> None:
+    assert in_words(as_data(LAWS[:1], TIMEBASE)) == "tde_stc"
+    assert in_words(as_data(LAWS[:2], TIMEBASE)) == "tde_stc -> tde_tsmc at 1.2345 s"
+    assert in_words(as_data(LAWS[1:3], TIMEBASE)) == "tde_tsmc (other k_1 at 2.0000 s)"
+    assert in_words(as_data(LAWS, TIMEBASE)) == (
+        "tde_stc -> tde_tsmc at 1.2345 s (other k_1 at 2.0000 s) -> tde_stc at 2.5000 s "
+        "(other k_2) and 1 more"
+    )
+    assert in_words(as_data((*LAWS[:1], LAWS[0]._replace(tick=9)), TIMEBASE)) == (
+        "tde_stc (begun again at 0.0045 s)"
+    )
+    assert in_words([]) == ""
+    assert str(LawChange(LAWS[1], LAWS[2])) == "tde_tsmc: other k_1"
+    assert str(LawChange(LAWS[0], LAWS[1])) == "tde_stc -> tde_tsmc"
+
+
+def test_a_part_of_a_flight_begins_with_the_law_in_force_there() -> None:
+    assert within(LAWS, 0, 10_000) == LAWS
+    assert within(LAWS, 2469, 4000) == LAWS[1:2]
+    assert within(LAWS, 2468, 4001) == LAWS[:3]
+    assert within(LAWS[1:], 0, 2469) == ()
+
+
+def test_of_two_laws_at_one_tick_the_last_has_answered_it() -> None:
+    crashed, flown = law(7, "ctc", k_p=1.0), law(7, "ctc", is_first=True, k_p=2.0)
+    assert in_order([LAWS[2], crashed, flown, LAWS[0]]) == (LAWS[0], flown, LAWS[2])
+
+
+def test_same_is_to_the_last_bit() -> None:
+    assert same(law(1, "ctc", k_p=0.0), law(2, "ctc", k_p=0.0))
+    assert not same(law(1, "ctc", k_p=0.0), law(1, "ctc", k_p=-0.0))
+    assert not same(law(1, "ctc", k_p=1.0), law(1, "ctc", k_d=1.0))
+    assert not same(law(1, "ctc", k_p=1.0), law(1, "pid", k_p=1.0))
+
+
+@pytest.mark.parametrize(
+    ("states", "done"),
+    [
+        (
+            [0, 1, 2469, 4000, 5000, 6000],
+            ["tde_stc", "tde_tsmc", "tde_tsmc", "tde_stc", "again", "tde_stc"],
+        ),
+        ([2470, 4500], ["tde_tsmc", "tde_tsmc"]),
+        ([5999, 7000], ["tde_stc", "again", "tde_stc"]),
+        ([6001], ["tde_stc"]),
+        ([1, 5999], ["tde_stc", "tde_stc"]),
+    ],
+)
+def test_laws_are_put_in_force_before_their_states(states: list[int], done: list[str]) -> None:
+    """Of several between two states the last; a controller that began again begins again."""
+    told: list[str] = []
+    laws = RecordedLaws(LAWS, lambda law: told.append(law.name), lambda: told.append("again"))
+    for tick in states:
+        laws.before(tick)
+    assert told == done
+
+
+@pytest.fixture(scope="module")
+def swapped() -> FlightLog:
+    """TDE-STC, then CTC, then TDE-SMC, whose h_bar is halved in the record."""
+    return simulate(Flight(resolve(FlightPlan(duration=0.3, swaps=["0.1:ctc", "0.2:tde_smc"]))))
+
+
+def test_the_report_has_all_laws_that_flew(swapped: FlightLog) -> None:
+    report = analyze(swapped)
+    assert [(law["tick"], law["t_s"], law["controller"]) for law in report["laws"]] == [
+        (0, 0.0, "tde_stc"),
+        (200, 0.1, "ctc"),
+        (400, 0.2, "tde_smc"),
+    ]
+    assert set(report["laws"][1]["gains"]) == {"k_p", "k_d"}
+    part = analyze(excerpt(swapped, 0.15, 0.25))
+    assert part["controller"] == "ctc"
+    assert [law["controller"] for law in part["laws"]] == ["ctc", "tde_smc"]
+
+
+@pytest.mark.parametrize("smoothing", [0.0, 0.3])
+@pytest.mark.parametrize("cuts", [(), (199, 200, 203, 500)])
+def test_the_estimates_error_is_taken_with_the_h_bar_in_force(
+    swapped: FlightLog, smoothing: float, cuts: tuple[int, ...]
+) -> None:
+    """Row k is tick k+1: as under one law alone where that is in force, left out under CTC."""
+    halved = {
+        **swapped.laws[2].gains,
+        "h_bar": tuple(0.5 * h for h in swapped.laws[2].gains["h_bar"]),
+    }
+    log = replace(swapped, laws=(*swapped.laws[:2], swapped.laws[2]._replace(gains=halved)))
+
+    def errors(h_bar: HBar) -> np.ndarray:
+        found = EstimateErrors(h_bar, smoothing)
+        parts = zip((0, *cuts), (*cuts, log.ticks), strict=True)
+        return np.concatenate([found.of(log.rows(start, stop)) for start, stop in parts])
+
+    alone = [errors(lambda _, law=law: np.array(law.gains["h_bar"])) for law in log.laws[::2]]
+    expected = np.vstack([alone[0][:199], alone[1][399:]])
+    np.testing.assert_array_equal(errors(estimator(log)[0]), expected)
+
+
+def test_where_no_law_has_an_estimate_there_is_no_error_of_it(swapped: FlightLog) -> None:
+    report = analyze(excerpt(swapped, 0.1, 0.2))
+    why = "ctc has no time-delay estimate with a constant h_bar"
+    assert report["unavailable"]["estimate_error"] == why
+    assert analyze(swapped)["estimate_error"]["rms"]["base"] > 0.0

@@ -126,22 +126,9 @@ DAMAGES: dict[str, tuple[Callable[[Path], object], range, list[str]]] = {
             range(100 * k, 100 * k + 100),
             ["bag_0.mcap: unreadable at byte ", "messages cannot be read", "/joint_states 100"],
         )
-        for k in range(4)
+        for k in (1, 3)
     },
     "gap": (_flip_chunk(1), range(100, 200), ["100 of 400 ticks lack", "t = 0.0500 to 0.0995 s"]),
-    "length": (
-        lambda bag: _flip(mcap_file(bag), *(chunks_of(bag)[1][0] + k for k in (1, 4, 8))),
-        range(100, 200),
-        ["unreadable"],
-    ),
-    "cut out": (_rewrite(lambda b, k, _: b[: k + 100] + b[k + 300 :]), range(100, 200), []),
-    "put in": (
-        _rewrite(lambda b, k, _: b[: k + 100] + b"\7" * 777 + b[k + 100 :]),
-        range(100, 200),
-        [],
-    ),
-    "zeros": (_rewrite(lambda b, k, end: b[:k] + bytes(5000) + b[end:]), range(100, 200), []),
-    "beginning": (_rewrite(lambda b, k, _: b"\xaa" * k + b[k:]), range(100), []),
     "index": (
         lambda bag: _flip(mcap_file(bag), mcap_file(bag).stat().st_size - 60),
         NONE,
@@ -202,7 +189,7 @@ def test_what_is_readable_is_read_and_the_rest_told(
     assert all(any(word in text for text in told) for word in words), told
     lost = len(gone) + 400 * (kind == "split")
     for topic in (topics.JOINT_STATES, topics.BASE_STATE, topics.COMMAND):
-        assert log.lost[topic.full_name] == lost or kind in ("beginning", "cut out", "zeros")
+        assert log.lost[topic.full_name] == lost
     assert log.flight == FLIGHT
 
 
