@@ -132,3 +132,23 @@ def test_a_batch_is_where_the_next_message_goes_on_from(
     assert counted.take(last + LONGEST_JUMP + beyond)
     assert counted.invalid_stamps == (beyond > 0)
     assert counted.received == count + 2 + (beyond <= 0)
+
+
+@given(st.integers(1, 30), st.permutations(range(6)), st.integers(0, 5))
+def test_late_messages_count_for_the_period_too(period: int, order: list[int], start: int) -> None:
+    """In any order all are there, from wherever the topic began."""
+    counted = MessageAccounting(topics.CLOCK)
+    for place in order:
+        assert counted.take(period * (start + place))
+    assert counted.unit == period
+    assert counted.received == 6
+    assert counted.missing(10**6) == 0
+    assert (counted.first, counted.last) == (period * start, period * (start + 5))
+
+
+def test_a_message_between_two_halves_the_period() -> None:
+    for ticks in ((0, 20, 10), (40, 60, 30), (0, 30, 10), (0, 30, 20)):
+        counted = MessageAccounting(topics.CLOCK)
+        for tick in ticks:
+            counted.take(tick)
+        assert counted.unit == 10
