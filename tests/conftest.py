@@ -104,8 +104,8 @@ SLOW = (
     "laboratory/processes/test_interruption.py",
     "laboratory/flight/test_long_flights.py",
     "laboratory/flight/test_shipped_robots.py",
-    "msgs/bag/test_bag_fuzz.py",
-    "msgs/bag/test_description_fuzz.py",
+    "msgs/bag/test_broken_bags.py",
+    "msgs/bag/test_description.py",
     "test_packaging.py",
     "test_shown_outputs.py",
 )

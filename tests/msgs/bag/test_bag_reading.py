@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
@@ -20,6 +21,7 @@ from bags import (
     messages_of,
     record,
     rosbags_bag,
+    within,
 )
 from mcap.reader import make_reader
 from mcap.writer import CompressionType
@@ -27,15 +29,17 @@ from mcap.writer import Writer as McapWriter
 from paths import DATA
 from rosbags.rosbag2 import CompressionFormat, CompressionMode, Reader, Writer
 
+from space_robot import load_bag
 from space_robot_msgs_py import topics
+from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.bag.folder import open_bag
 from space_robot_msgs_py.bag.reader import read_flight
-from space_robot_msgs_py.bag.recorder import FLIGHT_KEY
+from space_robot_msgs_py.bag.recorder import FLIGHT_KEY, BagRecorder
 from space_robot_msgs_py.errors import InputError
-from space_robot_msgs_py.samples import Timebase
 from space_robot_msgs_py.wire.definitions import decode, jazzy
 
 SAMPLE = DATA / "rosbag2_sample"
+WALL_NS = 1_795_220_105_128_297_452
 
 
 @pytest.fixture(scope="module")
@@ -46,6 +50,9 @@ def recorded(tmp_path_factory: pytest.TempPathFactory) -> Recorded:
 @pytest.fixture(scope="module")
 def entries(recorded: Recorded) -> list[Entry]:
     return entries_of(recorded.folder)
+
+
+# Storages
 
 
 def _plain(writer: Writer) -> None:
@@ -65,7 +72,11 @@ def _by_file(writer: Writer) -> None:
 def test_bag_of_rosbags_is_the_same_flight(
     recorded: Recorded, entries: list[Entry], tmp_path: Path, storage: str, setup: Any
 ) -> None:
-    assert_same_flight(read_flight(rosbags_bag(tmp_path / storage, entries, setup)), recorded.log)
+    folder = rosbags_bag(tmp_path / storage, entries, setup)
+    assert_same_flight(read_flight(folder), recorded.log)
+    if setup is _plain:
+        (file,) = (f for f in folder.iterdir() if f.suffix != ".yaml")
+        assert_same_flight(read_flight(file), recorded.log)
 
 
 @pytest.mark.parametrize(
@@ -87,21 +98,6 @@ def test_mcap_file_alone_is_the_same_flight_however_it_is_written(
     assert_same_flight(read_flight(mcap_of(tmp_path / "x.mcap", entries, **options)), recorded.log)
 
 
-def test_file_of_our_bag_alone_is_the_same_flight(recorded: Recorded) -> None:
-    log = read_flight(recorded.file)
-    assert_same_flight(log, recorded.log)
-    assert log.description == FLIGHT
-    assert read_flight(recorded.folder / "metadata.yaml").ticks == 200
-
-
-def test_database_alone_is_the_same_flight(
-    recorded: Recorded, entries: list[Entry], tmp_path: Path
-) -> None:
-    folder = rosbags_bag(tmp_path / "sqlite", entries, _plain)
-    (file,) = folder.glob("*.db3")
-    assert_same_flight(read_flight(file), recorded.log)
-
-
 def test_our_description_is_read_from_any_storage(
     recorded: Recorded, entries: list[Entry], tmp_path: Path
 ) -> None:
@@ -110,32 +106,29 @@ def test_our_description_is_read_from_any_storage(
 
     log = read_flight(rosbags_bag(tmp_path / "sqlite", entries, describe))
     assert log.flight["controller"] == "ctc"
-    assert_same_flight(log, recorded.log)
+    alone = read_flight(recorded.file)
+    assert_same_flight(alone, recorded.log)
+    assert alone.description == FLIGHT
+    assert read_flight(recorded.folder / "metadata.yaml").ticks == 200
 
 
 def test_bag_of_a_big_endian_machine_is_the_same_flight(
     recorded: Recorded, entries: list[Entry], tmp_path: Path
 ) -> None:
-    swapped = [
-        (
-            topic,
-            kind,
-            log_ns,
-            bytes(jazzy().serialize_cdr(decode(data, kind), kind, little_endian=False)),
-        )
-        for topic, kind, log_ns, data in entries
-    ]
-    assert {data[:2] for *_, data in swapped} == {b"\0\0"}
-    assert_same_flight(read_flight(mcap_of(tmp_path / "x.mcap", swapped)), recorded.log)
+    def swapped(data: bytes, kind: str) -> bytes:
+        return bytes(jazzy().serialize_cdr(decode(data, kind), kind, little_endian=False))
+
+    others = [(topic, kind, log_ns, swapped(data, kind)) for topic, kind, log_ns, data in entries]
+    assert {data[:2] for *_, data in others} == {b"\0\0"}
+    assert_same_flight(read_flight(mcap_of(tmp_path / "x.mcap", others)), recorded.log)
 
 
 def test_a_trajectory_of_unequal_points_is_left_out_and_told(
-    recorded: Recorded, entries: list[Entry], tmp_path: Path
+    entries: list[Entry], tmp_path: Path
 ) -> None:
     """One of its points has one position less than there are joints."""
-    at = next(
-        i for i, (topic, *_) in enumerate(entries) if topic == topics.REFERENCE_JOINTS.full_name
-    )
+    names = [topic for topic, *_ in entries]
+    at = names.index(topics.REFERENCE_JOINTS.full_name)
     topic, kind, log_ns, data = entries[at]
     message = decode(data, kind)
     message.points[1].positions = message.points[1].positions[:-1]
@@ -148,22 +141,19 @@ def test_a_trajectory_of_unequal_points_is_left_out_and_told(
     assert np.flatnonzero(~log.whole).tolist() == list(range(len(message.points)))
 
 
-def test_split_bag_is_one_flight(recorded: Recorded, entries: list[Entry], tmp_path: Path) -> None:
-    for i in range(11):  # bag_10 comes behind bag_2
-        part = slice(i * len(entries) // 11, (i + 1) * len(entries) // 11)
-        mcap_of(tmp_path / f"bag_{i}.mcap", entries[part])
-    log = read_flight(tmp_path)
+def test_split_bag_and_chunks_in_another_order_are_one_flight(
+    recorded: Recorded, entries: list[Entry], tmp_path: Path
+) -> None:
+    (folder := tmp_path / "split").mkdir()
+    cuts = [i * len(entries) // 11 for i in range(12)]
+    parts = [entries[cuts[i] : cuts[i + 1]] for i in range(11)]
+    for i, part in enumerate(parts):  # bag_10 comes behind bag_2
+        mcap_of(folder / f"bag_{i}.mcap", part)
+    log = read_flight(folder)
     assert log.unfinished == "the bag was not finished: read up to t = 0.0995 s"
     log.unfinished = ""
     assert_same_flight(log, recorded.log)
-
-
-def test_chunks_in_another_order_are_the_same_flight(
-    recorded: Recorded, entries: list[Entry], tmp_path: Path
-) -> None:
-    quarter = len(entries) // 4
-    parts = [entries[i : i + quarter] for i in range(0, len(entries), quarter)]
-    shuffled = [entry for i in (0, 2, 1, 3, 4) for entry in (parts[i] if i < len(parts) else [])]
+    shuffled = [entry for i in (0, 2, 1, 5, 3, 4, 6, 8, 7, 9, 10) for entry in parts[i]]
     log = read_flight(mcap_of(tmp_path / "x.mcap", shuffled))
     for name in COLUMNS:
         np.testing.assert_array_equal(getattr(log, name), getattr(recorded.log, name), name)
@@ -177,38 +167,43 @@ def test_messages_of_the_sample_are_those_that_rosbags_reads() -> None:
     with Reader(SAMPLE) as reader:
         theirs = [(c.topic, bytes(raw)) for c, _, raw in reader.messages()]
     for topic in topics.ALL:
-        assert [d for n, d in ours if n == topic.full_name] == [
-            d for n, d in theirs if n == topic.full_name
-        ]
+        mine, others = ([d for n, d in all_of if n == topic.full_name] for all_of in (ours, theirs))
+        assert mine == others
     assert len(ours) == 1208
-
-
-def completed_sample(recorded: Recorded) -> list[Entry]:
-    """The sample, which has no reference of the base, with one."""
-    with Reader(SAMPLE) as reader:
-        found = [(c.topic, c.msgtype, stamp, bytes(raw)) for c, stamp, raw in reader.messages()]
-    topic = topics.REFERENCE_BASE
-    missing = [
-        (topic.full_name, topic.type, 0, d) for t, d in messages_of(recorded.folder) if t is topic
-    ]
-    return found + missing
+    with pytest.raises(InputError, match="no messages on /reference/base"):
+        read_flight(SAMPLE)
 
 
 @pytest.mark.parametrize("storage", ["mcap", "sqlite"])
 def test_sample_is_read_equally_from_every_storage(
     recorded: Recorded, tmp_path: Path, storage: str
 ) -> None:
-    entries = completed_sample(recorded)
-    log = read_flight(rosbags_bag(tmp_path / storage, entries, _plain))
+    """Completed with a reference of the base, which it has not."""
+    with Reader(SAMPLE) as reader:
+        found = [(c.topic, c.msgtype, stamp, bytes(raw)) for c, stamp, raw in reader.messages()]
+    topic = topics.REFERENCE_BASE
+    found += [
+        (topic.full_name, topic.type, 0, d) for t, d in messages_of(recorded.folder) if t is topic
+    ]
+    log = read_flight(rosbags_bag(tmp_path / storage, found, _plain))
     assert log.damage == ()
     assert log.whole.all()
-    by_tick = {
-        decode(data, kind).header.stamp.nanosec // TIMEBASE.period_ns: decode(data, kind)
-        for name, kind, _, data in entries
-        if name == "/joint_states"
-    }
-    for tick in range(log.ticks):
-        np.testing.assert_array_equal(log.joint_positions[tick], by_tick[tick].position)
+    for name, kind, _, data in found:
+        if name not in ("/joint_states", "/base/state", "/command"):
+            continue
+        message = decode(data, kind)
+        tick = message.header.stamp.nanosec // TIMEBASE.period_ns
+        if tick >= log.ticks:  # behind the reference that was put in
+            continue
+        if name == "/joint_states":
+            order = [message.name.index(joint) for joint in log.joint_names]
+            np.testing.assert_array_equal(log.joint_positions[tick], message.position[order])
+        elif name == "/base/state":
+            q = message.transforms[0].rotation
+            assert log.quaternion[tick].tolist() == [q.w, q.x, q.y, q.z]
+        else:
+            assert log.commanded_torque is not None
+            np.testing.assert_array_equal(log.commanded_torque[tick], message.effort)
 
 
 # Other names, other clocks
@@ -250,67 +245,120 @@ def test_a_remapping_that_makes_no_sense_is_told(
         read_flight(recorded.folder, remap)
 
 
+def recorded_as(
+    folder: Path, recorded: Recorded, namespace: str, names: dict[str, str] | None = None
+) -> Path:
+    """The same messages once more, by our recorder in a namespace."""
+    recorder = BagRecorder(folder, FLIGHT, TIMEBASE, names=names, namespace=namespace)
+    for topic, data in messages_of(recorded.folder):
+        recorder.record(topic, data)
+    recorder.close()
+    return folder
+
+
+def test_a_bag_holds_full_names_and_is_read_all_the_same(
+    recorded: Recorded, tmp_path: Path
+) -> None:
+    bag = recorded_as(tmp_path / "bag", recorded, "/fleet/sat1")
+    full = {t.recorded.in_namespace("/fleet/sat1") for t in topics.RECORDED}
+    assert set(open_bag(bag).topics()) == full
+    log = load_bag(bag)
+    assert_same_flight(log, recorded.log)
+    assert (log.namespace, recorded.log.namespace) == ("/fleet/sat1", "/")
+    names = {topic.name: topic.full_name for topic in topics.ALL}
+    same = [recorded_as(tmp_path / f"{n is None}" / "bag", recorded, "/", n) for n in (None, names)]
+    assert len({next(bag.glob("*.mcap")).read_bytes() for bag in same}) == 1
+
+
+def test_topics_that_were_remapped_are_found_by_what_the_recorder_noted(
+    recorded: Recorded, tmp_path: Path
+) -> None:
+    names = {topic.name: topic.in_namespace("/sat1") for topic in topics.ALL}
+    names |= {"joint_states": "/arm/measured", "clock": "/clock"}
+    bag = recorded_as(tmp_path / "bag", recorded, "/sat1", names)
+    for remap in (None, {"/sat1/command": "/command"}):  # beside what was noted
+        log = read_flight(bag, remap)
+        assert_same_flight(log, recorded.log)
+        assert log.namespace == "/sat1"
+
+
+def test_of_several_robots_one_is_to_be_chosen(
+    recorded: Recorded, entries: list[Entry], tmp_path: Path
+) -> None:
+    """As `ros2 bag record -a` takes them, in one bag."""
+    other = [entry for entry in entries if entry[0] != "/command"]
+    both = sorted([*within("/sat1", entries), *within("/sat2", other)], key=lambda e: e[2])
+    bag = mcap_of(tmp_path / "x.mcap", both)
+    told = "robots of 2 namespaces, /sat1, /sat2: choose one (--namespace)"
+    with pytest.raises(InputError, match=re.escape(told)):
+        read_flight(bag)
+    assert_same_flight(read_flight(bag, namespace="sat1"), recorded.log)
+    second = read_flight(bag, namespace="/sat2/")
+    assert (second.commanded_torque, second.namespace) == (None, "/sat2")
+    with pytest.raises(InputError, match="no robot in namespace /sat3; it has /sat1, /sat2"):
+        read_flight(bag, namespace="sat3")
+    bag = mcap_of(tmp_path / "y.mcap", [*entries, *within("/sat1", entries)])
+    with pytest.raises(InputError, match="robots of 2 namespaces, /, /sat1"):
+        read_flight(bag)
+    assert_same_flight(read_flight(bag, namespace="/"), recorded.log)
+
+
+def test_topics_alike_do_not_make_a_robot(
+    recorded: Recorded, entries: list[Entry], tmp_path: Path
+) -> None:
+    """Joint states of another machine, and a topic whose type is another."""
+    arm = [e for e in within("/arm", entries) if e[0].endswith("joint_states")]
+    wrong = [(f"/x{n}", "std_msgs/msg/String", stamp, d) for n, _, stamp, d in entries]
+    found = read_flight(mcap_of(tmp_path / "x.mcap", [*arm, *wrong, *entries]))
+    assert_same_flight(found, recorded.log)
+    with pytest.raises(InputError, match=r"no messages on /base/state .*it has /arm/joint_states"):
+        read_flight(mcap_of(tmp_path / "y.mcap", arm))
+
+
+def stamp_of(entry: Entry) -> int:
+    seconds, rest = np.frombuffer(entry[3], np.uint32, 2, 4)
+    return int(seconds) * 1_000_000_000 + int(rest)
+
+
 def shifted(entries: Iterable[Entry], by_ns: int) -> list[Entry]:
     """All stamps later, in the messages with a header."""
     found = []
-    for name, kind, log_ns, data in entries:
+    for entry in entries:
+        name, kind, log_ns, data = entry
         if name not in ("/controller/telemetry", "/clock"):
-            head = np.frombuffer(data, np.uint32, 2, 4)
-            stamp = int(head[0]) * 1_000_000_000 + int(head[1]) + by_ns
-            words = np.array(divmod(stamp, 1_000_000_000), np.uint32).tobytes()
+            words = np.array(divmod(stamp_of(entry) + by_ns, 1_000_000_000), np.uint32).tobytes()
             found.append((name, kind, log_ns, data[:4] + words + data[12:]))
     return found
 
 
-def test_flight_by_the_clock_of_the_wall_begins_with_its_first_state(
-    recorded: Recorded, entries: list[Entry], tmp_path: Path
+@pytest.mark.parametrize("by_ns", [0, WALL_NS])
+@pytest.mark.parametrize("first", [0, 130])
+def test_a_flight_by_any_clock_begins_with_its_first_state(
+    recorded: Recorded, entries: list[Entry], tmp_path: Path, first: int, by_ns: int
 ) -> None:
-    later = shifted(entries, 1_795_220_105_128_297_452)
-    assert_same_flight(read_flight(mcap_of(tmp_path / "x.mcap", later)), recorded.log)
-
-
-@pytest.mark.parametrize("by_ns", [0, 1_795_220_105_128_297_452])
-def test_a_reference_that_begins_before_the_first_state_stays_in_its_place(
-    recorded: Recorded, entries: list[Entry], tmp_path: Path, by_ns: int
-) -> None:
-    """By a recorder that came late, to a flight in simulated time or by the wall clock."""
-    first, late = 130, {"/joint_states", "/base/state", "/command"}
-    first_ns = first * TIMEBASE.period_ns
-    kept = [
-        entry
-        for entry in entries
-        if entry[0] not in late or np.frombuffer(entry[3], np.uint32, 1, 8)[0] >= first_ns
-    ]
+    """Also by a recorder that came late: a reference from before stays in its place."""
+    late, first_ns = {"/joint_states", "/base/state", "/command"}, first * TIMEBASE.period_ns
+    kept = [entry for entry in entries if entry[0] not in late or stamp_of(entry) >= first_ns]
     log = read_flight(mcap_of(tmp_path / "x.mcap", shifted(kept, by_ns)))
     start = 0 if by_ns else first
     rows = slice(start, start + 200 - first)
     assert log.whole[rows].all()
     for name in COLUMNS:
-        np.testing.assert_array_equal(
-            getattr(log, name)[rows], getattr(recorded.log, name)[first:], name
-        )
+        column, true = getattr(log, name), getattr(recorded.log, name)
+        np.testing.assert_array_equal(column[rows], true[first:], name)
 
 
 def test_period_of_a_bag_of_others_is_that_of_its_stamps(
     recorded: Recorded, tmp_path: Path
 ) -> None:
-    states = (topics.JOINT_STATES, topics.BASE_STATE)
     sent = [(t.full_name, t.type, 0, data) for t, data in messages_of(recorded.folder)]
-    every_other = [
-        entry
-        for entry in sent
-        if topics.BY_NAME.get(entry[0]) in states
-        and int(np.frombuffer(entry[3], np.uint32, 1, 8)[0]) % 1_000_000 == 0
-    ]
+    states = [e for e in sent if e[0] in ("/joint_states", "/base/state")]
+    every_other = [entry for entry in states if stamp_of(entry) % 1_000_000 == 0]
     with pytest.raises(InputError, match="no messages on /reference/joints"):
         read_flight(mcap_of(tmp_path / "x.mcap", every_other))
     references = [entry for entry in sent if entry[0].startswith("/reference")]
     with pytest.raises(InputError, match="point 1 is not 1 ticks after its message's stamp"):
         read_flight(mcap_of(tmp_path / "x.mcap", every_other + references))
-    assert recorded.log.timebase == Timebase(500_000)
-
-
-# Latency
 
 
 def test_latency_is_the_time_between_the_senders(recorded: Recorded, tmp_path: Path) -> None:
@@ -343,9 +391,46 @@ def test_latency_is_the_time_between_the_senders(recorded: Recorded, tmp_path: P
     np.testing.assert_allclose(log.latency_s, expected, rtol=1e-12)
     assert np.isnan(log.commanded_torque[7]).all()
     assert log.unanswered == 1
+    assert recorded.log.commanded_torque is not None
+    np.testing.assert_array_equal(
+        recorded.log.commanded_torque[:-1], recorded.log.applied_torque[1:]
+    )
 
 
-def test_commands_are_those_recorded(recorded: Recorded) -> None:
-    log = recorded.log
-    assert log.commanded_torque is not None
-    np.testing.assert_array_equal(log.commanded_torque[:-1], log.applied_torque[1:])
+# The arrays of a log
+
+
+def test_arrays_have_the_shapes_they_say(recorded: Recorded) -> None:
+    log = load_bag(str(recorded.folder))
+    n = len(log.joint_names)
+    np.testing.assert_allclose(log.time, np.arange(200) * 0.0005)
+    for array, shape in (
+        (log.quaternion, (4,)),
+        (log.angular_velocity, (3,)),
+        (log.base_position, (3,)),
+        (log.base_velocity, (3,)),
+        (log.joint_positions, (n,)),
+        (log.joint_velocities, (n,)),
+        (log.applied_torque, (n + 3,)),
+        (log.commanded_torque, (n + 3,)),
+        (log.reference_joints, (3, n)),
+        (log.reference_base, (10,)),
+    ):
+        assert array is not None
+        assert array.shape == (200, *shape)
+        assert array.dtype == np.float64
+        assert array.flags.c_contiguous
+
+
+def test_longest_stretch_is_the_longest_without_a_gap(recorded: Recorded) -> None:
+    log = load_bag(recorded.folder)
+    assert log.longest_stretch().ticks == 200
+    log.quaternion[50], log.reference_base[175] = np.nan, np.nan
+    assert np.flatnonzero(~log.whole).tolist() == [50, 175]
+    stretch = log.longest_stretch()
+    assert isinstance(stretch, FlightLog)
+    assert (stretch.first_tick, stretch.ticks) == (51, 124)
+    assert stretch.whole.all()
+    assert stretch.time[0] == pytest.approx(0.0255)
+    log.joint_positions[:] = np.nan
+    assert log.longest_stretch().ticks == 0

@@ -1,8 +1,9 @@
-"""Flights analyzed block by block: the same figures, wherever the blocks are cut."""
+"""Flights block by block, and the laws that flew: the same figures, wherever blocks are cut."""
 
 from __future__ import annotations
 
 import itertools
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -13,21 +14,26 @@ from hypothesis import strategies as st
 from strategies import random_log
 
 from space_robot.analysis import Analysis, analyze
+from space_robot.analysis.described_estimator import estimator
+from space_robot.analysis.estimate_error import EstimateErrors, HBar
+from space_robot.analysis.excerpt import excerpt
 from space_robot.flight.plan import Flight, FlightPlan, resolve
+from space_robot.flight.replay.run import RecordedLaws
 from space_robot.flight.simulate import fly_blocks, simulate
 from space_robot_msgs_py.bag import blocks
 from space_robot_msgs_py.bag.blocks import BLOCK_TICKS, block_bounds, blocks_of, joined, last_rows
 from space_robot_msgs_py.bag.flight_log import REFERENCE, FlightLog
+from space_robot_msgs_py.bag.law_history import LawChange, as_data, in_words, same, within
 from space_robot_msgs_py.bag.reader import read_flight
-from space_robot_msgs_py.samples import STATE_FIELDS
+from space_robot_msgs_py.samples import STATE_FIELDS, LawInForce, Timebase, in_order
+
+COLUMNS = (*STATE_FIELDS, *REFERENCE, "commanded_torque")
 
 
 def analyzed(log: FlightLog, cuts: list[int]) -> dict[str, Any]:
     analysis = Analysis()
-    edges = [0, *sorted(cuts), log.ticks]
-    for start, stop in itertools.pairwise(edges):
-        if start < stop:
-            analysis.add(log.rows(start, stop))
+    for start, stop in itertools.pairwise([0, *sorted({*cuts} - {log.ticks}), log.ticks]):
+        analysis.add(log.rows(start, stop))
     return analysis.report()
 
 
@@ -41,38 +47,39 @@ def assert_close(one: Any, other: Any) -> None:
         assert other == (pytest.approx(one, rel=1e-11) if isinstance(one, float) else one)
 
 
+@settings(max_examples=30)
 @given(st.sampled_from([1, 3, 6, 7]), st.integers(0, 99), st.lists(st.integers(1, 399), max_size=5))
 def test_blocks_make_the_whole(n: int, seed: int, cuts: list[int]) -> None:
     log = random_log(n, 400, seed, latency_ticks=seed % 4, wall_clock=seed % 2 == 0)
-    whole = analyze(log)
-    assert (whole["settling"] is None) <= (whole["unavailable"].keys() >= {"settling"})
-    assert_close(whole, analyzed(log, cuts))
+    assert_close(analyze(log), analyzed(log, cuts))
 
 
-FLOWN = simulate(Flight(resolve(FlightPlan(duration=1.0, case="3"))))
+PLAN = FlightPlan.model_validate(
+    {
+        "duration": 0.3,
+        "case": "3",
+        "swaps": ["0.0755:ctc", "0.15:tde_stc"],
+        "command_latency_ticks": 2,
+        "faults": ["noise_attitude@0.01:1e-5", "torque_scale@0.05:joints=0.998"],
+    }
+)
+FLOWN = simulate(Flight(resolve(PLAN)))
 
 
-@settings(max_examples=20)
-@given(st.lists(st.integers(1, 199), max_size=5))
+@settings(max_examples=10)
+@given(st.lists(st.integers(1, 599), max_size=5))
 def test_blocks_of_a_flight_make_the_whole(cuts: list[int]) -> None:
-    """With all its figures, the end effector's pointing among them."""
-    assert not analyze(FLOWN)["unavailable"].keys() - {"latency"}
+    """With what it measured and its laws beside the numbers."""
     assert_close(analyze(FLOWN), analyzed(FLOWN, cuts))
 
 
 @given(st.integers(0, 4 * BLOCK_TICKS))
 def test_bounds_follow_one_another(ticks: int) -> None:
     bounds = list(block_bounds(ticks))
-    assert [k for a, b in bounds for k in (a, b)][1:-1] == [
-        k for a, _ in bounds[1:] for k in (a, a)
+    assert [k for pair in bounds for k in range(*pair, BLOCK_TICKS)] == [
+        *range(0, ticks, BLOCK_TICKS)
     ]
-    assert not bounds or (bounds[0][0], bounds[-1][1]) == (0, ticks)
-    assert all(0 < b - a <= BLOCK_TICKS for a, b in bounds)
-    assert all(b - a == BLOCK_TICKS for a, b in bounds[:-1])
-
-
-def test_the_papers_mission_is_one_block() -> None:
-    assert list(block_bounds(60_000)) == [(0, 60_000)]
+    assert [b for _, b in bounds] == [*range(BLOCK_TICKS, ticks, BLOCK_TICKS), ticks][: len(bounds)]
 
 
 def test_rows_joined_are_those_there_were() -> None:
@@ -81,55 +88,157 @@ def test_rows_joined_are_those_there_were() -> None:
     before, after = last_rows(log.rows(0, 12), 5), log.rows(12, 30)
     both = joined(before, after)
     assert (both.first_tick, both.ticks) == (14, 23)
-    for name in (*STATE_FIELDS, *REFERENCE, "commanded_torque"):
+    for name in COLUMNS:
         np.testing.assert_array_equal(getattr(both, name), getattr(log, name)[7:])
         assert not np.shares_memory(getattr(before, name), getattr(log, name))
     assert last_rows(log, 99).ticks == 30
     assert joined(None, after) is after
 
 
-@pytest.fixture
-def short_blocks(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(blocks, "BLOCK_TICKS", 150)
-
-
-@pytest.mark.usefixtures("short_blocks")
-@pytest.mark.parametrize(
-    "options",
-    [
-        {"controller": "tde_smc", "case": "4-2"},
-        {"command_latency_ticks": 3},
-        {"swaps": ["0.0755:ctc", "0.15:tde_stc"]},
-        {"robot": "seven_joint"},
-        {"parameters": {"controller": {"acceleration_filter_hz": 100.0}}},
-    ],
-    ids=str,
-)
-def test_a_long_flight_in_memory_from_blocks_and_from_its_bag_is_the_same(
-    options: dict[str, Any], tmp_path: Path
+def test_a_flight_whole_from_blocks_and_from_its_bag_is_the_same(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """To the last bit, log and report."""
-    plan = FlightPlan.model_validate({"duration": 0.3, **options})
-    whole, analysis = simulate(Flight(resolve(plan))), Analysis()
-    parts = list(fly_blocks(Flight(resolve(plan)), tmp_path / "bag"))
-    assert [block.first_tick for block in parts] == [0, 150, 300, 450]
-    for block in parts:
+    monkeypatch.setattr(blocks, "BLOCK_TICKS", 150)
+    analysis, parts, log = Analysis(), [], None
+    for block in fly_blocks(Flight(resolve(PLAN)), tmp_path / "bag"):
         analysis.add(block)
+        parts.append((block.first_tick, block.ticks))
+        log = joined(log, block)
+    assert parts == [(0, 150), (150, 150), (300, 150), (450, 150)]
+    assert log is not None
+    assert FLOWN.measured is not None
     read = read_flight(tmp_path / "bag")
-    for name in (*STATE_FIELDS, *REFERENCE, "commanded_torque", "telemetry"):
-        column = np.concatenate([getattr(block, name) for block in parts])
-        np.testing.assert_array_equal(column, getattr(whole, name))
-        if name != "telemetry":
-            np.testing.assert_array_equal(column, getattr(read, name))
-    assert parts[-1].laws == whole.laws == read.laws
-    assert analysis.report() == analyze(whole) == analyze(read)
+    for one in (log, read):
+        assert one.measured is not None
+        for name in COLUMNS:
+            np.testing.assert_array_equal(getattr(one, name), getattr(FLOWN, name), name)
+        for name in STATE_FIELDS:
+            measured = getattr(FLOWN.measured, name)
+            np.testing.assert_array_equal(getattr(one.measured, name), measured, name)
+        np.testing.assert_array_equal(one.assumed_error, FLOWN.assumed_error)
+        assert one.laws == FLOWN.laws
+    np.testing.assert_array_equal(log.telemetry, FLOWN.telemetry)
+    assert [block.ticks for block in blocks_of(FLOWN)] == [150] * 4
+    assert analysis.report() == analyze(FLOWN) == analyze(read)
 
 
-def test_blocks_are_flown_as_the_whole_is(monkeypatch: pytest.MonkeyPatch) -> None:
-    plan = FlightPlan(duration=0.3, case="3", command_latency_ticks=2)
-    whole = simulate(Flight(resolve(plan)))
-    monkeypatch.setattr(blocks, "BLOCK_TICKS", 70)
-    parts = simulate(Flight(resolve(plan)))
-    assert [b.ticks for b in blocks_of(parts)][-2:] == [70, 40]
-    for name in (*STATE_FIELDS, *REFERENCE, "commanded_torque", "telemetry"):
-        np.testing.assert_array_equal(getattr(parts, name), getattr(whole, name))
+TIMEBASE = Timebase(500_000)
+
+
+def law(tick: int, name: str, is_first: bool = False, **gains: float) -> LawInForce:
+    return LawInForce(tick, name, {gain: (value,) for gain, value in gains.items()}, is_first)
+
+
+LAWS = (
+    law(0, "tde_stc", is_first=True, k_1=1.0, k_2=2.0),
+    law(2469, "tde_tsmc", k_1=3.0),
+    law(4000, "tde_tsmc", k_1=4.0),
+    law(5000, "tde_stc", k_1=1.0, k_2=2.5),
+    law(6000, "tde_stc", is_first=True, k_1=1.0, k_2=2.0),
+)
+
+
+def test_in_words_every_change_is_told_with_its_time() -> None:
+    assert in_words(as_data(LAWS[:1], TIMEBASE)) == "tde_stc"
+    assert in_words(as_data(LAWS[:2], TIMEBASE)) == "tde_stc -> tde_tsmc at 1.2345 s"
+    assert in_words(as_data(LAWS[1:3], TIMEBASE)) == "tde_tsmc (other k_1 at 2.0000 s)"
+    assert in_words(as_data(LAWS, TIMEBASE)) == (
+        "tde_stc -> tde_tsmc at 1.2345 s (other k_1 at 2.0000 s) -> tde_stc at 2.5000 s "
+        "(other k_2) and 1 more"
+    )
+    assert in_words(as_data((*LAWS[:1], LAWS[0]._replace(tick=9)), TIMEBASE)) == (
+        "tde_stc (begun again at 0.0045 s)"
+    )
+    assert in_words([]) == ""
+    assert str(LawChange(LAWS[1], LAWS[2])) == "tde_tsmc: other k_1"
+    assert str(LawChange(LAWS[0], LAWS[1])) == "tde_stc -> tde_tsmc"
+
+
+def test_a_part_of_a_flight_begins_with_the_law_in_force_there() -> None:
+    assert within(LAWS, 0, 10_000) == LAWS
+    assert within(LAWS, 2469, 4000) == LAWS[1:2]
+    assert within(LAWS, 2468, 4001) == LAWS[:3]
+    assert within(LAWS[1:], 0, 2469) == ()
+
+
+def test_of_two_laws_at_one_tick_the_last_has_answered_it() -> None:
+    crashed, flown = law(7, "ctc", k_p=1.0), law(7, "ctc", is_first=True, k_p=2.0)
+    assert in_order([LAWS[2], crashed, flown, LAWS[0]]) == (LAWS[0], flown, LAWS[2])
+
+
+def test_same_is_to_the_last_bit() -> None:
+    assert same(law(1, "ctc", k_p=0.0), law(2, "ctc", k_p=0.0))
+    assert not same(law(1, "ctc", k_p=0.0), law(1, "ctc", k_p=-0.0))
+    assert not same(law(1, "ctc", k_p=1.0), law(1, "ctc", k_d=1.0))
+    assert not same(law(1, "ctc", k_p=1.0), law(1, "pid", k_p=1.0))
+
+
+@pytest.mark.parametrize(
+    ("states", "done"),
+    [
+        (
+            [0, 1, 2469, 4000, 5000, 6000],
+            ["tde_stc", "tde_tsmc", "tde_tsmc", "tde_stc", "again", "tde_stc"],
+        ),
+        ([2470, 4500], ["tde_tsmc", "tde_tsmc"]),
+        ([5999, 7000], ["tde_stc", "again", "tde_stc"]),
+        ([6001], ["tde_stc"]),
+        ([1, 5999], ["tde_stc", "tde_stc"]),
+    ],
+)
+def test_laws_are_put_in_force_before_their_states(states: list[int], done: list[str]) -> None:
+    """Of several between two states the last; a controller that began again begins again."""
+    told: list[str] = []
+    laws = RecordedLaws(LAWS, lambda law: told.append(law.name), lambda: told.append("again"))
+    for tick in states:
+        laws.before(tick)
+    assert told == done
+
+
+@pytest.fixture(scope="module")
+def swapped() -> FlightLog:
+    """TDE-STC, then CTC, then TDE-SMC, whose h_bar is halved in the record."""
+    return simulate(Flight(resolve(FlightPlan(duration=0.3, swaps=["0.1:ctc", "0.2:tde_smc"]))))
+
+
+def test_the_report_has_all_laws_that_flew(swapped: FlightLog) -> None:
+    report = analyze(swapped)
+    assert [(law["tick"], law["t_s"], law["controller"]) for law in report["laws"]] == [
+        (0, 0.0, "tde_stc"),
+        (200, 0.1, "ctc"),
+        (400, 0.2, "tde_smc"),
+    ]
+    assert set(report["laws"][1]["gains"]) == {"k_p", "k_d"}
+    part = analyze(excerpt(swapped, 0.15, 0.25))
+    assert part["controller"] == "ctc"
+    assert [law["controller"] for law in part["laws"]] == ["ctc", "tde_smc"]
+
+
+@pytest.mark.parametrize("smoothing", [0.0, 0.3])
+@pytest.mark.parametrize("cuts", [(), (199, 200, 203, 500)])
+def test_the_estimates_error_is_taken_with_the_h_bar_in_force(
+    swapped: FlightLog, smoothing: float, cuts: tuple[int, ...]
+) -> None:
+    """Row k is tick k+1: as under one law alone where that is in force, left out under CTC."""
+    halved = {
+        **swapped.laws[2].gains,
+        "h_bar": tuple(0.5 * h for h in swapped.laws[2].gains["h_bar"]),
+    }
+    log = replace(swapped, laws=(*swapped.laws[:2], swapped.laws[2]._replace(gains=halved)))
+
+    def errors(h_bar: HBar) -> np.ndarray:
+        found = EstimateErrors(h_bar, smoothing)
+        parts = zip((0, *cuts), (*cuts, log.ticks), strict=True)
+        return np.concatenate([found.of(log.rows(start, stop)) for start, stop in parts])
+
+    alone = [errors(lambda _, law=law: np.array(law.gains["h_bar"])) for law in log.laws[::2]]
+    expected = np.vstack([alone[0][:199], alone[1][399:]])
+    np.testing.assert_array_equal(errors(estimator(log)[0]), expected)
+
+
+def test_where_no_law_has_an_estimate_there_is_no_error_of_it(swapped: FlightLog) -> None:
+    report = analyze(excerpt(swapped, 0.1, 0.2))
+    why = "ctc has no time-delay estimate with a constant h_bar"
+    assert report["unavailable"]["estimate_error"] == why
+    assert analyze(swapped)["estimate_error"]["rms"]["base"] > 0.0

@@ -1,8 +1,7 @@
-"""The true states beside the measured ones, through a bag and in blocks."""
+"""The true states beside the measured ones, through a bag."""
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Callable
 from pathlib import Path
 
@@ -10,22 +9,18 @@ import numpy as np
 import pytest
 from bags import messages_of, read_accounts
 from benches import SensorBench as Bench
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
-from space_robot.analysis import Analysis, analyze, excerpt
+from space_robot.analysis import analyze, excerpt
 from space_robot.flight.plan import Flight, FlightPlan, resolve
-from space_robot.flight.simulate import fly_blocks, simulate
+from space_robot.flight.simulate import simulate
 from space_robot_msgs_py import topics
-from space_robot_msgs_py.bag import blocks
-from space_robot_msgs_py.bag.blocks import joined, last_rows
+from space_robot_msgs_py.bag.blocks import last_rows
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.bag.reader import read_flight
 from space_robot_msgs_py.bag.recorder import BagRecorder
 from space_robot_msgs_py.samples import STATE_FIELDS
 from space_robot_msgs_py.topics import Topic
 from space_robot_msgs_py.wire.cdr import header_stamp_ns
-from space_robot_msgs_py.wire.truth_writer import CHUNK_TICKS
 
 NOISE = ["noise_attitude@0.01:1e-5", "noise_gyro@0-0.1:1e-6", "noise_joint_position@0:1e-5"]
 FAULTS = [*NOISE, "torque_scale@0.05:joints=0.998"]
@@ -48,27 +43,6 @@ def recorded_anew(bag: Path, folder: Path, keep: Callable[[Topic, int], bool]) -
             recorder.record(topic, data)
     recorder.close()
     return read_flight(folder)
-
-
-def assert_same(log: FlightLog, other: FlightLog) -> None:
-    assert log.measured is not None
-    assert other.measured is not None
-    for name in STATE_FIELDS:
-        np.testing.assert_array_equal(getattr(log, name), getattr(other, name), name)
-        told = getattr(other.measured, name)
-        np.testing.assert_array_equal(getattr(log.measured, name), told, name)
-    np.testing.assert_array_equal(log.assumed_error, other.assumed_error)
-
-
-def test_a_bag_has_truth_and_measurement_as_flown(flown: tuple[FlightLog, Path]) -> None:
-    log, bag = flown
-    recorded = read_flight(bag)
-    assert_same(recorded, log)
-    assert recorded.lost == {topic.full_name: 0 for topic in topics.ALL}
-    assert analyze(recorded) == analyze(log)
-    assert {read_accounts(bag)[topic.full_name]["received"] for topic in topics.TRUTH} == {
-        TICKS // CHUNK_TICKS
-    }
 
 
 def test_measured_is_what_the_sensors_make_of_the_truth(flown: tuple[FlightLog, Path]) -> None:
@@ -150,41 +124,16 @@ def test_states_kept_back_are_filled_in_beside_a_whole_truth(
     assert analyze(log)["rms"] == analyze(original)["rms"]
 
 
-@settings(max_examples=20)
-@given(st.lists(st.integers(1, TICKS - 1), max_size=4))
-def test_blocks_make_the_whole(cuts: list[int]) -> None:
-    analysis, edges = Analysis(), [0, *sorted(cuts), TICKS]
-    for start, stop in itertools.pairwise(edges):
-        if start < stop:
-            analysis.add(WHOLE.rows(start, stop))
-    one, other = analyze(WHOLE), analysis.report()
-    for key in ("rms", "navigation_error", "estimate_error", "missed_deadlines", "maxima"):
-        for kind, values in one[key].items():
-            assert other[key][kind] == pytest.approx(values, rel=1e-11), (key, kind)
-
-
-WHOLE = simulate(Flight(resolve(FlightPlan(faults=FAULTS, duration=TICKS * 0.0005))))
-
-
-def test_a_flight_in_blocks_is_the_flight(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(blocks, "BLOCK_TICKS", 150)
-    flight = Flight(resolve(FlightPlan(faults=FAULTS, duration=TICKS * 0.0005)))
-    whole: FlightLog | None = None
-    for block in fly_blocks(flight):
-        whole = joined(whole, block)
-    assert whole is not None
-    assert_same(whole, WHOLE)
-
-
-def test_rows_take_what_was_measured_along() -> None:
-    part = excerpt(WHOLE, 0.05, 0.1)
+def test_rows_take_what_was_measured_along(flown: tuple[FlightLog, Path]) -> None:
+    whole = flown[0]
+    part = excerpt(whole, 0.05, 0.1)
     assert part.measured is not None
-    assert WHOLE.measured is not None
-    np.testing.assert_array_equal(part.measured.quaternion, WHOLE.measured.quaternion[100:200])
+    assert whole.measured is not None
+    np.testing.assert_array_equal(part.measured.quaternion, whole.measured.quaternion[100:200])
     last = last_rows(part, 3)
     assert last.measured is not None
     assert last.measured.quaternion.base is None  # a copy
-    np.testing.assert_array_equal(last.measured.quaternion, WHOLE.measured.quaternion[197:200])
+    np.testing.assert_array_equal(last.measured.quaternion, whole.measured.quaternion[197:200])
     told = part.as_measured()
     assert told.measured is None
     np.testing.assert_array_equal(told.quaternion, part.measured.quaternion)

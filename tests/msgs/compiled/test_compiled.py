@@ -1,15 +1,20 @@
-"""The cache of compiled code where it cannot be kept: it goes elsewhere, or is done without."""
+"""The cache of compiled code: one folder a state of the source, elsewhere if it cannot be kept."""
 
 from __future__ import annotations
 
 import os
+import shutil
 import subprocess
 import sys
 from pathlib import Path
 
+import numba
 import pytest
+from paths import ROOT
 
 from space_robot_msgs_py.compiled.cache import _temporary_cache
+from space_robot_msgs_py.compiled.call_graph import count_compiled, index_files
+from space_robot_msgs_py.compiled.kernels import kernel, subroutine
 
 PROGRAM = """
 import sys
@@ -41,36 +46,33 @@ def run(tmp_path: Path, cache: Path) -> subprocess.CompletedProcess[str]:
     )
 
 
-def check_elsewhere(tmp_path: Path, cache: Path, why: str) -> None:
-    done = run(tmp_path, cache)
+@pytest.mark.parametrize(
+    ("options", "why"),
+    [("", "Not a directory"), ("ro", "Read-only file system"), ("size=100k", "no space left")],
+)
+def test_a_folder_that_is_none_full_or_read_only_is_replaced(
+    tmp_path: Path, options: str, why: str
+) -> None:
+    cache = tmp_path / "cache"
+    if not options:
+        (tmp_path / "file").touch()
+        cache = tmp_path / "file" / "cache"
+    else:
+        cache.mkdir()
+        command = ["mount", "-t", "tmpfs", "-o", options, "none", str(cache)]
+        if subprocess.run(command, capture_output=True, check=False).returncode:
+            pytest.skip("nothing may be mounted here")
+    try:
+        done = run(tmp_path, cache)
+    finally:
+        if options:
+            subprocess.run(["umount", "-l", str(cache)], check=True)
     assert done.returncode == 0, done.stderr
     other = tmp_path / f"space_robot_{os.getuid()}"
-    (line,) = done.stderr.splitlines()
-    assert (
-        line == f"space_robot: compiled code is stored in {other}: {cache} cannot be used ({why})"
-    )
+    said = f"space_robot: compiled code is stored in {other}: {cache} cannot be used ({why})"
+    assert done.stderr.splitlines() == [said]
     assert done.stdout.startswith(f"6.0 {other}/")
     assert list(other.rglob("*.nbc"))
-
-
-def test_a_folder_that_cannot_be_made_is_replaced(tmp_path: Path) -> None:
-    (tmp_path / "file").touch()
-    check_elsewhere(tmp_path, tmp_path / "file" / "cache", "Not a directory")
-
-
-@pytest.mark.parametrize(
-    ("options", "why"), [("ro", "Read-only file system"), ("size=100k", "no space left")]
-)
-def test_a_full_or_read_only_folder_is_replaced(tmp_path: Path, options: str, why: str) -> None:
-    folder = tmp_path / "mounted"
-    folder.mkdir()
-    command = ["mount", "-t", "tmpfs", "-o", options, "none", str(folder)]
-    if subprocess.run(command, capture_output=True, check=False).returncode:
-        pytest.skip("nothing may be mounted here")
-    try:
-        check_elsewhere(tmp_path, folder, why)
-    finally:
-        subprocess.run(["umount", "-l", str(folder)], check=True)
 
 
 def test_what_is_in_the_cache_needs_no_compiler(tmp_path: Path) -> None:
@@ -112,3 +114,76 @@ def test_records_have_the_same_name_in_machine_code_whichever_process_compiles_i
     assert sorted(first.splitlines()) == sorted(second.splitlines())
     one, other = (line.split(maxsplit=1)[1] for line in first.splitlines())
     assert one != other
+
+
+SHOW = "from space_robot_msgs_py.compiled.cache import cache_directory; print(cache_directory())"
+
+
+def test_a_kernel_that_changes_has_another_folder_and_other_code_has_not(tmp_path: Path) -> None:
+    root = tmp_path / "root"
+    for package in ("space_robot_msgs_py", "space_robot_model"):
+        shutil.copytree(ROOT / package, root / package, ignore=shutil.ignore_patterns("*.pyc"))
+
+    def folder() -> str:
+        return subprocess.check_output(
+            [sys.executable, "-B", "-c", SHOW],
+            text=True,
+            cwd=root,
+            env={
+                "PYTHONPATH": str(root),
+                "NUMBA_CACHE_DIR": str(tmp_path),
+                "PATH": "/usr/bin:/bin",
+            },
+        ).strip()
+
+    first = folder()
+    assert Path(first).parent == tmp_path
+    for name, is_kernel in (
+        ("space_robot_model/dynamics/aba.py", True),
+        ("space_robot_msgs_py/compiled/records.py", True),
+        ("space_robot_model/robot/file.py", False),
+        ("space_robot_msgs_py/errors.py", False),
+    ):
+        text = (root / name).read_text()
+        (root / name).write_text(text + "\n# one line more\n")
+        assert (folder() != first) == is_kernel, name
+        (root / name).write_text(text)
+    assert folder() == first
+
+
+# Which kernels a kernel needs: what the progress of compiling them is counted of
+
+
+@kernel
+def leaf(x: float) -> float:
+    return x + 1.0
+
+
+@kernel
+def unused(x: float) -> float:
+    return x
+
+
+@subroutine
+def within(x: float) -> float:
+    return leaf(x)
+
+
+@kernel
+def top(x: float) -> float:
+    return within(x) + sum([leaf(v) for v in (x, x)])
+
+
+def test_kernels_are_counted_through_subroutines_once_each_when_compiled() -> None:
+    files = index_files([top, leaf])
+    names = sorted(Path(file).name.split("-")[0] for file in files)
+    assert names == ["test_compiled.leaf", "test_compiled.top"]
+    assert index_files([within]) == index_files([leaf])
+    assert not files & index_files([unused])
+    assert index_files([numba.njit(lambda x: x)]) == set()
+    files = index_files([leaf])
+    for file in files:
+        Path(file).unlink(missing_ok=True)
+    assert count_compiled(files) == 0
+    assert leaf(1.0) == 2.0
+    assert count_compiled(files) == 1

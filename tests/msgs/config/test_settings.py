@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 import yaml
 
-from space_robot.flight.plan import Flight, FlightPlan, resolve
 from space_robot_control.controller.gains import build_law, gain_files, read_gains
 from space_robot_control.controller.settings import ControllerNodeSettings
 from space_robot_control.guidance.settings import MissionNodeSettings
@@ -106,16 +105,6 @@ def test_layers_and_overrides() -> None:
     assert settings.initial_joints_deg[1] == 120.0  # from the mission
 
 
-def test_printed_gains_are_table_iv() -> None:
-    settings = ControllerNodeSettings.resolve({"gains": "printed"})
-    stc = build_law("tde_stc", settings, 9).gains
-    np.testing.assert_array_equal(stc.k_1, [0.02, 0.02, 0.02, 0.2, 0.2, 0.2, 0.4, 0.2, 0.2])
-    np.testing.assert_array_equal(stc.k_2, np.r_[[8e-5] * 3, [3e-3] * 3, 4e-3, 2e-3, 2e-3])
-    ctc = build_law("ctc", settings, 9).gains
-    np.testing.assert_array_equal(ctc.k_p, np.r_[7.5e6, [5e6] * 5, 5e4, 5e4, 8e3])
-    np.testing.assert_array_equal(ctc.k_d, np.r_[[5e4] * 6, 2e3, 8e3, 1e2])
-
-
 @pytest.mark.parametrize(("robot", "axes"), [("paper", 9), ("seven_joint", 10)])
 def test_every_law_has_tuned_and_default_gains(robot: str, axes: int) -> None:
     for gain_set in ("tuned", "default"):
@@ -144,29 +133,6 @@ def test_bad_gains_name_file_key_and_value(
         read_gains(path, laws()["tde_stc"], 9)
     assert said in str(caught.value)
     assert str(path) in str(caught.value)
-
-
-def test_unknown_names_list_the_known_ones() -> None:
-    with pytest.raises(InputError, match=r"unknown case '7': choose one of 1, 2, 3, 4-1, 4-2"):
-        named_file("cases", "7")
-    with pytest.raises(InputError, match="unknown gain set 'best' of robot 'paper': choose"):
-        gain_files("paper", "best")
-    with pytest.raises(
-        InputError, match=r"unknown robot 'mine': choose one of .*paper, seven_joint"
-    ):
-        gain_files("mine", "default")
-
-
-def test_file_that_is_no_parameter_file(tmp_path: Path) -> None:
-    path = tmp_path / "case.yaml"
-    path.write_text("plant: {friction: 1}")
-    with pytest.raises(InputError, match="ros__parameters"):
-        PlantNodeSettings.resolve({"case": str(path)})
-
-
-def test_mission_of_another_robot_does_not_fit() -> None:
-    with pytest.raises(InputError, match="has 21 values; 3 waypoint_times and 6 joints"):
-        Flight(resolve(FlightPlan(mission="seven_joint")))
 
 
 def test_names_of_files_and_paths(tmp_path: Path) -> None:
@@ -219,10 +185,25 @@ def test_what_lies_below_is_not_changed_by_what_is_put_over_it() -> None:
     assert merge(below, {"a": {"d": 3}, "c": {"e": 4}}) == {"a": {"b": 1, "d": 3}, "c": {"e": 4}}
     assert merge(below, {"a": 5}) == {"a": 5, "c": 2}
     assert below == {"a": {"b": 1}, "c": 2}
-    assert list(flatten({"a": {}, "b": {"c": {"d": 1}}})) == [("a", {}), ("b.c.d", 1)]
-
-
-def test_trees() -> None:
+    assert dict(flatten({"a": {}, "b": {"c": {"d": 1}}})) == {"a": {}, "b.c.d": 1}
     assert nest({"a.b": 1, "a.c": {"d.e": 2}}) == {"a": {"b": 1, "c": {"d": {"e": 2}}}}
-    assert merge({"a": {"b": 1, "c": 2}}, {"a": {"b": 3}}) == {"a": {"b": 3, "c": 2}}
-    assert dict(flatten({"a": {"b": 1}, "c": 2})) == {"a.b": 1, "c": 2}
+
+
+def test_printed_gains_are_table_iv() -> None:
+    settings = ControllerNodeSettings.resolve({"gains": "printed"})
+    stc = build_law("tde_stc", settings, 9).gains
+    np.testing.assert_array_equal(stc.k_1, [0.02, 0.02, 0.02, 0.2, 0.2, 0.2, 0.4, 0.2, 0.2])
+    np.testing.assert_array_equal(stc.k_2, np.r_[[8e-5] * 3, [3e-3] * 3, 4e-3, 2e-3, 2e-3])
+    ctc = build_law("ctc", settings, 9).gains
+    np.testing.assert_array_equal(ctc.k_p, np.r_[7.5e6, [5e6] * 5, 5e4, 5e4, 8e3])
+    np.testing.assert_array_equal(ctc.k_d, np.r_[[5e4] * 6, 2e3, 8e3, 1e2])
+
+
+def test_unknown_names_list_the_known_ones() -> None:
+    for find, said in (
+        (lambda: named_file("cases", "7"), "unknown case '7': choose one of 1, 2, 3, 4-1, 4-2"),
+        (lambda: gain_files("paper", "best"), "unknown gain set 'best' of robot 'paper': choose"),
+        (lambda: gain_files("mine", "default"), "unknown robot 'mine': choose one of "),
+    ):
+        with pytest.raises(InputError, match=said):
+            find()

@@ -83,31 +83,18 @@ def test_killed_holder_is_named_and_leaves_the_lock_at_once() -> None:
     FileLock(path, "another").release()
 
 
-def test_looking_takes_nothing() -> None:
-    FileLock(node_lock(7, "/plant_node"), "plant_node").release()
-    assert nodes_in(7) == []
-    lock = FileLock(node_lock(7, "/plant_node"), "plant_node")
-    assert [node.name for node in nodes_in(7)] == [f"plant_node (pid {os.getpid()})"]
-    lock.release()
-
-
-def test_nodes_of_a_namespace_are_not_those_of_others() -> None:
+def test_nodes_and_commands_are_found_by_domain_and_namespace() -> None:
     names = ("/plant_node", "/sat1/plant_node", "/sat1/arm/plant_node", "/sat11/plant_node")
     locks = [FileLock(node_lock(7, name), name) for name in names]
     for name in names:
         namespace = name.removesuffix("/plant_node") or "/"
         assert [node.name for node in nodes_in(7, namespace)] == [f"{name} (pid {os.getpid()})"]
-    for lock in locks:
-        lock.release()
-
-
-def test_commands_of_a_domain_are_those_in_all_its_namespaces() -> None:
     places = [(7, "/"), (7, "/sat1"), (7, "/fleet/sat2"), (70, "/"), (70, "/sat1")]
-    locks = [FileLock(domain_lock(*place), "space-robot") for place in places]
+    locks += [FileLock(domain_lock(*place), "space-robot") for place in places]
     assert [len(commands_in(domain)) for domain in (7, 70, 0)] == [3, 2, 0]
     for lock in locks:
         lock.release()
-    assert commands_in(7) == []
+    assert commands_in(7) == nodes_in(7) == []
 
 
 @given(

@@ -21,6 +21,8 @@ from space_robot_msgs_py.ros.node_scheduler import (
     PERIOD_S,
     REMIND_S,
     SERVICE_SHARE,
+    UPKEEP_GAP_S,
+    UPKEEP_PATIENCE_S,
     NodeScheduler,
     ScheduledNode,
     Upkeep,
@@ -109,57 +111,38 @@ def seat_of(node: Any, is_alone: bool = True) -> ScheduledNode:
     return ScheduledNode(node, is_alone)
 
 
-def scheduler_of(*nodes: Any) -> NodeScheduler:
-    return NodeScheduler(nodes)
+def scheduler_of(*nodes: Any, upkeep_at: float = 1e9) -> NodeScheduler:
+    scheduler = NodeScheduler(nodes)
+    scheduler._upkeep_at = upkeep_at
+    return scheduler
 
 
 def test_a_node_begins_once_all_its_listeners_are_there() -> None:
-    node = Node(None)
+    """It is said from time to time who is waited for; one that stood still begins anew."""
+    node = Node(Wait(10.0, is_brief=True))
     seat, loop = seat_of(node), node.loop
-    loop.missing = {"/clock": ["a", "b"]}
-    assert not seat.step(100.0)
-    assert seat.wake_at == 100.0 + LISTENER_PERIOD_S
-    loop.missing = {}
-    assert not seat.step(100.0 + 0.5 * LISTENER_PERIOD_S), "it is not looked at so soon"
-    assert (loop.begun, loop.steps) == (0, 0)
-    assert seat.step(100.0 + LISTENER_PERIOD_S)
-    assert (loop.begun, loop.steps) == (1, 1)
-    assert seat.step(100.0 + LISTENER_PERIOD_S)
-    assert (loop.begun, loop.steps) == (1, 2)
-    assert node.said == []
-
-
-def test_it_is_said_from_time_to_time_who_is_waited_for() -> None:
-    node = Node(None)
-    seat = seat_of(node)
-    node.loop.missing = {"/clock": ["a", "b"], "/joint_states": ["b"]}
-    after = (0.0, REMIND_S, REMIND_S + 1.0, 2 * REMIND_S + 1.0, 2 * REMIND_S + 2.0)
+    loop.missing = {"/clock": ["a", "b"], "/joint_states": ["b"]}
     said = []
-    for seconds in after:
-        seat.step(100.0 + seconds)
+    for seconds in (0.0, REMIND_S, REMIND_S + 1.0, 2 * REMIND_S + 1.0, 2 * REMIND_S + 2.0):
+        assert not seat.step(100.0 + seconds)
         said.append(len(node.said))
     assert said == [0, 0, 1, 1, 2]
     assert set(node.said) == {"waiting for a, b on /clock, b on /joint_states"}
-    node.loop.missing = {}
-    seat.step(200.0)
+    assert seat.wake_at == 100.0 + seconds + LISTENER_PERIOD_S
+    loop.missing = {}
+    seat.step(seat.wake_at - 0.5 * LISTENER_PERIOD_S)
+    assert (loop.begun, loop.steps) == (0, 0), "it is not looked at so soon"
+    assert not seat.step(seat.wake_at)
+    assert (loop.begun, loop.steps, seat.spins) == (1, 1, True)
     node.is_active = False
-    seat.step(300.0)
-    node.is_active, node.loop.missing = True, {"/clock": ["a"]}
-    seat.step(400.0)
-    assert len(node.said) == 2, "time is counted anew for a node that was active"
-
-
-def test_a_node_that_stood_still_begins_anew() -> None:
-    node = Node(Wait(10.0, is_brief=True))
-    seat = seat_of(node)
-    assert not seat.step(1.0)
-    assert seat.spins
-    node.is_active = False
-    assert not seat.step(20.0)
+    assert not seat.step(200.0)
     assert (seat.wait, seat.spins, seat.is_complete) == (Wait(0.0), False, False)
-    node.is_active = True
-    assert not seat.step(2.0), "whatever it waited for before"
-    assert (node.loop.begun, node.loop.steps) == (2, 2)
+    node.is_active, loop.missing = True, {"/clock": ["a"]}
+    seat.step(300.0)
+    assert len(node.said) == 2, "time is counted anew"
+    loop.missing = {}
+    seat.step(400.0)
+    assert (loop.begun, loop.steps) == (2, 2)
 
 
 INPUT: Any = object()
@@ -199,7 +182,6 @@ def test_one_that_expects_a_message_at_once_looks_for_it_without_sleep(clock: Cl
     node = Node(Wait(5.0, (INPUT,), is_brief=True))
     seat = seat_of(node)
     seat.step(clock.monotonic())
-    assert seat.spins
     begin = clock.monotonic()
     assert not seat.spin(begin + 1e-4)
     assert begin + 1e-4 <= clock.now < begin + 1.1e-4
@@ -214,73 +196,58 @@ def test_one_that_expects_a_message_at_once_looks_for_it_without_sleep(clock: Cl
 
 
 def test_each_has_a_turn_a_round_until_one_has_come_to_its_end() -> None:
+    """And others are stepped while one lets them work."""
     first, second, third = nodes = [Node(None) for _ in range(3)]
     scheduler = scheduler_of(*nodes)
-    scheduler._upkeep_at = 1e9
     assert all(scheduler.take() for _ in range(5))
-    assert [node.loop.steps for node in nodes] == [5, 5, 5]
+    scheduler._seats[0].node.let_others_work()
+    assert [node.loop.steps for node in nodes] == [5, 6, 6]
     second.loop.is_complete = True
     assert not scheduler.take()
-    assert [first.loop.steps, second.loop.steps, third.loop.steps] == [6, 6, 5]
-
-
-def test_others_are_stepped_while_one_stands_down() -> None:
-    first, second = Node(None), Node(None)
-    scheduler = scheduler_of(first, second)
-    scheduler._seats[0].node.let_others_work()
-    assert (first.loop.steps, second.loop.steps) == (0, 1)
-    scheduler._seats[1].node.let_others_work()
-    assert (first.loop.steps, second.loop.steps) == (1, 1)
+    assert [first.loop.steps, second.loop.steps, third.loop.steps] == [6, 7, 6]
     alone = Node(None)
     scheduler_of(alone)
     assert not hasattr(alone, "let_others_work")
 
 
-def test_the_process_sleeps_until_the_first_node_is_to_be_stepped(clock: Clock) -> None:
+def test_the_process_sleeps_until_the_first_node_is_to_be_stepped(
+    clock: Clock, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Or until a message of any of them."""
     slow, fast, idle = Node(Wait(0.5)), Node(Wait(0.2)), Node(Wait(0.01))
     idle.is_active = False
     scheduler = scheduler_of(slow, fast, idle)
-    scheduler._upkeep_at = 1e9
-    for _ in range(2):
-        assert scheduler.take()
+    assert all(scheduler.take() for _ in range(2))
     assert (slow.loop.steps, fast.loop.steps, idle.loop.steps) == (1, 2, 0)
     assert clock.slept == pytest.approx([0.2, 0.2], abs=1e-4)
+    mine, other = Node(Wait(0.5, (INPUT,))), Node(Wait(0.3, ("another",)))  # type: ignore[arg-type]
+    scheduler, waits = scheduler_of(mine, other), list[tuple[list[Any], float]]()
+
+    def wait(inputs: list[Any], timeout_s: float) -> None:
+        waits.append((inputs, timeout_s))
+
+    monkeypatch.setattr(scheduler._waiter, "wait", wait)
+    assert all(scheduler.take() for _ in range(2))
+    assert [inputs for inputs, _ in waits] == [[INPUT, "another"]] * 2
+    assert waits[0][1] == pytest.approx(0.3, abs=1e-4)
+    assert (mine.loop.steps, other.loop.steps) == (2, 2), "who waits is looked at after it"
+    assert len(clock.slept) == 2
 
 
 def test_a_patient_wait_lasts_longer_only_while_another_node_is_busy(clock: Clock) -> None:
     for other, seconds in ((Node(Wait(9.0)), 0.1), (Node(None), 0.4)):
         patient = Node(Wait(0.1, patience_s=0.3), None)
-        scheduler = scheduler_of(patient, other)
-        scheduler._upkeep_at = 1e9
-        begin = clock.now
+        scheduler, begin = scheduler_of(patient, other), clock.now
         while patient.loop.steps < 2:
             assert scheduler.take()
             clock.now += 1e-4
         assert clock.now - begin == pytest.approx(seconds, abs=1e-3)
 
 
-def test_it_waits_for_the_messages_of_all(monkeypatch: pytest.MonkeyPatch, clock: Clock) -> None:
-    waits: list[tuple[list[Any], float]] = []
-    mine, other = Node(Wait(0.5, (INPUT,))), Node(Wait(0.3, ("another",)))  # type: ignore[arg-type]
-    scheduler = scheduler_of(mine, other)
-    scheduler._upkeep_at = 1e9
-
-    def wait(inputs: list[Any], timeout_s: float) -> None:
-        waits.append((inputs, timeout_s))
-
-    monkeypatch.setattr(scheduler._waiter, "wait", wait)
-    for _ in range(2):
-        assert scheduler.take()
-    assert [inputs for inputs, _ in waits] == [[INPUT, "another"]] * 2
-    assert waits[0][1] == pytest.approx(0.3, abs=1e-4)
-    assert (mine.loop.steps, other.loop.steps) == (2, 2), "who waits is looked at after it"
-    assert clock.slept == []
-
-
-def test_without_an_active_node_calls_are_waited_for_until_all_are_shut_down(clock: Clock) -> None:
+def test_without_an_active_node_calls_are_waited_for_until_all_are_shut_down() -> None:
     first, second = nodes = Node(None), Node(None)
     first.is_active = second.is_active = False
-    scheduler = scheduler_of(*nodes)
+    scheduler = scheduler_of(*nodes, upkeep_at=0.0)
     first.is_shut_down = True
     assert scheduler.take()
     assert [node.waited_s for node in nodes] == [0.5 * PERIOD_S] * 2
@@ -289,10 +256,8 @@ def test_without_an_active_node_calls_are_waited_for_until_all_are_shut_down(clo
 
 
 def test_upkeep_that_is_due_waits_for_a_moment_of_rest_but_not_for_long(clock: Clock) -> None:
-    resting, busy = Node(Wait(1e-3)), Node(None)
-    for node, patience in ((resting, 0.0), (busy, node_scheduler.UPKEEP_PATIENCE_S)):
-        scheduler = scheduler_of(node)
-        scheduler._upkeep_at = begin = clock.now
+    for node, patience in ((Node(Wait(1e-3)), 0.0), (Node(None), UPKEEP_PATIENCE_S)):
+        scheduler, begin = scheduler_of(node, upkeep_at=clock.now), clock.now
         while not node.looks:
             assert scheduler.take()
             clock.now += 1e-4
@@ -301,8 +266,7 @@ def test_upkeep_that_is_due_waits_for_a_moment_of_rest_but_not_for_long(clock: C
 
 def test_each_node_has_its_upkeep_one_after_the_other(clock: Clock) -> None:
     nodes = Node(Wait(1e-3)), Node(Wait(1e-3)), Node(Wait(1e-3))
-    scheduler = scheduler_of(*nodes)
-    begin, at = clock.now, []
+    scheduler, begin, at = scheduler_of(*nodes, upkeep_at=0.0), clock.now, list[float]()
     while clock.now < begin + 1.0:
         before = sum(node.looks + node.reports for node in nodes)
         assert scheduler.take()
@@ -311,17 +275,17 @@ def test_each_node_has_its_upkeep_one_after_the_other(clock: Clock) -> None:
         assert after - before <= 1
     assert [node.looks for node in nodes] == pytest.approx([1.0 / PERIOD_S] * 3, abs=2)
     assert [node.reports for node in nodes] == pytest.approx([1.0 / PERIOD_S] * 3, abs=2)
-    gaps = [b - a for a, b in itertools.pairwise(at)]
-    assert min(gaps) >= node_scheduler.UPKEEP_GAP_S - 1e-4
+    assert min(b - a for a, b in itertools.pairwise(at)) >= UPKEEP_GAP_S - 1e-4
 
 
 @pytest.mark.parametrize(("lasts", "pause"), [(0.002, 0.02), (0.3, LONGEST_PAUSE_S)])
 def test_calls_one_behind_another_take_no_more_than_their_share(
     clock: Clock, lasts: float, pause: float
 ) -> None:
+    """And a report never comes with a call: both in one turn would last too long."""
     assert pytest.approx(min(lasts / SERVICE_SHARE, LONGEST_PAUSE_S)) == pause
     node: Any = Node(None)
-    at = []
+    at: list[float] = []
 
     def run_one(timeout_s: float) -> bool:
         at.append(clock.now)
@@ -331,7 +295,9 @@ def test_calls_one_behind_another_take_no_more_than_their_share(
     node.calls.run_one = run_one
     kept = Upkeep(node)
     for _ in range(4000):
+        before = len(at) + node.reports
         kept.run()
+        assert len(at) + node.reports - before <= 1
         clock.now += 1e-3
     gaps = [b - a for a, b in itertools.pairwise(at)]
     assert min(gaps) == pytest.approx(lasts + pause, abs=3e-3)
@@ -347,7 +313,6 @@ def test_where_both_are_overdue_calls_and_reports_take_turns(clock: Clock) -> No
     assert (node.looks, node.reports) == (5, 5)
     assert kept.run() < clock.now, "the report is overdue"
     assert kept.run() == pytest.approx(clock.now + PERIOD_S, abs=1e-4)
-    kept.run()
     clock.now += 1.0
     node.looks = node.reports = 5
     kept.run(timeout_s=0.5)

@@ -1,9 +1,9 @@
-"""Messages laid out from their definitions: alignment, slots, and which bytes fit a layout."""
+"""Messages laid out from their definitions, also those for viewers, as rosbags writes them."""
 
 from __future__ import annotations
 
 import contextlib
-import struct
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -18,10 +18,15 @@ from space_robot_msgs_py import topics
 from space_robot_msgs_py.bag.message_accounting import message_tick
 from space_robot_msgs_py.errors import MessageError
 from space_robot_msgs_py.samples import Timebase
+from space_robot_msgs_py.wire.carrier import unwrap, wrap
 from space_robot_msgs_py.wire.cdr import MessageLayout, Slot, header_stamp_ns
 from space_robot_msgs_py.wire.codec import Codec
 from space_robot_msgs_py.wire.compiled_codec import FOREIGN, CompiledCodec
+from space_robot_msgs_py.wire.definitions import definition, jazzy
 from space_robot_msgs_py.wire.joint_states import JointStates
+from space_robot_msgs_py.wire.poses import POSE
+from space_robot_msgs_py.wire.robot_description import robot_description
+from space_robot_msgs_py.wire.tf import Frame, TransformsCodec
 
 ENCAPSULATION = b"\x00\x01\x00\x00"
 STORE = get_typestore(Stores.ROS2_JAZZY)
@@ -87,39 +92,6 @@ class FramedStates(JointStates):
         super().__init__(joints, Timebase(1))
 
 
-def test_layout_is_plain_cdr_little_endian() -> None:
-    """Byte for byte by hand: alignment counts from behind the encapsulation header."""
-    layout = MessageLayout(
-        "sensor_msgs/msg/JointState",
-        {
-            "header": {"stamp": {"sec": 3, "nanosec": 4}, "frame_id": "abcd"},
-            "name": ["x"],
-            "position": [1.5],
-            "effort": [-2.5],
-        },
-    )
-    assert layout.data == ENCAPSULATION + b"".join(
-        [
-            struct.pack("<iI", 3, 4),
-            struct.pack("<I", 5),
-            b"abcd\0",
-            b"\0" * 3,
-            struct.pack("<I", 1),
-            struct.pack("<I", 2),
-            b"x\0",
-            b"\0\0",
-            struct.pack("<I", 1),
-            b"\0" * 4,
-            struct.pack("<d", 1.5),
-            struct.pack("<I", 0),
-            struct.pack("<I", 1),
-            struct.pack("<d", -2.5),
-        ]
-    )
-    stands = [slot for slot in layout.slots.values() if slot.length]
-    assert [numbers(layout.data, slot).tolist() for slot in stands] == [[1.5], [-2.5]]
-
-
 @pytest.mark.parametrize("type_name", [*TYPES, *OTHERS])
 @given(seed=seeds)
 def test_any_message_is_laid_out_as_rosbags_does(type_name: str, seed: int) -> None:
@@ -165,67 +137,24 @@ def test_a_slot_is_found_by_its_path() -> None:
 
 
 @given(texts, names, stamps)
-def test_any_names_are_written_as_rosbags_does(
+def test_any_names_are_written_as_rosbags_does_and_read(
     frame: str, joints: list[str], stamp_ns: int
 ) -> None:
-    """The other writer's bytes and ours agree, for strings of any length and script."""
+    """By both codecs, for strings of any length and script, and seconds below zero."""
     values = np.arange(3 * len(joints)) + 0.25
     types = STORE.types
     time = types["builtin_interfaces/msg/Time"](*divmod(stamp_ns, 10**9))
     header = types["std_msgs/msg/Header"](time, frame)
     theirs = types["sensor_msgs/msg/JointState"](header, joints, *values.reshape(3, -1))
-    expected = STORE.serialize_cdr(theirs, "sensor_msgs/msg/JointState")
+    expected = bytes(STORE.serialize_cdr(theirs, "sensor_msgs/msg/JointState"))
     for codec in (Codec(FramedStates(frame, joints)), CompiledCodec(FramedStates(frame, joints))):
-        assert codec.encode(stamp_ns, values) == bytes(expected)
-
-
-@given(stamps)
-def test_stamp_round_trip(stamp_ns: int) -> None:
-    """Seconds negative, nanoseconds never: as builtin_interfaces/Time wants it."""
-    data = CompiledCodec(FramedStates("", [])).encode(stamp_ns, np.empty(0))
-    assert data == Codec(FramedStates("", [])).encode(stamp_ns, np.empty(0))
-    assert CompiledCodec(FramedStates("", [])).decode(data, np.empty(0)) == stamp_ns
-    assert Codec(FramedStates("", [])).decode(data)[0] == stamp_ns
-    assert header_stamp_ns(data) == stamp_ns
-    sec, nanosec = struct.unpack_from("<iI", data, 4)
-    assert 0 <= nanosec < 10**9
-    assert sec * 10**9 + nanosec == stamp_ns
-
-
-def test_numbers_stand_where_they_should_whatever_stands_before() -> None:
-    """Both codecs, for frames of every length."""
-    values = np.arange(9) - 4.5
-    for length in range(9):
-        description = FramedStates("f" * length, ["joint", "x", "yy"])
-        data = Codec(description).encode(7, values)
-        assert data == CompiledCodec(description).encode(7, values)
-        message = STORE.deserialize_cdr(data, "sensor_msgs/msg/JointState")
-        arrays = [message.position, message.velocity, message.effort]
-        np.testing.assert_array_equal(np.concatenate(arrays), values)
-        stamp_ns, back = Codec(description).decode(data)
-        assert stamp_ns == 7
-        np.testing.assert_array_equal(back, values)
-
-
-def test_the_numbers_of_the_same_layout_are_taken() -> None:
-    """Trailing bytes do not matter."""
-    description, sent = FramedStates("abc", ["left", "r"]), np.arange(6) + 0.5
-    data, codec = CompiledCodec(description).encode(123, sent), CompiledCodec(description)
-    for tail in (b"", b"\x7f", b"\xff" * 40):
-        values = np.zeros(6)
-        assert codec.read(data + tail, values) == 123
-        np.testing.assert_array_equal(values, sent)
-
-
-def test_padding_is_ignored_when_a_foreign_writer_fills_it() -> None:
-    """After "ab" and its NUL stands one byte of padding."""
-    description = FramedStates("ab", ["x"])
-    data = bytearray(CompiledCodec(description).encode(5, np.arange(3.0)))
-    place = data.index(b"ab\0") + 3
-    data[place] = 0xAA
-    values = np.zeros(3)
-    assert CompiledCodec(description).read(bytes(data), values) == 5
-    assert values.tolist() == [0.0, 1.0, 2.0]
+        assert codec.encode(stamp_ns, values) == expected
+    back = np.empty_like(values)
+    assert CompiledCodec(FramedStates(frame, joints)).decode(expected, back) == stamp_ns
+    np.testing.assert_array_equal(back, values)
+    stamp, numbers_read = Codec(FramedStates(frame, joints)).decode(expected)
+    assert stamp == header_stamp_ns(expected) == stamp_ns
+    np.testing.assert_array_equal(numbers_read, values)
 
 
 @pytest.mark.parametrize(
@@ -239,17 +168,69 @@ def test_another_layout_is_refused_and_nothing_taken(other: tuple[str, list[str]
     assert values.tolist() == [5.0, 6.0, 7.0, 8.0, 9.0, 1.0]
 
 
-def test_what_is_cut_short_or_big_endian_is_no_message_of_the_layout() -> None:
-    description, values = FramedStates("abc", ["left"]), np.zeros(3)
-    data, codec = CompiledCodec(description).encode(0, np.ones(3)), CompiledCodec(description)
-    for given_data in (data[:-1], b"", b"\x00\x00" + data[2:]):
-        assert codec.read(given_data, values) == FOREIGN
-    assert not values.any()
-
-
 @given(st.sampled_from(topics.ALL), st.binary(max_size=200))
 def test_garbage_has_a_tick_or_is_refused(topic: topics.Topic, garbage: bytes) -> None:
     """Whatever a foreign publisher sends: the recorder asks every message for its tick."""
     for data in (garbage, ENCAPSULATION + garbage):
         with contextlib.suppress(MessageError):
             assert message_tick(topic, data, Timebase(500_000)) >= 0
+
+
+NAMES = st.text(st.characters(codec="utf-8", exclude_characters="\0"), max_size=9)
+TIMEBASE = Timebase(500_000)
+
+
+def rosbags_bytes(frames: Sequence[Frame], stamp_ns: int, poses: np.ndarray) -> bytes:
+    types = jazzy().types
+    header, time = types["std_msgs/msg/Header"], types["builtin_interfaces/msg/Time"]
+    stamped = types["geometry_msgs/msg/TransformStamped"]
+    vector, rotation = types["geometry_msgs/msg/Vector3"], types["geometry_msgs/msg/Quaternion"]
+    message = types["tf2_msgs/msg/TFMessage"](
+        transforms=[
+            stamped(
+                header=header(time(*divmod(stamp_ns, 1_000_000_000)), frame.parent),
+                child_frame_id=frame.child,
+                transform=types["geometry_msgs/msg/Transform"](
+                    vector(*pose[:3]), rotation(*pose[3:])
+                ),
+            )
+            for frame, pose in zip(frames, poses.tolist(), strict=True)
+        ]
+    )
+    return bytes(jazzy().serialize_cdr(message, "tf2_msgs/msg/TFMessage"))
+
+
+@given(
+    st.lists(st.builds(Frame, NAMES, NAMES), max_size=6),
+    st.integers(0, 10**9),
+    st.integers(0, 2**32),
+)
+def test_transforms_are_the_bytes_of_rosbags(frames: list[Frame], tick: int, seed: int) -> None:
+    """Of a codec that has written another message before."""
+    rng, codec = np.random.default_rng(seed), TransformsCodec(frames, TIMEBASE)
+    codec.encode(7, rng.normal(size=(len(frames), POSE)))
+    poses = rng.normal(size=(len(frames), POSE))
+    assert codec.encode(tick, poses) == rosbags_bytes(frames, TIMEBASE.stamp_ns(tick), poses)
+
+
+@given(st.binary(max_size=99))
+def test_a_carrier_is_a_message_of_ros(data: bytes) -> None:
+    message = jazzy().deserialize_cdr(wrap(data), topics.CARRIER)
+    assert bytes(message.data) == unwrap(wrap(data)) == data
+
+
+@given(st.text(st.characters(codec="utf-8", exclude_characters="\0"), max_size=99))
+def test_a_description_is_read_back(text: str) -> None:
+    """Whole words: so the middleware adds nothing, and all bags have the same bytes."""
+    data = robot_description(text)
+    read = jazzy().deserialize_cdr(data, "std_msgs/msg/String").data
+    assert read in {text + count * "\n" for count in range(4)}
+    assert len(data) % 4 == 0
+    message = jazzy().types["std_msgs/msg/String"](read)
+    assert bytes(jazzy().serialize_cdr(message, "std_msgs/msg/String")) == data
+
+
+def test_bags_can_tell_what_a_transform_is() -> None:
+    text = definition(topics.TF.type)
+    assert "TransformStamped[] transforms" in text
+    assert text.count("MSG: ") == 6

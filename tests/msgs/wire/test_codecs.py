@@ -1,4 +1,4 @@
-"""Samples to messages and back, read and written by rclpy and rosbags as well."""
+"""Samples to messages and back, whatever the robot has, read and written by ROS and rosbags."""
 
 from __future__ import annotations
 
@@ -6,15 +6,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 from random_samples import (
-    BASE,
     BASE_AXES,
-    JOINTS,
     TIMEBASE,
-    assert_same,
     joint_names,
     random_sample,
     ros_type,
@@ -22,20 +18,155 @@ from random_samples import (
     state_codec,
 )
 from rosbags.typesys import Stores, get_typestore
-from strategies import JOINTS as JOINT_COUNTS
 
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.errors import MessageError
-from space_robot_msgs_py.samples import Command, LawInForce, RobotState, Timebase
+from space_robot_msgs_py.samples import (
+    ACTUATOR_FIELDS,
+    MOST_PASSIVE,
+    MOST_THRUSTERS,
+    MOST_TORQUERS,
+    MOST_WHEELS,
+    PASSIVE_FIELDS,
+    STATE_FIELDS,
+    Command,
+    LawInForce,
+    RobotNames,
+    RobotState,
+    Timebase,
+)
 from space_robot_msgs_py.wire.cdr import header_stamp_ns
 from space_robot_msgs_py.wire.clock import ClockCodec
-from space_robot_msgs_py.wire.codecs import CommandCodec
+from space_robot_msgs_py.wire.codecs import CommandCodec, StateCodec
 from space_robot_msgs_py.wire.controller_law import LawCodec
 from space_robot_msgs_py.wire.controller_telemetry import TelemetryCodec
-
-Array = NDArray[np.float64]
+from space_robot_msgs_py.wire.truth_writer import TruthWriter
 
 STORE = get_typestore(Stores.ROS2_JAZZY)
+
+
+def names_of(
+    joints: int,
+    wheels: int = 0,
+    thrusters: int = 0,
+    passive: int = 0,
+    geared: int = 0,
+    torquers: int = 0,
+) -> RobotNames:
+    """The last joints are geared."""
+    own = tuple(joint_names(joints))
+    actuators = ("wheel", wheels), ("thruster", thrusters), ("torquer", torquers)
+    named = (tuple(f"{kind}_{k + 1}" for k in range(count)) for kind, count in actuators)
+    w, t, m = named
+    panels = tuple(f"panel{'_' * (k % 3)}{k}" for k in range(passive))
+    return RobotNames(own, w, t, panels, own[joints - min(geared, joints) :], torquers=m)
+
+
+robots = st.builds(
+    names_of,
+    st.integers(1, 7),
+    st.integers(0, MOST_WHEELS),
+    st.integers(0, MOST_THRUSTERS),
+    st.integers(0, MOST_PASSIVE),
+    st.integers(0, 7),
+    st.integers(0, MOST_TORQUERS),
+)
+seeds, ticks = st.integers(0, 2**32 - 1), st.integers(0, 4 * 10**9)
+
+
+def state_of(names: RobotNames, seed: int = 0, tick: int = 7) -> RobotState:
+    """A state with another number everywhere, zero where the robot has nothing."""
+    rng, state = np.random.default_rng(seed), RobotState.allocate(len(names.joints))
+    state.tick = tick
+    for name in STATE_FIELDS:
+        getattr(state, name)[:] = rng.normal(size=getattr(state, name).shape)
+    wheels, geared, passive = len(names.wheels), len(names.geared), len(names.passive)
+    counts = (wheels, wheels, len(names.thrusters), geared, geared)
+    for name, count in zip(ACTUATOR_FIELDS, counts, strict=True):
+        getattr(state, name)[:count] = rng.normal(size=count)
+    for name in PASSIVE_FIELDS:
+        getattr(state, name)[:passive] = rng.normal(size=passive)
+    if names.torquers:
+        state.magnetic_field[:] = rng.normal(size=3)
+    return state
+
+
+def encoded(names: RobotNames, state: RobotState) -> dict[topics.Topic, bytes]:
+    codec = StateCodec(names, TIMEBASE)
+    return dict(zip(codec.topics, codec.encode(state), strict=True))
+
+
+@given(robots, seeds, ticks)
+def test_a_state_comes_back_whole_whatever_the_robot_has(
+    names: RobotNames, seed: int, tick: int
+) -> None:
+    """The same bits; of what it has not there is no message."""
+    state, back = state_of(names, seed, tick), RobotState.allocate(len(names.joints))
+    reader, sent = StateCodec(names, TIMEBASE), encoded(names, state)
+    assert set(sent) == {
+        *(topics.JOINT_STATES, topics.BASE_STATE),
+        *([topics.WHEELS_STATE] if names.wheels else []),
+        *([topics.THRUSTERS_STATE] if names.thrusters else []),
+        *([topics.MOTORS_STATE] if names.geared else []),
+        *([topics.MAGNETOMETER] if names.torquers else []),
+    }
+    for topic, data in sent.items():
+        assert reader.decode(topic, data, back) == tick
+    assert back.numbers.tobytes() == state.numbers.tobytes()
+
+
+@given(robots, seeds, ticks, st.sampled_from([None, np.nan, np.inf, -0.0, 5e-324, 1.7e308]))
+def test_a_command_comes_back_whole(
+    names: RobotNames, seed: int, tick: int, odd: float | None
+) -> None:
+    torque = np.random.default_rng(seed).normal(size=len(names.commanded))
+    torque[-1] = torque[-1] if odd is None else odd
+    back = Command(-1, np.zeros_like(torque))
+    data = CommandCodec(names.commanded, TIMEBASE).encode(Command(tick, torque))
+    CommandCodec(names.commanded, TIMEBASE).decode(data, back)
+    assert back.tick == tick
+    assert back.torque.tobytes() == torque.tobytes()
+
+
+def test_decoded_samples_do_not_change_with_the_next_message() -> None:
+    """The codec's buffer is its own."""
+    writer, reader = (state_codec(joint_names(2)) for _ in range(2))
+    first, back = random_sample(2, 1), RobotState.allocate(2)
+    sent = writer.encode(first)
+    for topic, data in zip((topics.JOINT_STATES, topics.BASE_STATE), sent, strict=True):
+        reader.decode(topic, data, back)
+    other = writer.encode(random_sample(2, 2))
+    assert not set(other) & set(sent)
+    reader.decode(topics.JOINT_STATES, other[0], RobotState.allocate(2))
+    assert back.numbers.tobytes() == first.numbers.tobytes()
+
+
+@pytest.mark.parametrize(("wheels", "thrusters", "torquers"), [(4, 0, 3), (0, 0, 0), (2, 3, 1)])
+def test_actuators_are_told_apart_by_their_number(
+    wheels: int, thrusters: int, torquers: int
+) -> None:
+    whole = names_of(1, wheels, thrusters, 1, 1, torquers)
+    taken = RobotNames.of(
+        whole.joints, whole.actuators, wheels, whole.passive, whole.geared, torquers
+    )
+    assert taken == whole
+    assert taken.commanded == ("base_x", "base_y", "base_z", *whole.joints, *whole.actuators)
+
+
+def test_the_controller_waits_for_what_it_needs() -> None:
+    """Not for thrusters and motors; the magnetometer is the last."""
+    codec = StateCodec(names_of(3, 1, 1, 1, 2, 3), TIMEBASE)
+    assert codec.control_topics == (
+        topics.JOINT_STATES,
+        topics.WHEELS_STATE,
+        topics.BASE_STATE,
+        topics.MAGNETOMETER,
+    )
+    assert topics.MAGNETOMETER.per_tick
+    assert topics.MAGNETOMETER.is_optional
+
+
+# Our bytes, other readers
 
 
 def by_rclpy(data: bytes, type_name: str) -> Any:
@@ -54,27 +185,25 @@ def xyz(value: Any) -> list[float]:
     return [value.x, value.y, value.z]
 
 
-def seconds(stamp: Any) -> tuple[int, int]:
-    return stamp.sec, stamp.nanosec
-
-
-# Our bytes, other readers
+def tick_of(stamp: Any) -> int:
+    return TIMEBASE.tick(stamp.sec * 10**9 + stamp.nanosec)
 
 
 @READERS
 @pytest.mark.parametrize("n", [1, 2, 6, 7])
-def test_state_is_read_as_ros_messages(n: int, read: Any) -> None:
+def test_a_state_is_read_as_ros_messages(n: int, read: Any) -> None:
     """JointState's effort and the wrench echo the applied torque; quaternions are x, y, z, w."""
-    state = random_sample(n, seed=n)
-    joints_data, base_data = state_codec(joint_names(n)).encode(state)
-    joints = read(joints_data, "sensor_msgs/msg/JointState")
-    assert seconds(joints.header.stamp) == (2, 500_000)
-    assert list(joints.name) == joint_names(n)
-    np.testing.assert_array_equal(joints.position, state.joint_positions)
-    np.testing.assert_array_equal(joints.velocity, state.joint_velocities)
-    np.testing.assert_array_equal(joints.effort, state.applied_torque[3:])
-    base = read(base_data, "sensor_msgs/msg/MultiDOFJointState")
-    assert seconds(base.header.stamp) == (2, 500_000)
+    names = names_of(n, 3, 4, 2, 1, 2)
+    state = state_of(names, n, tick=4001)
+    message = {topic: read(data, topic.type) for topic, data in encoded(names, state).items()}
+    assert {tick_of(one.header.stamp) for one in message.values()} == {4001}
+    joints = message[topics.JOINT_STATES]
+    assert list(joints.name) == [*names.joints, *names.passive]
+    passive = state.passive_positions[:2], state.passive_velocities[:2]
+    np.testing.assert_array_equal(joints.position, [*state.joint_positions, *passive[0]])
+    np.testing.assert_array_equal(joints.velocity, [*state.joint_velocities, *passive[1]])
+    np.testing.assert_array_equal(joints.effort, [*state.applied_torque[3:], 0.0, 0.0])
+    base = message[topics.BASE_STATE]
     assert base.header.frame_id == topics.INERTIAL_FRAME
     assert list(base.joint_names) == [topics.BASE_JOINT]
     (transform,), (twist,), (wrench,) = base.transforms, base.twist, base.wrench
@@ -84,17 +213,43 @@ def test_state_is_read_as_ros_messages(n: int, read: Any) -> None:
     assert xyz(twist.angular) == state.omega_base.tolist()
     assert xyz(wrench.torque) == state.applied_torque[:3].tolist()
     assert xyz(wrench.force) == [0.0, 0.0, 0.0], "the base's position is left uncontrolled"
+    for topic, frame, own, columns in (
+        (
+            topics.WHEELS_STATE,
+            topics.BASE_FRAME,
+            names.wheels,
+            ([], state.wheel_velocities[:3], state.wheel_torques[:3]),
+        ),
+        (topics.THRUSTERS_STATE, topics.BASE_FRAME, names.thrusters, ([], [], state.thrusts[:4])),
+        (
+            topics.MOTORS_STATE,
+            "",
+            names.geared,
+            (state.motor_positions[:1], state.motor_velocities[:1], []),
+        ),
+    ):
+        one = message[topic]
+        assert (one.header.frame_id, tuple(one.name)) == (frame, own)
+        for column, expected in zip((one.position, one.velocity, one.effort), columns, strict=True):
+            np.testing.assert_array_equal(column, expected)
+    magnetometer = message[topics.MAGNETOMETER]
+    assert magnetometer.header.frame_id == topics.BASE_FRAME
+    assert xyz(magnetometer.magnetic_field) == state.magnetic_field.tolist()
+    assert not np.any(magnetometer.magnetic_field_covariance), "unknown"
 
 
 @READERS
-def test_command_is_read_as_a_joint_state_of_efforts(read: Any) -> None:
-    axes, torque = BASE_AXES + joint_names(3), np.arange(6.0) - 2.5
-    data = CommandCodec(axes, TIMEBASE).encode(Command(7, torque))
-    message = read(data, "sensor_msgs/msg/JointState")
-    assert seconds(message.header.stamp) == (0, 3_500_000)
-    assert list(message.name) == axes
+def test_a_command_is_read_as_a_joint_state_of_efforts(read: Any) -> None:
+    names = names_of(3, 2, 1, 1, 1, 2)
+    torque = np.arange(float(len(names.commanded))) - 2.5
+    data = CommandCodec(names.commanded, TIMEBASE).encode(Command(7, torque))
+    message = read(data, topics.COMMAND.type)
+    assert tick_of(message.header.stamp) == 7
+    assert tuple(message.name) == (*BASE_AXES, *names.joints, *names.actuators)
     np.testing.assert_array_equal(message.effort, torque)
     assert len(message.position) == len(message.velocity) == 0
+    with pytest.raises(MessageError, match="/command: names"):
+        CommandCodec(names.axes, TIMEBASE).decode(data, Command(-1, np.zeros(6)))
 
 
 @READERS
@@ -118,16 +273,15 @@ def test_telemetry_is_read_as_a_labelled_array(read: Any) -> None:
 @READERS
 def test_clock_is_read_as_a_clock(read: Any) -> None:
     message = read(ClockCodec().encode(12_345_678_901), "rosgraph_msgs/msg/Clock")
-    assert seconds(message.clock) == (12, 345_678_901)
+    assert (message.clock.sec, message.clock.nanosec) == (12, 345_678_901)
 
 
 @READERS
 @pytest.mark.parametrize("is_first", [True, False])
 def test_law_is_read_as_a_parameter_event(read: Any, is_first: bool) -> None:
     law = LawInForce(7, "tde_smc", {"h_bar": (1.5, 2.0), "lambda": (-0.0, 5e-324)}, is_first)
-    data = LawCodec(TIMEBASE).encode(law)
-    message = read(data, topics.LAW.type)
-    assert seconds(message.stamp) == (0, 3_500_000)
+    message = read(LawCodec(TIMEBASE).encode(law), topics.LAW.type)
+    assert tick_of(message.stamp) == 7
     assert message.node == "/controller_node"
     given, other = message.new_parameters, message.changed_parameters
     given, other = (given, other) if is_first else (other, given)
@@ -140,6 +294,7 @@ def test_law_is_read_as_a_parameter_event(read: Any, is_first: bool) -> None:
         assert sent.tobytes() == np.array(values).tobytes()
 
 
+@settings(max_examples=50)
 @given(
     st.text(min_size=1, max_size=9).filter(lambda name: "\0" not in name),
     st.dictionaries(st.text("abc_1.", min_size=1), st.lists(st.floats(), max_size=9), max_size=5),
@@ -154,8 +309,7 @@ def test_law_round_trip(name: str, gains: dict[str, list[float]], is_first: bool
 
 
 def test_a_parameter_event_that_names_no_law_is_an_error() -> None:
-    law = LawInForce(0, "ctc", {"k_p": (1.0,)})
-    data = LawCodec(TIMEBASE).encode(law)
+    data = LawCodec(TIMEBASE).encode(LawInForce(0, "ctc", {"k_p": (1.0,)}))
     with pytest.raises(MessageError, match="no parameter 'controller'"):
         LawCodec.decode(data.replace(b"controller\0", b"kontroller\0"), 0)
     at = data.index(b"ctc.k_p\0") + 8
@@ -163,82 +317,49 @@ def test_a_parameter_event_that_names_no_law_is_an_error() -> None:
         LawCodec.decode(data[:at] + b"\x03" + data[at + 1 :], 0)
 
 
+def test_the_truth_tells_all_joints() -> None:
+    names = names_of(2, passive=3)
+    writer, state = TruthWriter(names, TIMEBASE, topics.TRUTH), state_of(names, 4)
+    assert writer.add(state) == ()
+    (topic, data), _ = writer.flush()
+    message = STORE.deserialize_cdr(data, topic.type)
+    assert message.joint_names == [*names.axes, *names.passive]
+    point = message.points[0]
+    np.testing.assert_array_equal(point.positions[5:], state.passive_positions[:3])
+    np.testing.assert_array_equal(point.velocities[3:5], state.joint_velocities)
+    np.testing.assert_array_equal(point.velocities[5:], state.passive_velocities[:3])
+    np.testing.assert_array_equal(point.effort, [*state.applied_torque, 0.0, 0.0, 0.0])
+
+
+# Stamps
+
+
 def test_every_message_begins_with_its_stamp() -> None:
     """So that a recorder can tell the tick without decoding."""
-    joints, base = state_codec(joint_names(2)).encode(random_sample(2, 1, tick=9))
+    names = names_of(2, 1, 1, 1, 1, 1)
     command = CommandCodec(BASE_AXES, TIMEBASE).encode(Command(9, np.zeros(3)))
     law = LawCodec(TIMEBASE).encode(LawInForce(9, "ctc", {}))
-    for data in (joints, base, command, law, ClockCodec().encode(TIMEBASE.stamp_ns(9))):
+    states = encoded(names, state_of(names, tick=9)).values()
+    for data in (*states, command, law, ClockCodec().encode(TIMEBASE.stamp_ns(9))):
         assert header_stamp_ns(data) == 4_500_000
 
 
-# Round trips
-
-
-@given(st.sampled_from(JOINT_COUNTS), st.integers(0, 2**32 - 1), st.integers(0, 4 * 10**9))
-def test_state_round_trip(n: int, seed: int, tick: int) -> None:
-    """Any number of joints, any tick: the same bits come back."""
-    state, back = random_sample(n, seed, tick), RobotState.allocate(n)
-    joints, base = state_codec(joint_names(n)).encode(state)
-    reader = state_codec(joint_names(n))
-    assert reader.decode(JOINTS, joints, back) == reader.decode(BASE, base, back) == tick
-    assert_same(back, state)
-
-
-@given(st.sampled_from(JOINT_COUNTS), st.integers(0, 2**32 - 1), st.integers(0, 4 * 10**9))
-def test_command_round_trip(n: int, seed: int, tick: int) -> None:
-    torque = np.random.default_rng(seed).normal(size=n + 3)
-    axes, back = BASE_AXES + joint_names(n), Command(-1, np.zeros(n + 3))
-    CommandCodec(axes, TIMEBASE).decode(
-        CommandCodec(axes, TIMEBASE).encode(Command(tick, torque)), back
-    )
-    assert back.tick == tick
-    np.testing.assert_array_equal(back.torque, torque)
-
-
-def test_decoded_samples_do_not_change_with_the_next_message() -> None:
-    """The codec's buffer is its own."""
-    writer, reader = (state_codec(joint_names(2)) for _ in range(2))
-    first, back = random_sample(2, 1), RobotState.allocate(2)
-    joints, base = writer.encode(first)
-    reader.decode(JOINTS, joints, back)
-    reader.decode(BASE, base, back)
-    for data in writer.encode(random_sample(2, 2)):
-        assert data not in (joints, base)
-    reader.decode(
-        topics.JOINT_STATES, writer.encode(random_sample(2, 3))[0], RobotState.allocate(2)
-    )
-    assert_same(back, first)
-
-
-@pytest.mark.parametrize("value", [np.nan, np.inf, -0.0, 5e-324, 1.7e308])
-def test_odd_numbers_survive(value: float) -> None:
-    axes, back = BASE_AXES, Command(0, np.zeros(3))
-    CommandCodec(axes, TIMEBASE).decode(
-        CommandCodec(axes, TIMEBASE).encode(Command(0, np.full(3, value))), back
-    )
-    assert back.torque.tobytes() == np.full(3, value).tobytes()
-
-
-# Timebase
-
-
-@given(st.integers(0, 10**12), st.sampled_from([500_000, 1_000_000, 1, 333_333]))
-def test_tick_to_stamp_and_back(tick: int, period_ns: int) -> None:
+@given(
+    st.integers(0, 10**12),
+    st.sampled_from([500_000, 1_000_000, 1, 333_333]),
+    st.integers(1, 499_999),
+)
+def test_tick_to_stamp_and_back(tick: int, period_ns: int, offset: int) -> None:
     timebase = Timebase(period_ns)
     assert timebase.tick(timebase.stamp_ns(tick)) == tick
     assert timebase.period == pytest.approx(period_ns / 1e9, rel=1e-15)
-
-
-@given(st.integers(0, 10**12), st.integers(1, 499_999))
-def test_a_stamp_between_ticks_is_an_error(tick: int, offset: int) -> None:
     with pytest.raises(MessageError, match="same period"):
         TIMEBASE.tick(TIMEBASE.stamp_ns(tick) + offset)
 
 
 def test_a_state_of_another_period_is_an_error() -> None:
-    joints, base = state_codec(["a"]).encode(random_sample(1, 6, tick=3))
     reader, back = state_codec(["a"], Timebase(1_000_000)), RobotState.allocate(1)
-    for topic, data in ((topics.JOINT_STATES, joints), (topics.BASE_STATE, base)):
+    sent = state_codec(["a"]).encode(random_sample(1, 6, tick=3))
+    for topic, data in zip((topics.JOINT_STATES, topics.BASE_STATE), sent, strict=True):
         with pytest.raises(MessageError, match="1500000 ns is not a whole number of 1000000 ns"):
             reader.decode(topic, data, back)

@@ -1,9 +1,10 @@
-"""Publishers told apart: the graph's own counted to the last message, foreign ones left out."""
+"""What is counted and believed of received messages: lost ones, and strange stamps."""
 
 from __future__ import annotations
 
 import random
 from collections.abc import Mapping
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -15,11 +16,13 @@ from hypothesis import strategies as st
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.bag.accounts import foreign, noted_accounts
 from space_robot_msgs_py.bag.mcap_storage import McapStorage
+from space_robot_msgs_py.bag.metadata import read_information
 from space_robot_msgs_py.bag.recorder import BagRecorder
 from space_robot_msgs_py.bag.rows import stamps_of
 from space_robot_msgs_py.samples import Command, Timebase
 from space_robot_msgs_py.wire.codecs import CommandCodec
 from space_robot_msgs_py.wire.sources import PARTICIPANT_BYTES, Claimed, Sources
+from space_robot_msgs_py.wire.stamp_guard import AGREEING, StampGuard
 
 TIMEBASE = Timebase(500_000)
 TOPIC = topics.COMMAND.full_name
@@ -71,57 +74,10 @@ def test_lost_is_what_was_sent_and_did_not_come(
     assert sources.is_behind == (is_told and len(sent[OURS]) > max(came, default=0))
 
 
-@pytest.mark.parametrize("order", [(FOREIGN, OURS), (OURS, FOREIGN)])
-def test_the_claim_decides_whoever_comes_first(graph: Graph, order: tuple[bytes, ...]) -> None:
-    sources = Sources(TOPIC, graph)
-    assert [sources.take(p, 1) for p in order] == [p == OURS for p in order]
-
-
-def test_a_node_that_was_started_again_is_ours(graph: Graph) -> None:
-    sources = Sources(TOPIC, graph)
-    assert sources.take(OURS, 1)
-    graph.claim = Claimed((OURS,), False)  # killed
-    assert not sources.take(FOREIGN, 1)
-    graph.claim = Claimed((AGAIN,), True)
-    assert sources.take(AGAIN, 3)
-    assert sources.take(OURS, 2)  # was on its way
-    assert not sources.take(OTHER, 1)
-    assert (sources.holes, sources.foreign) == (2, 2)
-
-
-def test_one_that_had_ended_before_it_was_heard_is_ours(graph: Graph) -> None:
-    """The recorder was behind: the topic has been claimed anew before its first message came."""
-    graph.claim = Claimed((OURS, AGAIN), True)
-    sources = Sources(TOPIC, graph)
-    assert sources.take(OURS, 1)
-    assert sources.take(AGAIN, 1)
-    assert not sources.take(FOREIGN, 1)
-    assert sources.foreign == 1
-
-
-def test_a_topic_that_nobody_claims_is_its_first_publishers(graph: Graph) -> None:
-    graph.claim = Claimed()
-    graph.listed = {OURS: "/player", FOREIGN: "/other", AGAIN: "/player", OTHER: ""}
-    sources = Sources(TOPIC, graph)
-    assert [sources.take(p, 1) for p in (OURS, FOREIGN, AGAIN, OTHER)] == [True, False, True, False]
-    del graph.listed[OURS], graph.listed[AGAIN]
-    assert sources.take(bytes(16), 1)  # those are gone: it takes their place
-
-
-def test_who_claims_it_takes_a_topic_over(graph: Graph) -> None:
-    graph.claim = Claimed()
-    sources = Sources(TOPIC, graph)
-    assert sources.take(FOREIGN, 1)
-    assert not sources.begins_anew
-    graph.claim = Claimed((OURS,), True)
-    assert sources.take(OURS, 1)
-    assert sources.begins_anew
-    assert not sources.take(FOREIGN, 2)
-    assert (sources.holes, sources.foreign) == (0, 2)
-
-
 def test_what_is_sent_in_a_pause_is_passed_over(graph: Graph) -> None:
     sources = Sources(TOPIC, graph)
+    sources.note_sent(FOREIGN[:PARTICIPANT_BYTES], 1000)
+    assert (sources.tail, sources.is_behind) == (0, False)
     for sequence in (1, 2, 4):
         sources.take(OURS, sequence)
     sources.pause()
@@ -152,14 +108,6 @@ def test_who_is_first_heard_after_a_pause_has_lost_nothing(
     assert sources.holes == (2 if pauses else passed + 2)
 
 
-def test_nothing_has_come_of_what_was_told(graph: Graph) -> None:
-    sources = Sources(TOPIC, graph)
-    sources.note_sent(FOREIGN[:PARTICIPANT_BYTES], 1000)
-    assert (sources.tail, sources.is_behind) == (0, False)
-    sources.note_sent(OURS[:PARTICIPANT_BYTES], 7)
-    assert (sources.tail, sources.is_behind) == (7, True)
-
-
 def test_foreign_publishers_are_named_when_their_names_are_known(graph: Graph) -> None:
     sources = Sources(TOPIC, graph)
     for publisher in (OURS, FOREIGN, OTHER):
@@ -175,7 +123,7 @@ def _command(tick: int, torque: float) -> bytes:
     return CommandCodec(("j",), TIMEBASE).encode(Command(tick, np.array([torque])))
 
 
-@pytest.mark.parametrize("stamps", [range(10), range(5, 15), range(10**6, 10**6 + 10)])
+@pytest.mark.parametrize("stamps", [range(10), range(10**6, 10**6 + 10)])
 def test_foreign_messages_displace_nothing(tmp_path: Path, graph: Graph, stamps: range) -> None:
     """With the stamps of ours, later ones, or of another time; or malformed."""
     recorder = BagRecorder(tmp_path / "bag", {}, TIMEBASE, publishers=graph)
@@ -192,35 +140,32 @@ def test_foreign_messages_displace_nothing(tmp_path: Path, graph: Graph, stamps:
     assert all(batch.message(i) == _command(i, 1.0) for i in range(10))
 
 
-def test_unanswered_ticks_are_not_lost_and_lost_answers_are(tmp_path: Path, graph: Graph) -> None:
+@pytest.mark.parametrize(
+    ("sent", "lost"),
+    [
+        ([(1, 0), (2, 1), (3, 500), (5, 502)], 1),  # unanswered ticks are none
+        ([(3, 0), (4, 1), (6, 3), (7, 2), (8, 2)], 0),  # sent again: 1 and 2 were tick 0, too
+    ],
+)
+def test_lost_is_told_by_the_numbers_of_the_messages(
+    tmp_path: Path, graph: Graph, sent: list[tuple[int, int]], lost: int
+) -> None:
     recorder = BagRecorder(tmp_path / "bag", {}, TIMEBASE, publishers=graph)
-    answers = [(1, 0), (2, 1), (3, 500), (5, 502)]  # sequence number, tick
-    for sequence, tick in answers:
+    for sequence, tick in sent:
         recorder.record(topics.COMMAND, _command(tick, 1.0), 1, OURS, sequence)
-    assert recorder.lost[TOPIC] == 1
-    recorder.close()
-
-
-def test_what_was_lost_and_sent_again_is_not_lost(tmp_path: Path, graph: Graph) -> None:
-    recorder = BagRecorder(tmp_path / "bag", {}, TIMEBASE, publishers=graph)
-    for sequence, tick in [(3, 0), (4, 1), (6, 3), (7, 2), (8, 2)]:  # 1 and 2 were tick 0, too
-        recorder.record(topics.COMMAND, _command(tick, 1.0), 1, OURS, sequence)
-    assert recorder.lost[TOPIC] == 0
-    recorder.note_sent(TOPIC, OURS, 10)
+    assert recorder.lost[TOPIC] == lost
+    recorder.note_sent(TOPIC, OURS, sent[-1][0] + 2)
     assert recorder.is_behind
-    assert recorder.lost[TOPIC] == 2
+    assert recorder.lost[TOPIC] == lost + 2
     recorder.close()
-
-
-def test_what_the_recorder_noted_is_read_back_with_care() -> None:
-    whole = (
-        '{"/command": {"received": 3, "missing": 0, "foreign": 2, "foreign_publishers": ["/a"]}}'
-    )
-    accounts = noted_accounts({"space_robot.accounting": whole})
-    assert foreign(accounts) == ["2 messages on /command were left out: they are from /a"]
+    accounts = noted_accounts(read_information(tmp_path / "bag").noted)
+    assert accounts[TOPIC].missing == lost + 2
     for text in ("[", "[]", '{"/a": null}', '{"/a": {"received": -1, "missing": 0}}', "NaN"):
         assert noted_accounts({"space_robot.accounting": text}) == {}
     assert noted_accounts({}) == {}
+    told = '{"/command": {"received": 3, "missing": 0, "foreign": 2, "foreign_publishers": ["/a"]}}'
+    said = "2 messages on /command were left out: they are from /a"
+    assert foreign(noted_accounts({"space_robot.accounting": told})) == [said]
 
 
 def test_where_messages_tell_no_publisher_all_are_ours(tmp_path: Path) -> None:
@@ -238,3 +183,95 @@ def test_where_messages_tell_no_publisher_all_are_ours(tmp_path: Path) -> None:
     assert recorder.lost[TOPIC] == 0
     recorder.close()
     assert read_accounts(tmp_path / "bag")[TOPIC]["received"] == 5
+
+
+JUMP = 8
+
+steps = st.lists(st.integers(1, JUMP), max_size=30)
+stamps = st.lists(st.integers(0, 40) | st.integers(0, 10**9), max_size=40)
+
+
+def rising(begin: int, steps: list[int]) -> list[int]:
+    found = [begin]
+    for step in steps:
+        found.append(found[-1] + step)
+    return found
+
+
+def passing(guard: StampGuard, ticks: list[int]) -> list[bool]:
+    return [guard.passes(tick) for tick in ticks]
+
+
+@given(st.integers(0, 10**9), steps)
+def test_stamps_that_rise_are_believed(begin: int, steps: list[int]) -> None:
+    guard, ticks = StampGuard(JUMP), rising(begin, steps)
+    assert guard.last == -1, "none yet"
+    assert all(passing(guard, ticks))
+    assert guard.last == ticks[-1]
+
+
+@given(st.integers(0, 10**6), steps, st.integers(0, 10**9), st.integers(0, 29), st.integers(1, 4))
+def test_fewer_strange_ones_than_agreeing_are_not(
+    begin: int, steps: list[int], strange: int, where: int, many: int
+) -> None:
+    """The stream goes on as if they had not come."""
+    ticks = rising(begin, steps)
+    where = min(where, len(ticks) - 1)
+    last = ticks[where]
+    if 0 < strange - last <= JUMP:
+        strange = last
+    guard = StampGuard(JUMP)
+    passing(guard, ticks[: where + 1])
+    assert not any(passing(guard, [strange] * min(many, AGREEING - 1)))
+    assert guard.last == last
+    assert all(passing(guard, ticks[where + 1 :]))
+
+
+@given(stamps)
+def test_a_strange_stamp_is_only_believed_after_others_that_fit_it(ticks: list[int]) -> None:
+    """Any stream: the ones before it were all refused, and lead up to it."""
+    guard = StampGuard(JUMP)
+    verdicts: list[bool] = []
+    for i, tick in enumerate(ticks):
+        last = guard.last
+        verdicts.append(guard.passes(tick))
+        if i == 0 or 0 < tick - last <= JUMP:
+            assert verdicts[i]
+        elif verdicts[i]:
+            run = ticks[i - AGREEING + 1 : i + 1]
+            assert len(run) == AGREEING
+            assert not any(verdicts[i - AGREEING + 1 : i])
+            assert all(0 <= b - a <= JUMP for a, b in pairwise(run))
+
+
+@given(stamps, st.integers(0, 10**9), steps)
+def test_a_new_time_is_believed_by_its_fifth_stamp_at_the_latest(
+    past: list[int], begin: int, steps: list[int]
+) -> None:
+    """Whatever has come before: the plant has started anew."""
+    guard = StampGuard(JUMP)
+    passing(guard, past)
+    verdicts = passing(guard, rising(begin, [1] * AGREEING + steps))
+    assert any(verdicts[:AGREEING])
+    assert all(verdicts[AGREEING - 1 :])
+
+
+def test_a_plant_that_asks_again_from_tick_0_is_believed() -> None:
+    """In lockstep it repeats its first state until that is answered."""
+    guard = StampGuard(JUMP)
+    passing(guard, list(range(100, 120)))
+    assert passing(guard, [0] * AGREEING) == [False] * (AGREEING - 1) + [True]
+    assert guard.passes(1)
+
+
+@given(st.integers(0, 10**6), st.integers(0, 10**9))
+def test_a_new_time_is_told_as_one_and_only_once(begin: int, new: int) -> None:
+    guard = StampGuard(JUMP)
+    guard.passes(begin)
+    if 0 < new - begin <= JUMP:
+        new = begin
+    passing(guard, [new] * AGREEING)
+    assert guard.last == new
+    assert guard.is_new_time
+    assert guard.passes(new + 1)
+    assert not guard.is_new_time

@@ -1,0 +1,441 @@
+"""Bags that we write, read by the mcap library, by rosbags and by ourselves."""
+
+from __future__ import annotations
+
+import json
+import struct
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any, get_args
+
+import pytest
+import yaml
+from bags import as_sent, read_accounts
+from hypothesis import given
+from hypothesis import strategies as st
+from mcap.opcode import Opcode
+from mcap.reader import make_reader
+from mcap.stream_reader import StreamReader
+from paths import DATA
+from robots import driven_paper
+from rosbags.highlevel import AnyReader
+from rosbags.rosbag2 import Reader, StoragePlugin, Writer
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+from rosbags.typesys.store import Typestore
+
+from space_robot.analysis import analyze
+from space_robot.flight.plan import Flight, FlightPlan, resolve
+from space_robot.flight.simulate import simulate
+from space_robot_model.robot import Robot
+from space_robot_msgs_py import topics
+from space_robot_msgs_py.bag.folder import open_bag
+from space_robot_msgs_py.bag.mcap_file import Compression
+from space_robot_msgs_py.bag.message_accounting import MessageAccounting, lost_messages
+from space_robot_msgs_py.bag.reader import read_flight
+from space_robot_msgs_py.bag.recorder import ACCOUNTS_KEY, FLIGHT_KEY, BagRecorder
+from space_robot_msgs_py.bag.rosbag2_yaml import FileSummary, bag_information, to_yaml
+from space_robot_msgs_py.bag.writer import DESCRIPTION
+from space_robot_msgs_py.errors import FlightError, InputError
+from space_robot_msgs_py.samples import RobotNames, RobotState, Timebase
+from space_robot_msgs_py.wire.clock import ClockCodec
+from space_robot_msgs_py.wire.codecs import StateCodec
+from space_robot_msgs_py.wire.definitions import definition, jazzy
+
+TIMEBASE = Timebase(500_000)
+FLIGHT = {"controller": "tde_stc", "period": 0.0005}
+SPLIT = 65_536
+LATCHED = {"/tf_static", "/robot_description"}
+SAMPLE = DATA / "rosbag2_sample" / "metadata.yaml"
+Messages = list[tuple[topics.Topic, bytes]]
+"""What the nodes send."""
+Message = tuple[str, int, bytes]
+
+
+def _files(bag: Path) -> list[Path]:
+    return sorted(bag.glob("*.mcap"), key=lambda file: int(file.stem.rpartition("_")[2]))
+
+
+def _read_file(file: Path) -> list[Message]:
+    """Topic, log time, data, as mcap reads them."""
+    with file.open("rb") as stream:
+        sent = make_reader(stream, validate_crcs=True).iter_messages(log_time_order=False)
+        return [(channel.topic, m.log_time, m.data) for _, channel, m in sent]
+
+
+def _read(bag: Path) -> list[Message]:
+    return [message for file in _files(bag) for message in _read_file(file)]
+
+
+def _unrepeated(messages: list[Message]) -> list[Message]:
+    """Leave out what the later files of a bag repeat."""
+    return [m for i, m in enumerate(messages) if i < len(LATCHED) or m[0] not in LATCHED]
+
+
+def _summary(file: Path) -> Any:
+    with file.open("rb") as stream:
+        return make_reader(stream).get_summary()
+
+
+def _information(bag: Path) -> dict[str, Any]:
+    content: dict[str, Any] = yaml.safe_load((bag / "metadata.yaml").read_text())
+    assert list(content) == ["rosbag2_bagfile_information"]
+    return dict(content["rosbag2_bagfile_information"])
+
+
+# Whole flights
+
+OF_HARDWARE = {
+    *(topics.WHEELS_STATE, topics.THRUSTERS_STATE, topics.MOTORS_STATE),
+    *(topics.MAGNETOMETER, topics.TRUTH_ORBIT),
+}
+FLIGHTS: dict[str, tuple[dict[str, Any], set[topics.Topic]]] = {
+    "paper": ({"robot": "paper"}, OF_HARDWARE),
+    "in_orbit": (
+        {
+            "robot": Robot.from_dict(driven_paper()),
+            "orbit": "iss",
+            "actuators": "wheels_and_torquers",
+        },
+        {topics.THRUSTERS_STATE},
+    ),
+}
+"""Options of each flight, and the topics that it does not have."""
+
+
+@pytest.fixture(scope="module", params=FLIGHTS)
+def bag(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("bags") / request.param
+    options = {"duration": 0.1, "sensors": "fine", **FLIGHTS[request.param][0]}
+    simulate(Flight(resolve(FlightPlan.model_validate(options))), folder)
+    return folder
+
+
+def _types_in(bag: Path) -> Typestore:
+    """Of the definitions in the bag alone."""
+    store = get_typestore(Stores.EMPTY)
+    for schema in _summary(_files(bag)[0]).schemas.values():
+        types = get_types_from_msg(schema.data.decode(), schema.name)
+        store.register({n: fields for n, fields in types.items() if n not in store.fielddefs})
+    return store
+
+
+def test_every_message_serialised_again_is_the_same_bytes(bag: Path) -> None:
+    """By rosbags with the definitions in the bag, whose hashes are those the bag tells."""
+    store, seen = _types_in(bag), set()
+    with Reader(bag) as reader:
+        for connection in reader.connections:
+            assert store.hash_rihs01(connection.msgtype) == connection.digest
+        for connection, stamp, raw in reader.messages():
+            message = store.deserialize_cdr(raw, connection.msgtype)
+            assert bytes(store.serialize_cdr(message, connection.msgtype)) == bytes(raw)
+            seen.add(connection.topic)
+            if connection.topic == "/joint_states":
+                assert stamp == message.header.stamp.sec * 10**9 + message.header.stamp.nanosec
+    absent = FLIGHTS[bag.name][1]
+    assert seen == {t.recorded.full_name for t in topics.RECORDED if t not in absent}
+
+
+def test_copied_by_rosbags_it_is_the_same_flight(bag: Path, tmp_path: Path) -> None:
+    store = _types_in(bag)
+    copy = Writer(tmp_path / "copy", version=9, storage_plugin=StoragePlugin.MCAP)
+    with Reader(bag) as reader, copy:
+        for key, value in open_bag(bag).custom_data().items():
+            copy.set_custom_data(key, value)
+        connections = {
+            c.topic: copy.add_connection(c.topic, c.msgtype, typestore=store)
+            for c in reader.connections
+        }
+        for connection, time, raw in reader.messages():
+            copy.write(connections[connection.topic], time, raw)
+    assert analyze(read_flight(tmp_path / "copy")) == analyze(read_flight(bag))
+
+
+@pytest.mark.parametrize("topic", topics.ALL, ids=lambda topic: topic.full_name)
+def test_definition_parses_to_the_type_it_names(topic: topics.Topic) -> None:
+    types = get_types_from_msg(definition(topic.type), topic.type)
+    for name, fields in types.items():
+        assert fields == jazzy().fielddefs[name]
+
+
+HEAD = struct.Struct("<BQ")
+
+
+def _walk(data: bytes) -> Iterator[tuple[int, int, int]]:
+    """Offset, opcode and length of each record, its head included."""
+    offset = 8
+    while offset < len(data) - 8:
+        opcode, length = HEAD.unpack_from(data, offset)
+        yield offset, opcode, HEAD.size + length
+        offset += HEAD.size + length
+    assert offset == len(data) - 8
+
+
+@pytest.mark.parametrize("ticks", [0, 1200])
+def test_every_offset_leads_to_the_record_it_is_said_to_lead_to(ticks: int, tmp_path: Path) -> None:
+    """Readers follow some of them only, so the file is walked byte by byte."""
+    if ticks:
+        simulate(Flight(resolve(FlightPlan(duration=ticks * 0.0005))), tmp_path / "bag")
+    else:
+        BagRecorder(tmp_path / "bag", FLIGHT, TIMEBASE).close()
+    file, records = tmp_path / "bag" / "bag_0.mcap", dict[str, list[Any]]()
+    with file.open("rb") as stream:
+        for record in StreamReader(stream, emit_chunks=True, validate_crcs=True).records:
+            records.setdefault(type(record).__name__, []).append(record)
+    places = list(_walk(file.read_bytes()))
+    at = {offset: (opcode, length) for offset, opcode, length in places}
+    (footer,), (statistics,) = records["Footer"], records["Statistics"]
+    assert at[footer.summary_offset_start][0] == Opcode.SUMMARY_OFFSET
+    covered = []
+    for group in records["SummaryOffset"]:
+        end = group.group_start + group.group_length
+        members = [place for place in places if group.group_start <= place[0] < end]
+        assert (members[0][0], sum(members[-1][::2])) == (group.group_start, end)
+        assert {opcode for _, opcode, _ in members} == {group.group_opcode}
+        covered += members
+    begin, end = footer.summary_start, footer.summary_offset_start
+    assert covered == [place for place in places if begin <= place[0] < end]
+    chunks, metadata = records.get("Chunk", []), records["Metadata"]
+    for index, chunk in zip(records.get("ChunkIndex", []), chunks, strict=True):
+        assert at[index.chunk_start_offset] == (Opcode.CHUNK, index.chunk_length)
+        assert index.compressed_size == len(chunk.data)
+        for name in ("uncompressed_size", "compression", "message_start_time", "message_end_time"):
+            assert getattr(index, name) == getattr(chunk, name)
+        behind = index.chunk_start_offset + index.chunk_length
+        assert min(index.message_index_offsets.values()) == behind
+        indexes = [at[offset] for offset in index.message_index_offsets.values()]
+        assert {opcode for opcode, _ in indexes} == {Opcode.MESSAGE_INDEX}
+        assert sum(length for _, length in indexes) == index.message_index_length
+        assert at[behind + index.message_index_length][0] != Opcode.MESSAGE_INDEX
+    for index, named in zip(records["MetadataIndex"], metadata, strict=True):
+        assert index.name == named.name
+        assert at[index.offset] == (Opcode.METADATA, index.length)
+    assert (statistics.metadata_count, statistics.chunk_count) == (len(metadata), len(chunks))
+    assert bool(chunks) == bool(ticks)
+
+
+# Chunks, compressions, splits
+
+
+@pytest.fixture(scope="module")
+def plain(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    bag = tmp_path_factory.mktemp("plain") / "bag"
+    simulate(Flight(resolve(FlightPlan(duration=0.3))), bag)
+    return bag
+
+
+@pytest.fixture(scope="module")
+def messages(plain: Path) -> Messages:
+    return [as_sent(name, data) for name, _, data in _read(plain)]
+
+
+@pytest.fixture(scope="module")
+def split(messages: Messages, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    bag = tmp_path_factory.mktemp("split") / "bag"
+    recorder = BagRecorder(bag, FLIGHT, TIMEBASE, split_size=SPLIT)
+    for message in messages:
+        recorder.record(*message)
+    recorder.close()
+    return bag
+
+
+def test_compressions_hold_the_same_messages_in_less_room(plain: Path, tmp_path: Path) -> None:
+    sizes = {}
+    for compression in get_args(Compression):
+        bag = tmp_path / compression
+        simulate(Flight(resolve(FlightPlan(duration=0.3, compression=compression))), bag)
+        assert _read(bag) == _read(plain)
+        with Reader(bag) as reader:
+            assert [bytes(raw) for *_, raw in reader.messages()] == [
+                data for _, _, data in sorted(_read(plain), key=lambda message: message[1])
+            ]
+        kinds = {index.compression for index in _summary(_files(bag)[0]).chunk_indexes}
+        assert kinds == {compression.replace("none", "")}
+        sizes[compression] = _files(bag)[0].stat().st_size
+    assert sizes["none"] > sizes["lz4"] > sizes["zstd"]
+
+
+def test_splits_hold_every_message_once_and_each_shows_the_robot(split: Path, plain: Path) -> None:
+    """The messages of latched topics are the first of each file, at the time it begins."""
+    files = _files(split)
+    assert [file.name for file in files] == [f"bag_{k}.mcap" for k in range(len(files))]
+    assert len(files) > 2
+    assert _unrepeated(_read(split)) == _read(plain)
+    assert all(file.stat().st_size >= SPLIT for file in files[:-1])
+    assert {t.recorded.full_name for t in topics.RECORDED if t.recorded.is_latched} == LATCHED
+    first = _read_file(files[0])[:2]
+    for file in files:
+        sent = _read_file(file)
+        assert {name for name, _, _ in sent[:2]} == LATCHED
+        assert {stamp for _, stamp, _ in sent[:2]} == {min(stamp for _, stamp, _ in sent)}
+        assert not LATCHED & {name for name, _, _ in sent[2:]}
+        assert {data for *_, data in sent[:2]} == {data for *_, data in first}
+    count = len(_read(plain)) + 2 * (len(files) - 1)
+    with Reader(split) as reader:
+        assert reader.message_count == count
+    with AnyReader([split]) as any_reader:
+        times = [time for _, time, _ in any_reader.messages()]
+    assert times == sorted(times)
+    assert len(times) == count
+    assert read_flight(split).ticks == read_flight(plain).ticks
+
+
+def test_splits_are_in_metadata_with_their_times_and_counts(split: Path) -> None:
+    content = _information(split)
+    assert content["relative_file_paths"] == [file.name for file in _files(split)]
+    for file, said in zip(_files(split), content["files"], strict=True):
+        statistics = _summary(file).statistics
+        start = said["starting_time"]["nanoseconds_since_epoch"]
+        assert (said["path"], said["message_count"]) == (file.name, statistics.message_count)
+        assert start == statistics.message_start_time
+        assert start + said["duration"]["nanoseconds"] == statistics.message_end_time
+    assert content["message_count"] == sum(said["message_count"] for said in content["files"])
+
+
+def test_every_file_says_what_was_flown_and_the_last_what_was_lost(split: Path) -> None:
+    for file in _files(split):
+        with file.open("rb") as stream:
+            records = [(r.name, r.metadata) for r in make_reader(stream).iter_metadata()]
+        assert [name for name, _ in records] == [DESCRIPTION, "rosbag2"] * 2
+        for name, content in records:
+            if name == "rosbag2":
+                content = yaml.safe_load(content["serialized_metadata"])["custom_data"]
+            assert json.loads(content[FLIGHT_KEY]) == FLIGHT
+    *_, (_, own), (_, rosbag2) = records
+    written = _information(split)
+    assert yaml.safe_load(rosbag2["serialized_metadata"]) == written
+    assert own == written["custom_data"]
+    with Reader(split) as reader:
+        counted = {connection.topic: connection.msgcount for connection in reader.connections}
+    for name, counts in json.loads(own[ACCOUNTS_KEY]).items():
+        again = len(_files(split)) - 1 if name in LATCHED else 0
+        assert counts["received"] == counts["expected"] == counted[name] - again
+        assert counts["missing"] == counts["repeated"] == counts["invalid_stamps"] == 0
+
+
+def test_killed_after_a_split_all_before_is_whole(messages: Messages, tmp_path: Path) -> None:
+    """The files are as they were when the recorder had made the third."""
+    recorder = BagRecorder(tmp_path / "bag", FLIGHT, TIMEBASE, split_size=SPLIT)
+    for topic, data in messages:
+        recorder.record(topic, data)
+        if len(_files(tmp_path / "bag")) == 3:
+            break
+    assert all(_summary(file) is not None for file in _files(tmp_path / "bag")[:2])
+    assert read_flight(tmp_path / "bag").ticks == recorder.kept_tick + 1
+
+
+def test_no_place_for_the_next_file_keeps_those_before(messages: Messages, tmp_path: Path) -> None:
+    bag = tmp_path / "bag"
+    recorder = BagRecorder(bag, FLIGHT, TIMEBASE, split_size=SPLIT)
+    (bag / "bag_2.mcap").write_bytes(b"of somebody else")
+    for topic, data in messages:
+        recorder.record(topic, data)
+    with pytest.raises(FlightError, match="File exists"):
+        recorder.close()
+    assert (bag / "bag_2.mcap").read_bytes() == b"of somebody else"
+    (bag / "bag_2.mcap").unlink()
+    assert len(_unrepeated(_read(bag))) == len(messages) - recorder.unkept
+    assert 0 < recorder.kept_tick == read_flight(bag).ticks - 1
+
+
+def test_publish_time_is_the_senders(messages: Messages, tmp_path: Path) -> None:
+    recorder = BagRecorder(tmp_path / "bag", FLIGHT, TIMEBASE)
+    for number, (topic, data) in enumerate(messages[:50]):
+        recorder.record(topic, data, 10**18 + number if number % 2 else 0)
+    recorder.close()
+    with _files(tmp_path / "bag")[0].open("rb") as stream:
+        sent = [m for _, _, m in make_reader(stream).iter_messages(log_time_order=False)]
+    for number, message in enumerate(sent):
+        known = 10**18 + number
+        assert message.publish_time == (known if number % 2 else message.log_time)
+
+
+def test_recorder_counts_what_is_missing_and_drops_what_is_repeated(tmp_path: Path) -> None:
+    recorder = BagRecorder(tmp_path / "bag", {}, TIMEBASE)
+    codec, state = StateCodec(RobotNames.of(("j",)), TIMEBASE), RobotState.allocate(1)
+    for state.tick in (0, 1, 1, 2, 5, 6):
+        joints, base = codec.encode(state)
+        recorder.record(topics.JOINT_STATES, joints)
+        if state.tick != 6:
+            recorder.record(topics.BASE_STATE, base)
+    for tick in (0, 20, 40, 80, 100):
+        recorder.record(topics.CLOCK, ClockCodec().encode(tick * 500_000))
+    recorder.close()
+    lost = [recorder.lost[name] for name in ("/joint_states", "/base/state", "/clock", "/command")]
+    assert lost == [2, 3, 1, 7]
+    with Reader(tmp_path / "bag") as reader:
+        counts = {c.topic: c.msgcount for c in reader.connections}
+    assert counts["/joint_states"] == 5
+    assert read_accounts(tmp_path / "bag")["/joint_states"]["repeated"] == 1
+    nothing = lost_messages({t.full_name: MessageAccounting(t) for t in topics.ALL})
+    assert set(nothing.values()) == {0}
+
+
+def test_a_bag_is_never_overwritten_and_of_two_recorders_the_first_has_it(tmp_path: Path) -> None:
+    """In a folder that was empty, too, as a flight leaves it to its recorder."""
+    first = BagRecorder(tmp_path / "bag", {}, TIMEBASE)
+    for taken in (tmp_path / "bag", tmp_path):
+        with pytest.raises(InputError, match="exists already"):
+            BagRecorder(taken, {}, TIMEBASE)
+    first.close()
+    with Reader(tmp_path / "bag") as reader:
+        assert reader.message_count == 0
+        assert len(reader.connections) == len(topics.RECORDED)
+
+
+@pytest.mark.parametrize(
+    ("parameter", "value", "said"),
+    [
+        ("compression", "gzip", "'none', 'lz4' or 'zstd', got 'gzip'"),
+        ("split_size", "1K", "65536 to 4611686018427387904 bytes"),
+        ("split_size", -5, "split_size"),
+        ("split_size", "many", "split_size: could not parse .* got 'many'"),
+    ],
+)
+def test_bad_options_are_named(parameter: str, value: object, said: str) -> None:
+    with pytest.raises(InputError, match=said):
+        Flight(resolve(FlightPlan(parameters={"recorder": {parameter: value}})))
+
+
+@pytest.mark.parametrize(
+    ("given", "size"), [("500K", 500_000), ("100M", 10**8), ("2G", 2 * 10**9), ("1MiB", 2**20)]
+)
+def test_sizes_as_people_write_them(given: str, size: int) -> None:
+    plan = FlightPlan.model_validate({"split_size": given})
+    assert Flight(resolve(plan)).scenario.recorder.split_size == size
+
+
+# metadata.yaml
+
+SPANS = st.none() | st.tuples(st.integers(0, 10**12), st.integers(0, 10**12)).map(
+    lambda span: (span[0], span[0] + span[1])
+)
+FILES = st.lists(st.builds(FileSummary, st.just("a"), SPANS, st.integers(0, 10**6)), min_size=1)
+
+
+def _keys(value: Any) -> list[Any]:
+    if isinstance(value, dict):
+        return [key for pair in value.items() for key in (pair[0], *_keys(pair[1]))]
+    return _keys(value[0]) if isinstance(value, list) and value else []
+
+
+def test_text_is_what_rosbag2_writes(plain: Path) -> None:
+    """Indents, quotes, the null: byte for byte; and the keys in its order."""
+    text = SAMPLE.read_text()
+    assert to_yaml(yaml.safe_load(text)) == text.rstrip("\n")
+    ours, theirs = ({**_information(b), "custom_data": None} for b in (plain, SAMPLE.parent))
+    assert _keys(ours) == _keys(theirs)
+
+
+@given(st.dictionaries(st.text(), st.text()), FILES)
+def test_any_custom_data_comes_back_and_a_bag_spans_its_files(
+    custom: dict[str, str], files: list[FileSummary]
+) -> None:
+    given = {key: json.dumps({key: value}) for key, value in custom.items()}
+    information = bag_information(files, [(topics.CLOCK, 1)], given)
+    assert (yaml.safe_load(to_yaml(information))["custom_data"] or {}) == given
+    start = information["starting_time"]["nanoseconds_since_epoch"]
+    end = start + information["duration"]["nanoseconds"]
+    assert information["message_count"] == sum(file.message_count for file in files)
+    empty = 2**63 - 1  # as rosbag2 says of an empty bag
+    spans = [file.span_ns for file in files if file.span_ns] or [(empty, empty)]
+    assert (start, end) == (min(s[0] for s in spans), max(s[1] for s in spans))

@@ -1,0 +1,176 @@
+"""One publisher a topic: a second is refused, and of several the owner is heard."""
+
+from __future__ import annotations
+
+import os
+import re
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+
+import pytest
+
+from space_robot_msgs_py import topics
+from space_robot_msgs_py.errors import InputError
+from space_robot_msgs_py.ros.process_environment import DEFAULTS, set_defaults
+from space_robot_msgs_py.wire.sources import Claimed
+
+set_defaults()
+rclpy = pytest.importorskip("rclpy")
+
+from space_robot_msgs_py.ros.endpoints import PolledCallbackGroup, RawPublisher, RawSubscription  # noqa: E402
+from space_robot_msgs_py.ros.exclusive import (  # noqa: E402
+    GraphPublishers,
+    TopicClaim,
+    claim_name,
+    foreign_publishers,
+)
+from space_robot_msgs_py.ros.locks import MOST_NOTES  # noqa: E402
+from space_robot_msgs_py.ros.serialized_take import ROOM, Received  # noqa: E402
+
+TOPIC = topics.COMMAND
+TIMEOUT_S = 30.0
+PUBLISHER = """
+import sys, time
+from space_robot_msgs_py.ros.process_environment import set_defaults
+
+set_defaults()
+import rclpy
+from std_msgs.msg import String
+from space_robot_msgs_py.ros.exclusive import TopicClaim
+
+rclpy.init()
+node = rclpy.create_node("controller")
+claim = TopicClaim(node, ["/command"])
+publisher = node.create_publisher(String, "/command", 1)
+print("ready", flush=True)
+time.sleep(60)
+"""
+Make = Callable[..., "rclpy.node.Node"]
+
+
+def until(done: Callable[[], bool]) -> None:
+    end = time.monotonic() + TIMEOUT_S
+    while not done():
+        assert time.monotonic() < end
+        time.sleep(0.005)
+
+
+@pytest.fixture
+def make_node(domain: int) -> Iterator[Make]:
+    made = []
+
+    def make(name: str, **options: object) -> rclpy.node.Node:
+        context = rclpy.Context()
+        rclpy.init(args=[], context=context, domain_id=domain)
+        made.append(rclpy.create_node(name, context=context, **options))
+        return made[-1]
+
+    yield make
+    for node in made:  # now, not by a collection of garbage in another test
+        node.destroy_node()
+        node.context.try_shutdown()
+
+
+# Claims
+
+
+def test_the_publisher_of_a_topic_is_alone_and_killed_leaves_its_place_at_once(
+    make_node: Make, domain: int
+) -> None:
+    process = subprocess.Popen(
+        [sys.executable, "-c", PUBLISHER],
+        stdout=subprocess.PIPE,
+        text=True,
+        env={**os.environ, **DEFAULTS, "ROS_DOMAIN_ID": str(domain)},
+    )
+    try:
+        assert process.stdout is not None
+        assert process.stdout.readline() == "ready\n"
+        node = make_node("controller", namespace="/robot")
+        said = f"/command of ROS domain {domain} is already published by controller"
+        with pytest.raises(InputError, match=re.escape(f"{said} (pid {process.pid})")):
+            TopicClaim(node, ["/controller/telemetry", "/command"])
+        # what it had got before the refusal is free again
+        TopicClaim(make_node("other"), ["/controller/telemetry"]).release()
+        from std_msgs.msg import String
+
+        node.create_publisher(String, "/command", 1)
+        until(lambda: foreign_publishers(node, ["/command", "/x"]) == {"/command": ["/controller"]})
+        process.send_signal(signal.SIGKILL)
+        process.wait()
+        names = [info.node_name for info in node.get_publishers_info_by_topic("/command")]
+        assert names.count("controller") == 2, "discovery still lists the dead one"
+        TopicClaim(node, ["/command"]).release()
+    finally:
+        process.kill()
+        process.communicate()
+
+
+def test_remapped_topics_and_other_topics_do_not_meet(make_node: Make) -> None:
+    node = make_node("controller")
+    moved = make_node("controller", cli_args=["--ros-args", "-r", "/command:=/spare/command"])
+    claims = [TopicClaim(node, ["/command"]), TopicClaim(moved, ["/command"])]
+    with pytest.raises(InputError, match="/spare/command of ROS domain"):
+        TopicClaim(node, ["/spare/command"])
+    for claim in claims:
+        claim.release()
+
+
+def test_two_nodes_of_one_name_are_refused(make_node: Make, domain: int) -> None:
+    """Whoever asks /recorder_node to configure means one of them."""
+    name = claim_name(make_node("recorder_node"))
+    said = f"ROS domain {domain} has a /recorder_node already: recorder_node (pid {os.getpid()})"
+    with pytest.raises(InputError, match=re.escape(said)):
+        claim_name(make_node("recorder_node"))
+    claim_name(make_node("recorder_node", namespace="/other")).release()
+    name.release()
+    claim_name(make_node("recorder_node")).release()
+
+
+# Messages and their publishers
+
+
+def _next(entry: RawSubscription) -> Received:
+    found: list[Received] = []
+
+    def is_there() -> bool:
+        found.extend(filter(None, [entry.take_with_source()]))
+        return bool(found)
+
+    until(is_there)
+    return found[0]
+
+
+def test_publisher_number_and_time_of_every_message(make_node: Make) -> None:
+    node = make_node("sender")
+    entry = RawSubscription(node, TOPIC, PolledCallbackGroup())
+    first, second = RawPublisher(node, TOPIC), RawPublisher(node, TOPIC)
+    until(lambda: all(out._publisher.get_subscription_count() for out in (first, second)))
+    sizes = (16, 3 * ROOM, 40)  # more than there is room for, then less
+    found: dict[bytes, list[int]] = {}
+    begin_ns = time.time_ns()
+    for number, size in enumerate(sizes, 1):
+        for out in (first, second):
+            data = b"\x00\x01\x00\x00" + bytes([number]) * (size - 4)
+            out.publish(data)
+            taken = _next(entry)
+            assert taken.data == data
+            assert begin_ns <= taken.sent_ns <= time.time_ns()
+            found.setdefault(taken.publisher, []).append(taken.sequence)
+    assert entry.take_with_source() is None
+    assert list(found.values()) == [[1, 2, 3], [1, 2, 3]]
+    assert (first.sent, second.sent) == (3, 3)
+    publishers = GraphPublishers(node)
+    names = publishers.names(TOPIC.name)
+    assert {publisher: names[publisher] for publisher in found} == dict.fromkeys(found, "/sender")
+    before = publishers.claimed(TOPIC.name)
+    assert not before.is_held
+    claim = TopicClaim(node, [TOPIC.name])
+    expected = (*before.publishers, *found)[-MOST_NOTES:]
+    held = publishers.claimed(TOPIC.name)
+    assert (set(held.publishers), held.is_held) == (set(expected), True)
+    claim.release()
+    assert publishers.claimed(TOPIC.name) == Claimed(held.publishers, is_held=False)
