@@ -5,10 +5,11 @@ from __future__ import annotations
 import hashlib
 import os
 import warnings
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import cache
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -27,6 +28,7 @@ CELLS = ("printed", "graph", "lanes", "bench", "c", "bag")
 OF_A_FEW = ("processes", "replay")
 """Cells of those scenarios that ask for them."""
 OWN_KEYS = ("why", "besides", "also", "lacking")
+ADVICE = "If new bits are wanted: python tests/matrix --write, and say so in the commit"
 BLOCKS = 10
 """Parts of a flight that have digests of their own."""
 OF_THE_CLOCK = {"latency_s"}
@@ -141,10 +143,7 @@ def digests(flown: FlownFlight) -> dict[str, Any]:
     for name, content in named.items():
         groups.setdefault(group_of(name), []).append(content)
     edges = np.linspace(0, log.ticks, BLOCKS + 1).astype(int)
-    parts = [
-        short(*(numbers(c[a:b]) for c in columns.values()))[:4]
-        for a, b in zip(edges, edges[1:], strict=False)
-    ]
+    parts = [short(*(numbers(c[a:b]) for c in columns.values()))[:4] for a, b in pairwise(edges)]
     whole = hashlib.sha256(b"".join([about.encode(), *named.values()])).hexdigest()
     return {
         "flight": whole,
@@ -163,7 +162,7 @@ def group_of(name: str) -> str:
 
 
 def what_changed(now: Mapping[str, Any], stored: Mapping[str, Any]) -> str:
-    """Say how a flight differs from that of the stored digests, and how to accept it."""
+    """Say how a flight differs from that of the stored digests."""
     lines = [
         f"{key}: {now[key]!r}, was {stored[key]!r}"
         for key in ("end", "ticks")
@@ -178,13 +177,10 @@ def what_changed(now: Mapping[str, Any], stored: Mapping[str, Any]) -> str:
         if first is not None:
             start, stop = (int(now["ticks"] * k / BLOCKS) for k in (first, first + 1))
             lines.append(f"from a tick of {start} to {stop - 1} on")
-    lines.append(
-        "If the new bits are wanted: python tests/matrix --write, and say so in the commit"
-    )
     return "\n".join(lines)
 
 
-def difference(log: FlightLog, expected: FlightLog, ignored: frozenset[str] = frozenset()) -> str:
+def difference(log: FlightLog, expected: FlightLog, ignored: Collection[str] = ()) -> str:
     """Name the signals in which a log differs, each with its first tick; empty: in none."""
     here, there = (
         {n: c for n, c in columns_of(one).items() if n not in ignored} for one in (log, expected)
