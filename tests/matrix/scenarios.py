@@ -23,7 +23,7 @@ from space_robot_msgs_py.bag.flight_log import FlightLog
 HERE = Path(__file__).parent
 ROOT = HERE.parents[1]
 DIGESTS = HERE / "digests.yaml"
-CELLS = ("printed", "graph", "lanes", "bench", "c", "bag")
+CELLS = ("printed", "graph", "lanes", "bench", "messages", "c", "bag")
 """Beside the flight in this process, which all scenarios have."""
 OF_A_FEW = ("processes", "replay")
 """Cells of those scenarios that ask for them."""
@@ -65,9 +65,17 @@ class Planned:
         """The scenario as a new object."""
         return Scenario(**self.options)
 
-    def neighbour(self, lane: int) -> dict[str, Any]:
-        """Return the options of a flight beside it in a batch that differ from its own."""
+    def neighbour(self, lane: int, gains: Mapping[str, Any]) -> dict[str, Any]:
+        """Return the options of a flight beside it in a batch that differ from its own.
+
+        Its gains are a little larger than ``gains``, by law.
+        """
         options: dict[str, Any] = {"seed": 100 + lane, "case": "123"[lane % 3]}
+        if gains:
+            larger = {
+                n: {g: v * (1.0 + 0.01 * lane) for g, v in own.items()} for n, own in gains.items()
+            }
+            options["gains"] = larger
         if self.options.keys() & {"sensors", "faults"}:  # its measured states are not the true ones
             fault = f"torque_scale@0.002:all={1 + 1e-6 * lane}"
             options |= {"faults": [*self.options.get("faults", []), fault]}

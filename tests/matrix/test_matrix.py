@@ -36,6 +36,7 @@ from matrix.scenarios import (
 from space_robot import FlownFlight
 from space_robot.flight.batch.batch import FlightBatch
 from space_robot.flight.batch.sharing import batches
+from space_robot.flight.plan import Flight
 from space_robot_msgs_py.bag.reader import read_flight
 from space_robot_msgs_py.compiled.lanes import WIDTH
 
@@ -166,12 +167,25 @@ def test_a_bench_flies_it_step_by_step(plan: Planned, flown: Get) -> None:
     assert bench.log().laws == expected.log.laws
 
 
+def memory(flight: Flight) -> list[bytes]:
+    """What a flown flight leaves behind: of its law, if it flew to the end."""
+    plant, law = flight.plant, flight.controller.law
+    parts = ("x", "truth", "measured", "actuators", "sensors", "environment", "model")
+    left = [getattr(plant.memory, part).tobytes() for part in parts]
+    left.append(plant.command_delay_buffer.tobytes())
+    law_left = [law.memory.s.tobytes(), law.memory.u.tobytes()]
+    return left + (law_left if plant.tick == flight.ticks else [])
+
+
 @cells("lanes")
 def test_it_flies_among_seven_others(plan: Planned, flown: Get) -> None:
     """In a lane of a batch, beside flights with other seeds, cases and faults."""
     own = list(PLANS).index(plan.name) % WIDTH
+    law, gains = flown(plan).flight.law, {}
+    if "gains" not in plan.options:
+        gains = {law.name: law.gain_values}
     flights = [
-        (plan.scenario if k == own else plan.scenario.replace(**plan.neighbour(k))).check()
+        (plan.scenario if k == own else plan.scenario.replace(**plan.neighbour(k, gains))).check()
         for k in range(WIDTH)
     ]
     assert [len(group) for group in batches(enumerate(flights))] == [WIDTH]
@@ -181,9 +195,20 @@ def test_it_flies_among_seven_others(plan: Planned, flown: Get) -> None:
     assert difference(blocks[0].log, expected.log) == ""
     assert blocks[0].log.laws == expected.log.laws
     assert str(blocks[0].error or "") == expected.reason
-    for part in ("x", "truth", "measured", "actuators", "sensors", "environment", "model"):
-        left, wanted = (getattr(f.plant.memory, part) for f in (flights[own], expected.flight))
-        assert left.tobytes() == wanted.tobytes(), part
+    for left, wanted in zip(memory(flights[own]), memory(expected.flight), strict=True):
+        assert left == wanted
+
+
+@cells("messages")
+def test_it_flies_message_by_message(plan: Planned, flown: Get, tmp_path: Path) -> None:
+    """As if messages could fail: the loop of the nodes, without ROS."""
+    faults = [*plan.options.get("faults", []), "drop_state@0:0"]
+    expected, flight = flown(plan), plan.scenario.replace(faults=faults).fly(tmp_path / "bag")
+    if expected.log.measured is None:  # where nothing can be wrong they are not told apart
+        flight.log.measured = flight.log.assumed_error = None
+    assert difference(flight.log, expected.log, OF_THE_PROCESS) == ""
+    assert (flight.log.laws, flight.log.filled) == (expected.log.laws, 0)
+    assert flight.reason == expected.reason
 
 
 @needs_compiler
