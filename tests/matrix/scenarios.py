@@ -73,7 +73,7 @@ class Planned:
         options: dict[str, Any] = {"seed": 100 + lane, "case": "123"[lane % 3]}
         if gains:
             larger = {
-                n: {g: v * (1.0 + 0.01 * lane) for g, v in own.items()} for n, own in gains.items()
+                n: {g: v * (1.01 + 0.01 * lane) for g, v in own.items()} for n, own in gains.items()
             }
             options["gains"] = larger
         if self.options.keys() & {"sensors", "faults"}:  # its measured states are not the true ones
