@@ -36,9 +36,12 @@ def compiled_functions() -> Iterator[list[str]]:
         yield listener.names
 
 
-def fly(robot: str, **options: str) -> None:
+SWAPS = [f"{0.001 * k:g}:{law}" for k, law in enumerate(laws(), 1)]
+
+
+def fly(robot: str, **options: Any) -> None:
     """Fly a few ticks in one loop, and one step by step as the nodes do."""
-    flight = Flight(resolve(FlightPlan(robot=robot, mission=robot, duration=0.002, **options)))  # type: ignore[arg-type]
+    flight = Flight(resolve(FlightPlan(robot=robot, mission=robot, **options)))
     simulate(flight)
     names, n = flight.controller.names, flight.robot.n
     states = StateCodec(names, flight.timebase)
@@ -53,11 +56,14 @@ def fly(robot: str, **options: str) -> None:
 
 @pytest.mark.parametrize(
     "options",
-    [{"controller": law} for law in laws()]
-    + [{"sensors": "fine", "navigation": "filtered"}, {"actuators": "none"}],
-    ids=lambda options: next(iter(options.values())),
+    [
+        {"swaps": SWAPS, "duration": 0.001 * (len(SWAPS) + 1)},
+        {"sensors": "fine", "navigation": "filtered", "duration": 0.002},
+        {"actuators": "none", "duration": 0.002},
+    ],
+    ids=["laws", "filter", "free_base"],
 )
-def test_another_number_of_joints_compiles_nothing(options: dict[str, str]) -> None:
+def test_another_number_of_joints_compiles_nothing(options: dict[str, Any]) -> None:
     fly("paper", **options)
     with compiled_functions() as names:
         fly("seven_joint", **options)
