@@ -151,6 +151,15 @@ def test_no_way_of_looking_and_flying_on_makes_false_verdicts_more_frequent(
     assert max(fixed.flying_on(lambda k, _: int(fixed.met_from[k]))) > 1.3 * error
 
 
+def test_the_page_on_campaigns_has_the_exact_probabilities() -> None:
+    """The rows that take little time."""
+    page = (DOCS / "explanation/campaign_statistics.md").read_text("utf-8")
+    before, now = (exact.rules(kind(exact.SHARE, exact.CONFIDENCE)) for kind in KINDS)
+    for name in [name for name in before if "until:" not in name and "every run" not in name]:
+        errors = [*before[name](), *now[name]()]
+        assert " | ".join([f"| {name}", *(f"{100.0 * e:.1f} %" for e in errors)]) in page, name
+
+
 @settings(max_examples=60, deadline=None)
 @given(
     st.sampled_from([0.5, 0.8, 0.95, 0.99, 0.997]),

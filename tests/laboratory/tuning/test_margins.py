@@ -201,12 +201,12 @@ def test_margin_of_table_iv() -> None:
 @pytest.mark.parametrize("controller", ["tde_smc", "tde_stc"])
 def test_a_torque_reported_too_large_by_more_than_the_margin_diverges(controller: str) -> None:
     with pytest.raises(DivergedError):
-        fly(controller, echo_scale=1.01)
-    assert fly(controller, echo_scale=1.005) < 1e-3
+        fly(controller, "default", echo_scale=1.01)
+    assert fly(controller, "default", echo_scale=1.005) < 1e-3
 
 
 def test_a_torque_reported_too_small_costs_accuracy_but_does_not_diverge() -> None:
-    assert 1e-4 < fly(echo_scale=0.99) < 1e-2
+    assert 1e-4 < fly("tde_stc", "default", echo_scale=0.99) < 1e-2
 
 
 @pytest.mark.parametrize("is_nominal", [False, True])
