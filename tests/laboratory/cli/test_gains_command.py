@@ -211,19 +211,13 @@ def robot_file(folder: Path, encoder: str, **changes: Any) -> str:
 @cache
 def check_gears(*options: str) -> Result:
     runner = CliRunner(env={"COLUMNS": "80"})
-    return runner.invoke(cli, ["gains", "check_gears", "--gains", "robust", *options])
+    return runner.invoke(cli, ["gains", "check", "--gains", "robust", *options])
 
 
 @pytest.fixture(scope="module")
 def motor(tmp_path_factory: pytest.TempPathFactory) -> str:
     """A plant whose motors are as heavy as the links and seen by the laws."""
     return robot_file(tmp_path_factory.mktemp("geared"), "motor")
-
-
-@pytest.fixture(scope="module")
-def link(tmp_path_factory: pytest.TempPathFactory) -> str:
-    """One whose links are seen, through soft springs."""
-    return robot_file(tmp_path_factory.mktemp("geared"), "link", damping=5.0)
 
 
 def on(path: str, *options: str) -> Result:
