@@ -1,157 +1,38 @@
-"""A campaign's file: whatever is wrong with it is told in one line, with file and key."""
+"""A campaign's file, the shipped ones, and what `new` says of a robot."""
 
 from __future__ import annotations
 
 import math
+import shlex
+from itertools import pairwise
 from pathlib import Path
-from typing import Any
 
+import numpy as np
 import pytest
-import yaml
+from hypothesis import given
+from hypothesis import strategies as st
 from paths import CONFIG
 
+from space_robot.analysis.metrics import axis_groups
 from space_robot.campaign.draws import Draws
 from space_robot.campaign.flown.preparation import Preparation
-from space_robot.campaign.study import Law, Requirement, Study, read_study, short_names
-from space_robot_msgs_py.errors import InputError
-
-MASS = "robot.links[*].mass"
-GOOD: dict[str, Any] = {
-    "scenario": {"duration": 0.1},
-    "laws": ["ctc"],
-    "require": {"pointing": {"metric": "attitude_max", "below": 1e-3, "in": 0.9}},
-    "runs": 4,
-}
-
-
-def read(folder: Path, **keys: Any) -> Draws:
-    file = folder / "my.yaml"
-    file.write_text(yaml.safe_dump({**GOOD, **keys}))
-    study = read_study(file)
-    return Draws(study, seed=0, runs=study.runs_asked())
-
-
-WRONG_FILES: list[tuple[dict[str, Any], str]] = [
-    ({"lawes": ["ctc"]}, "lawes: unknown key"),
-    ({"laws": []}, "laws: "),
-    ({"laws": ["ctc", "ctc"]}, "laws: the same law twice"),
-    ({"laws": ["ctc="]}, "laws: LAW or LAW=GAINS"),
-    ({"laws": "ctc"}, "laws: "),
-    ({"laws": ["pid"]}, "law pid: unknown"),
-    ({"laws": ["ctc=lost"]}, "law ctc=lost: "),
-    ({"scenario": {"cas": 3}}, "scenario: unknown option 'cas'"),
-    ({"scenario": {"seed": 3}}, "scenario: seed cannot be set"),
-    ({"scenario": {"controller": "ctc"}}, "scenario: controller cannot be set: use laws"),
-    ({"scenario": {"realtime": True}}, "scenario: realtime cannot be set"),
-    ({"scenario": {"case": "9"}}, "unknown case '9'"),
-    ({"scenario": {"duration": "long"}}, "duration: "),
-    ({"require": {"p": {"metric": "a", "below": 1, "in": 1.5}}}, "require.p.in: "),
-    ({"require": {"p": {"metric": "a", "in": 0.9}}}, "require.p: either below or above"),
-    ({"require": {"p": {"metric": "a", "below": 1, "above": 0, "in": 0.9}}}, "require.p: either"),
-    ({"require": {"p": {"metrik": "a", "below": 1, "in": 0.9}}}, "require.p.metrik: unknown key"),
-    ({"require": {"p": {"metric": "a", "below": 1, "in": 0.9, "from_s": 2, "to_s": 1}}}, "to_s"),
-    ({"keep": {"bag": "sometimes"}}, "keep.bag: "),
-    ({"until": {"half_width": 0.1}}, "until.runs: "),
-    ({"until": {"half_width": 0.9, "runs": 5}}, "until.half_width: "),
-    ({"until": {"half_width": 0.1, "runs": 5}, "require": {}}, "until: "),
-    ({"until": {"half_width": 0.1, "runs": 5}, "design": "latin_hypercube"}, "design: "),
-    ({"until": {"half_width": 0.1, "runs": 5}, "fixed_runs": True}, "fixed_runs: contradicts"),
-    ({"design": "halton"}, "design: "),
-    ({"runs": 0}, "runs: "),
-    ({"runs": None}, "runs: missing"),
-    ({"runs": 5, "vary": {"scenario.case": {"grid": [1, 3]}}}, "runs: a multiple of 2"),
-    (
-        {"runs": 4, "design": "saltelli", "vary": {MASS: {"normal": 20, "sigma": 1}}},
-        "runs: a multiple of 8",
-    ),
-    ({"design": "saltelli", "vary": {"scenario.case": {"choice": [1, 3]}}}, "continuous"),
-]
-WRONG_VARIABLES: list[tuple[str, Any, str]] = [
-    ("robot.links[*].mas", 1.0, "unknown number of robot.links[...] 'mas'"),
-    ("robot.links[9].mass", 1.0, "no link '9': choose one of joint1"),
-    ("robot.links.mass", 1.0, "an element is missing"),
-    ("robot.legs[1].mass", 1.0, "unknown part of the robot 'legs'"),
-    ("robot..mass", 1.0, "is not a variable name"),
-    ("rocket.mass", 1.0, "unknown group 'rocket'"),
-    ("robot.links[*].com", 0.1, "the axis is missing"),
-    ("robot.joints[*].friction.coulomb", 0.1, "vary plant.friction.coulomb"),
-    ("robot.joints[joint1].stiffness", 0.1, "has a motor and no spring"),
-    (MASS, {"normal": 1.0}, "sigma: "),
-    (MASS, {"normal": 1.0, "sigma": -1}, "sigma: "),
-    (MASS, {"normal": 1.0, "sigma": float("nan")}, "sigma: "),
-    (MASS, {"normal": 1, "sigma": 1, "low": 2, "high": 1}, "low must be below high"),
-    (MASS, {"nornal": 1.0, "sigma": 1}, "a distribution was expected"),
-    (MASS, [1, 2], "a distribution was expected"),
-    (MASS, {"uniform": [2, 1]}, "uniform: a lower bound"),
-    (MASS, {"uniform": [-1, 1]}, "can be -1: "),
-    (MASS, {"log_uniform": [0, 1]}, "log_uniform: numbers above 0"),
-    (MASS, {"uniform": [1, 2], "relative": True, "offset": True}, "relative and offset"),
-    (MASS, {"choice": ["light", "heavy"]}, "numbers were expected"),
-    (MASS, {"choice": [1, 2], "weights": [1]}, "weights: one weight"),
-    ("robot.base.inertia", {"scale": 0.1, "rotat_deg": 3}, "rotat_deg: unknown key"),
-    ("robot.base.inertia", {"uniform": [100, 200]}, "needs relative: true"),
-    ("scenario.cse", {"choice": [1, 3]}, "unknown option 'cse'"),
-    ("scenario.case", {"choice": [1, 9]}, "scenario.case can be 9: "),
-    ("scenario.case", {"choice": [1, "4-1"]}, "numbers and texts are mixed: put the numbers in"),
-    ("scenario.command_latency_ticks", {"uniform": [0, 2]}, "valid integer"),
-    ("scenario.duration", {"uniform": [0.9, 1.1], "offset": True, "low": 1}, "low: unknown key"),
-    ("plant.friction.columb", 0.1, "unknown parameter of the plant"),
-    ("plant.friction.coulomb", {"normal": 0.02, "sigma": 0.005}, "plant.friction.coulomb can be -"),
-    (
-        "plant.initial_joints_deg",
-        1.0,
-        "is a list: plant.initial_joints_deg[*] for all of it, or plant.initial_joints_deg[1] to "
-        "[6] for one of them",
-    ),
-    ("plant.fault_seed", {"uniform": [0, 1]}, "fault_seed"),
-    ("plant.case", {"choice": ["1", "3"]}, "scenario.case"),
-    ("gains.k_9", {"uniform": [0.9, 1.1], "relative": True}, "unknown gain 'k_9' of the laws"),
-    ("faults", {"torque_skale@0:all": 1.0}, "unknown kind of fault"),
-    ("faults", {"torque_scale@0": 1.0}, "the text up to its number"),
-    ("faults", {"torque_scale@0:all": {"uniform": [-1, 1]}}, "can be -1: "),
-    ("faults", {"torque_scale@0:all": {"uniform": [1, 2], "relative": True}}, "no nominal value"),
-    ("faults", {"torque_scale@0:joint7": {"uniform": [1, 2]}}, "joint7"),
-    ("faults", 3, "a mapping of faults was expected"),
-]
-
-
-def test_the_good_one_is_read(tmp_path: Path) -> None:
-    assert read(tmp_path).names == []
-
-
-@pytest.mark.parametrize(("keys", "told"), WRONG_FILES, ids=lambda value: str(value)[:40])
-def test_a_wrong_file_is_told_in_a_line(tmp_path: Path, keys: dict[str, Any], told: str) -> None:
-    with pytest.raises(InputError) as raised:
-        read(tmp_path, **keys)
-    assert told in str(raised.value)
-    assert str(raised.value).startswith(f"{tmp_path}/my.yaml: ")
-    assert "\n" not in str(raised.value)
-
-
-@pytest.mark.parametrize(("key", "given", "told"), WRONG_VARIABLES, ids=lambda v: str(v)[:40])
-def test_a_wrong_variable_is_told_in_a_line(
-    tmp_path: Path, key: str, given: Any, told: str
-) -> None:
-    with pytest.raises(InputError) as raised:
-        read(tmp_path, vary={key: given})
-    assert told in str(raised.value)
-    assert str(raised.value).startswith(f"{tmp_path}/my.yaml: vary.{key}")
-    assert "\n" not in str(raised.value)
-
-
-def test_nothing_is_varied_twice(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match=r"robot.links\[joint1\].mass is varied by robot"):
-        read(tmp_path, vary={MASS: 20.0, "robot.links[1].mass": 20.0})
-    with pytest.raises(InputError, match="is part of an inertia that is varied as a whole"):
-        read(
-            tmp_path,
-            vary={
-                "robot.links[1].inertia": {"scale": 0.1},
-                "robot.links[*].inertia": {"uniform": [0.9, 1.1], "relative": True},
-            },
-        )
-    with pytest.raises(InputError, match="cannot be varied together"):
-        read(tmp_path, vary={MASS: 20.0, "scenario.robot": {"choice": ["paper"]}})
+from space_robot.campaign.new_robot import robot_texts
+from space_robot.campaign.new_robot.make import (
+    BEYOND,
+    DAMPING_RATIO,
+    DIVERGED,
+    FREQUENCY_HZ,
+    Outcome,
+    hinge_remark,
+    tool_remark,
+    trial_remark,
+)
+from space_robot.campaign.study import Requirement, read_study, short_names
+from space_robot.cli.new import new
+from space_robot.tuning.method import Tuned
+from space_robot.tuning.task import TuningOptions
+from space_robot.tuning.warning import estimate_remark
+from space_robot_model.robot import Robot
 
 
 def test_a_requirement_holds_strictly() -> None:
@@ -160,14 +41,6 @@ def test_a_requirement_holds_strictly() -> None:
     assert [below.is_met(value) for value in (0.9, 1.0, float("nan"))] == [True, False, False]
     assert [above.is_met(value) for value in (1.1, 1.0, float("nan"))] == [True, False, False]
     assert below.confidence == 0.9
-
-
-def test_what_was_read_reads_again() -> None:
-    study = read_study("first")
-    again = Study.model_validate_json(study.model_dump_json(by_alias=True))
-    assert again.model_dump() == study.model_dump()
-    assert Law.parse("tde_stc=robust") == ("tde_stc", "robust")
-    assert Law.parse("tde_stc") == ("tde_stc", "default")
 
 
 @pytest.mark.parametrize("file", sorted((CONFIG / "campaigns").iterdir()), ids=lambda f: f.stem)
@@ -180,12 +53,110 @@ def test_a_shipped_campaign_can_be_flown(file: Path) -> None:
         draws.scenario(run, study.laws[0]).check()
 
 
-def test_names_of_shipped_campaigns_are_told() -> None:
-    with pytest.raises(InputError, match=r"unknown campaign 'frist': choose one of .*first"):
-        read_study("frist")
-
-
 def test_tables_leave_out_the_gain_set_that_all_laws_have() -> None:
     assert list(short_names(["ctc=robust", "tde_stc=robust"]).values()) == ["ctc", "tde_stc"]
     assert list(short_names(["ctc", "tde_stc"]).values()) == ["ctc", "tde_stc"]
     assert list(short_names(["ctc", "ctc=robust"]).values()) == ["ctc", "ctc=robust"]
+
+
+LINK = """<link name="{0}"><inertial><origin xyz="{1} 0 0"/><mass value="{2}"/>
+<inertia ixx="0.1" iyy="0.2" izz="{3}" ixy="0" ixz="0" iyz="0"/></inertial></link>"""
+
+
+JOINT = """<joint name="{0}" type="{3}"><parent link="{1}"/><child link="{2}"/>
+<axis xyz="0 0 1"/><limit lower="-1" upper="1" effort="9" velocity="1"/></joint>"""
+
+
+def satellite(tmp_path: Path, panel: str = "revolute") -> Robot:
+    """A base with an arm of two joints between two panels, each 3 kg at 0.5 m of its hinge."""
+    links = [("bus", 0, 100, 0.25), ("upper", 0.2, 5, 0.25), ("fore", 0.2, 5, 0.25)]
+    links += [("left", 0.5, 3, 0.25), ("right", 0.5, 3, 0.25)]
+    joints = [
+        ("left_hinge", "bus", "left", panel),
+        ("a", "bus", "upper", "revolute"),
+        ("b", "upper", "fore", "revolute"),
+        ("right_hinge", "bus", "right", panel),
+    ]
+    text = "".join(LINK.format(*x) for x in links) + "".join(JOINT.format(*x) for x in joints)
+    file = tmp_path / "satellite.urdf"
+    file.write_text(f'<robot name="satellite">{text}</robot>')
+    return Robot.from_urdf(file)
+
+
+def test_panels_on_hinges_are_proposed_as_passive_joints(tmp_path: Path) -> None:
+    """The command is one that `new` takes, and its springs swing as they are said to."""
+    robot = satellite(tmp_path)
+    remark = hinge_remark(robot, f"space-robot new {tmp_path}/satellite.urdf", Path("my sat"))
+    words = shlex.split(remark.split("`")[1])
+    assert words[:2] == ["space-robot", "new"]
+    parsed = new.commands["robot"].make_context("robot", words[2:]).params
+    assert (parsed["out"], parsed["force"]) == (Path("my sat"), True)
+    proposed = parsed["passive"]
+    assert list(proposed) == ["left_hinge", "right_hinge"]
+    _, passive = robot_texts(Path(parsed["robot"]), None, False, "", proposed)
+    assert (passive.joint_names, set(passive.passive_names)) == (("a", "b"), set(proposed))
+    inertia = 0.25 + 3.0 * 0.5**2  # about the hinge
+    for spring in proposed.values():
+        rate = math.sqrt(spring["stiffness"] / inertia)
+        assert rate / (2.0 * math.pi) == pytest.approx(FREQUENCY_HZ, rel=0.03)
+        ratio = spring["damping"] / (2.0 * inertia * rate)
+        assert ratio == pytest.approx(DAMPING_RATIO, rel=0.05)
+    assert hinge_remark(passive, "", tmp_path) == ""
+    assert remark.startswith("left_hinge, right_hinge: each carries one body")
+    one = {"left_hinge": proposed["left_hinge"]}
+    _, passive = robot_texts(Path(parsed["robot"]), None, False, "", one)
+    assert hinge_remark(passive, "", tmp_path).startswith("right_hinge: it carries one body")
+
+
+@given(st.lists(st.integers(1, 9), min_size=2, max_size=6))
+def test_joints_are_grouped_by_branch(branches: list[int]) -> None:
+    """Each group has the joints of one branch, and its name tells their numbers."""
+    n = sum(branches)
+    groups = axis_groups(n, True, (), branches)
+    axes = [np.arange(n + 3)[index].tolist() for index in groups.values()]
+    assert [axis for group in axes for axis in group] == list(range(n + 3))
+    assert [len(group) for group in axes] == [3, *branches]
+    for name, group in list(zip(groups, axes, strict=True))[1:]:
+        first, last = group[0] - 2, group[-1] - 2
+        assert name == (f"{first}_{last}" if last > first else f"{first}")
+    assert all(before[-1] + 1 == after[0] for before, after in pairwise(axes))
+    assert list(axis_groups(n)) == ["base", f"1_{min(n, 3)}", *([f"4_{n}"] if n > 3 else [])]
+
+
+@pytest.mark.parametrize(("slower", "is_told"), [(1.01, False), (9.9, False), (10.1, True)])
+def test_weak_gains_are_told_with_their_reason(slower: float, is_told: bool) -> None:
+    tuned = Tuned(
+        TuningOptions(0.05, 0.2), 1.0, 0.0123, 5.0, 5.0 * slower, 0.06, 120.0, np.ones(9), {}
+    )
+    remark = estimate_remark(tuned)
+    assert bool(remark) == is_told
+    if is_told:
+        assert all(number in remark for number in ("0.06 to 120", "12.3 ms", "5 rad/s"))
+
+
+def test_laws_that_failed_in_the_comparison_are_named() -> None:
+    flights = {
+        law: Outcome({"attitude": 1.0}, "", 1.0, how)
+        for law, how in (("a", DIVERGED), ("b", ""), ("c", BEYOND), ("d", DIVERGED))
+    }
+    remark = trial_remark(flights)
+    assert remark.startswith("With friction, payload and disturbances of case 3, ")
+    assert remark.endswith(": a, d diverged; c went beyond the joints' limits of effort.")
+    assert trial_remark({"b": flights["b"]}) == ""
+
+
+def test_the_frame_that_missions_move_is_told_where_a_body_is_fixed_to_it(tmp_path: Path) -> None:
+    camera = LINK.format("camera", 0.1, 1, 0.25) + JOINT.format("mount", "fore", "camera", "fixed")
+    satellite(tmp_path)
+    file = tmp_path / "satellite.urdf"
+    for more, tools, told in (
+        (camera, "", True),
+        (camera, "tools: [camera]", False),
+        ("", "", False),
+    ):
+        text = file.read_text().replace(camera, "").replace("</robot>", f"{more}</robot>")
+        file.write_text(text)
+        (tmp_path / "robot.yaml").write_text(f"robot:\n  urdf: satellite.urdf\n  {tools}\n")
+        remark = tool_remark(Robot.from_yaml(tmp_path / "robot.yaml"), tmp_path)
+        assert remark.startswith("Missions move the frame of fore, to which camera is") == told
+        assert bool(remark) == told

@@ -10,18 +10,26 @@ import sys
 import time
 from pathlib import Path
 
+import numpy as np
 import pytest
+from campaign_tables import made_table
 from click.testing import CliRunner
 
 from space_robot.campaign.flown import FlownCampaign
+from space_robot.campaign.report.league_tables import number
+from space_robot.campaign.report.quantities import chosen, of_metric, of_requirement
+from space_robot.campaign.report.verdict_tables import demanded
 from space_robot.campaign.store.manifest import read_manifest
 from space_robot.campaign.store.table import table_rows, write_table
+from space_robot.campaign.study import Requirement
+from space_robot.campaign.verdicts.league import league
 from space_robot.cli.campaign import name_of
+from space_robot.cli.campaign_display import medians
 from space_robot.cli.main import cli
-from space_robot.processes.pool import cluster
-from space_robot_msgs_py.errors import InputError
 
 pytest.importorskip("pyarrow")
+
+
 FILE = """
 scenario: {duration: 0.1}
 laws: [tde_stc]
@@ -98,59 +106,68 @@ def test_rerun_says_that_the_digest_is_the_same_or_fails(flown: Path, tmp_path: 
     assert "numpy 0.1, now" in differing[0].stderr
 
 
-@pytest.mark.parametrize(
-    ("arguments", "said"),
-    [
-        (("run", "FILE", "--out", "x"), "my.yaml: runs: missing"),
-        (("run", "nothing", "--out", "x"), "unknown campaign 'nothing': choose one of"),
-        (
-            ("run", "FILE", "--runs", "2", "--out", "x", "--scheduler", "tcp://127.0.0.1:9"),
-            "scheduler 'tcp://127.0.0.1:9': ",
-        ),
-        (("rerun", "nowhere", "1"), "nowhere: not a campaign folder"),
-    ],
-)
-def test_what_cannot_be_is_one_line_and_leaves_nothing(
-    file: Path,
-    arguments: tuple[str, ...],
-    said: str,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_who_ends_it_is_told_how_to_go_on(
+    file: Path, tmp_path: Path, number: signal.Signals
 ) -> None:
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(cluster, "CONNECT_S", 0.5)
-    given = [str(file) if word == "FILE" else word for word in arguments]
-    error = CliRunner().invoke(cli, ["campaign", *given]).exception
-    assert isinstance(error, InputError)
-    assert said in str(error)
-    assert "\n" not in str(error)
-    assert not (tmp_path / "x").exists()
-
-
-def test_ctrl_c_says_how_to_go_on(file: Path, tmp_path: Path) -> None:
-    command = [
-        sys.executable,
-        "-m",
-        "space_robot.cli.main",
-        "campaign",
-        "run",
-        str(file),
-        "--runs",
-        "5000",
-        "--out",
-        str(tmp_path / "a"),
-        "--workers",
-        "1",
-    ]
+    command = [sys.executable, "-m", "space_robot.cli.main", "campaign", "run", str(file)]
+    command += ["--runs", "5000", "--out", str(tmp_path / "a"), "--workers", "1"]
     process = subprocess.Popen(
         command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True
     )
     journal = tmp_path / "a/journal.db-wal"
     while process.poll() is None and not (journal.exists() and journal.stat().st_size > 100_000):
         time.sleep(0.02)
-    os.kill(process.pid, signal.SIGINT)
-    stdout, stderr = process.communicate(timeout=60)
-    assert process.returncode == 130
+    os.killpg(process.pid, number)  # as the terminal does
+    stdout, stderr = process.communicate(timeout=120)
+    assert process.returncode == 128 + number
+    assert stderr.splitlines()[-1] == f"space-robot: stopped by {number.name}"
+    assert "Traceback" not in stderr
     assert not stdout
     assert f"of 5000 flights are kept in {tmp_path / 'a'}: the same line goes on" in stderr
     assert len(FlownCampaign.open(tmp_path / "a").table) > 3
+
+
+def test_the_attitude_is_shown_in_degrees_where_it_was_measured_so() -> None:
+    table = made_table(runs=60)
+    table["metric.attitude_deg_rms"] = np.degrees(2.0 * table["metric.attitude_rms"])
+    shown = medians(table, {law: law for law in table["law"]}, 1)
+    assert [column.name for column in shown.columns][2:] == [
+        "attitude_deg_rms",
+        "ripple_base_torque",
+    ]
+    known = table[table["law"] == "ctc"]["metric.attitude_deg_rms"].dropna()
+    assert float(shown.groups[0].rows[0][2]) == pytest.approx(known.median(), rel=0.05)
+    quantities = chosen(table, {})
+    assert [q.name for q in quantities] == [
+        "attitude_deg_rms",
+        "joints_1_3_rms",
+        "ripple_base_torque",
+    ]
+    assert quantities[0].label == "attitude, RMS (deg)"
+    assert of_metric("tilt_deg_max").heading == "tilt deg, largest"  # of somebody's own
+    assert of_metric("half_cone_arcsec_jitter_rms").label == "half cone jitter, RMS (arcsec)"
+
+
+def test_a_demand_on_the_vector_part_tells_its_angle() -> None:
+    demand = {"metric": "attitude_max", "below": 1e-3, "in": 0.9}
+    text = demanded(of_requirement("p", Requirement.model_validate(demand)))
+    assert text.startswith("attitude, largest below 0.001 (an angle of 0.115 deg) in 90 %")
+
+
+@pytest.mark.parametrize("failing", [0.0, 0.2, 0.7])
+def test_medians_are_those_of_the_report_however_many_flights_failed(failing: float) -> None:
+    table = made_table(runs=60, failing=failing)
+    shown = medians(table, {law: law for law in table["law"]}, 1)
+    reported = {s.law: s for s in league(table, "metric.attitude_rms").standings}
+    assert [column.name for column in shown.columns] == [
+        "law",
+        "complete",
+        "attitude_rms",
+        "ripple_base_torque",
+    ]
+    (group,) = shown.groups
+    for law, complete, median, _ in group.rows:
+        assert complete == f"{60 - reported[law].failures} of 60"
+        assert median == number(reported[law].median.value)
+    assert (failing > 0.5) == any(row[2] == "failed" for row in group.rows)

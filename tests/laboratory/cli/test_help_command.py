@@ -1,16 +1,26 @@
-"""The command help: topics of one screen, which lead on to pages that exist."""
+"""Help of all kinds: topics, sections, completion in a shell, examples."""
 
 from __future__ import annotations
 
 import re
+import shutil
+import stat
+import subprocess
+import sys
+from pathlib import Path
 
 import pytest
+from click.shell_completion import CompletionItem, ShellComplete
+from click.testing import CliRunner
 from command import Run
-from pages import TOPICS, items
-from paths import ROOT
+from pages import TOPICS
+from paths import CONFIG, DOCS, ROOT
 
+from space_robot.cli.completion import PROGRAM, VARIABLE
 from space_robot.cli.main import cli
+from space_robot.cli.sections import SECTIONS, section_of
 from space_robot.help.topics import ORDER, as_plain_text, read_topic, title
+from space_robot_control.laws import laws
 
 MOST_LINES, MOST_COLUMNS = 25, 100
 
@@ -48,19 +58,6 @@ def test_a_topic_fits_a_screen_and_leads_on(name: str, space_robot: Run) -> None
         assert not anchor or anchor in anchors(page)
 
 
-@pytest.mark.parametrize("topic", TOPICS, ids=lambda file: file.stem)
-def test_a_topic_has_commands(topic: object) -> None:
-    (file,) = [file for file in TOPICS if file == topic]
-    assert any(item.text.startswith("space-robot ") for item in items(file))
-
-
-def test_an_unknown_topic_is_refused_with_the_nearest(space_robot: Run) -> None:
-    code, out, err = space_robot("help", "own-robt")
-    assert (code, out) == (2, "")
-    assert err.startswith("space-robot: error: unknown topic 'own-robt': choose one of first-fl")
-    assert err.endswith("install (did you mean own-robot?)\n")
-
-
 def test_a_command_for_a_topic_shows_its_help(space_robot: Run) -> None:
     """Unless a topic has its name."""
     shown = space_robot("help", "simulate").out
@@ -73,3 +70,151 @@ def test_a_command_for_a_topic_shows_its_help(space_robot: Run) -> None:
 def test_fenced_blocks_are_indented() -> None:
     text = "# A?\n\n```yaml\n# a.yaml\n\na: 1\n```\n\nEnd\n"
     assert as_plain_text(text) == "A?\n\n    # a.yaml\n\n    a: 1\n\nEnd"
+
+
+def test_every_command_is_listed_once_below_its_heading() -> None:
+    printed = CliRunner().invoke(cli, ["--help"]).output
+    of_headings = dict(re.findall(r"^(\S[^\n]*):\n((?:  [^\n]*\n)+)", printed, re.MULTILINE))
+    for name, command in cli.commands.items():
+        headings = [h for h in SECTIONS if re.search(rf"^  {name} ", of_headings.get(h, ""), re.M)]
+        assert headings == ([] if command.hidden else [section_of(command)]), name
+
+
+def test_no_sentence_is_cut() -> None:
+    assert "..." not in CliRunner().invoke(cli, ["--help"]).output.partition("Options:")[2]
+
+
+def completed(*words: str) -> list[CompletionItem]:
+    """What is offered for the last word."""
+    *before, last = words
+    shell: ShellComplete = ShellComplete(cli, {}, PROGRAM, VARIABLE)
+    return shell.get_completions(before, last)
+
+
+def values(*words: str) -> list[str]:
+    items = completed(*words)
+    assert all(item.type == "plain" for item in items)
+    return [str(item.value) for item in items]
+
+
+def test_every_command_is_offered() -> None:
+    assert values("") == [name for name in sorted(cli.commands) if not cli.commands[name].hidden]
+    assert values("campaign", "re") == ["report", "rerun"]
+
+
+@pytest.mark.parametrize(
+    ("option", "folder"),
+    [
+        ("--case", "cases"),
+        ("--robot", "robots"),
+        ("--plant-robot", "robots"),
+        ("--sensors", "sensors"),
+        ("--actuators", "actuators"),
+        ("--orbit", "orbits"),
+        ("--mission", "missions"),
+    ],
+)
+def test_an_option_offers_the_names_of_its_files(option: str, folder: str) -> None:
+    names = sorted(file.stem for file in (CONFIG / folder).glob("*.yaml"))
+    assert names
+    assert values("simulate", option, "") == names
+    assert values("simulate", option, names[0][:1])[0] == names[0]
+
+
+def test_laws_gain_sets_and_choices_are_offered() -> None:
+    assert set(values("fly", "--controller", "")) == set(laws())
+    assert values("gains", "check", "--controller", "al") == ["all"]
+    assert {"default", "printed", "robust", "tuned"} < set(values("simulate", "--gains", ""))
+    assert values("simulate", "--navigation", "") == ["direct", "filtered"]
+
+
+def test_arguments_offer_the_names_of_their_files() -> None:
+    for words in (["robot"], ["urdf"], ["new"]):
+        assert values(*words, "pap") == ["paper"]
+    assert values("plan", "lin") == ["line"]
+    assert "sensor_grades" in values("campaign", "run", "sensor")
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("simulate", "--robot", "mine/"),
+        ("simulate", "--scenario", ""),
+        ("campaign", "run", "my.y"),
+        ("view", "flights/"),
+    ],
+)
+def test_files_are_offered_where_no_name_fits(words: tuple[str, ...]) -> None:
+    assert [item.type for item in completed(*words)] == ["file"]
+
+
+@pytest.mark.parametrize("words", [("--fault", "list"), ("--scenario", "missing.yaml")])
+def test_a_completion_prints_nothing_else_and_never_fails(
+    words: tuple[str, ...], capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert values("simulate", *words, "--navigation", "d") == ["direct"]
+    assert capsys.readouterr() == ("", "")
+
+
+def test_bash_completes(space_robot: Run, tmp_path: Path) -> None:
+    bash = shutil.which("bash") or pytest.skip("no bash")
+    command = tmp_path / PROGRAM
+    command.write_text(f'#!/bin/sh\nexec "{sys.executable}" -m space_robot.cli.main "$@"\n')
+    command.chmod(command.stat().st_mode | stat.S_IXUSR)
+    script = space_robot("completion", "bash").out
+    words = 'COMP_WORDS=(space-robot simulate --case 4); COMP_CWORD=3; _space_robot_completion "$0"'
+    done = subprocess.run(
+        [bash, "-c", f'{script}\n{words}\necho "${{COMPREPLY[@]}}"', str(command)],
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=False,
+    )
+    assert done.stdout == "4-1 4-2\n", done.stderr
+
+
+def test_a_completion_imports_nothing_slow() -> None:
+    slow = {"numpy", "numba", "pydantic", "yaml", "scipy"}
+    code = (
+        "import sys; from click.shell_completion import ShellComplete as S\n"
+        "from space_robot.cli.main import cli\n"
+        f"S(cli, {{}}, {PROGRAM!r}, {VARIABLE!r}).get_completions(['simulate', '--robot'], '')\n"
+        f"print(sorted({slow!r} & set(sys.modules)))"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert done.stdout == "[]\n", done.stderr
+
+
+EXAMPLES = ROOT / "examples"
+
+
+def test_every_program_is_listed_with_its_topic(space_robot: Run) -> None:
+    lines = space_robot("examples").out.splitlines()
+    programs = sorted(file.stem for file in EXAMPLES.glob("*.py"))
+    assert [line.split()[0] for line in lines[: len(programs)]] == programs
+    assert all(re.match(r"\w+ +[A-Z].*[.:]", line) for line in lines[: len(programs)])
+
+
+@pytest.fixture
+def copied(space_robot: Run, tmp_path: Path) -> Path:
+    assert space_robot("examples", "copy", tmp_path / "deep/trials").code == 0
+    return tmp_path / "deep/trials"
+
+
+def test_a_copy_has_every_example_and_the_whole_configuration(copied: Path) -> None:
+    for file in CONFIG.rglob("*.*"):
+        assert (copied / file.relative_to(ROOT)).read_bytes() == file.read_bytes()
+    names = {file.name for file in (copied / "examples").iterdir()}
+    assert {"README.md", "two_link_arm.urdf", "flight_computer"} <= names
+    assert {file.name for file in EXAMPLES.glob("*.py")} <= names
+    made = {"flight_code", "__pycache__", "flight_computer"}  # by running them
+    assert made & {f.name for f in (copied / "examples/flight_computer").iterdir()} == set()
+
+
+def test_the_files_that_commands_of_the_docs_name_are_in_the_copy(copied: Path) -> None:
+    """So the pages' commands work there, without a clone."""
+    text = "\n".join(page.read_text("utf-8") for page in sorted(DOCS.rglob("*.md")))
+    commands = re.findall(r"^(?: {4,}|\$ )(?!git|tests).*", text, re.MULTILINE)
+    named = {p for line in commands for p in re.findall(r"(?:config|examples)/[\w/.]+\w", line)}
+    assert {"config/robots/paper.yaml", "examples/two_link_arm.urdf"} <= named
+    assert [path for path in sorted(named) if not (copied / path).exists()] == []

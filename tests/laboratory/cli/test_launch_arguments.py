@@ -2,61 +2,22 @@
 
 from __future__ import annotations
 
-import ast
 import re
 from pathlib import Path
 
 import click
 import pytest
-from paths import ROOT
 
-from space_robot.cli.fly import fly
 from space_robot.cli.launch_arguments import launch_arguments, launched_flight, refuse_unknown
 from space_robot.cli.scenario_option import NODES
 from space_robot.flight.graph.node_names import started_nodes
 from space_robot.flight.graph.orchestrator import flight_parameters
-from space_robot.flight.plan import Flight, FlightPlan
+from space_robot.flight.plan import FlightPlan
 from space_robot_msgs_py.errors import InputError
-
-LAUNCH = sorted((ROOT / "launch").glob("*.launch.py"))
-ONLY_OF_FLY = {"json", "composed", "restart_controller", "domain"}
 
 
 def names(option: click.Option) -> set[str]:
     return {text.lstrip("-").replace("-", "_") for text in option.opts}
-
-
-def test_each_option_of_fly_is_an_argument() -> None:
-    options = [option for option in fly.params if isinstance(option, click.Option)]
-    arguments = {argument.name: argument for argument in launch_arguments()}
-    of_fly = set().union(*(names(option) for option in options))
-    assert set(arguments) - of_fly == {"params_file"}
-    assert of_fly - set(arguments) == ONLY_OF_FLY
-    for option in options:
-        if (name := next(iter(names(option)))) in arguments:
-            said = arguments[name].description
-            assert said.startswith((option.help or "").partition(" [default")[0][:20])
-            if option.multiple:  # one text with all of them
-                assert not arguments[name].choices
-            elif isinstance(option.type, click.Choice):
-                assert arguments[name].choices == ("", *option.type.choices)
-
-
-def test_arguments_show_the_defaults_of_their_options() -> None:
-    shown = {argument.name: argument.default for argument in launch_arguments()}
-    without = {name for name, default in shown.items() if not default}
-    assert without == {"swap", "fault", "bag", "set", "scenario", "params_file", "without"}
-    of_options = {
-        "controller": "tde_stc",
-        "friction": "true",
-        "realtime": "false",
-        "repair": "false",
-        "seed": "0",
-        "period": "0.0005",
-        "duration": "the mission's",
-    }
-    assert shown.items() >= of_options.items()
-    assert not any("[default" in argument.description for argument in launch_arguments())
 
 
 def test_the_flight_is_the_one_of_the_command(tmp_path: Path) -> None:
@@ -98,11 +59,6 @@ def test_nodes_of_ones_own_take_the_places_of_those_that_are_not_started(tmp_pat
     assert {entry.partition(":")[0] for entry in parameters["wait_for"]} == {"recorder_node"}
     flight, bag, _ = launched_flight({**values, "without": "mission"})
     assert flight_parameters(flight, bag)["controller"]["join_timeout"] == 5.0
-
-
-def test_nothing_given_is_the_flight_without_options() -> None:
-    given = {argument.name: "" for argument in launch_arguments()}
-    assert launched_flight(given).flight.scenario.options == FlightPlan()
 
 
 def test_a_parameter_file_goes_over_the_arguments_and_into_the_bag(tmp_path: Path) -> None:
@@ -174,18 +130,6 @@ def test_what_cannot_be_is_refused_in_a_line(values: dict[str, str], said: str) 
     with pytest.raises(InputError, match=re.escape(said)) as refused:
         launched_flight(values)
     assert "\n" not in str(refused.value)
-
-
-@pytest.mark.parametrize("file", LAUNCH, ids=lambda path: path.name)
-def test_launch_files_are_python_with_the_function_that_launch_calls(file: Path) -> None:
-    tree = ast.parse(file.read_text("utf-8"), str(file))
-    functions = {node.name for node in tree.body if isinstance(node, ast.FunctionDef)}
-    assert "generate_launch_description" in functions
-
-
-def test_a_launched_flight_is_checked_like_any_other() -> None:
-    """By `Flight`, which needs no files but the package's."""
-    assert isinstance(launched_flight({}).flight, Flight)
 
 
 @pytest.mark.parametrize(

@@ -1,9 +1,13 @@
-"""``space-robot new``: a robot's file becomes a folder that flies, or nothing at all."""
+"""``space-robot new``: a folder that flies from a robot's file; templates, and their tests."""
 
 from __future__ import annotations
 
 import json
+import os
+import shlex
 import shutil
+import subprocess
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -11,12 +15,13 @@ import numpy as np
 import pytest
 import yaml
 from click.testing import CliRunner, Result
-from paths import CONFIG, DATA
+from paths import CONFIG, DATA, ROOT
 
 from space_robot.campaign.flown import Campaign
 from space_robot.campaign.new_robot import robot_texts
 from space_robot.campaign.new_robot.make import mission_text, rest_to_rest
 from space_robot.cli.main import cli
+from space_robot.cli.new_files import LAW, METRIC, MISSION, SENSOR
 from space_robot.flight.plan import Flight, FlightPlan, resolve
 from space_robot.flight.simulate import simulate
 from space_robot_control.guidance.mission import Mission
@@ -28,6 +33,8 @@ from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.errors import DivergedError, InputError, SpaceRobotError
 
 FILE = str(CONFIG / "robots/ets_vii.yaml")
+
+
 ARM = DATA / "arm.urdf"
 
 
@@ -213,32 +220,56 @@ def test_files_for_other_joints_name_the_command_that_mends_them(stale: str) -> 
     assert said[stale] in str(caught.value)
 
 
-@pytest.mark.parametrize(
-    ("arguments", "said"),
-    [
-        ([str(ARM), "--passive", "leg:1,1"], "unknown passive joint 'leg' of"),
-        ([FILE, "--passive", "leg:1,1"], "unknown passive joint 'leg' of"),
-        (["none.urdf"], "none.urdf: no such file"),
-        ([FILE, "--base", "hull"], "not a URDF, so base and repair"),
-        ([str(ARM), "--base", "leg"], "leg"),
-        ([FILE, "--out", "/proc/mine"], "/proc/mine: cannot be written"),
-    ],
-)
-def test_what_cannot_be_is_said_and_leaves_nothing(
-    arguments: list[str], said: str, tmp_path: Path
-) -> None:
-    result = new(*arguments)
+KINDS = {kind.name: kind for kind in (LAW, SENSOR, METRIC, MISSION)}
+
+
+def run(*arguments: str) -> Result:
+    return CliRunner().invoke(cli, arguments)
+
+
+def pytest_of(folder: Path) -> subprocess.CompletedProcess[str]:
+    """Run the tests of a folder as their user would."""
+    return subprocess.run(
+        [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", str(folder)],
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("out", ["", "my pieces/deep"])
+def test_the_printed_command_flies_the_file(kind: str, out: str, tmp_path: Path) -> None:
+    result = run("new", kind, "mine_2", *(["--out", out] if out else []))
+    assert result.exit_code == 0, result.exception
+    files = sorted(path.name for path in (tmp_path / out).iterdir())
+    assert files == sorted(name.replace("$name", "mine_2") for name in KINDS[kind].files.values())
+    for command in result.stdout.splitlines():
+        _, *words = shlex.split(command)
+        short = ["--duration", "0.2"] if words[0] == "simulate" else []
+        flown = run(*words, *short, "--json")
+        assert flown.exit_code == 0, (flown.output, flown.exception)
+    report = json.loads(flown.stdout)
+    assert report["rms"]["mean_axis"]["joints_1_3"] < 1e-4
+    if kind == "metric":
+        assert 0.0 < report["own_metrics"]["mine_2"] < 0.01
+
+
+def test_their_tests_pass(tmp_path: Path) -> None:
+    for kind in KINDS:
+        assert run("new", kind, f"my_{kind}").exit_code == 0
+    result = pytest_of(tmp_path)
+    assert result.returncode == 0, result.stdout
+    assert "8 passed" in result.stdout
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_nothing_is_overwritten(kind: str, tmp_path: Path) -> None:
+    there = tmp_path / "test_mine.py"
+    there.write_text("mine", "utf-8")
+    result = run("new", kind, "mine")
     assert isinstance(result.exception, InputError)
-    assert said in str(result.exception)
-    assert result.exception.exit_code == 2
-    assert not list(tmp_path.iterdir())
-
-
-@pytest.mark.parametrize(
-    "text", ["pitch", "pitch:15", "pitch:15,-1", "pitch:inf,1", ":1,2", "a:b,c"]
-)
-def test_a_spring_is_two_numbers(text: str, tmp_path: Path) -> None:
-    result = new(str(ARM), "--passive", text)
-    assert result.exit_code == 2
-    assert "JOINT:STIFFNESS,DAMPING was expected" in result.stderr
-    assert not list(tmp_path.iterdir())
+    assert "test_mine.py: exists already; it is not overwritten" in str(result.exception)
+    assert [path.name for path in tmp_path.iterdir()] == ["test_mine.py"]
+    assert there.read_text("utf-8") == "mine"

@@ -1,18 +1,23 @@
-"""``--set`` and ``--scenario``: what is given is flown as given, or refused in one line."""
+"""Options of flights: the same in all places; what is given is flown as given."""
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 from typing import Any
 
+import click
 import pytest
 from click.testing import CliRunner, Result
 from hypothesis import given
 from hypothesis import strategies as st
 
 from space_robot.cli import main as cli
+from space_robot.cli.fly import fly
+from space_robot.cli.launch_arguments import launch_arguments
+from space_robot.cli.numbers import FiniteRange
+from space_robot.cli.simulate import simulate
 from space_robot.flight.plan import Flight, FlightPlan, resolve
+from space_robot.scenario.option_table import OPTIONS, Option, names
 from space_robot_msgs_py.config.validation import validate
 from space_robot_msgs_py.errors import InputError
 
@@ -30,13 +35,13 @@ def planned(monkeypatch: pytest.MonkeyPatch) -> list[FlightPlan]:
     return plans
 
 
-def simulate(*arguments: str) -> Result:
+def simulated(*arguments: str) -> Result:
     return CliRunner().invoke(cli.cli, ["simulate", *arguments])
 
 
 def said_by(*arguments: str) -> str:
     """The one line with which a command refuses them."""
-    result = simulate(*arguments)
+    result = simulated(*arguments)
     assert isinstance(result.exception, InputError), result.exception
     return str(result.exception)
 
@@ -59,72 +64,6 @@ def test_parameters_of_a_scenario_and_those_given(
     assert (second.duration, second.swaps, second.friction) == (3.0, ["1:ctc"], False)
 
 
-@pytest.mark.parametrize(
-    ("content", "said"),
-    [
-        ("friction: [1]", "friction: true or false was expected, got [1]"),
-        ("friction: 1", "friction: true or false was expected, got 1"),
-        ("duration: '3'", "duration: a number was expected, got '3'"),
-        ("duration: true", "duration: a number was expected, got True"),
-        ("duration: .nan", "duration: Input should be a finite number, got nan"),
-        ("command_latency_ticks: 1.5", "a whole number was expected, got 1.5"),
-        ("command_latency_ticks: 1e9999", "a whole number was expected, got inf"),
-        ("swaps: 5:ctc", "swaps: a list of texts was expected, got '5:ctc'"),
-        ("swaps: [5]", "swaps: a list of texts was expected, got [5]"),
-        ("bag: [b]", "bag: a text was expected, got ['b']"),
-        ('bag: "a\\0b"', "bag: a text was expected"),
-        ("robot: null", "robot: a text or a mapping of numbers was expected, got None"),
-        ("parameters: 5", "parameters: a mapping of nodes to their parameters was expected"),
-        ("parameters: {plant: 5}", "a mapping of nodes to their parameters was expected"),
-        ("parameters: {plnt: {}}", "unknown node 'plnt'"),
-        ("parameters: ['plant.case=[']", "parameters 'plant.case': line 2: not YAML"),
-        ("5: 6", "unknown key 5"),
-        ("[1]", "a mapping was expected, got list"),
-        ("[1]: 2", "a key must be a text or a number"),
-    ],
-)
-def test_a_wrong_scenario_is_refused(tmp_path: Path, content: str, said: str) -> None:
-    path = tmp_path / "scenario.yaml"
-    path.write_text(content)
-    assert said in said_by("--scenario", str(path))
-
-
-@pytest.mark.parametrize(
-    ("text", "said"),
-    [
-        ("plant.case=[", "--set 'plant.case': line 2: not YAML"),
-        ("plant.case=!!int x", "the value 'x' is not of type int"),
-        ("plant.case=" + "[" * 20_000, "nested deeper"),
-        ("plant.case", "NODE.PARAM=VALUE expected"),
-        ("plnt.case=1", "unknown node 'plnt'"),
-        ("plant.case={}", "case: Input should be a valid string, got {}"),
-        ("plant.case=2020-13-45", "unknown case '2020-13-45'"),
-        ("plant.friction=5", "friction: a mapping was expected, got 5"),
-        ("plant.friction={5: 1}", "friction.5: unknown key"),
-        ("plant.base_torque_limit=1e9999", "Input should be a finite number, got inf"),
-        ("plant.initial_quaternion=[true,1,0,0]", "initial_quaternion.0: Input should be"),
-        ("plant.initial_quaternion=[1e9,1e9,0,0]", "must have a norm of 0.001 to 1000"),
-        ("plant.robot=" + "a" * 300 + ".yaml", "cannot be read (File name too long)"),
-        ("plant.robot=/dev/zero.yaml", "no such file"),
-        ('plant.robot="a\\0.yaml"', "cannot be read"),
-        ("controller.tde_stc.k_1=['1']", "numbers were expected, got ['1']"),
-        ("controller.tde_stc.k_1=[true]", "numbers were expected, got [True]"),
-        ("controller.gains=" + "g" * 300, "unknown gain set 'ggg"),
-    ],
-)
-def test_a_wrong_parameter_is_refused(text: str, said: str) -> None:
-    line = said_by("--set", text)
-    assert said in line
-    assert len(line.splitlines()) == 1
-
-
-def test_a_pipe_for_a_file_is_not_waited_for(tmp_path: Path) -> None:
-    pipe = tmp_path / "pipe.yaml"
-    os.mkfifo(pipe)
-    for option in ("--robot", "--mission", "--case", "--gains", "--scenario"):
-        assert "not a file" in said_by(option, str(pipe)), option
-
-
 def test_a_folder_of_gains_needs_no_slash(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "g").mkdir()
     (tmp_path / "g" / "tde_stc.yaml").write_text(
@@ -137,67 +76,17 @@ def test_a_folder_of_gains_needs_no_slash(tmp_path: Path, monkeypatch: pytest.Mo
     assert bare.description == slash.description
 
 
-_NAMES = st.sampled_from(
-    [
-        "plant.case",
-        "plant.friction",
-        "plant.friction.coulomb",
-        "plant.initial_quaternion",
-        "plant.realtime",
-        "plant.faults",
-        "plant.robot",
-        "controller.swaps",
-        "controller.tde_stc",
-        "controller.tde_stc.k_1",
-        "controller.controller",
-        "controller.gains",
-        "mission.mission",
-        "mission.waypoint_times",
-        "recorder.split_size",
-        "recorder.compression",
-        "recorder",
-        "x.y",
-        "plant..",
-        "plant.period",
-        "plant.a=b",
-        ".",
-        "",
-    ]
+_NAMES = (
+    st.sampled_from(["plant.friction", "plant.friction.coulomb", "plant.faults", "plant.robot"])
+    | st.sampled_from(["controller.swaps", "controller.tde_stc", "controller.tde_stc.k_1", "x.y"])
+    | st.sampled_from(["controller.gains", "mission.waypoint_times", "recorder.split_size", ""])
 )
-_TEXTS = st.sampled_from(
-    [
-        "1",
-        "true",
-        "[]",
-        "{}",
-        "[1, 2.5, 0, 0]",
-        "{a: {b: 1}}",
-        "!!int x",
-        "&a [*a]",
-        "2020-13-45",
-        "[[1]]",
-        "{[1]: 2}",
-        ".inf",
-        "-1",
-        "1e400",
-        "~",
-        "'",
-        "[",
-        "\0",
-        "é",
-        "9" * 400,
-        "..",
-        "/",
-        "/dev/null",
-        "/dev/zero.yaml",
-        "x:y",
-        "os:path",
-        "a" * 300,
-        "[a]",
-        "{coulomb: true}",
-        "-0.0",
-    ]
-) | st.text(max_size=8)
+_TEXTS = (
+    st.sampled_from(["1", "true", "[]", "{}", "[1, 2.5, 0, 0]", "{a: {b: 1}}", "!!int x", "~"])
+    | st.sampled_from(["&a [*a]", "2020-13-45", "{[1]: 2}", ".inf", "-1", "1e400", "'", "\0", "é"])
+    | st.sampled_from(["9" * 400, "/dev/null", "os:path", "{coulomb: true}"])
+    | st.text(max_size=8)
+)
 
 
 @given(st.lists(st.tuples(_NAMES, _TEXTS), min_size=1, max_size=3))
@@ -214,10 +103,52 @@ def test_any_parameters_fly_or_are_refused_in_one_line(pairs: list[tuple[str, st
         assert len(str(error).splitlines()) == 1  # noqa: PT017
 
 
-@pytest.mark.parametrize(
-    "text", ["/mine=/joint_states", ":=/joint_states", "/mine:=", "/mine", ":="]
-)
-def test_a_remapping_needs_both_names_and_the_sign(text: str) -> None:
-    ended = CliRunner().invoke(cli.cli, ["analyze", "nowhere", "--remap", text])
-    assert ended.exit_code == 2
-    assert f"{text!r}: THEIRS:=OURS expected" in " ".join(ended.output.split())
+@pytest.mark.parametrize("text", ["nan", "inf", "-inf", "1e999", "x"])
+def test_what_is_no_finite_number_is_refused(text: str) -> None:
+    for kind in (FiniteRange(), FiniteRange(0.0, 0.5, min_open=True)):
+        with pytest.raises(click.BadParameter):
+            kind.convert(text, None, None)
+    if text != "x":
+        with pytest.raises(click.BadParameter) as caught:
+            FiniteRange().convert(text, None, None)
+        assert str(caught.value) == f"{text} is not a finite number."
+
+
+@pytest.mark.parametrize("text", ["0", "0.51", "-1"])
+def test_what_is_beyond_a_bound_is_refused(text: str) -> None:
+    with pytest.raises(click.BadParameter, match="is not in the range"):
+        FiniteRange(0.0, 0.5, min_open=True).convert(text, None, None)
+
+
+def test_bounds_are_in_the_range_unless_they_are_open() -> None:
+    assert FiniteRange(0.0, 0.5, min_open=True).convert("0.5", None, None) == 0.5
+    assert FiniteRange(0.0, 0.5).convert("0", None, None) == 0.0
+
+
+NOT_TYPED = {"parameters"}
+"""With a form of its own on the command line."""
+
+
+def test_the_plan_has_the_options_of_the_table() -> None:
+    assert set(FlightPlan.model_fields) == {*names(), *NOT_TYPED}
+
+
+@pytest.mark.parametrize("option", OPTIONS, ids=lambda option: option.name)
+def test_an_option_is_the_same_everywhere(option: Option) -> None:
+    field = FlightPlan.model_fields[option.name]
+    assert field.description == option.help_text
+    default = field.get_default(call_default_factory=True)
+    assert default == ([] if option.kind == "texts" else option.default)
+    of_fly, of_simulate = (
+        {p.name: p for p in command.params if isinstance(p, click.Option)}
+        for command in (fly, simulate)
+    )
+    assert option.name in of_fly
+    assert (option.name in of_simulate) == (not option.needs_graph)
+    launched = {
+        argument.name
+        for argument in launch_arguments()
+        if argument.description.startswith(option.help_text.partition(" [default")[0])
+    }
+    flags = {max(of_fly[option.name].opts, key=len).lstrip("-").replace("-", "_")}
+    assert launched == (flags if option.is_launched else set())

@@ -1,4 +1,4 @@
-"""``space-robot robot``, and what commands say of URDFs that are wrong."""
+"""``space-robot robot`` and ``urdf``, and what commands say of URDFs that are wrong."""
 
 from __future__ import annotations
 
@@ -7,15 +7,16 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pinocchio as pin
 import pytest
 from click.testing import CliRunner, Result
-from flights import space_robot_here
 from paths import CONFIG, DATA
 from urdf_defects import DEFECTS, GOOD, with_defect
 
 from space_robot.cli.main import _run, cli
 from space_robot_model.robot import Robot
 from space_robot_model.robot.find import find_robot
+from space_robot_model.robot.urdf_text import urdf_text
 from space_robot_msgs_py.errors import InputError
 
 ARM = DATA / "arm.urdf"
@@ -57,23 +58,6 @@ def test_tables() -> None:
         assert words in result.stdout
 
 
-@pytest.mark.parametrize(
-    ("metres", "millimetres", "said"),
-    [
-        ('xyz="0 0 0.8"', 'xyz="0 0 800"', "joint 'slide' is 800 m from the joint before it"),
-        ('upper="2"', 'upper="115"', "joint 'shoulder' has a limit at 6589.01 degrees (115 rad)"),
-    ],
-)
-def test_millimetres_and_degrees_are_remarked(
-    tmp_path: Path, metres: str, millimetres: str, said: str
-) -> None:
-    path = tmp_path / "arm.urdf"
-    path.write_text(GOOD.replace(metres, millimetres))
-    result = run(path)
-    assert f"warning: {said}" in " ".join(result.stdout.split())
-    assert report(ARM)["remarks"] == []
-
-
 def test_json_has_all_numbers() -> None:
     found, robot = report(ARM), Robot.from_urdf(ARM)
     assert [body["name"] for body in found["bodies"]] == list(robot.body_names)
@@ -88,13 +72,6 @@ def test_json_has_all_numbers() -> None:
     assert slide["friction"] is None
     assert [shape["shape"] for shape in found["shapes"]] == ["box", "cylinder", "mesh", "sphere"]
     assert found["defects"] == []
-
-
-def test_base() -> None:
-    assert report(ARM, "--base", "fore")["bodies"][0]["name"] == "fore"
-    result = run(ARM, "--base", "tail")
-    assert isinstance(result.exception, InputError)
-    assert "unknown link 'tail'" in str(result.exception)
 
 
 def test_defects_are_listed_and_end_in_an_error(bad: Path) -> None:
@@ -156,6 +133,8 @@ robot:
        drive: {rotor_inertia: 1.5e-5, gear_ratio: 120.0, stiffness: 8000.0, damping: 12.0}}
     - {name: rigid, mass: 3.0, inertia: [0.1, 0.1, 0.1, 0, 0, 0], com: [0, 0, 0]}
 """
+
+
 PLATES = """
   plates:
     - {area: 2.5, normal: [1, 0, 0]}
@@ -214,18 +193,6 @@ def test_plates_of_the_file_and_of_the_shapes(tmp_path: Path) -> None:
     assert "made from the shapes" in run(ARM).stdout
 
 
-def test_the_plates_of_shapes_have_their_surface(tmp_path: Path) -> None:
-    """A box, a cylinder, a box in the mesh's place, and a sphere."""
-    urdf, mesh = tmp_path / "boxes.urdf", '<mesh filename="package://arm/fore.stl" scale="2 2 2"/>'
-    assert mesh in ARM.read_text()
-    urdf.write_text(ARM.read_text().replace(mesh, '<box size="0.2 0.2 0.5"/>'))
-    plates = report(urdf)["plates"]
-    assert plates["source"] == "shapes"
-    assert plates["count"] == 6 + 8 + 6 + 6
-    areas = [10.0, 2.0 * np.pi * 0.1 * (0.1 + 0.8), 0.48, 4.0 * np.pi * 0.1**2]
-    assert plates["area"] == pytest.approx(sum(areas))
-
-
 @pytest.mark.parametrize("name", DEFECTS)
 def test_every_defect_is_one_line_of_every_command(
     name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
@@ -240,23 +207,6 @@ def test_every_defect_is_one_line_of_every_command(
         assert DEFECTS[name].text in said or command[0] == "robot"
 
 
-@pytest.mark.parametrize("name", ["not XML", "triangle inequality", "circle"])
-def test_the_process_ends_with_code_2(name: str, tmp_path: Path) -> None:
-    path = tmp_path / "given.urdf"
-    path.write_text(with_defect(name))
-    result = space_robot_here("simulate", "--robot", str(path))
-    assert result.returncode == 2
-    assert result.stdout == ""
-    assert result.stderr.startswith(f"space-robot: error: {path}: ")
-    assert DEFECTS[name].text in result.stderr
-    assert result.stderr.count("\n") == 1
-
-
-def test_a_sound_urdf_lacks_a_mission_only(capsys: pytest.CaptureFixture[str]) -> None:
-    assert _run(["simulate", "--robot", str(ARM)]) == 2
-    assert "has no mission of its own: `space-robot new" in capsys.readouterr().err
-
-
 def test_base_and_repair_are_a_part_of_the_name(
     bad: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -268,3 +218,21 @@ def test_base_and_repair_are_a_part_of_the_name(
         assert "triangle" in capsys.readouterr().err
     assert _run(["simulate", "--base", "fore"]) == 2
     assert "not a URDF" in capsys.readouterr().err
+
+
+def urdf(*arguments: object) -> Result:
+    return CliRunner().invoke(cli, ["urdf", *map(str, arguments)])
+
+
+@pytest.mark.parametrize("robot", ["dual_arm", DATA / "arm.urdf"], ids=["yaml", "urdf"])
+def test_the_text_is_that_of_the_robot_that_flies(robot: object, tmp_path: Path) -> None:
+    """Alone on standard output, and the same in a file."""
+    expected = urdf_text(find_robot(str(robot)))
+    assert urdf(robot).stdout == expected
+    file = tmp_path / "robot.urdf"
+    result = urdf(robot, "--out", file)
+    assert (result.exit_code, result.stdout) == (0, "")
+    assert result.stderr == f"wrote {file}\n"
+    assert file.read_text("utf-8") == expected
+    model = pin.buildModelFromUrdf(str(file), pin.JointModelFreeFlyer())
+    assert model.nv == 6 + find_robot(str(robot)).joint_count

@@ -61,23 +61,6 @@ def test_printed_gains_of_case_1(printed: dict[str, Any]) -> None:
         assert solved["residual"] <= 0.0
 
 
-def test_joints_arrive_within_the_bound_and_the_base_has_not_yet(printed: dict[str, Any]) -> None:
-    reaching = printed["super_twisting"]["reaching"]
-    times = reaching["reaching_time_s_below_bound"]
-    assert [check["holds"] for check in times] == [None] * 9
-    assert not any(check["applies"] for check in times), "the flight exceeds the bound's premise"
-    assert [check["value"] for check in times[:3]] == [None] * 3
-    assert all(0.0 < check["value"] < 0.6 for check in times[3:])
-
-
-def test_without_friction_beta_is_smaller(printed: dict[str, Any]) -> None:
-    errors = printed["time_delay_error"]
-    for flown, smooth in zip(
-        errors["as_flown"]["beta"], errors["without_friction"]["beta"], strict=True
-    ):
-        assert smooth < 1.02 * flown
-
-
 def test_tables_name_every_condition(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("COLUMNS", "80")
     text = run("--duration", "0.2", "--no-friction")
@@ -130,21 +113,9 @@ def test_pictures_are_the_same_bytes_twice(tmp_path: Path) -> None:
     assert matplotlib.image.imread(first[0]).std() > 0.01
 
 
-def test_law_without_time_delay_estimation_is_refused() -> None:
-    with pytest.raises(InputError, match=r"'ctc'.*h_bar.*tde_smc, tde_stc, tde_tsmc"):
-        studied(controller="ctc")
-    assert InputError.exit_code == 2
-
-
 def test_flight_of_a_few_ticks_is_refused() -> None:
     with pytest.raises(InputError, match="10 ticks"):
         study(FlightPlan(duration=0.002), 1e-3, lambda flight, which: simulate(flight))
-
-
-def test_folder_that_cannot_be_made_is_refused(tmp_path: Path) -> None:
-    (tmp_path / "file").touch()
-    with pytest.raises(InputError, match="the folder cannot be created"):
-        run("--plot", str(tmp_path / "file" / "figures"))
 
 
 def test_law_is_looked_at_before_anything_flies() -> None:

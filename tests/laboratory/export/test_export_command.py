@@ -1,4 +1,4 @@
-"""`space-robot export`: the folder, its flights on every compiler and processor, and refusals."""
+"""`space-robot export`: the folder, its flights on compilers and processors, in orbit, refusals."""
 
 from __future__ import annotations
 
@@ -7,17 +7,29 @@ import re
 import shutil
 import subprocess
 from pathlib import Path
+from typing import Any
 
 import pytest
 from command import Run
+from robots import driven_paper
 
+from space_robot.export.software import export
 from space_robot.export.verify import CROSS, EMULATORS
+from space_robot.flight.plan import Flight, FlightPlan, resolve
+from space_robot_control.flight_code.folder import Exported
 from space_robot_control.laws import laws
+from space_robot_model.robot import Robot
 
 LAWS = sorted(laws())
+
+
 COPIES = {"memset", "memcpy", "memmove"}
+
+
 ALLOWED = {"sqrt", "floor", "fmod", "fabs", "copysign", "__stack_chk_fail", *COPIES}
 """Functions of the C library that flight software may call; compilers make copies by `COPIES`."""
+
+
 SCENARIOS = {
     "wheels": (
         "--case 3 --sensors fine --navigation filtered --actuators wheels "
@@ -26,6 +38,8 @@ SCENARIOS = {
     "seven_joints_on_thrusters": "--robot seven_joint --actuators thrusters --controller tde_smc",
     "dual_arm": "--robot dual_arm --controller ctc --sensors fine --navigation filtered",
 }
+
+
 needs_make = pytest.mark.skipif(
     not (shutil.which("make") and shutil.which("gcc")), reason="make or gcc is not installed"
 )
@@ -69,11 +83,18 @@ def check_flights(output: str) -> None:
 
 
 @needs_make
-@pytest.mark.parametrize("name", SCENARIOS)
+@pytest.mark.parametrize(
+    "name",
+    [
+        name if name == "wheels" else pytest.param(name, marks=pytest.mark.docs)
+        for name in SCENARIOS
+    ],
+)
 def test_every_bit_is_equal(name: str, folders: dict[str, Path], space_robot: Run) -> None:
     check_flights(make(exported(name, folders, space_robot), "COMPILERS=gcc"))
 
 
+@pytest.mark.docs
 @pytest.mark.parametrize("target", ["clang", *CROSS])
 def test_on_other_compilers_and_processors(
     target: str, folders: dict[str, Path], space_robot: Run
@@ -85,11 +106,13 @@ def test_on_other_compilers_and_processors(
     check_flights(make(folder, target if target in CROSS else "COMPILERS=clang"))
 
 
+@pytest.mark.docs
 @needs_make
 def test_sanitizers_find_nothing(folders: dict[str, Path], space_robot: Run) -> None:
     check_flights(make(exported("wheels", folders, space_robot), "sanitize"))
 
 
+@pytest.mark.docs
 @needs_make
 def test_most_branches_are_taken(folders: dict[str, Path], space_robot: Run) -> None:
     if not shutil.which("gcov"):
@@ -102,6 +125,7 @@ def test_most_branches_are_taken(folders: dict[str, Path], space_robot: Run) -> 
     assert "branches that were never taken:" in output
 
 
+@pytest.mark.docs
 def test_misra_rules_are_kept_but_for_the_deviations(
     folders: dict[str, Path], space_robot: Run
 ) -> None:
@@ -184,6 +208,8 @@ class Mine(ControlLaw):
     def force(self, signals):
         return self.memory.force
 """
+
+
 WRONG_KERNEL = """
 import numpy as np
 from space_robot_control.laws import CompiledLaw, LawGains, LawMemory, per_axis
@@ -229,6 +255,7 @@ def test_a_law_without_translation_is_refused(
     assert not (tmp_path / "o").exists()
 
 
+@pytest.mark.docs
 @needs_make
 def test_what_is_verified_is_told_in_json(tmp_path: Path, space_robot: Run) -> None:
     """Also with processors for which gcc would fuse products and sums of the navigation."""
@@ -275,3 +302,43 @@ def test_a_wrong_bit_is_found(tmp_path: Path, space_robot: Run) -> None:
     run = subprocess.run(command, capture_output=True, text=True, check=False)
     assert run.returncode != 0
     assert re.search(r"mission\.bin: tick \d+: ", run.stdout)
+
+
+GEARS: dict[str, Any] = {
+    "plant_robot": Robot.from_dict(driven_paper()),
+    "orbit": "iss",
+    "sensors": "fine",
+    "navigation": "filtered",
+    "swaps": ["0.05:tde_smc"],
+}
+"""A plant of which the flight software, for the rigid robot in free space, knows nothing."""
+
+
+def code_of(**options: Any) -> Exported:
+    return export(Flight(resolve(FlightPlan.model_validate(options))))
+
+
+def test_gears_and_orbit_of_the_plant_are_no_part_of_the_flight_software() -> None:
+    """Its files are those for the rigid robot in free space, but for the scenario's digest."""
+    rigid = {key: GEARS[key] for key in ("sensors", "navigation", "swaps")}
+    one, other = code_of(**GEARS), code_of(**rigid)
+    assert one.digest != other.digest
+    assert one.sources.keys() == other.sources.keys()
+    for path, text in one.sources.items():
+        assert text.replace(one.digest, other.digest) == other.sources[path], path
+
+
+@pytest.mark.parametrize("way", ["scenario"])
+def test_the_command_exports_what_flies_in_an_orbit(
+    way: str, tmp_path: Path, space_robot: Run
+) -> None:
+    """As all commands that fly do; torquers cannot be code_of otherwise."""
+    words = ["--orbit", "iss", "--actuators", "wheels_and_torquers"]
+    if way == "scenario":
+        file = tmp_path / "scenario.yaml"
+        file.write_text("orbit: iss\nactuators: wheels_and_torquers\n")
+        words = ["--scenario", str(file)]
+    ran = space_robot("export", "-o", tmp_path / "code", *words, "--acceptance-seconds", "0.05")
+    assert ran.code == 0, ran.err
+    header = (tmp_path / "code/include/space_robot_flight.h").read_text("utf-8")
+    assert "#define SPACE_ROBOT_TORQUERS 3\n" in header

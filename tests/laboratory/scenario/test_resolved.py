@@ -1,112 +1,34 @@
-"""A resolved scenario flies the same bits, and needs no file."""
+"""Resolved scenarios, and plants other than what the flight software assumes."""
 
 from __future__ import annotations
 
+import copy
 import json
 import subprocess
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
 import yaml
+from command import Run
 from flights import space_robot_here
+from paths import CONFIG
 from robots import driven_paper
 
 from space_robot.api import Scenario
-from space_robot.flight.plan import Flight, resolve
-from space_robot.flight.simulate import simulate
-from space_robot.scenario.comparison import differences, recorded_scenario
+from space_robot.flight.plan import Flight, FlightPlan, resolve
+from space_robot.scenario.comparison import recorded_scenario
 from space_robot.scenario.node_settings import FlightSettings
-from space_robot.scenario.options import FlightPlan
-from space_robot_model.robot import Robot
-from space_robot_model.robot.find import find_robot
-from space_robot_model.robot.tree import Visual
+from space_robot_msgs_py.bag.flight_log import FlightLog
+from space_robot_msgs_py.bag.reader import read_flight
 from space_robot_msgs_py.config.directory import GRAPH_FILE, config_directory
 from space_robot_msgs_py.errors import InputError
-from space_robot_msgs_py.samples import ORBIT_FIELDS
-
-COLUMNS = (
-    *("quaternion", "joint_positions", "applied_torque", "commanded_torque"),
-    *("motor_positions", "motor_velocities", *ORBIT_FIELDS),
-)
-SCENARIOS: dict[str, dict[str, Any]] = {
-    "sensors and filter": {"case": "3", "sensors": "fine", "navigation": "filtered", "seed": 5},
-    "another robot": {"robot": "seven_joint", "case": "2", "friction": False},
-    "hardware and gains": {"actuators": "wheels_and_thrusters", "gains": "robust", "case": "4-1"},
-    "passive joints": {"robot": "flexible_panels"},
-    "capture": {"robot": "dual_arm", "events": ["capture@0.05:small_satellite"]},
-    "free base": {"actuators": "none"},
-    "faults and swaps": {
-        "controller": "ctc",
-        "faults": ["torque_scale@0.05:base=0.9"],
-        "swaps": ["0.1:tde_stc"],
-        "substeps": 2,
-    },
-    "single parameters": {
-        "actuators": "small_wheels",
-        "parameters": {
-            "controller": {"tde_stc.k_1": [2.0], "hold_ticks": 7},
-            "plant": {"wheels.max_torque": [0.1]},
-        },
-    },
-    "orbit": {"orbit": "iss", "case": "3", "actuators": "wheels"},
-    "gears and plates": {
-        "robot": Robot.from_dict(driven_paper()),
-        "orbit": {"orbital_elements": {"height": 400e3}, "atmosphere": {"density": 4e-12}},
-    },
-    "shapes in an orbit": {
-        "robot": replace(
-            find_robot("paper"),
-            visuals=(
-                Visual("box", (3.0, 1.0, 0.1), np.eye(3), np.array([0.0, 2.0, 0.5]), body=0),
-                Visual("cylinder", (0.2, 1.0), np.eye(3), np.zeros(3), body=3),
-            ),
-        ),
-        "orbit": "iss",
-    },
-    "a start that points, with errors of the assumed orbit": {
-        "mission": {
-            "start": {"joints_deg": [0, 90, 200, 20, 30, 10], "base": "nadir"},
-            "segments": [{"base": {"point": "sun", "offset_deg": [0, 0, 5]}, "duration": 60}],
-        },
-        "orbit": "iss",
-        "sensors": "fine",
-        "parameters": {"mission": {"assumed_orbit.errors.along": 2e3}},
-    },
-    "a start with a rate": {
-        "mission": {
-            "start": {
-                "joints_deg": [0, 90, 200, 20, 30, 10],
-                "base": {"rpy_deg": [0, 0, 170], "rate_deg_s": [0.1, -0.2, 0.3]},
-            },
-            "segments": [{"base": {"rpy_deg": [0, 0, 0]}, "duration": 60}],
-        },
-        "sensors": "fine",
-        "navigation": "filtered",
-    },
-    "another plant": {"robot": "paper", "plant_robot": "paper", "parameters": {"plant": {}}},
-}
 
 
 def run(*words: str, code: int = 0) -> subprocess.CompletedProcess[str]:
     process = space_robot_here(*words)
     assert process.returncode == code, process.stderr
     return process
-
-
-@pytest.mark.parametrize("options", SCENARIOS.values(), ids=SCENARIOS)
-def test_resolved_numbers_as_yaml_fly_the_same_bits(options: dict[str, Any]) -> None:
-    flight = Flight(resolve(FlightPlan(duration=0.2, **options)))
-    numbers = yaml.safe_load(yaml.safe_dump(flight.scenario.tree))
-    again = Flight(resolve(FlightPlan(**numbers)))
-    assert again.scenario.tree == flight.scenario.tree == json.loads(json.dumps(numbers))
-    assert differences(again.scenario.tree, flight.scenario.tree) == []
-    assert again.ticks == flight.ticks
-    one, other = simulate(again), simulate(flight)
-    for name in COLUMNS:
-        assert np.array_equal(getattr(one, name), getattr(other, name)), name
 
 
 def test_it_needs_no_file_of_the_package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -140,19 +62,85 @@ def test_a_command_prints_it_another_flies_it_a_third_compares(tmp_path: Path) -
     ]
 
 
-@pytest.mark.parametrize(
-    ("content", "said"),
-    [
-        ("case: {payload: {mas: 1.0}}", "mas"),
-        ("robot: {name: x}", "robot"),
-        ("duration: {a: 1}", "duration: a number was expected"),
-        ("assumed_actuators: 3", "assumed_actuators"),
-    ],
-)
-def test_wrong_numbers_are_one_line(tmp_path: Path, content: str, said: str) -> None:
-    file = tmp_path / "wrong.yaml"
-    file.write_text(content)
-    process = run("simulate", "--scenario", str(file), code=2)
-    assert said in process.stderr
-    assert "Traceback" not in process.stderr
-    assert len(process.stderr.strip().splitlines()) == 1
+DURATION = ("--duration", "0.05")
+
+
+WHEELS = yaml.safe_load((CONFIG / "actuators" / "wheels.yaml").read_text("utf-8"))
+"""What the file of the wheels holds."""
+
+
+def heavier_wheels() -> dict[str, Any]:
+    """Return wheels whose rotors are assumed to be heavier by a tenth."""
+    numbers: dict[str, Any] = copy.deepcopy(WHEELS["plant_node"]["ros__parameters"])
+    inertia = numbers["wheels"]["rotor_inertia"]
+    numbers["wheels"]["rotor_inertia"] = [1.1 * value for value in inertia]
+    return {key: numbers[key] for key in ("base_actuation", "wheels")}
+
+
+@pytest.fixture
+def truth(tmp_path: Path) -> Path:
+    """A file of the paper's robot with gears."""
+    path = tmp_path / "truth.yaml"
+    path.write_text(yaml.safe_dump(driven_paper()), "utf-8")
+    return path
+
+
+def assert_same_bits(one: FlightLog, other: FlightLog) -> None:
+    for name, column in one.columns.items():
+        assert other.columns[name].tobytes() == column.tobytes(), name
+
+
+def flown(space_robot: Run, bag: Path, *words: str) -> FlightLog:
+    ran = space_robot("simulate", *words, "--bag", str(bag))
+    assert ran.code == 0, ran.err
+    return read_flight(bag)
+
+
+def test_the_plant_has_one_robot_and_the_laws_another(truth: Path) -> None:
+    flight = Flight(resolve(FlightPlan(plant_robot=str(truth), duration=0.05)))
+    assert flight.plant.robot.geared_names == ("joint2", "joint3", "joint5")
+    assert flight.scenario.robots.controller.geared_names == ()
+    tree = flight.scenario.tree
+    assert not any("drive" in link for link in tree["robot"]["robot"]["links"])
+    assert tree["plant_robot"]["robot"]["links"] == driven_paper()["robot"]["links"]
+    assert flight.description["robot_file"] == tree["plant_robot"]
+    assert flight.description["controller_robot_file"] == tree["robot"]
+    mission = Flight(resolve(FlightPlan(duration=0.05))).scenario.tree["mission"]
+    assert tree["mission"] == mission, "the mission is that of the robot assumed"
+
+
+@pytest.mark.parametrize("as_numbers", [True, False], ids=["numbers", "file"])
+def test_assumed_actuators_are_numbers_or_a_file(
+    space_robot: Run, tmp_path: Path, as_numbers: bool
+) -> None:
+    """The plant's are others; the resolved scenario flies the same bits either way."""
+    numbers, file = heavier_wheels(), tmp_path / "mine.yaml"
+    assumed: Any = numbers
+    if not as_numbers:
+        path = tmp_path / "heavier.yaml"
+        path.write_text(yaml.safe_dump({"plant_node": {"ros__parameters": numbers}}))
+        assumed = str(path)
+    content = {"actuators": "wheels", "assumed_actuators": assumed, "duration": 0.05}
+    file.write_text(yaml.safe_dump(content))
+    log = flown(space_robot, tmp_path / "first", "--scenario", str(file))
+    flight = Flight(resolve(FlightPlan(**content)))
+    own, other = flight.scenario.plant, flight.scenario.assumed_actuators
+    expected = [1.1 * value for value in own.wheels.rotor_inertia]
+    assert other.wheels.rotor_inertia == pytest.approx(expected, rel=1e-15)
+    assert other.wheels.axes == own.wheels.axes
+    tree = flight.scenario.tree
+    assert tree["assumed_actuators"]["wheels"]["rotor_inertia"] == other.wheels.rotor_inertia
+    assert "controller_base_actuators" in flight.description
+    again = tmp_path / "resolved.yaml"
+    again.write_text(yaml.safe_dump(tree))
+    assert_same_bits(log, flown(space_robot, tmp_path / "second", "--scenario", str(again)))
+    if not as_numbers:
+        words = ("--actuators", "wheels", "--assumed-actuators", assumed, *DURATION)
+        assert_same_bits(log, flown(space_robot, tmp_path / "option", *words))
+
+
+def test_what_is_assumed_as_it_is_is_not_told() -> None:
+    tree = Flight(
+        resolve(FlightPlan(actuators="wheels", assumed_actuators="wheels", duration=0.05))
+    ).scenario.tree
+    assert "assumed_actuators" not in tree

@@ -19,10 +19,19 @@ from space_robot_control.laws.checked import LawError
 
 Array = NDArray[np.float64]
 
+
 PERIOD = 5e-4
+
+
 JOINTS = np.radians([0.0, 120.0, 220.0, 0.0, -10.0, 0.0])
+
+
 UPRIGHT = np.array([1.0, 0.0, 0.0, 0.0])
+
+
 ONES = np.ones(9)
+
+
 DIAGONAL = np.array(H_BAR)
 
 
@@ -50,68 +59,6 @@ LAWS = {
     "pd": law("pd", k_p=300.0 * DIAGONAL, k_d=30.0 * DIAGONAL),
     "pd_feedforward": law("pd_feedforward", k_p=300.0 * DIAGONAL, k_d=30.0 * DIAGONAL),
 }
-INERTIA_OF = {"ctc": True, "nominal": True, "indi": True, "tde_tsmc": False}
-
-
-@pytest.mark.parametrize("controls_base", [True, False])
-@pytest.mark.parametrize("name", INERTIA_OF)
-def test_poles_of_laws_are_their_gains_times_their_inertia(name: str, controls_base: bool) -> None:
-    own = posture(controls_base)
-    linear = linear_law(LAWS[name], own)
-    inertia = own.inertia if INERTIA_OF[name] else np.diag(DIAGONAL[-own.axes :])
-    np.testing.assert_allclose(linear.force_by["error"], 300.0 * inertia, rtol=1e-12)
-    np.testing.assert_allclose(linear.force_by["error_rate"], 30.0 * inertia, rtol=1e-12)
-    np.testing.assert_array_equal(linear.force_by["n_hat"], (name != "ctc") * np.eye(own.axes))
-    assert linear.step.size == 0
-    if name == "ctc":
-        assert linear.estimate is None
-    else:
-        assert linear.estimate is not None
-        np.testing.assert_array_equal(linear.estimate, inertia)
-
-
-def test_a_boundary_layer_counts_with_its_slope_and_switching_does_not() -> None:
-    layer, inertia = linear_law(LAWS["ctc_smc"], posture()), posture().inertia
-    slope = 2.0 / 1e-4 * np.eye(9)
-    np.testing.assert_allclose(layer.force_by["error_rate"], 7.0 * inertia + slope, rtol=1e-9)
-    np.testing.assert_allclose(layer.force_by["error"], 7.0 * slope, rtol=1e-9)
-    for name in ("tde_smc", "tde_stc"):
-        linear = linear_law(LAWS[name], posture())
-        np.testing.assert_allclose(linear.force_by["error_rate"], np.diag(7.0 * DIAGONAL))
-        assert not linear.force_by["error"].any()
-
-
-def test_the_observer_of_adrc_has_its_three_poles() -> None:
-    """At ``1 / (1 + omega_o period)`` on each axis; a triple one is known to the cube root."""
-    linear = linear_law(LAWS["adrc"], posture())
-    assert linear.step.shape == (27, 27)
-    beta = 1.0 / (1.0 + 70.0 * PERIOD)
-    np.testing.assert_allclose(np.linalg.eigvals(linear.step), beta, atol=1e-4)
-    polynomial = np.poly(linear.step[np.ix_([0, 9, 18], [0, 9, 18])])
-    np.testing.assert_allclose(polynomial, np.poly([beta] * 3), atol=1e-9)
-
-
-def test_the_observer_of_dob_has_its_pole_and_reaches_the_force() -> None:
-    """``d_hat`` follows a constant force completely, with the pole ``1 / (1 + g period)``."""
-    linear = linear_law(LAWS["dob"], posture())
-    poles = np.linalg.eigvals(linear.step)
-    pole = 1.0 / (1.0 + 80.0 * PERIOD)
-    np.testing.assert_allclose(np.sort(np.abs(poles)), [0.0] * 9 + [pole] * 9, atol=1e-12)
-    at_rest = np.linalg.solve(np.eye(18) - linear.step, linear.state_by["applied_force"])
-    reached = linear.force_by["applied_force"] + linear.force_by_state @ at_rest
-    np.testing.assert_allclose(reached, np.eye(9), atol=1e-9)
-
-
-def test_feedforward_moves_the_base_as_the_joints_need() -> None:
-    """``F_b = PD + H_bq H_qq^-1 F_q``, so that only PD turns the base."""
-    linear, inertia = linear_law(LAWS["pd_feedforward"], posture()), posture().inertia
-    pd = np.diag(300.0 * DIAGONAL)
-    share = inertia[:3, 3:] @ np.linalg.inv(inertia[3:, 3:])
-    expected = pd.copy()
-    expected[:3] += share @ pd[3:]
-    np.testing.assert_allclose(linear.force_by["error"], expected, rtol=1e-9, atol=1e-9)
-    moved = np.linalg.solve(inertia, expected)
-    np.testing.assert_allclose(moved[:3, 3:], 0.0, atol=1e-9 * np.abs(moved).max())
 
 
 @pytest.mark.parametrize("name", LAWS)
@@ -214,13 +161,6 @@ class Failing(Steps):
 def test_a_law_that_fails_is_named() -> None:
     with pytest.raises(LawError, match="controller failing failed"):
         linear_law(Failing({"k": ONES}, PERIOD), posture())
-
-
-def test_the_law_is_not_changed() -> None:
-    own = LAWS["adrc"]
-    before = own.gains_block.tobytes(), own.memory_block.tobytes()
-    linear_law(own, posture(), 2.0)
-    assert (own.gains_block.tobytes(), own.memory_block.tobytes()) == before
 
 
 @pytest.mark.parametrize("name", ["tde_tsmc", "nominal", "indi", "dob", "adrc"])

@@ -1,8 +1,10 @@
-"""The method of ``gains tune`` against what it promises."""
+"""The method of ``gains tune`` against what it promises; noise and lag against formulas."""
 
 from __future__ import annotations
 
 import functools
+import math
+from typing import Any
 
 import numpy as np
 import pytest
@@ -15,15 +17,16 @@ from space_robot.tuning.equal_ripple import LINEAR_SHARE
 from space_robot.tuning.held_ripple import law_ripple
 from space_robot.tuning.inertia import SAMPLING, inertia_along
 from space_robot.tuning.method import Tuned, tune
-from space_robot.tuning.noise import Noise
+from space_robot.tuning.noise import Noise, listen
 from space_robot.tuning.postures import Posture, postures_along
 from space_robot.tuning.spectrum import eigenvalues
 from space_robot.tuning.switching_ripple import switching_ripple
 from space_robot.tuning.task import TuningOptions, TuningTask, axis_inertia
-from space_robot_control.laws import laws
 from space_robot_msgs_py.errors import InputError
 
 Array = np.ndarray
+
+
 PERIOD = 5e-4
 
 
@@ -84,45 +87,10 @@ def test_conditions_of_the_laws_hold() -> None:
     assert inside.max() == pytest.approx(found.model_bandwidth, rel=0.02)
 
 
-def test_a_lag_of_the_navigation_makes_it_slower_not_weaker() -> None:
-    quick, slow = (tuned(TuningOptions(0.05, 0.2), lag=lag) for lag in (0.0, 0.02))
-    assert slow.delay == pytest.approx(quick.delay + 0.02)
-    assert slow.bandwidth < quick.bandwidth / 5.0
-    np.testing.assert_array_equal(slow.gains["tde_stc"]["h_bar"], quick.gains["tde_stc"]["h_bar"])
-
-
 def test_a_bandwidth_beyond_the_estimates_is_refused() -> None:
     assert tuned(TuningOptions(0.05, 0.2, bandwidth=3.0)).gains["ctc"]["k_p"][0] == 9.0
     with pytest.raises(InputError, match=r"at most 13\.\d rad/s.*got 20"):
         tuned(TuningOptions(0.05, 0.2, bandwidth=20.0))
-
-
-def test_all_laws_of_the_house_get_all_their_gains() -> None:
-    found = tuned(TuningOptions(0.05, 0.2))
-    assert found.gains.keys() == laws().keys()
-    for name, law in laws().items():
-        assert found.gains[name].keys() == law.gain_descriptions().keys()
-
-
-def test_laws_without_h_bar_have_poles_and_inertia_of_the_method() -> None:
-    found, inertia = tuned(TuningOptions(0.05, 0.2)), scene()[0]
-    free = 1.0 / np.diagonal(np.linalg.inv(inertia), axis1=1, axis2=2)
-    d = free.min(axis=0)
-    for law in ("pd", "pd_feedforward"):
-        gains = found.gains[law]
-        np.testing.assert_allclose(gains["k_d"], 2.0 * 100.0 * d, rtol=0.01)
-        np.testing.assert_allclose(gains["k_p"], 100.0**2 * d, rtol=0.01)
-    dob, h_bar = found.gains["dob"], np.asarray(found.gains["tde_stc"]["h_bar"])
-    weight = 1.0 - np.exp(-2.0 * np.pi * found.corner_hz * PERIOD)
-    np.testing.assert_array_equal(dob["inertia"], h_bar)
-    per_tick = dob["bandwidth"] * PERIOD
-    np.testing.assert_allclose(per_tick / (1.0 + per_tick), weight, rtol=0.01)
-    np.testing.assert_allclose(dob["k_p"], found.bandwidth**2, rtol=0.01)
-    adrc = found.gains["adrc"]
-    np.testing.assert_array_equal(adrc["inertia"], h_bar)
-    np.testing.assert_allclose(3.0 / adrc["omega_o"], PERIOD / weight, rtol=0.01)  # the same lag
-    assert np.all(adrc["omega_c"] <= adrc["omega_o"] / 4.0)
-    np.testing.assert_allclose(adrc["omega_c"], found.bandwidth, rtol=0.01)
 
 
 def test_adrc_has_less_inertia_where_its_three_poles_would_be_unstable() -> None:
@@ -135,71 +103,6 @@ def test_adrc_has_less_inertia_where_its_three_poles_would_be_unstable() -> None
     for value, is_stable in ((largest, True), (8.9, True), (9.1, False)):
         roots = np.roots([1.0, 3.0, 3.0, value])
         assert bool(roots.real.max() < 0.0) is is_stable
-
-
-def test_indi_waits_for_its_estimate_alone() -> None:
-    """Its pole is at the smallest eigenvalue of ``H_S'^-1 H_S``, over the lag of the low-pass."""
-    found, (inertia, postures, _) = tuned(TuningOptions(0.05, 0.2)), scene()
-    nominal = np.tile([posture.inertia for posture in postures], (2, 1, 1))
-    small = np.linalg.eigvals(np.linalg.solve(1.2 * inertia, nominal)).real.min()
-    weight = 1.0 - np.exp(-2.0 * np.pi * found.corner_hz * PERIOD)
-    bandwidth = small * weight / PERIOD / 4.0
-    assert bandwidth < 100.0
-    np.testing.assert_allclose(found.gains["indi"]["k_d"], 2.0 * bandwidth, rtol=0.01)
-
-
-def test_a_nominal_set_has_no_h_bar_and_is_fast_as_computed_torque() -> None:
-    found = tuned(TuningOptions(0.05, 0.2, h_bar="nominal"))
-    constant = tuned(TuningOptions(0.05, 0.2))
-    for law in ("tde_smc", "tde_tsmc", "tde_stc"):
-        assert not found.gains[law]["h_bar"].any()
-    assert found.h_bar == "nominal"
-    assert found.bandwidth > 5.0 * constant.bandwidth
-    assert found.bandwidth <= found.model_bandwidth
-    assert found.corner_hz > constant.corner_hz
-    for law in ("ctc", "ctc_smc", "pd", "dob", "adrc"):  # they have no part in it
-        for name, values in found.gains[law].items():
-            np.testing.assert_array_equal(values, constant.gains[law][name])
-    # eps: the force that the estimate misses, as acceleration in the worst posture
-    inertia, postures, asked = scene()
-    gap = found.delay * asked.slope + 0.025 * asked.peak
-    accelerations = np.array([np.abs(np.linalg.inv(own)) @ gap for own in inertia])
-    share = found.switching
-    np.testing.assert_allclose(found.error, share * accelerations.max(axis=0), rtol=1e-6)
-    np.testing.assert_allclose(found.gains["tde_smc"]["g"], gap, rtol=0.01)
-    # what K_1 switches by in a tick, through H_S, is a tenth of the largest force on one axis
-    step = 0.5 * PERIOD * found.gains["tde_stc"]["k_1"] ** 2
-    ripple = np.max([np.abs(own.inertia) @ step for own in postures], axis=0)
-    assert 0.0 < share < 1.0
-    np.testing.assert_allclose((ripple / asked.peak).max(), 0.1, rtol=0.02)
-
-
-def test_auto_takes_the_nominal_inertia_where_no_diagonal_will_do() -> None:
-    """Where a constant one has less than a tenth of the bandwidth of computed torque, or asked."""
-    for bandwidth, kind in ((None, "nominal"), (3.0, "constant"), (20.0, "nominal")):
-        found = tuned(TuningOptions(0.05, 0.2, bandwidth=bandwidth, h_bar="auto"))
-        assert found.constant is not None
-        assert found.h_bar == kind
-        own = found.constant.bandwidth
-        assert (own < 0.1 * found.model_bandwidth) is (bandwidth is None)
-
-
-def test_more_margin_than_the_payload_leaves_is_refused() -> None:
-    with pytest.raises(InputError, match=r"margin must be at most 0\.312 .* got 0\.4"):
-        tuned(TuningOptions(0.4, 0.2, h_bar="nominal"))
-
-
-def test_noise_of_the_nominal_estimate_is_that_of_all_axes_together() -> None:
-    inertia, postures, asked = scene()
-    wishes = TuningOptions(0.05, 0.2, h_bar="nominal")
-    noise = white(1e-6)
-    found = tune(inertia, postures, asked, wishes, PERIOD, noise)
-    weight = 1.0 - np.exp(-2.0 * np.pi * found.corner_hz * PERIOD)
-    # white noise through the low-pass of a difference, see test_noise
-    one = np.sqrt(2.0 / (2.0 - weight)) * weight / PERIOD * 1e-6
-    nominal = np.array([posture.inertia for posture in postures])
-    force = one * np.sqrt((nominal**2).sum(axis=2)).max(axis=0)
-    assert (force / asked.peak).max() == pytest.approx(0.1, rel=0.05)
 
 
 def test_every_law_has_the_same_ripple_on_request() -> None:
@@ -280,16 +183,6 @@ def test_noise_is_kept_within_the_ripple_allowed() -> None:
     assert loud.bandwidth == pytest.approx(0.05 / loud.delay / 4.0, rel=1e-3)
 
 
-def test_bandwidth_is_also_what_computed_torque_allows() -> None:
-    inertia, postures, asked = scene()
-    noise = white(1e-9, angle=1e-3)
-    found = tune(inertia, postures, asked, TuningOptions(0.05, 0.2), PERIOD, noise)
-    own = np.diagonal(inertia, axis1=1, axis2=2).max(axis=0)
-    gains = found.gains["ctc"]
-    command = gains["k_d"] * noise.rates + gains["k_p"] * noise.errors
-    assert (own * command.std(axis=0) / asked.peak).max() == pytest.approx(0.1, rel=0.02)
-
-
 def test_noise_beyond_any_low_pass_is_refused() -> None:
     with pytest.raises(InputError, match="allow more ripple"):
         tune(*scene(), TuningOptions(0.05, 0.2), PERIOD, white(10.0))
@@ -313,3 +206,47 @@ def test_axes_that_nothing_is_asked_of_have_gains_as_well() -> None:
                 continue
             busy = np.delete(np.arange(len(values)), idle)
             np.testing.assert_array_equal(values[busy], usual.gains[law][name][busy])
+
+
+@functools.cache
+def heard(sensors: str, navigation: Any = "direct", corner: float = 100.0) -> Noise:
+    own = {"navigation_filter.rate_filter_hz": corner, "navigation_filter.joint_bandwidth_hz": 0.0}
+    plan = FlightPlan(
+        sensors=sensors, navigation=navigation, case="3", parameters={"controller": own}
+    )
+    flight = Flight(resolve(plan))
+    return listen(
+        flight.robot,
+        flight.plant_settings,
+        flight.controller_settings.filter_settings,
+        flight.mission_settings,
+        flight.period,
+    )
+
+
+def test_ideal_sensors_have_none() -> None:
+    found = heard("ideal")
+    assert not found.rates.any()
+    assert found.lag == 0.0
+
+
+def test_white_noise_has_the_size_it_is_given() -> None:
+    found = heard("white_l1")  # 1e-6 and 1e-5 rad/s; J0 = E / 2
+    np.testing.assert_allclose(found.rates.std(axis=0), [5e-7] * 3 + [1e-5] * 6, rtol=0.05)
+    np.testing.assert_allclose(found.errors.std(axis=0), [5e-6] * 3 + [1e-5] * 6, rtol=0.05)
+    assert np.abs(np.corrcoef(found.rates.T) - np.eye(9)).max() < 0.05
+
+
+@pytest.mark.parametrize("weight", [1.0, 0.3, 0.02])
+def test_acceleration_is_that_of_a_low_pass_of_differences(weight: float) -> None:
+    """Variance of ``w (v_k - v_k-1) / (1 - (1 - w) z^-1)``: ``2 w^2 / (2 - w)`` of that of v."""
+    expected = math.sqrt(2.0 / (2.0 - weight)) * weight / PERIOD
+    found = heard("white_l1").acceleration(weight)
+    np.testing.assert_allclose(found, np.array([5e-7] * 3 + [1e-5] * 6) * expected, rtol=0.06)
+
+
+@pytest.mark.parametrize("corner", [20.0, 100.0])
+def test_lag_is_that_of_both_low_passes(corner: float) -> None:
+    weight = 1.0 - math.exp(-2.0 * math.pi * corner * PERIOD)
+    expected = 2.0 * PERIOD * (1.0 - weight) / weight
+    assert heard("ideal", "filtered", corner).lag == pytest.approx(expected, rel=1e-6)

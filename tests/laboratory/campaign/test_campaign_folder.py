@@ -1,0 +1,402 @@
+"""A campaign's folder: journal, table and manifest; what somebody has changed in it is told."""
+
+from __future__ import annotations
+
+import multiprocessing
+import shutil
+import subprocess
+import sys
+import warnings
+from collections.abc import Callable, Iterable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from space_robot.campaign.flown import Campaign, FlownCampaign
+from space_robot.campaign.report.findings import Findings
+from space_robot.campaign.report.subject import subject_of
+from space_robot.campaign.row.row import Row, Task
+from space_robot.campaign.store.folder import begin_or_resume, held_folder
+from space_robot.campaign.store.journal import Journal
+from space_robot.campaign.store.journal_codec import JournalCodec
+from space_robot.campaign.store.journal_file import damage_of, write_journal
+from space_robot.campaign.store.manifest import Manifest, read_manifest
+from space_robot.campaign.store.schema import Schema
+from space_robot.campaign.store.software import file_digests, source_digest
+from space_robot.campaign.store.table import table_rows, write_table
+from space_robot.campaign.study import Study
+from space_robot.campaign.verdicts.requirements import verdicts
+from space_robot_control.laws.trust import NotTrustedError
+from space_robot_msgs_py.errors import InputError
+
+pytest.importorskip("pyarrow")
+
+
+CONTENT: dict[str, Any] = {
+    "scenario": {"case": "3", "duration": 0.01},
+    "laws": ["tde_stc", "ctc"],
+    "vary": {"robot.links[*].mass": {"normal": 1.0, "sigma": 0.05, "relative": True}},
+    "require": {
+        "pointing": {"metric": "attitude_max", "below": 1e-9, "in": 0.9},
+        "late": {"metric": "attitude_rms", "from_s": 0.005, "below": 1.0, "in": 0.9},
+    },
+}
+
+
+CAMPAIGN = Campaign.of(CONTENT)
+
+
+def numbers(folder: Path, study: Study | None = None) -> tuple[str, list[str]]:
+    """All that a report is made of, and its remarks on the folder."""
+    subject = subject_of(FlownCampaign.open(folder), study)
+    judged = verdicts(subject.table, subject.study, subject.runs)
+    text = f"{subject.table.to_dict('list')} {judged} {subject.seed} {subject.runs} {subject.about}"
+    return text, list(subject.remarks)
+
+
+def run(folder: Path, warn: Callable[[str], object] = warnings.warn) -> FlownCampaign:
+    return CAMPAIGN.run(2, 7, folder, workers=0, warn=warn)
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return run(tmp_path_factory.mktemp("campaigns") / "whole").folder
+
+
+@pytest.fixture(scope="module")
+def reported(whole: Path) -> str:
+    found, remarks = numbers(whole)
+    assert not remarks
+    return found
+
+
+@pytest.fixture
+def copy(whole: Path, tmp_path: Path) -> Path:
+    return Path(shutil.copytree(whole, tmp_path / "copy"))
+
+
+def test_the_study_that_was_flown_counts(copy: Path, reported: str) -> None:
+    text = (copy / "campaign.yaml").read_text()
+    (copy / "campaign.yaml").write_text(text.replace("1.0e-09", "1.0"))
+    found, remarks = numbers(copy)
+    assert found == reported
+    assert "require.pointing.below: 1e-09 was flown, 1.0 is in the file now" in remarks[0]
+    opened = FlownCampaign.open(copy)
+    assert [v.word for v in opened.verdicts] == [v.word for v in run(copy).verdicts]
+
+
+def test_another_study_judges_the_same_rows(whole: Path, reported: str) -> None:
+    def asked(**other: Any) -> Study:
+        return Study.model_validate({**CONTENT, **other}).named("other.yaml")
+
+    table = FlownCampaign.open(whole).table
+    require = {
+        "by_rms": {"metric": "attitude_rms", "below": 1.0, "in": 0.5},
+        "late_again": {**CONTENT["require"]["late"], "below": 1e-30},
+    }
+    subject = subject_of(FlownCampaign.open(whole), asked(require=require, runs=9))
+    assert subject.table["require.by_rms"].equals(table["metric.attitude_rms"])
+    assert subject.table["require.late_again"].equals(table["require.late"])
+    assert "require.pointing" not in subject.table
+    failures = {v.requirement: v.failures for v in Findings(subject).verdicts}
+    assert failures == {"by_rms": 0, "late_again": 2}
+    assert subject.remarks == ["The requirements are those of other.yaml."]
+    assert numbers(whole)[0] == reported
+    for other, said in (
+        ({"laws": ["ctc"]}, "other.yaml: laws: .* was flown"),
+        ({"scenario": {"case": "1", "duration": 0.01}}, "scenario.case: '3' was flown, not '1'"),
+        (
+            {"require": {"p": {**CONTENT["require"]["late"], "from_s": 0.006}}},
+            r"other.yaml: require.p: the rows have no attitude_rms in that window",
+        ),
+    ):
+        with pytest.raises(InputError, match=said):
+            subject_of(FlownCampaign.open(whole), asked(**other))
+
+
+LAW = """
+from typing import ClassVar
+from space_robot_control.laws import ControlLaw, LawGains
+class Free(ControlLaw):
+    name: ClassVar[str] = "free"
+    gains_type: ClassVar[type[LawGains]] = LawGains
+    def force(self, signals):
+        return self.memory.force
+"""
+
+
+def test_a_folder_imports_and_opens_nothing_unless_it_is_trusted(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "law_of_somebody.py").write_text(LAW)
+    case = tmp_path / "case.yaml"
+    monkeypatch.syspath_prepend(tmp_path)
+    for number, other in enumerate(
+        (
+            {"laws": ["ctc", "law_of_somebody:Free"]},
+            {
+                "laws": ["ctc"],
+                "scenario": {
+                    "duration": 0.01,
+                    "parameters": {"controller": {"controller": "law_of_somebody:Free"}},
+                },
+            },
+            {"laws": [f"ctc={tmp_path}/gains"]},
+            {"vary": {"scenario.case": {"choice": ["1", str(case)]}}},
+            {"scenario": {"duration": 0.01, "events": [f"capture@0.001:{tmp_path}/target.yaml"]}},
+        )
+    ):
+        folder = tmp_path / str(number)
+        folder.mkdir()
+        study = Study.model_validate({**CONTENT, "require": {}, **other})
+        manifest = read_manifest(_flown_anywhere(tmp_path) / "campaign.json")
+        changed = manifest.model_copy(update={"study": study.content})
+        changed.write(folder / "campaign.json")
+        with pytest.raises(NotTrustedError, match=r"only with --trust|--trust imports a"):
+            FlownCampaign.open(folder).rerun(0)
+    assert "law_of_somebody" not in sys.modules
+    mine = Campaign.of({**CONTENT, "require": {}, "laws": ["law_of_somebody:Free"]})
+    flown = mine.run(1, 7, tmp_path / "mine", workers=0)
+    assert flown.rerun(0).is_same
+    with pytest.raises(NotTrustedError, match="the campaign uses the law"):
+        FlownCampaign.open(tmp_path / "mine").rerun(0)
+    assert FlownCampaign.open(tmp_path / "mine", trust=True).rerun(0).is_same
+
+
+def _flown_anywhere(tmp_path: Path) -> Path:
+    folder = tmp_path / "shipped"
+    if not folder.exists():
+        run(folder)
+        assert FlownCampaign.open(folder).rerun(1, "ctc").is_same
+    return folder
+
+
+BOTH = ["tde_stc", "ctc=tuned"]
+
+
+SCHEMA = Schema(
+    grid={},
+    vary={"mass": "float64", "word": "str"},
+    metrics=["m"],
+    require=["r"],
+    bands=["s"],
+    bins=3,
+)
+
+
+FLOATS = st.floats(allow_nan=False, allow_infinity=False)
+
+
+@st.composite
+def rows(draw: st.DrawFn) -> Row:
+    task = Task(draw(st.integers(0, 20)), draw(st.sampled_from(BOTH)))
+    vary = {"mass": draw(FLOATS), "word": draw(st.sampled_from(["a", "ß\n"]))}
+    if draw(st.booleans()):
+        return Row(task, "diverged", draw(st.text(max_size=5)), draw(FLOATS), vary).digested()
+    band = np.array(draw(st.lists(st.floats(width=32), min_size=3, max_size=3)), np.float32)
+    return Row(
+        task,
+        "complete",
+        "",
+        draw(FLOATS),
+        vary,
+        {"m": draw(FLOATS)},
+        {"r": draw(FLOATS)},
+        {"s": band},
+    ).digested()
+
+
+CODEC = JournalCodec("campaign", BOTH)
+
+
+def journal_of(path: Path, rows: Iterable[Row] = ()) -> Journal:
+    write_journal(path, CODEC, rows)
+    return Journal(path, CODEC)
+
+
+@settings(max_examples=12)
+@given(st.lists(rows(), max_size=8), st.randoms(use_true_random=False))
+def test_order_of_arrival_leaves_no_trace(
+    tmp_path_factory: pytest.TempPathFactory, found: list[Row], random: object
+) -> None:
+    folder = tmp_path_factory.mktemp("store")
+    unique = list({row.task: row for row in found}.values())
+    with journal_of(folder / "one.db", unique) as journal:
+        kept = list(journal.rows(100))
+        write_table(folder / "one", SCHEMA, "c", kept)
+    random.shuffle(unique)  # type: ignore[attr-defined]
+    with journal_of(folder / "two.db", unique[::2]) as journal:
+        for row in unique[1::2]:
+            journal.add(row)
+        write_table(folder / "two", SCHEMA, "c", journal.rows(100))
+    assert (folder / "one").read_bytes() == (folder / "two").read_bytes()
+    expected = sorted(unique, key=lambda row: (row.task.run, BOTH.index(row.task.law)))
+    assert [row.task for row in kept] == [row.task for row in expected]
+    for ours, theirs in zip(kept, expected, strict=True):
+        assert ours.digest == ours.digested().digest == theirs.digest
+    # the table has all of a row, too
+    write_table(folder / "three", SCHEMA, "c", table_rows(folder / "one", SCHEMA))
+    assert (folder / "one").read_bytes() == (folder / "three").read_bytes()
+
+
+def test_a_row_half_written_is_no_row(tmp_path: Path) -> None:
+    """The process ends by SIGKILL in the middle of a transaction."""
+    path = tmp_path / "journal.db"
+    with journal_of(path) as journal:
+        journal.add(Row(Task(0, "tde_stc"), "complete"))
+    script = (
+        "import os, sqlite3, sys; d = sqlite3.connect(sys.argv[1], isolation_level=None);"
+        "d.execute('BEGIN'); d.execute('PRAGMA cache_size=1');"
+        "[d.execute('INSERT INTO rows VALUES (?,0,?,?,?,?)', (k, 'x', '{}', b'1'*9999, ''))"
+        " for k in range(1, 99)]; os.kill(os.getpid(), 9)"
+    )
+    assert subprocess.run([sys.executable, "-c", script, str(path)], check=False).returncode == -9
+    assert not damage_of(path, CODEC)
+    with Journal(path, CODEC) as journal:
+        assert [row.task.run for row in journal.rows(100)] == [0]
+
+
+@settings(max_examples=25)
+@given(st.sampled_from([10, 4097, 70_000, 2**21]), st.data())
+def test_any_byte_of_any_source_changes_the_digest_of_the_software(
+    tmp_path_factory: pytest.TempPathFactory, size: int, data: st.DataObject
+) -> None:
+    root = tmp_path_factory.mktemp("root")
+    for package in (
+        "space_robot_msgs_py",
+        "space_robot_model",
+        "space_robot_sim/deep",
+        "space_robot_control",
+        "space_robot",
+    ):
+        (root / package).mkdir(parents=True)
+        (root / package / "one.py").write_bytes(b"x" * size)
+    before = source_digest(root)
+    changed = data.draw(st.sampled_from(sorted(root.rglob("*.py"))))
+    place = data.draw(st.sampled_from([0, size // 2, size - 1]) | st.integers(0, size - 1))
+    content = bytearray(changed.read_bytes())
+    content[place] ^= 1
+    changed.write_bytes(content)
+    assert source_digest(root) != before
+    changed.write_bytes(b"x" * size)
+    assert source_digest(root) == before
+    changed.rename(changed.with_name("two.py"))
+    assert source_digest(root) != before
+
+
+def test_a_full_disk_is_told_in_a_line(tmp_path: Path) -> None:
+    with journal_of(tmp_path / "journal.db") as journal:
+        journal.add(Row(Task(0, "tde_stc"), "complete"))
+        pages = journal._database.execute("PRAGMA page_count").fetchone()[0]
+        journal._database.execute(f"PRAGMA max_page_count = {pages}")
+        band = {"s": np.zeros(9999, np.float32)}
+        with pytest.raises(InputError, match=r"database or disk is full; the same command"):
+            journal.add(Row(Task(1, "tde_stc"), "complete", bands=band))
+        assert [row.task.run for row in journal.rows(9)] == [0]
+
+
+def content_of(study: dict[str, object]) -> dict[str, object]:
+    return Study.model_validate(study).content
+
+
+TEXT = "laws: [tde_stc, ctc=tuned]\nvary: {a: {normal: 1.0}}\n"
+
+
+def manifest(**other: object) -> Manifest:
+    content = {
+        "seed": 7,
+        "runs": 20,
+        "study": content_of({"laws": BOTH, "vary": {"a": {"normal": 1.0}}}),
+        "software": {"numpy": "2.0"},
+        "commit": None,
+        "files": {},
+        "flights": {"tde_stc": "f"},
+        "table": SCHEMA.model_dump(),
+    }
+    return Manifest.model_validate({**content, **other})
+
+
+@pytest.mark.parametrize(
+    ("other", "said"),
+    [
+        ({"seed": 8}, "another seed: 7 then, 8 now"),
+        ({"software": {"numpy": "2.1"}}, "another software: numpy: '2.0' then, '2.1' now"),
+        (
+            {"study": content_of({"laws": BOTH, "vary": {"a": {"normal": 2.0}}})},
+            "another file: vary.a.normal: 1.0 then, 2.0 now",
+        ),
+        ({"files": {"my.yaml": "f"}}, "another named file: my.yaml: None then, 'f' now"),
+        ({"runs": 19}, "started with 20 runs, 19 are requested: request 20 or more"),
+    ],
+)
+def test_another_campaign_is_refused_in_a_line(
+    tmp_path: Path, other: dict[str, object], said: str
+) -> None:
+    folder = tmp_path / "a"
+    with held_folder(folder):
+        assert not begin_or_resume(folder, manifest(), TEXT)
+        assert not begin_or_resume(folder, manifest(), TEXT)
+        with pytest.raises(InputError) as refused:
+            begin_or_resume(folder, manifest(**other), TEXT)
+    assert said in str(refused.value)
+    assert "\n" not in str(refused.value)
+    assert read_manifest(folder / "campaign.json") == manifest()
+
+
+def test_more_runs_extend_unless_the_design_forbids(tmp_path: Path) -> None:
+    for design, name in (("sobol", "a"), ("latin_hypercube", "b")):
+        study = content_of({"laws": BOTH, "design": design})
+        with held_folder(tmp_path / name):
+            begin_or_resume(tmp_path / name, manifest(study=study), "")
+            if design == "sobol":
+                begin_or_resume(tmp_path / name, manifest(study=study, runs=40), "")
+                continue
+            with pytest.raises(InputError, match="latin_hypercube design cannot be extended"):
+                begin_or_resume(tmp_path / name, manifest(study=study, runs=40), "")
+    fixed = content_of({"laws": BOTH, "fixed_runs": True})
+    with held_folder(tmp_path / "c"):
+        begin_or_resume(tmp_path / "c", manifest(study=fixed), "")
+        with pytest.raises(InputError, match="its file has fixed_runs: true"):
+            begin_or_resume(tmp_path / "c", manifest(study=fixed, runs=40), "")
+
+
+def test_one_process_at_a_time(tmp_path: Path) -> None:
+    context = multiprocessing.get_context("fork")
+    ours, theirs = context.Pipe()
+
+    def hold() -> None:
+        try:
+            with held_folder(tmp_path):
+                theirs.send("held")
+        except InputError as error:
+            theirs.send(str(error))
+
+    with held_folder(tmp_path):
+        context.Process(target=hold).start()
+        assert "another process is flying this campaign" in ours.recv()
+    context.Process(target=hold).start()
+    assert ours.recv() == "held"
+
+
+def test_a_folder_of_something_else_is_left_alone(tmp_path: Path) -> None:
+    (tmp_path / "thesis.tex").write_text("x")
+    said = r"contains thesis\.tex and no "
+    with pytest.raises(InputError, match=said), held_folder(tmp_path):
+        pass
+    assert [path.name for path in tmp_path.iterdir()] == ["thesis.tex"]
+
+
+def test_of_the_names_in_a_file_those_of_settings_and_laws_are_digested(tmp_path: Path) -> None:
+    """Not a folder, and not a file of another kind that a text happens to name."""
+    settings_file, law, other = (tmp_path / name for name in ("a.yaml", "law.py", "notes.txt"))
+    for file in (settings_file, law, other):
+        file.write_text(file.name)
+    (tmp_path / "folder.yaml").mkdir()
+    names = [str(settings_file), f"{law}:Law", str(other), str(tmp_path / "folder.yaml"), "b.yaml"]
+    found = file_digests({"values": names})
+    assert set(found) == {str(settings_file), str(law)}
+    assert found[str(settings_file)] != found[str(law)]

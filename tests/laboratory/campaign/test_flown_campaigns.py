@@ -1,0 +1,317 @@
+"""A campaign's table depends on file, seed and runs alone: not on workers, kills, or extensions."""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import random
+import signal
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import yaml
+from hypothesis import example, given, settings
+from hypothesis import strategies as st
+from robots import driven_paper
+
+from space_robot import load_bag
+from space_robot.campaign.flown import Campaign, FlownCampaign, campaign, flights, precision
+from space_robot.campaign.flown.flights import Progress
+from space_robot.campaign.flown.precision import CHECKED_EVERY, Precision
+from space_robot.campaign.report.findings import Findings
+from space_robot.campaign.report.subject import subject_of
+from space_robot.campaign.row.row import Row, Task
+from space_robot.campaign.study import Study
+from space_robot.campaign.verdicts.share_test import Sequential
+from space_robot.flight.compilation import compile_kernels
+from space_robot.processes.pool import Done, WorkerDiedError, run_many
+from space_robot_msgs_py.errors import InputError
+
+pytest.importorskip("pyarrow")
+
+
+RUNS = 20
+
+
+CONTENT: dict[str, Any] = {
+    "scenario": {"case": "3", "sensors": "fine", "duration": 0.2},
+    "laws": ["tde_stc", "ctc=tuned"],
+    "vary": {
+        "robot.links[*].mass": {"normal": 1.0, "sigma": 0.05, "relative": True},
+        "scenario.sensors": {"choice": ["fine", "ideal"]},
+    },
+    "require": {"pointing": {"metric": "attitude_max", "from_s": 0.1, "below": 1e-6, "in": 0.9}},
+}
+
+
+def study(**other: Any) -> Study:
+    return Study.model_validate({**CONTENT, **other})
+
+
+@pytest.fixture(scope="module")
+def undisturbed(tmp_path_factory: pytest.TempPathFactory) -> FlownCampaign:
+    """In this process."""
+    folder = tmp_path_factory.mktemp("campaigns") / "undisturbed"
+    return Campaign(study()).run(RUNS, 7, folder, workers=0)
+
+
+def table_of(folder: Path) -> bytes:
+    return (folder / "table.parquet").read_bytes()
+
+
+def test_killed_again_and_again_it_has_the_same_table(
+    undisturbed: FlownCampaign, tmp_path: Path
+) -> None:
+    """By SIGKILL, after some flights and a little more, with one worker and with two."""
+    compile_kernels()
+    chance, context = random.Random(5), multiprocessing.get_context("fork")
+    folder, kept = tmp_path / "killed", []
+
+    def fly(workers: int, end: Any) -> None:
+        def told(progress: Progress) -> None:
+            end.send(progress.done)
+
+        Campaign(study()).run(RUNS, 7, folder, workers=workers, progress=told)
+
+    for kill in range(6):
+        ours, theirs = context.Pipe(duplex=False)
+        process = context.Process(target=fly, args=(1 + kill % 2, theirs))
+        process.start()
+        theirs.close()
+        try:
+            first = ours.recv()
+            kept.append(first)
+            for _ in range(chance.randint(0, 1)):  # groups of flights
+                ours.recv()
+        except EOFError:  # all is flown
+            process.join()
+            break
+        process.join(chance.uniform(0.0, 0.03))
+        os.kill(process.pid or 0, signal.SIGKILL)
+        process.join()
+        ours.close()
+    assert kept == sorted(kept)
+    assert len(kept) > 2
+    assert kept[-1] > 0
+    found = Campaign(study()).run(RUNS, 7, folder, workers=2)
+    assert found.kept >= kept[-1]
+    assert table_of(folder) == table_of(undisturbed.folder)
+
+
+def test_more_runs_extend_it(undisturbed: FlownCampaign, tmp_path: Path) -> None:
+    few = Campaign(study()).run(3, 7, tmp_path / "a", workers=0)
+    assert len(few.table) == 6
+    Campaign(study()).run(RUNS, 7, tmp_path / "a", workers=0)
+    assert table_of(tmp_path / "a") == table_of(undisturbed.folder)
+
+
+def test_ctrl_c_leaves_the_table_of_what_is_done(
+    undisturbed: FlownCampaign, tmp_path: Path
+) -> None:
+    def told(progress: Progress) -> None:
+        if progress.done >= 5:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        Campaign(study()).run(RUNS, 7, tmp_path / "a", workers=0, progress=told)
+    rows, key = FlownCampaign.open(tmp_path / "a").table, ["run", "law"]
+    assert 5 <= len(rows) < 2 * RUNS
+    every = undisturbed.table.set_index(key)["digest"]
+    assert rows.set_index(key)["digest"].equals(every[rows.set_index(key).index])
+
+
+def test_any_row_flies_again_to_the_same_bits(undisturbed: FlownCampaign) -> None:
+    for law in (None, "ctc=tuned"):
+        again = FlownCampaign.open(undisturbed.folder).rerun(11, law)
+        assert again.is_same, again.verdict
+        assert again.log.ticks == 400
+    with pytest.raises(InputError, match=r"run 20: .* has no row of this run"):
+        undisturbed.rerun(20)
+    with pytest.raises(InputError, match="unknown law 'tde': choose one of tde_stc, ctc=tuned"):
+        undisturbed.rerun(0, "tde")
+
+
+def test_a_flight_whose_worker_died_is_a_row_and_is_tried_again(
+    undisturbed: FlownCampaign, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def run(function: Any, items: Any, **options: Any) -> Iterator[Any]:
+        for done in run_many(function, items, **options):
+            if Task(4, "tde_stc") in done.item:  # with others, then alone
+                yield Done(done.item, None, WorkerDiedError("its process died"))
+            else:
+                yield done
+
+    with monkeypatch.context() as patch:
+        patch.setattr(flights, "run_many", run)
+        found = Campaign(study()).run(RUNS, 7, tmp_path / "a", workers=0)
+    row = found.table.iloc[8]
+    assert (row["outcome"], row["reason"]) == ("killed", "its process died")
+    assert row["vary.scenario.sensors"] == undisturbed.table.iloc[8]["vary.scenario.sensors"]
+    assert (found.table["outcome"] == "complete").sum() == 2 * RUNS - 1
+    Campaign(study()).run(RUNS, 7, tmp_path / "a", workers=0)
+    assert table_of(tmp_path / "a") == table_of(undisturbed.folder)
+
+
+def test_it_stops_at_a_precision_whoever_flies_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    content = {**CONTENT, "laws": ["tde_stc"], "scenario": {"duration": 0.005}}
+    content["require"] = {"p": {"metric": "attitude_max", "below": 1.0, "in": 0.9}}
+    content["vary"] = {"scenario.case": {"grid": ["1", "2"]}}
+    content["until"] = {"half_width": 0.4, "runs": 50}
+    monkeypatch.setattr(precision, "CHECKED_EVERY", 5)
+    asked = Campaign(Study.model_validate(content))
+    one = asked.run(out=tmp_path / "one", workers=0)
+    asked.run(out=tmp_path / "two", workers=2)
+    assert one.table["vary.scenario.case"].value_counts().tolist() == [5, 5]
+    remarks = Findings(subject_of(one)).remarks
+    assert not any("not finished" in remark for remark in remarks)
+    assert table_of(tmp_path / "one") == table_of(tmp_path / "two")
+
+
+def test_failures_are_kept_as_bags(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    keep = Campaign(study(keep={"bag": "on_failure"}, scenario={"duration": 0.05}, vary={}))
+    keep.study.require["pointing"] = keep.study.require["pointing"].model_copy(
+        update={"below": 1e-30, "from_s": 0.0}
+    )
+    (tmp_path / "a/bags/.0_tde_stc").mkdir(parents=True)
+    (tmp_path / "a/campaign.yaml").write_text("")
+    with pytest.raises(InputError, match="another one"):
+        keep.run(1, 7, tmp_path / "a", workers=0)
+    found = keep.run(1, 7, tmp_path / "b", workers=0)
+    kept = sorted(path.name for path in (tmp_path / "b/bags").iterdir())
+    assert kept == ["0_ctc=tuned", "0_tde_stc"]
+    bag = load_bag(tmp_path / "b/bags/0_ctc=tuned")
+    assert (bag.quaternion == found.rerun(0, "ctc=tuned").log.quaternion).all()
+    (tmp_path / "b/bags/0_tde_stc").rename(tmp_path / "b/bags/.0_tde_stc")  # killed while at it
+    keep.run(1, 7, tmp_path / "b", workers=0)
+    assert sorted(path.name for path in (tmp_path / "b/bags").iterdir()) == kept
+    assert campaign.bag_name(Task(3, "ctc=my/gains")) == "3_ctc=my_gains"
+
+
+def test_without_a_folder_it_lasts_as_long_as_the_object() -> None:
+    found = Campaign(study(vary={}, scenario={"duration": 0.02}, require={})).run(1, workers=0)
+    folder = found.folder
+    assert len(found.table) == 2
+    assert not found.verdicts
+    del found
+    assert not folder.exists()
+
+
+GEARS: dict[str, Any] = {
+    "robot.joints[*].drive.stiffness": {"log_uniform": [0.5, 2.0], "relative": True},
+    "robot.joints[*].drive.damping": {"uniform": [0.0, 2.0], "relative": True},
+    "robot.joints[joint3].drive.rotor_inertia": {"uniform": [0.9, 1.1], "relative": True},
+}
+
+
+WORLD: dict[str, Any] = {
+    "scenario.orbit": {"grid": ["iss", "sso_700"]},
+    "plant.orbital_elements.height": {"log_uniform": [300e3, 1000e3]},
+    "plant.sunlight.beta_angle_deg": {"uniform": [-75, 75]},
+    "robot.plates.area": {"normal": 1.0, "sigma": 0.2, "relative": True},
+    "robot.plates[*].diffuse": {"uniform": [0.1, 0.3]},
+}
+
+
+DRIVEN_RUNS = 10
+
+
+def fly_driven(folder: Path, vary: dict[str, Any], **scenario: Any) -> FlownCampaign:
+    """In this process, eight flights at once where they can be."""
+    (folder / "paper.yaml").write_text(yaml.safe_dump(driven_paper()))
+    content = {
+        "scenario": {"robot": "paper.yaml", "case": "3", "duration": 0.1, **scenario},
+        "laws": ["tde_stc"],
+        "vary": vary,
+        "require": {"pointing": {"metric": "attitude_max", "below": 1e-3, "in": 0.9}},
+    }
+    (folder / "campaign.yaml").write_text(yaml.safe_dump(content))
+    return Campaign.load("campaign.yaml").run(DRIVEN_RUNS, 5, folder / "flown", workers=0)
+
+
+@pytest.fixture
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """An empty working folder."""
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def test_orbits_gears_and_plates(here: Path) -> None:
+    flown = fly_driven(here, WORLD | GEARS, orbit="iss")
+    table = flown.table
+    assert len(table) == DRIVEN_RUNS
+    assert set(table["outcome"]) == {"complete"}
+    assert table["digest"].is_unique
+    assert table["vary.scenario.orbit"].tolist() == ["iss", "sso_700"] * (DRIVEN_RUNS // 2)
+    assert table["vary.robot.joints[joint5].drive.stiffness"].between(0.5, 2.0).all()
+    for run in (3, 8):
+        again = FlownCampaign.open(flown.folder, trust=True).rerun(run)
+        assert again.is_same, again.verdict
+        assert again.log.geared_names == ("joint2", "joint3", "joint5")
+        radius = 6378137.0 + table["vary.plant.orbital_elements.height"][run]
+        assert (again.log.orbit_position**2).sum(axis=1) ** 0.5 == pytest.approx(radius, rel=2e-3)
+
+
+BOTH, SENSORS = ("tde_stc", "ctc"), ("fine", "coarse", "ideal")
+
+
+DRAWS = 3 * CHECKED_EVERY
+
+
+BOUNDS = {"p": 1.0, "q": 2.0}
+
+
+def precise_study(half_width: float, points: int) -> Study:
+    return Study.model_validate(
+        {
+            "laws": BOTH,
+            "vary": {"scenario.sensors": {"grid": SENSORS[:points]}},
+            "require": {
+                name: {"metric": "attitude_max", "below": bound, "in": 0.9}
+                for name, bound in BOUNDS.items()
+            },
+            "until": {"half_width": half_width, "runs": points * DRAWS},
+        }
+    )
+
+
+@settings(max_examples=12, deadline=None)
+@given(
+    st.integers(1, 3),
+    st.sampled_from([0.07, 0.1, 0.13]),
+    st.integers(0, 2**32 - 1),
+    st.lists(st.sampled_from([0.5, 0.9, 1.0]), min_size=6, max_size=6),
+)
+@example(3, 0.1, 0, [0.5, 0.5, 1.0, 1.0, 1.0, 1.0])
+@example(3, 0.1, 0, [1.0, 1.0, 1.0, 0.5, 1.0, 1.0])
+@example(3, 0.1, 0, [1.0, 1.0, 1.0, 1.0, 0.5, 1.0])
+def test_the_stop_is_the_first_look_at_which_all_are_narrow_at_each_point(
+    points: int, half_width: float, seed: int, rates: list[float]
+) -> None:
+    """In whole draws: every point and every law has flown as often."""
+    runs, rng = points * DRAWS, np.random.default_rng(seed)
+    frequency = np.resize(rates, (points, 2))
+    met = rng.uniform(size=(DRAWS, points, 2)) < frequency
+    values = np.where(met, 0.5, np.where(rng.uniform(size=met.shape) < 0.5, 1.5, 2.5))
+    rows = [
+        Row(Task(draw * points + point, law), "complete", require=dict.fromkeys(BOUNDS, value))
+        for draw in range(DRAWS)
+        for point in range(points)
+        for law, value in zip(BOTH, values[draw, point].tolist(), strict=True)
+    ]
+    precision = Precision(precise_study(half_width, points), runs, {"scenario.sensors": points})
+    for index in rng.permutation(len(rows)).tolist():
+        precision.add(rows[index])
+    expected = runs
+    for draws in range(CHECKED_EVERY, DRAWS + 1, CHECKED_EVERY):
+        failures = [(values[:draws] >= bound).sum(axis=0) for bound in BOUNDS.values()]
+        intervals = [Sequential(0.9, 0.9).interval(int(k), draws) for k in np.ravel(failures)]
+        if max(interval.half_width for interval in intervals) <= half_width:
+            expected = draws * points
+            break
+    assert precision.stop == expected
+    assert precision.is_reached == (expected < runs) or expected == runs

@@ -1,0 +1,176 @@
+"""What users mistype and what is wrong in their files: one line that says so, and exit code 2."""
+
+from __future__ import annotations
+
+import copy
+import os
+import re
+import shlex
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import pytest
+import yaml
+from command import Run
+from flights import space_robot as started
+from paths import CONFIG, DATA
+from robots import driven_paper
+
+from space_robot.flight.plan import Flight, FlightPlan, resolve
+from space_robot.flight.simulate import simulate
+from space_robot_model.robot.plate_file import MOST_PLATES
+from space_robot_sim.environment import surfaces
+from space_robot_sim.plant.gear_mounting import MOST_SUBSTEPS
+from space_robot_sim.plant.plant import PlantSettings
+
+URDF = (DATA / "docs.urdf").read_text("utf-8")
+
+
+PAPER = (CONFIG / "robots/paper.yaml").read_text("utf-8")
+
+
+MADE = {
+    "my.urdf": URDF,
+    "no_mass.urdf": URDF.replace('<mass value="10"/>', '<mass value="-10"/>'),
+    "no_link.urdf": URDF.replace('<parent link="upper_arm"/>', '<parent link="uper_arm"/>'),
+    "no_end.urdf": URDF.replace("</robot>", ""),
+    "kg.yaml": re.sub(r"mass: ([\d.]+)", r"mass: \1 kg", PAPER, count=1),
+    "arm.urdf": (DATA / "arm.urdf").read_text("utf-8"),
+    "ets.yaml": (CONFIG / "robots/ets_vii.yaml").read_text("utf-8"),
+    "paper.yaml": yaml.safe_dump(driven_paper()),
+}
+"""Files that are no lines of a table."""
+
+
+class Group(NamedTuple):
+    """Rows of a table: the words typed, or what is in the file, and what is said."""
+
+    rows: list[list[Any]]
+    files: dict[str, str]
+    command: str = ""
+    made: tuple[str, ...] = ()
+    file: str = ""
+    """Whose content is that of the row, or of ``base`` with the row's values by key."""
+    base: Any = None
+    at: str = ""
+
+
+GROUPS = {
+    f"{table.stem}-{name}": Group(**{"files": {}, **content})
+    for table in sorted((DATA / "refusals").glob("*.yaml"))
+    for name, content in yaml.safe_load(table.read_text("utf-8")).items()
+}
+
+
+ROWS = [(name, k) for name, group in GROUPS.items() for k in range(len(group.rows))]
+
+
+def put(tree: Any, key: str, value: Any) -> None:
+    *parents, last = key.split(".")
+    for part in parents:
+        tree = tree[int(part)] if isinstance(tree, list) else tree.setdefault(part, {})
+    tree[int(last) if isinstance(tree, list) else last] = value
+
+
+def content_of(group: Group, given: Any) -> str:
+    """The text of the row's file."""
+    if isinstance(given, str):
+        return given
+    base = yaml.safe_load(PAPER) if group.base == "paper" else copy.deepcopy(group.base or {})
+    for key, value in {group.at: given}.items() if group.at else given.items():
+        put(base, key, value)
+    return yaml.safe_dump(base)
+
+
+@pytest.fixture(scope="module")
+def bag(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("bags") / "bag"
+    simulate(Flight(resolve(FlightPlan(controller="ctc", duration=0.3))), path)
+    return path
+
+
+@pytest.fixture
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def make(group: Group, folder: Path, bag: Path) -> None:
+    for name, text in {**{name: MADE.get(name) for name in group.made}, **group.files}.items():
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
+        if text is None:
+            (folder / name).symlink_to(bag)
+        else:
+            (folder / name).write_text(text, "utf-8")
+
+
+def said_is(line: str, said: str) -> bool:
+    """Whether a line is what is expected, but for its dots."""
+    pattern = ".*".join(map(re.escape, said.split("...")))
+    return re.fullmatch(f"space-robot: error: {pattern}", line) is not None
+
+
+@pytest.mark.parametrize(("name", "k"), ROWS)
+def test_what_is_said(name: str, k: int, here: Path, bag: Path, space_robot: Run) -> None:
+    group = GROUPS[name]
+    *given, said = group.rows[k]
+    make(group, here, bag)
+    typed = group.command
+    if group.file:
+        (here / group.file).write_text(content_of(group, given[0]), "utf-8")
+    else:
+        typed = f"{typed} {given[0]}".replace("LONG", 300 * "a")
+    before = sorted(here.rglob("*"))
+    code, out, err = space_robot(*shlex.split(typed))
+    (line,) = err.splitlines()
+    assert said_is(line, said), line
+    assert (code, out) == (2, "")
+    assert sorted(here.rglob("*")) == before
+
+
+@pytest.mark.parametrize("k", [0, 2, 14])
+def test_a_process_of_its_own_says_the_same(k: int, here: Path, bag: Path) -> None:
+    group = GROUPS["commands-typing_errors"]
+    typed, said = group.rows[k]
+    make(group, here, bag)
+    ended = started(*shlex.split(typed))
+    (line,) = ended.stderr.splitlines()
+    assert said_is(line, said), line
+    assert (ended.returncode, ended.stdout) == (2, "")
+
+
+DRIVE = {"rotor_inertia": 1e-4, "gear_ratio": 100.0, "stiffness": 1e9}
+
+
+def test_the_steps_that_an_error_names_would_do(here: Path, space_robot: Run) -> None:
+    """So does the period; one substep less would not."""
+    content = yaml.safe_load(PAPER)
+    content["robot"]["links"][1]["drive"] = DRIVE
+    (here / "paper.yaml").write_text(yaml.safe_dump(content))
+    words = ("simulate", "--robot", "paper.yaml", "--duration", "0.001")
+    said = space_robot(*words).err
+    assert "drive.stiffness of 'joint2' is too large for steps of 0.0005 s: " in said
+    advice = said.partition("; substeps: ")[2].split()
+    substeps, period = int(advice[0]), float(advice[5])
+    assert space_robot(*words, "--set", f"plant.substeps={substeps - 1}").code == 2
+    for better in (["--set", f"plant.substeps={substeps}"], ["--period", str(period)]):
+        assert space_robot(*words, *better).code == 0
+
+
+def test_limits_are_those_of_the_plant(here: Path, space_robot: Run) -> None:
+    assert MOST_PLATES == surfaces.MOST_PLATES
+    bounds = PlantSettings.model_fields["substeps"].metadata
+    assert {MOST_SUBSTEPS} == {bound.le for bound in bounds if hasattr(bound, "le")}
+    content = yaml.safe_load(PAPER)
+    plate = {"area": 1.0, "normal": [1, 0, 0], "centre": [0, 0, 0]}
+    content["robot"]["plates"] = [plate] * (MOST_PLATES + 1)
+    (here / "paper.yaml").write_text(yaml.safe_dump(content))
+    ran = space_robot("simulate", "--robot", "paper.yaml")
+    assert (ran.code, "at most 128 items" in ran.err) == (2, True)
+
+
+def test_a_pipe_for_a_file_is_not_waited_for(here: Path, space_robot: Run) -> None:
+    os.mkfifo(here / "pipe.yaml")
+    for option in ("--robot", "--mission", "--case", "--gains", "--scenario"):
+        ran = space_robot("simulate", option, "pipe.yaml")
+        assert (ran.code, "not a file" in ran.err) == (2, True), option

@@ -1,0 +1,303 @@
+"""The paper's proofs: (46) to (77), Lemma 1, reaching times and figures, by independent code."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from closed_loop import GAINS, H_BAR
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from matplotlib.figure import Figure
+from oracles import rho_space_inertia
+from strategies import Case, cases
+
+from space_robot.analysis.generalised_motion import continuous_error, mean_acceleration
+from space_robot.flight.plan import Flight, FlightPlan, resolve
+from space_robot.flight.simulate import simulate
+from space_robot.paper.stability import figures
+from space_robot.paper.stability.circle_criterion import (
+    largest_tolerated_beta,
+    peak_gain,
+    transfer_function,
+)
+from space_robot.paper.stability.lemma_1 import contraction
+from space_robot.paper.stability.lyapunov import (
+    B,
+    C,
+    certify,
+    largest_gamma,
+    paper_m,
+    residual,
+    shifted_gains,
+    state_matrix,
+)
+from space_robot.paper.stability.reaching import arrival, lyapunov_state, off_mission_plan, ripple
+from space_robot.paper.stability.time_delay_error import error_derivative, time_delay_error
+from space_robot.tuning.spectrum import contraction_matrix
+from space_robot_msgs_py.bag.flight_log import FlightLog
+
+PRINTED = sorted(set(zip(GAINS["tde_stc"]["k_1"], GAINS["tde_stc"]["k_2"], strict=True)))
+
+
+@st.composite
+def gains(draw: st.DrawFn, damped: bool = False) -> tuple[float, float]:
+    """K_1 over four decades, ``4 K_2 / K_1^2`` from 0.04 to 0.96 (damped) or to 20."""
+    k_1 = 10.0 ** draw(st.floats(-3.0, 1.0))
+    return k_1, k_1**2 / 4.0 * draw(st.floats(0.04, 0.96 if damped else 20.0))
+
+
+@given(gains(), st.floats(0.0, 100.0))
+def test_transfer_function_is_that_of_the_state_space(
+    pair: tuple[float, float], ratio: float
+) -> None:
+    """(72) and (74)."""
+    omega = ratio * np.sqrt(pair[1])
+    inverse = np.linalg.inv(1j * omega * np.eye(2) - state_matrix(*pair))
+    assert transfer_function(*pair, np.array(omega)) == pytest.approx((C @ inverse @ B)[0, 0])
+
+
+@pytest.mark.parametrize("pair", [(0.0, 1.0), (1.0, 0.0), (0.0, 0.0)])
+def test_a_gain_of_zero_tolerates_nothing(pair: tuple[float, float]) -> None:
+    assert peak_gain(*pair) == np.inf
+    assert largest_tolerated_beta(*pair) == 0.0
+    assert certify(*pair, 1e-3) is None
+
+
+def feasible(k_1: float, k_2: float, beta: float, gamma: float) -> bool:
+    """Whether Clarabel finds an M for (51), written for K_1 = 1 (time in units of 1 / K_1)."""
+    kappa, b = k_2 / k_1**2, beta / k_1**2
+    a, e = np.array([[-0.5, 0.5], [-kappa, 0.0]]), np.eye(2)
+    import cvxpy as cp  # two seconds, which each test process would take to collect this file
+
+    m, slack = cp.Variable((2, 2), symmetric=True), cp.Variable()
+    # V and phi in units of beta: the corner is C^T C, the disturbance enters through b B
+    corner = a.T @ m + m @ a + gamma / k_1 * m + C.T @ C
+    block = cp.bmat([[corner, b * m @ B], [b * B.T @ m, -np.eye(1)]])
+    constraints = [block << slack * np.eye(3), m >> 0, m << 1e4 * e]
+    problem = cp.Problem(cp.Minimize(slack), constraints)
+    problem.solve(solver=cp.CLARABEL)
+    return bool(problem.status == "optimal" and slack.value <= 1e-7)
+
+
+@pytest.mark.parametrize("pair", [*PRINTED, (0.1, 0.01), (3.0, 1.0)])
+@pytest.mark.parametrize("share", [0.1, 0.5, 0.9])
+def test_largest_gamma_is_that_of_a_semidefinite_program(
+    pair: tuple[float, float], share: float
+) -> None:
+    beta = share * largest_tolerated_beta(*pair)
+    largest = largest_gamma(*pair, beta)
+    assert largest is not None
+    low, high = 0.0, pair[0]
+    while high - low > 1e-4 * largest:
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if feasible(*pair, beta, middle) else (low, middle)
+    assert largest == pytest.approx(low, rel=2e-3)
+
+
+@given(gains(), st.floats(0.01, 0.99))
+def test_certificate_solves_the_lmi(pair: tuple[float, float], share: float) -> None:
+    """M > 0 with a residual not above zero; with 2 % more gamma the frequency condition fails."""
+    limit = largest_tolerated_beta(*pair)
+    certificate = certify(*pair, share * limit)
+    assert certificate is not None
+    assert certificate.gamma > 0.0
+    assert certificate.m_eigenvalues[0] > 0.0
+    assert certificate.residual <= 1e-14
+    omega = np.sqrt(pair[1]) * np.linspace(0.0, 3.0, 20_001)
+    a = state_matrix(*pair) + 0.51 * certificate.gamma * np.eye(2)
+    if np.linalg.eigvals(a).real.max() < 0.0:
+        shifted = shifted_gains(*pair, 1.02 * certificate.gamma)
+        assert np.abs(transfer_function(*shifted, omega)).max() > 1.0 / certificate.beta
+
+
+@given(gains(), st.floats(0.0, 1.0), st.floats(0.0, 1.0))
+def test_paper_m_needs_a_k_1_of_two(pair: tuple[float, float], beta: float, gamma: float) -> None:
+    """The corner of the Schur complement of (51) with (48) is ``-K_1/2 + gamma + 1``."""
+    k_1, k_2 = pair
+    m, a = paper_m(k_1, k_2), state_matrix(k_1, k_2)
+    schur = a.T @ m + m @ a + gamma * m + beta**2 * C.T @ C + m @ B @ B.T @ m
+    assert schur[1, 1] == pytest.approx(-k_1 / 2.0 + gamma + 1.0)
+    if k_1 < 2.0:
+        assert residual(m, k_1, k_2, beta, gamma) > 0.0
+
+
+PAIR = (1.5, 3.0)
+
+
+@pytest.mark.parametrize("measured", [0.0, 0.4])
+def test_a_panel_of_nyquist_has_the_curve_and_the_circles_of_both_betas(measured: float) -> None:
+    panel = Figure().add_subplot()
+    figures._nyquist_panel(panel, PAIR, 0.8, measured)
+    lines = {str(line.get_label()): line.get_xydata() for line in panel.lines}
+    for beta, word in ((0.8, "tolerated"), (measured, "measured")):
+        circles = [xy for label, xy in lines.items() if label.endswith(word)]
+        assert len(circles) == (beta > 0.0)
+        for circle in circles:
+            np.testing.assert_allclose(np.linalg.norm(circle, axis=1), 1.0 / beta, rtol=1e-12)
+            np.testing.assert_allclose(circle[0], circle[-1], atol=1e-12)
+            np.testing.assert_allclose(circle[90], (0.0, 1.0 / beta), atol=1e-12)
+    (curve,) = (xy for label, xy in lines.items() if label.startswith("$G"))
+    half = np.geomspace(1e-3, 1e3, len(curve) // 2) * np.sqrt(PAIR[1] / 2.0)
+    expected = transfer_function(*PAIR, np.concatenate([-half[::-1], half]))
+    np.testing.assert_allclose(curve[:, 0] + 1j * curve[:, 1], expected, rtol=1e-12)
+    reach = 1.1 / 0.8
+    assert panel.get_xlim() == panel.get_ylim() == pytest.approx((-reach, reach))
+
+
+def test_axes_of_the_same_gains_share_a_panel_of_nyquist() -> None:
+    twisting: Any = SimpleNamespace(
+        gains=((2.0, 1.0), (0.0, 0.0), (3.0, 1.0), (2.0, 1.0)),
+        tolerated_beta=np.array([0.5, 0.0, 0.25, 0.5]),
+        beta=np.array([0.2, 9.0, 0.1, 0.125]),
+    )
+    figure = figures.nyquist(twisting, ("base x", "base y", "joint1", "joint2"))
+    titles = [panel.get_title(loc="left") for panel in figure.axes]
+    assert titles == [
+        "base x, joint2\n" r"$\beta$ tolerated 0.5, measured 0.125 or more",
+        "joint1\n" r"$\beta$ tolerated 0.25, measured 0.1 or more",
+    ]
+    for panel, beta in zip(figure.axes, (0.5, 0.25), strict=True):
+        assert panel.get_xlim()[1] == pytest.approx(1.1 / beta)
+    labels = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert len(labels) == len(set(labels)) == 3
+
+
+PERIOD = 0.01
+
+
+def test_arrival_is_the_first_long_stay_below_the_threshold() -> None:
+    s = np.ones((1000, 4))
+    s[300:, 0] = 0.05  # stays
+    s[200:250, 1] = 0.05  # half a second only
+    s[400:600, 1] = -0.05  # two seconds, then pushed off again
+    s[:, 2] = 0.0  # there from the start
+    s[950:, 3] = 0.0  # too late to tell
+    times = arrival(s, np.full(4, 0.1), PERIOD)
+    np.testing.assert_allclose(times[:3], [3.0, 4.0, 0.0])
+    assert np.isnan(times[3])
+
+
+def test_ripple_leaves_out_the_rarest_ticks() -> None:
+    s = np.full((10_000, 2), -1e-7)
+    s[5] = 1.0
+    np.testing.assert_allclose(ripple(s), 1e-7)
+
+
+def test_psi_makes_the_paper_s_equations_true() -> None:
+    """Both lines of (46) for an s that follows them: psi is eps less the law's integral."""
+    k_1, k_2, period = 0.2, 3e-3, 1e-4
+    time = period * np.arange(20_001)
+    epsilon = 1e-3 * np.sin(time)
+    s, integral, law = 1e-3, 0.0, []
+    values = []
+    for k in range(len(time)):
+        values.append(s)
+        law.append(integral)
+        s += period * (epsilon[k] - k_1 * np.sqrt(abs(s)) * np.sign(s) - integral)  # (44)
+        integral += period * k_2 * np.sign(values[-1])
+    eta = lyapunov_state(np.array(values)[:, np.newaxis], np.array([k_1]), period)[:, 0]
+    np.testing.assert_allclose(eta[:, 0] * np.abs(eta[:, 0]), values[:-1], atol=1e-15)
+    np.testing.assert_allclose(eta[:, 1], (epsilon - law)[:-1], atol=1e-9)
+    psi_rate = np.diff(eta[:, 1]) / period
+    expected = -k_2 * np.sign(values[:-2]) + 1e-3 * np.cos(time[:-2])
+    np.testing.assert_allclose(psi_rate, expected, atol=1e-6)
+
+
+@pytest.mark.parametrize("robot", ["paper", "seven_joint"])
+def test_flight_starts_with_the_same_error_on_every_axis(robot: str) -> None:
+    flight = Flight(resolve(FlightPlan(robot=robot, duration=0.001, gains="tuned")))
+    log = simulate(Flight(resolve(off_mission_plan(flight, 2e-3))))
+    assert log.telemetry is not None
+    np.testing.assert_allclose(log.telemetry[0, 3], 2e-3, rtol=1e-9)
+    np.testing.assert_allclose(log.telemetry[0, 0], 3.0 * 2e-3, rtol=1e-9)  # s = lambda e
+
+
+def desired(plan: FlightPlan, every: float) -> tuple[Flight, FlightLog]:
+    """A log of the desired motion, a row each ``every`` seconds."""
+    flight = Flight(resolve(plan))
+    step = round(every / flight.period)
+    rows = flight.mission.chunk(0, flight.ticks + 1)
+    log = FlightLog.allocate(len(rows.base[::step]), flight.robot.joint_names, flight.timebase)
+    log.quaternion[:] = rows.base[::step, :4]
+    log.reference_base[:] = rows.base[::step]
+    log.omega_base[:] = rows.base[::step, 4:7]
+    log.joint_positions[:] = rows.joints[::step, 0]
+    log.joint_velocities[:] = rows.joints[::step, 1]
+    return flight, log
+
+
+def test_lemma_1_with_table_iv() -> None:
+    """The printed h_bar does not meet the printed condition, but its spectral radius is below 1."""
+    flight, log = desired(FlightPlan(), every=0.0125)  # 40 samples of these make 20 s
+    h_bar = np.array(H_BAR)
+    found = contraction(flight.plant.robot, h_bar, log)
+    assert found.norm.min == pytest.approx(1.026, abs=1e-3)
+    assert found.norm.max == pytest.approx(1.029, abs=1e-3)
+    assert found.radius.min == pytest.approx(0.992, abs=1e-3)
+    assert found.radius.max == pytest.approx(0.997, abs=1e-3)
+    assert found.norm_below_one.holds is False
+    assert found.radius_below_one.holds is True
+    sampled = range(0, log.ticks, 40)
+    w = [
+        np.eye(9) - np.linalg.inv(rho_space_inertia(flight.robot, q, theta)) @ np.diag(h_bar)
+        for q, theta in zip(log.quaternion[sampled], log.joint_positions[sampled], strict=True)
+    ]
+    norms = [np.linalg.norm(x, 2) for x in w]
+    radii = [max(abs(np.linalg.eigvals(x))) for x in w]
+    assert (found.norm.min, found.norm.max) == pytest.approx((min(norms), max(norms)))
+    assert (found.radius.min, found.radius.max) == pytest.approx((min(radii), max(radii)))
+    assert found.norm.max_at_s == sampled[int(np.argmax(norms))] * flight.period
+
+
+@settings(max_examples=30)
+@given(cases())
+def test_radius_is_the_norm_weighted_by_the_inertia(case: Case) -> None:
+    """``H_S^1/2 W H_S^-1/2`` is symmetric: why a radius below 1 is enough."""
+    robot, rng = case.robot, case.rng
+    quaternion = np.array([0.9, *rng.normal(size=3) * 0.2])
+    inertia = rho_space_inertia(robot, quaternion / np.linalg.norm(quaternion), case.state.theta)
+    values, vectors = np.linalg.eigh(inertia)
+    root = vectors @ np.diag(np.sqrt(values)) @ vectors.T
+    w = contraction_matrix(inertia, rng.uniform(0.1, 1.0, robot.n + 3) * values[0])
+    weighted = root @ w @ np.linalg.inv(root)
+    assert np.linalg.norm(weighted, 2) == pytest.approx(max(abs(np.linalg.eigvals(w))), rel=1e-6)
+
+
+@pytest.mark.parametrize("law", ["tde_stc", "tde_tsmc", "tde_smc"])
+@pytest.mark.parametrize("robot", ["paper", "seven_joint"])
+def test_error_is_what_the_paper_defines(law: str, robot: str) -> None:
+    """``h_bar eps = N - N_hat`` (65), N being the next tick's estimate, and ``eps = u - rhodd``."""
+    plant = {"initial_quaternion": [0.9, 0.1, -0.3, 0.2], "base_torque_limit": 50.0}
+    plan = FlightPlan(
+        controller=law, case="2", robot=robot, duration=0.1, parameters={"plant": plant}
+    )
+    flight = Flight(resolve(plan))
+    log, gains = simulate(flight), flight.controller.law.gain_values
+    assert log.telemetry is not None
+    error = time_delay_error(log, gains["h_bar"])
+    assert np.abs(error).max() > 1e-3
+    s, u, n_hat, _ = np.swapaxes(log.telemetry, 0, 1)
+    change = np.diff(n_hat, axis=0)
+    np.testing.assert_allclose(gains["h_bar"] * error, change, atol=1e-9 * np.abs(change).max())
+    if np.abs(log.applied_torque[:, :3]).max() < 50.0:  # else u is not what acted
+        wanted = u[:-1] - mean_acceleration(log, continuous_error(log))
+        if law == "tde_smc":  # its switching term stands beside h_bar u
+            wanted += gains["g"] * np.sign(s[:-1]) / gains["h_bar"]
+        np.testing.assert_allclose(error, wanted, atol=1e-9 * np.abs(error).max())
+
+
+def test_derivative_of_a_known_error() -> None:
+    """A ramp with one jump; the row of the first tick, without an estimate, does not count."""
+    period = 0.5
+    ramp = 0.25 * period * np.arange(5000.0)
+    error = np.column_stack([ramp, -2.0 * ramp])
+    error[0] = 1e6
+    error[3000:, 1] += 10.0
+    found = error_derivative(error, period)
+    np.testing.assert_allclose(found.beta, [0.25, 19.5])
+    assert found.beta_at_s[1] == 3000 * period
+    np.testing.assert_allclose(found.beta_99_9_percentile, [0.25, 0.5])
+    np.testing.assert_allclose(found.max_error, np.abs(error[1:]).max(axis=0))

@@ -1,0 +1,232 @@
+"""Loops and eigenvalues: margins against algebra, SciPy and flights."""
+
+from __future__ import annotations
+
+import functools
+
+import numpy as np
+import pytest
+import scipy.linalg
+from closed_loop import H_BAR
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from space_robot.flight.plan import Flight, FlightPlan, resolve
+from space_robot.flight.simulate import simulate
+from space_robot.tuning.closed_loop import RigidLoop, loop_of, rigid_motion
+from space_robot.tuning.gain_check import GainCheck, check_gains, pair_corner
+from space_robot.tuning.inertia import SAMPLING, inertia_along
+from space_robot.tuning.linear_law import linear_laws
+from space_robot.tuning.mass_errors import check_masses, drawn_inertias
+from space_robot.tuning.postures import postures_along
+from space_robot.tuning.spectrum import Spectrum, eigenvalues, spectrum
+from space_robot_control.laws import ControlLaw, find_law
+from space_robot_msgs_py.errors import DivergedError
+
+Array = np.ndarray
+
+
+PERIOD = 5e-4
+
+
+SLOW = {"k_p": 1e-4, "k_d": 2e-2}
+"""Poles at 0.01 rad/s: u does not move the limits of the estimate."""
+
+
+@functools.cache
+def flight(case: str = "1", gains: str = "default") -> Flight:
+    return Flight(resolve(FlightPlan(case=case, gains=gains)))
+
+
+def slow_law(name: str, **gains: Array | float) -> ControlLaw:
+    values = {**SLOW, **gains}
+    return find_law(name)({key: value * np.ones(9) for key, value in values.items()}, PERIOD)
+
+
+@pytest.mark.parametrize("weight", [1.0, 0.2])
+@pytest.mark.parametrize("name", ["constant", "nominal", "indi", "dob"])
+def test_margins_are_those_of_the_algebra(name: str, weight: float) -> None:
+    """Of a robot with an unknown payload, by the whole loop with and without the formula (*)."""
+    robot, mission = flight("4-2").plant.robot, flight().mission_settings
+    inertia = inertia_along(robot, mission, 6.0)
+    postures = postures_along(flight().robot, mission, 6.0)
+    assumed: Array = np.array([posture.inertia for posture in postures])
+    h_bar = np.array(H_BAR)
+    share = weight if weight < 1.0 else 0.9
+    law = {
+        "constant": slow_law("tde_tsmc", h_bar=h_bar, k_1=0.1),
+        "nominal": slow_law("tde_tsmc", h_bar=0.0, k_1=0.1),
+        "indi": slow_law("indi"),
+        "dob": slow_law("dob", inertia=h_bar, bandwidth=share / (1.0 - share) / PERIOD),
+    }[name]
+    if name in ("constant", "dob"):
+        assumed = h_bar
+    own = share if name == "dob" else weight
+    expected = spectrum(inertia, assumed, own)
+    loop = RigidLoop(inertia, postures, linear_laws(law, postures), 1.0 if name == "dob" else own)
+    assert loop.is_stable()
+    assert loop.margin() == pytest.approx(expected.margin, rel=0.02)
+    assert loop.largest_scale() == pytest.approx(expected.largest_scale, rel=0.02)
+    check = check_gains(law, inertia, postures, corner(own if name != "dob" else 1.0))
+    assert check.spectrum is not None
+    assert check.margin == pytest.approx(eigenvalues(inertia, assumed).min())
+    assert check.spectrum.weight == pytest.approx(own)
+
+
+def corner(weight: float) -> float:
+    return 0.0 if weight == 1.0 else float(-np.log(1.0 - weight) / (2.0 * np.pi * PERIOD))
+
+
+def test_a_loop_of_noise_is_the_recursion_of_the_law() -> None:
+    """PD of one rigid axis, all by hand: noise of e and r enters the force and moves the robot."""
+    posture = postures_along(flight().robot, flight().mission_settings, 30.0)[0]
+    law = find_law("pd")({"k_p": np.full(9, 40.0), "k_d": np.full(9, 6.0)}, PERIOD)
+    inertia = np.diag(np.arange(1.0, 10.0))
+    (linear,) = linear_laws(law, [posture])
+    loop = loop_of(rigid_motion(inertia, posture, PERIOD), linear, 1.0)
+    rng, state = np.random.default_rng(0), np.zeros(18)
+    p, r = np.zeros(9), np.zeros(9)
+    for _ in range(100):
+        noise = rng.normal(size=27)
+        force = 40.0 * (noise[:9] - p) - 6.0 * (r + noise[9:18])
+        np.testing.assert_allclose(loop.force @ state + loop.force_by_noise @ noise, force)
+        state = loop.step @ state + loop.by_noise @ noise
+        acceleration = force / np.diag(inertia)
+        p, r = p + PERIOD * r + 0.5 * PERIOD**2 * acceleration, r + PERIOD * acceleration
+        np.testing.assert_allclose(state, np.concatenate([p, r]), atol=1e-12)
+
+
+def checked(law: str, gains: str) -> GainCheck:
+    own = flight(gains=gains)
+    inertia = inertia_along(own.plant.robot, own.mission_settings)
+    postures = postures_along(own.robot, own.mission_settings, SAMPLING)
+    return check_gains(own.laws[law], inertia, postures, pair_corner(own.controller_settings))
+
+
+def fly(law: str, gains: str, **plant: float) -> float:
+    """The largest error of any axis in case 1, with parameters of the plant."""
+    parameters = {"plant": {name: [value] for name, value in plant.items()}}
+    plan = FlightPlan(controller=law, gains=gains, parameters=parameters)
+    log = simulate(Flight(resolve(plan)))
+    assert log.telemetry is not None
+    return float(np.max(np.abs(log.telemetry[:, 3])))
+
+
+@pytest.mark.parametrize("law", ["adrc", "dob"])
+def test_observers_fly_up_to_their_margin_and_no_further(law: str) -> None:
+    """The margin is that of the worst posture, at the end of the mission; later ones grow fast."""
+    margin = checked(law, "tuned").margin
+    assert margin is not None
+    assert 0.04 < margin < 0.1
+    assert fly(law, "tuned", echo_scale=1.0 + 0.7 * margin) < 1e-3
+    with pytest.raises(DivergedError):
+        fly(law, "tuned", echo_scale=1.0 + 2.5 * margin)
+
+
+@pytest.mark.parametrize(
+    ("law", "largest"), [("indi", 0.02), ("tde_stc", 0.02), ("tde_tsmc", 0.02), ("tde_smc", 0.2)]
+)
+def test_with_the_nominal_inertia_a_fifth_too_much_is_flown(law: str, largest: float) -> None:
+    """TDE-SMC leaves its surface, for its g is for an excess of 2.5 %, but it flies."""
+    assert fly(law, "nominal", echo_scale=1.2) < largest
+
+
+def some_inertia(rng: np.random.Generator, m: int) -> np.ndarray:
+    """A positive definite matrix."""
+    root = rng.normal(size=(m, m))
+    return root @ root.T + 0.1 * np.eye(m)
+
+
+@given(st.integers(0, 2**32 - 1), st.integers(1, 10))
+@settings(max_examples=30, deadline=None)
+def test_eigenvalues_are_scipys(seed: int, m: int) -> None:
+    rng = np.random.default_rng(seed)
+    inertia, h_bar = some_inertia(rng, m), rng.uniform(0.01, 100.0, m)
+    expected = scipy.linalg.eigh(np.diag(h_bar), inertia, eigvals_only=True)
+    np.testing.assert_allclose(eigenvalues(inertia[np.newaxis], h_bar)[0], expected, rtol=1e-8)
+    found = spectrum(inertia[np.newaxis], h_bar)
+    w = np.eye(m) - np.linalg.solve(inertia, np.diag(h_bar))
+    assert found.radius == pytest.approx(np.max(np.abs(np.linalg.eigvals(w))), rel=1e-7)
+    assert found.norm == pytest.approx(np.linalg.norm(w, 2))
+
+
+@given(st.integers(0, 2**32 - 1), st.floats(0.05, 1.0), st.floats(0.5, 1.3), st.floats(0.2, 3.0))
+@settings(max_examples=50, deadline=None)
+def test_an_error_of_the_estimate_grows_as_the_formula_says(
+    seed: int, weight: float, reported: float, given_torque: float
+) -> None:
+    """The recursion of (36) itself, as the controller runs it: force and acceleration apart."""
+    rng = np.random.default_rng(seed)
+    m = 3
+    inertia, h_bar = some_inertia(rng, m), rng.uniform(0.05, 0.5, m)
+    inverse = np.linalg.inv(inertia)
+
+    def tick(memory: np.ndarray) -> np.ndarray:
+        force, acceleration = memory[:m], memory[m:]
+        command = force - h_bar * acceleration  # u and c are left out: they add, no more
+        return np.concatenate(
+            [
+                force + weight * (reported * command - force),
+                acceleration + weight * (given_torque * inverse @ command - acceleration),
+            ]
+        )
+
+    matrix = np.column_stack([tick(column) for column in np.eye(2 * m)])
+    expected = 1.0 + weight * (reported - 1.0 - given_torque * eigenvalues(inertia, h_bar))
+    radius = max(*np.abs(expected), 1.0 - weight)  # what cancels in N_hat only fades
+    assert np.max(np.abs(np.linalg.eigvals(matrix))) == pytest.approx(radius, rel=1e-6)
+
+
+def test_limits_are_where_an_error_neither_grows_nor_fades() -> None:
+    found = Spectrum(smallest=0.03, largest=1.2, norm=1.5)
+    assert found.radius == pytest.approx(0.97)
+    assert found.contracts
+    assert found.is_sound
+    assert 1.0 + found.margin - found.smallest == pytest.approx(1.0)
+    assert 1.0 - found.largest_scale * found.largest == pytest.approx(-1.0)
+    too_large = Spectrum(smallest=0.03, largest=2.1, norm=2.0)
+    assert not too_large.contracts
+    assert too_large.margin == pytest.approx(-0.1)
+    assert Spectrum(0.03, 2.1, 2.0, weight=0.5).contracts
+
+
+def test_margin_of_table_iv() -> None:
+    """Its size, by spec an eigenvalue of 0.0031 to 0.0079, and what it means in flight."""
+    flight = Flight(resolve(FlightPlan()))
+    every = eigenvalues(inertia_along(flight.robot, flight.mission_settings), np.array(H_BAR))
+    assert every[:, 0].min() == pytest.approx(0.0031, abs=5e-5)
+    assert every[:, 0].max() == pytest.approx(0.0079, abs=5e-5)
+
+
+@pytest.mark.parametrize("controller", ["tde_smc", "tde_stc"])
+def test_a_torque_reported_too_large_by_more_than_the_margin_diverges(controller: str) -> None:
+    with pytest.raises(DivergedError):
+        fly(controller, "default", echo_scale=1.01)
+    assert fly(controller, "default", echo_scale=1.005) < 1e-3
+
+
+def test_a_torque_reported_too_small_costs_accuracy_but_does_not_diverge() -> None:
+    assert 1e-4 < fly("tde_stc", "default", echo_scale=0.99) < 1e-2
+
+
+@pytest.mark.parametrize("is_nominal", [False, True])
+@pytest.mark.parametrize("share", [0.02, 0.2, 0.5])
+def test_the_sample_is_within_the_bound_and_scipys(share: float, is_nominal: bool) -> None:
+    flight = Flight(resolve(FlightPlan()))
+    robot, mission = flight.plant.robot, flight.mission_settings
+    inertia = inertia_along(robot, mission, 5.0)
+    nominal = np.array([x.inertia for x in postures_along(flight.robot, mission, 5.0)])
+    assumed = nominal if is_nominal else np.array(H_BAR)
+    drawn = drawn_inertias(robot, mission, share, 5.0)
+    check = check_masses(spectrum(inertia, assumed), assumed, drawn, share)
+    expected = [
+        scipy.linalg.eigh(nominal[k] if is_nominal else np.diag(H_BAR), own, eigvals_only=True)
+        for sample in drawn
+        for k, own in enumerate(sample)
+    ]
+    assert check.smallest_drawn == pytest.approx(np.min(expected), rel=1e-7)
+    assert check.largest_drawn == pytest.approx(np.max(expected), rel=1e-7)
+    assert check.smallest <= check.smallest_drawn < check.largest_drawn <= check.largest
+    if is_nominal:  # the margin is that of the masses alone
+        assert check.smallest == pytest.approx(1.0 / (1.0 + share))
+        assert check.largest == pytest.approx(1.0 / (1.0 - share))
