@@ -23,6 +23,7 @@ from space_robot_sim.environment import surfaces
 from space_robot_sim.plant.gear_mounting import MOST_SUBSTEPS
 from space_robot_sim.plant.plant import PlantSettings
 
+TABLE = DATA / "refusals/commands.yaml"
 URDF = (DATA / "docs.urdf").read_text("utf-8")
 
 
@@ -56,9 +57,8 @@ class Group(NamedTuple):
 
 
 GROUPS = {
-    f"{table.stem}-{name}": Group(**{"files": {}, **content})
-    for table in sorted((DATA / "refusals").glob("*.yaml"))
-    for name, content in yaml.safe_load(table.read_text("utf-8")).items()
+    name: Group(**{"files": {}, **content})
+    for name, content in yaml.safe_load(TABLE.read_text("utf-8")).items()
 }
 
 
