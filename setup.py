@@ -72,7 +72,6 @@ setup(
         "llvmlite>=0.41",  # numba has the versions that fit
         "numba>=0.58.1",
         "numpy>=1.26,<3",
-        "pillow>=8",
         "pydantic>=2.5",
         "pyyaml>=6",
         "rich>=13",
@@ -149,7 +148,7 @@ setup(
             "xacro",
             "ziamath",
         ],
-        "view": ["trimesh>=4", "viser>=1.1", "websockets>=13"],  # `view`
+        "view": ["trimesh>=4", "viser>=1.1"],  # `view`
         "xacro": ["xacro"],  # robots in files that end in .xacro
     },
     entry_points={"console_scripts": ["space-robot = space_robot.cli.main:main"]},

@@ -25,7 +25,6 @@ from space_robot_msgs_py import topics
 ROOT = Path(__file__).resolve().parents[1]
 EXECUTABLES = sorted((ROOT / "resource/executables").iterdir())
 PYPI = {
-    "PIL": "pillow",
     "yaml": "pyyaml",
     "typing_extensions": "typing-extensions",
     "pinocchio": "pin",
@@ -38,11 +37,10 @@ OF_EXTRAS = {
     "pyarrow": "parquet",
     "trimesh": "view",
     "viser": "view",
-    "websockets": "view",
     "xacro": "xacro",
 }
 """Packages that one command needs, and their extra."""
-ROSDEP = {"pillow": "pil", "pyyaml": "yaml", "rosbags": "rosbags-pip"}
+ROSDEP = {"pyyaml": "yaml", "rosbags": "rosbags-pip"}
 """Names of rosdep's keys, behind python3-, where they are not the package's."""
 
 

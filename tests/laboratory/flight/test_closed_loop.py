@@ -23,6 +23,7 @@ from space_robot.flight.simulate import simulate
 from space_robot_control.laws import laws
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.errors import FlightError
+from space_robot_msgs_py.samples import Command, Reference, State
 from space_robot_sim.environment.friction import FrictionSettings
 
 Array = NDArray[np.float64]
@@ -43,7 +44,15 @@ def test_super_twisting_flies_with_late_commands_too(
 def test_pairing_with_its_own_last_output_would_lose_the_arm(paper_robot: Robot) -> None:
     """Why the echo matters: one tick late, the same loop without it is off by a radian."""
     loop = Loop(paper_robot, law_of("tde_stc"), command_latency_ticks=1)
-    loop.own_output_as_applied = True
+    last = np.zeros(9)
+
+    def unaware(state: State, reference: Reference) -> Command:
+        state.applied_torque[:] = last
+        command = loop.controller.update(state, reference)
+        last[:] = command.torque
+        return command
+
+    loop.answer = unaware
     try:
         errors, _ = loop.fly(4000)
     except FlightError:

@@ -313,8 +313,8 @@ def test_a_rate_that_the_law_has_to_brake_is_told() -> None:
         for segment in ({"hold": 5}, {"base": {"rpy_deg": [0, 0, 0]}, "duration": 60})
     )
     assert braked
-    assert braked.rate_deg_s == pytest.approx(5.0)
-    assert "the base's rate is 5 deg/s from where the mission begins" in sentence(braked._asdict())
+    assert braked["rate_deg_s"] == pytest.approx(5.0)
+    assert "the base's rate is 5 deg/s from where the mission begins" in sentence(braked)
     assert led is None
 
 
