@@ -130,7 +130,7 @@ def test_what_is_said(name: str, k: int, here: Path, bag: Path, space_robot: Run
 
 @pytest.mark.parametrize("k", [0, 2, 14])
 def test_a_process_of_its_own_says_the_same(k: int, here: Path, bag: Path) -> None:
-    group = GROUPS["commands-typing_errors"]
+    group = GROUPS["typing_errors"]
     typed, said = group.rows[k]
     make(group, here, bag)
     ended = started(*shlex.split(typed))

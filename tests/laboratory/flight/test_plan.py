@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 import yaml
 from flights import planned
-from hypothesis import given, settings
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from paths import ROOT
 
@@ -325,7 +325,11 @@ def _parameters(names: list[str], sets: list[str]) -> st.SearchStrategy[Paramete
 @given(_any_parameters())
 def test_all_that_is_made_of_a_plan_agrees(parameters: Parameters) -> None:
     """Settings and objects as the nodes make them of what they are sent; labels; `simulate`."""
-    flight = flight_of(parameters, actuators="wheels")
+    try:
+        flight = flight_of(parameters, actuators="wheels")
+    except InputError as error:  # wheels that cannot hold the mission
+        assume("of what the actuators" not in str(error))
+        raise
     sent = json.loads(json.dumps(flight.scenario.parameters))
     for schema in SCHEMAS:
         for name in parameters.get(schema.node, {}):
