@@ -24,11 +24,7 @@ from space_robot_msgs_py import topics
 
 ROOT = Path(__file__).resolve().parents[1]
 EXECUTABLES = sorted((ROOT / "resource/executables").iterdir())
-PYPI = {
-    "yaml": "pyyaml",
-    "typing_extensions": "typing-extensions",
-    "pinocchio": "pin",
-}
+PYPI = {"yaml": "pyyaml", "typing_extensions": "typing-extensions", "pinocchio": "pin"}
 """Names on PyPI of modules that are not called as their package."""
 OF_EXTRAS = {
     "distributed": "dask",
