@@ -12,7 +12,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from paths import CONFIG, DATA
 
-from space_robot_control.allocation.assumed_actuators import assumed_actuators
 from space_robot_model.hardware.base_actuators import BaseActuatorSettings
 from space_robot_model.hardware.magnetic_torquers import MagneticTorquerSettings
 from space_robot_model.hardware.sensors import SensorSettings
@@ -97,13 +96,6 @@ def test_sizes_are_not_negative(part: str, key: str, zero_is_allowed: bool) -> N
             resolved(**{f"{part}.{key}": [value]})
 
 
-def test_there_are_the_files_that_the_manual_names() -> None:
-    names = {kind: {path.stem for path in paths} for kind, paths in FILES.items()}
-    hardware = ("wheels", "small_wheels", "thrusters", "wheels_and_thrusters")
-    assert names["actuators"] == {"ideal", "none", *hardware, "wheels_and_torquers"}
-    assert names["sensors"] == {"ideal", "fine", "tactical", "coarse", "white_l1", "white_l2"}
-
-
 @pytest.mark.parametrize(
     ("kind", "path"), [(kind, path) for kind in FILES for path in FILES[kind]], ids=str
 )
@@ -136,16 +128,6 @@ def test_without_a_choice_everything_is_ideal_and_single_numbers_come_over_a_fil
     assert settings.wheels.axes == plain.wheels.axes
     assert settings.star_tracker.delay == 0.3
     assert settings.star_tracker.rate == plain.star_tracker.rate
-
-
-def test_wheels_and_thrusters_may_span_together() -> None:
-    """Two wheels, and thrusters for the axis that is missing."""
-    found = resolved(actuators="thrusters", **{"wheels.axes": [1.0, 0.0, 0.0, 0.0, 1.0, 0.0]})
-    flat = found.thrusters.model_dump()
-    about_z = {key: flat[key][24:] for key in ("positions", "directions")}
-    parts = {"wheels": found.wheels.model_dump(), "thrusters": {**flat, **about_z}}
-    settings = BaseActuatorSettings.model_validate({"base_actuation": "hardware", **parts})
-    settings.check(PAPER, "mine")
 
 
 @given(st.integers(0, 8), st.integers(0, 24), st.integers(0, MOST_TORQUERS))
@@ -188,20 +170,6 @@ def test_axes_of_torquers_are_directions_and_one_dipole_may_stand_for_all() -> N
     assert MagneticTorquerSettings().unit_axes.shape == (0, 3)
     with pytest.raises(ValueError, match="x, y, z of at most 6 vectors were expected"):
         MagneticTorquerSettings(axes=[1.0, 0.0, 0.0] * 7)
-
-
-def test_the_file_of_torquers_has_the_wheels_of_the_other_file() -> None:
-    """The flight software needs no orbit to know its torquers: it reads a magnetometer."""
-    settings = resolved(actuators="wheels_and_torquers", orbit="iss")
-    wheels = resolved(actuators="wheels").wheels
-    assert settings.names[-3:] == TORQUERS
-    assert assumed_actuators("wheels_and_torquers", PAPER).names[-3:] == TORQUERS
-    np.testing.assert_array_equal(settings.magnetic_torquers.unit_axes, np.eye(3))
-    np.testing.assert_array_equal(settings.magnetic_torquers.largest, np.full(3, 400.0))
-    speeds = {"initial_speed": settings.wheels.initial_speed}
-    assert settings.wheels == wheels.model_copy(update=speeds)
-    stored = settings.wheels.spin_momenta(settings.wheels.values("initial_speed"))
-    np.testing.assert_allclose(stored, 0.25 * settings.wheels.values("max_momentum"), rtol=0.01)
 
 
 @pytest.mark.parametrize(

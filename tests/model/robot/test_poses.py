@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
-
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -107,14 +105,6 @@ def test_bodies_and_tools_are_where_pinocchio_has_them(seed: int, kinds: list[st
         np.testing.assert_array_equal(link.position, [tool.position])
         turn = rotation_of(link.quaternion[0]).as_matrix()
         np.testing.assert_allclose(turn, tool.rotation, atol=1e-15)
-
-
-def test_frames_are_a_chain_and_what_does_not_change_is_told_once(paper_robot: Robot) -> None:
-    names = [INERTIAL_FRAME, "base_link", *(f"link{i}" for i in range(1, 7))]
-    assert list(RobotPoses(paper_robot).frames) == list(itertools.pairwise(names))
-    assert tool_poses(paper_robot)[0] == (("link6", "tool"),)
-    for transform in joint_transforms(paper_robot, np.zeros((7, 6))):
-        assert (transform.position.shape, transform.quaternion.shape) == ((1, 3), (7, 4))
 
 
 @given(SEEDS)

@@ -15,7 +15,6 @@ from strategies import BASE, KINDS, SEEDS, random_bodies
 
 from space_robot_model.robot import Robot
 from space_robot_model.robot.mission_document import QUATERNION
-from space_robot_model.robot.tool import tool_pose
 from space_robot_model.robot.tree import Body, Joint, Spring, flatten, other_meaning
 from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.topics import BASE_AXES
@@ -55,19 +54,6 @@ def test_nominal_robot_is_locked_at_rest(seed: int, kinds: list[str]) -> None:
     assert_same_dynamics(robot.nominal, oracle, seed)
 
 
-@settings(max_examples=30)
-@given(seed=SEEDS, kinds=SOME_TREES)
-def test_nominal_tool_is_where_the_true_one_is_at_rest(seed: int, kinds: list[str]) -> None:
-    robot, rng = Robot.of_tree("tree", tree_of(seed, kinds)), np.random.default_rng(seed)
-    quaternion = Rotation.random(3, random_state=seed).as_quat()[:, [3, 0, 1, 2]]
-    joints = rng.uniform(-3.0, 3.0, (3, robot.n))
-    rest = np.broadcast_to([spring.rest for spring in robot.springs], (3, len(robot.springs)))
-    rotation, position = tool_pose(robot, quaternion, np.hstack([joints, rest]))
-    nominal_rotation, nominal_position = tool_pose(robot.nominal, quaternion, joints)
-    np.testing.assert_allclose(nominal_rotation, rotation, atol=1e-12)
-    np.testing.assert_allclose(nominal_position, position, atol=1e-11)
-
-
 def _locked(body: Body) -> Body:
     joint = body.joint
     if joint is None or joint.spring is None:
@@ -87,32 +73,6 @@ def test_no_joint_has_the_name_of_something_else() -> None:
     assert all(map(other_meaning, names))
     assert other_meaning("elbow_rate", ["elbow"])
     assert not any(map(other_meaning, ["elbow_rate", "joint_1", "base_yaw", "wheel", "time_1"]))
-
-
-@given(seed=SEEDS, kinds=SOME_TREES)
-def test_structure(seed: int, kinds: list[str]) -> None:
-    bodies = tree_of(seed, kinds)
-    robot, by_name = Robot.of_tree("tree", bodies), {body.name: body for body in bodies}
-    joints = {body.joint.name: body.joint for body in bodies if body.joint}
-    moving = {name for name, joint in joints.items() if joint.kind != "fixed"}
-    assert set(robot.all_joint_names) == moving
-    assert all(joints[name].spring is None for name in robot.joint_names)
-    assert robot.springs == tuple(joints[name].spring for name in robot.passive_names)
-    assert robot.mass.sum() == pytest.approx(sum(body.mass for body in bodies))
-    for number, name in enumerate(robot.body_names[1:]):
-        above = by_name[by_name[name].parent]
-        while above.joint and above.joint.kind == "fixed":
-            above = by_name[above.parent]
-        assert robot.body_names[robot.parent[number]] == above.name
-        assert robot.is_prismatic[number] == (by_name[name].joint.kind == "prismatic")  # type: ignore[union-attr]
-    seen = {-1}
-    for joint in robot.order:
-        assert robot.parent[joint] - 1 in seen, "a parent's before its children's"
-        seen.add(joint)
-    assert seen == set(range(-1, robot.joint_count))
-    assert len(robot.tools) == len(bodies), "those of merged bodies are kept"
-    for array in (robot.mass, robot.com, robot.inertia, robot.rotation, robot.offset):
-        assert np.all(np.isfinite(array))
 
 
 @given(seed=SEEDS, kinds=SOME_TREES)

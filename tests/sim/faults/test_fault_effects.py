@@ -345,15 +345,6 @@ def test_jitter_loses_nothing_repeats_nothing_and_is_bounded(
         assert lateness == set(range(delay, delay + jitter + 1)), "each as likely, so all occur"
 
 
-@given(SEEDS)
-def test_another_fault_changes_no_draw_of_the_first(seed: int) -> None:
-    """Nothing that the first one drops arrives when a second one drops more."""
-    alone = sent_over(link("drop_state@0:0.3", seed=seed))
-    both = sent_over(link("drop_state@0:0.3", "drop_state@0:0.3", seed=seed))
-    assert all(more in (items, []) for items, more in zip(alone, both, strict=True))
-    assert both != alone
-
-
 def test_ticks_that_are_skipped_lose_nothing() -> None:
     """A plant that sends nothing at a tick still gets all that was due, oldest first."""
     slow = link("delay_command@0-0.001:2", what="command")

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 import pytest
 from oracles.momenta import momentum
@@ -21,7 +19,6 @@ from robots import (
 )
 
 from space_robot_model.robot import Robot
-from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.samples import RobotState
 from space_robot_sim.environment.neighbouring_orbit import meet
 from space_robot_sim.environment.orbit_settings import OrbitSettings
@@ -141,25 +138,3 @@ def test_the_reach_is_the_largest_distance(
     assert bool(plant.captures.misses) is not hits
     held = target.mass if hits else 0.0
     assert plant.robot.mass.sum() == pytest.approx(paper_robot.mass.sum() + held, rel=1e-14)
-
-
-@pytest.mark.parametrize("distance", [0.0, 0.3])
-def test_a_snapshot_is_gone_back_to_from_behind_the_capture(
-    paper_robot: Robot, target: Target, distance: float
-) -> None:
-    plant = flying_plant(paper_robot, events_of(beside(target, distance)))
-    coast(plant, CAPTURE - 50)
-    snapshot = plant.save()
-    first = states_of(plant, END - CAPTURE + 50)
-    plant.restore(snapshot)
-    assert plant.robot.mass.sum() == paper_robot.mass.sum()
-    assert states_of(plant, END - CAPTURE + 50) == first
-
-
-def test_without_an_orbit_a_plant_is_refused_in_one_line(
-    paper_robot: Robot, target: Target
-) -> None:
-    nowhere: dict[str, Any] = {"orbital_elements": {}, "gravity": {}}
-    with pytest.raises(InputError, match=r"target 'drifter': motion\.relative_to") as caught:
-        orbiting_plant(paper_robot, PERIOD, events=events_of(target), **nowhere)
-    assert "\n" not in str(caught.value)

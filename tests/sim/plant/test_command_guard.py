@@ -64,19 +64,6 @@ def test_what_acts_is_the_newest_good_command_while_it_is_young(
     assert guard.refused.total() + len(good) - 1 == offered
 
 
-def test_a_late_command_acts_only_for_what_is_left_of_its_time() -> None:
-    """One that comes after all of it does not bring the torque back; the next one does."""
-    guard = CommandGuard(AXES, HOLD)
-    assert offer(guard, 8, 0, 1.0)
-    assert [guard.act(now).torque[0] for now in (8, HOLD, HOLD + 1)] == [1.0, 1.0, 0.0]
-    assert offer(guard, 100, 50, 2.0)
-    assert guard.act(100).torque[0] == 0.0
-    assert guard.held_ticks(100) == 50
-    assert offer(guard, 130, 130, 2.5)
-    assert guard.act(130).torque[0] == 2.5
-    assert not guard.is_safe
-
-
 @pytest.mark.parametrize(
     ("stamp", "torque", "reason"),
     [

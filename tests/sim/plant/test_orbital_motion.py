@@ -9,22 +9,16 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
-from oracles import quaternion_of
 from oracles.orbit import (
-    EARTH_RADIUS,
     MU,
     EarthTotals,
     angular_momentum,
     centre_of_mass,
-    clohessy_wiltshire,
     earth_totals,
-    mean_motion,
     whole_inertia,
 )
 from paths import CONFIG
-from robots import ANGLES_DEG, MOTORS, NO_FRICTION, coast, orbiting_plant, rigid_robot, set_motion
-from scipy.spatial.transform import Rotation
-from scipy.special import ellipk
+from robots import ANGLES_DEG, MOTORS, NO_FRICTION, coast, orbiting_plant, set_motion
 from strategies import random_quaternion, random_robot
 
 from space_robot_model.robot import Robot
@@ -103,106 +97,6 @@ def test_energy_and_angular_momentum_about_the_earth_are_conserved(
     about_axis = [float(t.whole_angular[2] / totals[0].whole_angular[2] - 1) for t in totals]
     assert np.abs(whole).max() < 1e-12
     assert np.abs(about_axis).max() < 1e-12
-
-
-SEMI_MAJOR_AXIS = EARTH_RADIUS + 400e3
-N = mean_motion(SEMI_MAJOR_AXIS)
-"""rad/s."""
-ORBIT_S = 2.0 * np.pi / N
-ROLL, PITCH, YAW = 50.0, 60.0, 20.0
-"""Moments of inertia about the velocity, the normal of the orbit and the vertical, kg m2."""
-LIBRATION_S = ORBIT_S / np.sqrt(3.0 * (ROLL - YAW) / PITCH)
-"""Small librations in the plane of the orbit."""
-DRIFT = 12.0 * np.pi
-ORBIT_TICKS = 11000
-PERIOD = ORBIT_S / ORBIT_TICKS
-"""Half a second, and an orbit is a whole number of ticks."""
-
-
-def attitudes(period: float, start: Rotation, ticks: int, skipped: int = 1) -> Array:
-    """Return rotation vectors (K, 3) on the orbit's axes: vertical, velocity, normal.
-
-    The robot's z lies along the normal of an equatorial orbit, its x along the vertical; it turns
-    with the orbit, but for the rotation ``start``.
-    """
-    robot = rigid_robot(100.0, [YAW, ROLL, PITCH])
-    plant = orbiting_plant(robot, period, initial_quaternion=quaternion_of(start).tolist())
-    set_motion(plant, omega=[0.0, 0.0, N])
-    states = [coast(plant, skipped).copy() for _ in range(ticks // skipped)]
-    x, y, _ = np.transpose([state.orbit_position for state in states])
-    orbit = Rotation.from_rotvec(np.outer(np.arctan2(y, x), [0.0, 0.0, 1.0]))
-    quaternions = np.array([state.quaternion for state in states])
-    turns = orbit.inv() * Rotation.from_quat(np.roll(quaternions, -1, axis=1))
-    return np.asarray(turns.as_rotvec())
-
-
-def pitch_period(period: float, amplitude: float, swings: int = 3) -> float:
-    """Return the time between zero crossings of the pitch, two by two, s."""
-    skipped = max(1, round(2.0 / period))
-    ticks = int((swings + 0.5) * LIBRATION_S / period)
-    pitch = attitudes(period, Rotation.from_euler("z", amplitude), ticks, skipped)[:, 2]
-    k = np.flatnonzero(pitch[:-1] * pitch[1:] < 0.0)
-    crossings = period * skipped * (k + pitch[k] / (pitch[k] - pitch[k + 1]))
-    assert len(crossings) >= 2 * swings
-    return float(2.0 * (crossings[-1] - crossings[0]) / (len(crossings) - 1))
-
-
-def test_pitch_librates_at_the_frequency_of_the_formula() -> None:
-    """``n sqrt(3 (I_roll - I_yaw) / I_pitch)`` to 1e-4, of an amplitude of 0.01 rad.
-
-    To 1e-8, if the period of a pendulum of that amplitude is taken: the pitch's equation is
-    ``I_pitch phi'' = -3/2 n^2 (I_roll - I_yaw) sin(2 phi)``.
-    """
-    amplitude = 0.01
-    measured = pitch_period(PERIOD, amplitude)
-    assert measured == pytest.approx(LIBRATION_S, rel=1e-4)
-    pendulum = LIBRATION_S * 2.0 / np.pi * ellipk(np.sin(amplitude) ** 2)
-    assert measured == pytest.approx(pendulum, rel=1e-8)
-
-
-def rotating(angle: float) -> Array:
-    """Return the axes vertical, velocity, normal of an equatorial orbit, as columns."""
-    return Rotation.from_euler("z", angle).as_matrix()
-
-
-def free_points(place: Array, motion: Array, times: Array) -> Array:
-    """Return relative positions (K, 3) of a free robot, rotating axes, m; ``times`` in ticks."""
-    plant = orbiting_plant(rigid_robot(100.0, [20.0] * 3), PERIOD)
-    velocity = motion + np.cross([0.0, 0.0, N], place)
-    set_motion(plant, position=place, velocity=velocity)
-    places = []
-    for tick in times:
-        state = coast(plant, int(tick) - plant.tick)
-        places.append(rotating(N * tick * PERIOD).T @ state.base_position)
-    return np.array(places)
-
-
-DIRECTIONS = {
-    "above": ([1.0, 0.0, 0.0], [0.0, 0.0, 0.0]),
-    "any": ([0.4, -0.6, 0.5], [0.7, 0.3, -0.8]),
-}
-"""Places and velocities, in units of a distance d and of n d."""
-
-
-@pytest.mark.parametrize("name", DIRECTIONS)
-def test_a_free_robot_moves_as_hills_equations_say(name: str) -> None:
-    """Over an orbit, to `DRIFT` times ``D^2 / R``, D the farthest distance: the rest is quadratic.
-
-    An offset of height, also one of ``D^2 / R``, drifts along the orbit by 12 pi times as much.
-    """
-    place, motion = (np.array(values) for values in DIRECTIONS[name])
-    ticks = np.linspace(1, ORBIT_TICKS, 13).astype(int)
-    shares = []
-    for distance in (10.0, 1000.0):
-        start, speed = distance * place, N * distance * motion
-        flown = free_points(start, speed, ticks)
-        linear = [clohessy_wiltshire(N, start, speed, tick * PERIOD)[:3] for tick in ticks]
-        farthest = np.linalg.norm(flown, axis=1).max()
-        apart = np.linalg.norm(flown - linear, axis=1).max()
-        shares.append(apart / (farthest**2 / SEMI_MAJOR_AXIS))
-    assert shares[0] < DRIFT
-    # the next order is smaller by D / R, and the share of a hundredth of the distance the same
-    assert shares[0] == pytest.approx(shares[1], rel=4.0 * farthest / SEMI_MAJOR_AXIS)
 
 
 ELEMENTS = {"height": 420e3, "inclination_deg": 51.6, "raan_deg": 30.0, "anomaly_deg": 20.0}

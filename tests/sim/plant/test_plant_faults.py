@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from random_samples import assert_same
 
 from space_robot_model.robot import Robot
 from space_robot_msgs_py.errors import InputError
@@ -100,21 +99,6 @@ def test_a_plant_changes_when_its_parts_begin_or_cease_to_fail(paper_robot: Robo
     assert changes == {20, 40, math.inf}
 
 
-def test_truth_and_measurement_are_told_apart(paper_robot: Robot) -> None:
-    """Equal with sound sensors; a plant with noise flies the same truth."""
-    sound, noisy = plant_of(paper_robot), plant_of(paper_robot, "noise_gyro@0.005:1")
-    assert sound.measures_truth
-    assert not noisy.measures_truth
-    for tick in range(20):
-        assert_same(sound.state, sound.truth)
-        assert_same(noisy.truth, sound.truth)
-        off = np.abs(noisy.state.omega_base - noisy.truth.omega_base)
-        assert (off > 0.0).all() if tick >= 10 else (off == 0.0).all()
-        assert sound.state.tick == sound.truth.tick == noisy.truth.tick == tick
-        for plant in (sound, noisy):
-            plant.step(Command(tick, TORQUE))
-
-
 def test_settings_take_faults_and_refuse_bad_ones() -> None:
     assert PlantNodeSettings.resolve({}).parsed_faults == []
     settings = PlantNodeSettings.resolve({"faults": ["", "drop_state@2:0.1"], "fault_seed": 7})
@@ -140,12 +124,6 @@ class Watched:
         command = np.zeros(len(self.plant.names.commanded))
         command[-len(asked) :] = asked
         self.plant.step(Command(self.plant.tick, command))
-
-
-def test_an_ideal_base_has_nothing_to_tell(paper_robot: Robot) -> None:
-    watched = Watched(paper_robot, "ideal")
-    assert watched.health.values == {}
-    assert watched.health.saturated() == ""
 
 
 def test_wheels_tell_saturation_momentum_and_failure(paper_robot: Robot) -> None:
