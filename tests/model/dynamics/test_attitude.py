@@ -65,6 +65,14 @@ def test_rate_from_inertial_and_from_base_angular_velocity_is_the_same(
     np.testing.assert_allclose(attitude_jacobian_inertial(q) @ omega_inertial, rate[1:], atol=1e-15)
 
 
+def test_the_two_frames_differ_away_from_the_identity() -> None:
+    """A quarter turn about x: base y is inertial z, so the same numbers mean another motion."""
+    q, omega = np.array([np.sqrt(0.5), np.sqrt(0.5), 0.0, 0.0]), np.array([0.0, 1.0, 0.0])
+    from_inertial = written(quaternion_rate, (4,), q, omega)[1:]
+    np.testing.assert_allclose(from_inertial, [0.0, np.sqrt(0.125), -np.sqrt(0.125)], atol=1e-15)
+    np.testing.assert_allclose(j0_of(q) @ omega, [0.0, np.sqrt(0.125), np.sqrt(0.125)], atol=1e-15)
+
+
 @given(RNGS)
 def test_inverse_jacobian_inverts(rng: np.random.Generator) -> None:
     """Both ways and against NumPy, up to 179.9 degrees."""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from decimal import localcontext
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -34,7 +33,7 @@ from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.samples import RobotState
 from space_robot_sim.environment.gravity_gradient import add_gravity_gradient
 from space_robot_sim.environment.orbit import Orbit, magnetic_field
-from space_robot_sim.environment.orbit_file import orbit_layers, read_orbit
+from space_robot_sim.environment.orbit_file import orbit_layers
 from space_robot_sim.environment.orbit_settings import OrbitSettings
 from space_robot_sim.plant.plant import Plant
 
@@ -135,16 +134,6 @@ def test_no_file_is_read_without_an_orbit() -> None:
     """So a resolved scenario flies where there are no files."""
     assert orbit_layers("none") == orbit_layers("given") == []
     assert [path.stem for path in orbit_layers("iss")] == ["iss"]
-
-
-@pytest.mark.parametrize("section", ["/**", "plant_node", "/plant_node", "/**/plant_node"])
-def test_sections_are_those_that_ros_would_apply(section: str, tmp_path: Path) -> None:
-    path = tmp_path / "mine.yaml"
-    text = "{ros__parameters: {orbital_elements.height: 5.0e5, sunlight: {pressure: 4.56e-6}}}"
-    path.write_text(f"{section}: {text}\n")
-    orbit = read_orbit(path)
-    assert orbit.orbital_elements.height == 5e5
-    assert orbit.sunlight.pressure == 4.56e-6
 
 
 def test_settings_without_an_orbit_are_refused_by_their_key() -> None:

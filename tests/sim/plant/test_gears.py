@@ -26,10 +26,10 @@ from strategies import (
 )
 
 from space_robot_model.robot import Robot
-from space_robot_model.robot.tree import Body, Encoder, Gear, JointFriction
+from space_robot_model.robot.tree import Body, Gear, JointFriction
 from space_robot_msgs_py.errors import InputError
 from space_robot_sim.environment.target import Target
-from space_robot_sim.plant.gear_mounting import STABLE, check_rotors, check_springs, measured_motors
+from space_robot_sim.plant.gear_mounting import STABLE, check_rotors, check_springs
 from space_robot_sim.plant.stick_slip import slip_or_stick
 
 Array = NDArray[np.float64]
@@ -251,15 +251,3 @@ def test_rotors_must_have_less_inertia_than_their_carriers() -> None:
         assert f"drive.rotor_inertia of {names}: the inertia of 'base'" in message
         assert message.endswith(f"smallest principal moment is {least:g} kg m2")
         assert "\n" not in message
-
-
-def test_encoders_on_the_motors_side_know_their_motors() -> None:
-    robot = carried(0.1, 0.0, 0.1, 0.1)
-    kinds: tuple[Encoder, ...] = ("motor", "link", "link", "both")
-    gears = [
-        gear and gear._replace(encoder=kind) for gear, kind in zip(robot.gears, kinds, strict=True)
-    ]
-    assert measured_motors(with_gears(robot, gears)) == [1, 0, 0, 0]
-    gears[3] = gears[0]
-    assert measured_motors(with_gears(robot, gears)) == [1, 0, 0, 3]
-    assert not any(measured_motors(with_gears(robot, [None] * 4)))
