@@ -305,12 +305,6 @@ def test_a_delay_shifts_and_two_add_up(what: str, first: int, second: int) -> No
     assert arrived == [[]] * min(late, TICKS) + [[k] for k in range(max(TICKS - late, 0))]
 
 
-def test_a_delay_that_ends_delivers_the_rest_late() -> None:
-    """What was sent before the end is overtaken, not hurried and not lost."""
-    arrived = sent_over(link("delay_state@0-0.002:3"), 8)
-    assert arrived == [[], [], [], [0], [1, 4], [2, 5], [3, 6], [7]]
-
-
 @given(SEEDS, st.floats(0.05, 0.95))
 def test_drops_lose_some_and_delay_none(seed: int, probability: float) -> None:
     arrived = sent_over(link(f"drop_state@0:{probability!r}", seed=seed), 500)
