@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from space_robot_msgs_py.compiled import kernels
+from space_robot_msgs_py.compiled import kernels, lane_words, lanes
 from space_robot_msgs_py.compiled.records import Record
 
 
@@ -61,6 +61,47 @@ def _record_at(address: int, layout: np.dtype[Any]) -> Any:
 
 
 MOST_JOINTS = 65
+
+
+def _as_numbers(array: Any) -> Any:
+    """As of one flight: a width of 1."""
+    return array[..., np.newaxis]
+
+
+def _as_lanes(array: Any) -> Any:
+    """Every number is a lane of its own."""
+    return array.reshape(-1)
+
+
+def _where(condition: Any, then: Any, otherwise: Any) -> Any:
+    """Numbers in lanes are arrays (8,) here."""
+    if np.ndim(condition) == 0:
+        return then if condition else otherwise
+    if isinstance(then, tuple):
+        return tuple(_where(condition, *pair) for pair in zip(then, otherwise, strict=True))
+    return np.where(condition, then, otherwise)
+
+
+def _first(value: Any) -> Any:
+    return value[0] if np.ndim(value) else value
+
+
+def _lane_of(value: Any, lane: int) -> Any:
+    return value[lane] if np.ndim(value) else value
+
+
+WORDS = {
+    "where": _where,
+    "uniform": _first,
+    "whole": lambda value: int(_first(value)),
+    "any_lane": lambda condition: bool(np.any(condition)),
+    "all_lanes": lambda condition: bool(np.all(condition)),
+    "negated": np.logical_not,
+    "lane_of": _lane_of,
+}
+for name, word in WORDS.items():
+    setattr(lanes, name, word)
+lane_words.as_numbers, lane_words.as_lanes = _as_numbers, _as_lanes
 
 kernels.kernel = kernels.subroutine = _as_it_is  # type: ignore[assignment]
 kernels.RecordFunction = _PlainFunction  # type: ignore[assignment,misc]

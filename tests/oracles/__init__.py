@@ -1,4 +1,4 @@
-"""Robots and trees of bodies in independent programs: Pinocchio, MuJoCo, SciPy, plain NumPy.
+"""Robots and trees of bodies in independent programs: Pinocchio, SciPy, plain NumPy.
 
 Further ones: `rotors` (wheels, and motors behind gears), `momenta`, `orbit`, `second_moments`.
 """
@@ -8,7 +8,6 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
-import mujoco
 import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
@@ -123,7 +122,7 @@ def pinocchio_model(robot: Robot) -> pin.Model:
 
 
 def visited(robot: Robot, state: State) -> State:
-    """The state with its joints in the order of Pinocchio's and MuJoCo's models of the robot."""
+    """The state with its joints in the order of Pinocchio's model of the robot."""
     order = list(robot.order)
     return state._replace(theta=state.theta[order], rate=state.rate[order])
 
@@ -184,72 +183,6 @@ def pinocchio_acceleration(model: Any, data: Any, state: State, force: Array) ->
     spatial = pin.aba(model, data, configuration, velocity, to_base @ force).copy()
     spatial[:3] += np.cross(velocity[3:6], velocity[:3])
     return to_base.T @ spatial
-
-
-def mujoco_numbers(values: Sequence[float] | Array) -> str:
-    """As MJCF has them, to the last digit."""
-    return " ".join(repr(float(value)) for value in values)
-
-
-def mujoco_inertial(com: Array, mass: float, tensor: Array) -> str:
-    """A body's inertia in MJCF, ``tensor`` about its centre of mass."""
-    full = [tensor[ij] for ij in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))]
-    return (
-        f'<inertial pos="{mujoco_numbers(com)}" mass="{float(mass)!r}" '
-        f'fullinertia="{mujoco_numbers(full)}"/>'
-    )
-
-
-def mujoco_model(robot: Robot, base: str = "", on_base: str = "") -> mujoco.MjModel:
-    """The same robot in MuJoCo, without gravity: a free joint, and hinges and slides of z.
-
-    In MJCF, ``base`` is another `mujoco_inertial` for the base, and ``on_base`` are more bodies on
-    it; their joints stand behind the robot's.
-    """
-
-    def inertial(body: int) -> str:
-        return mujoco_inertial(robot.com[body], robot.mass[body], robot.inertia[body])
-
-    def branch(body: int) -> str:
-        text = inertial(body)
-        for i in robot.order:
-            if robot.parent[i] != body:
-                continue
-            place = robot.rotation[i] @ robot.offset[i]
-            kind = "slide" if robot.is_prismatic[i] else "hinge"
-            turn = mujoco_numbers(quaternion_of(Rotation.from_matrix(robot.rotation[i])))
-            text += (
-                f'<body pos="{mujoco_numbers(place)}" quat="{turn}">'
-                f'<joint type="{kind}" axis="0 0 1"/>{branch(i + 1)}'
-                "</body>"
-            )
-        return text
-
-    text = branch(0).replace(inertial(0), base or inertial(0), 1)
-    text = f'<body name="base"><freejoint/>{text}{on_base}</body>'
-    return mujoco.MjModel.from_xml_string(
-        f'<mujoco><option gravity="0 0 0"/><worldbody>{text}</worldbody></mujoco>'
-    )
-
-
-def mujoco_forward_dynamics(robot: Robot, state: State, force: Array) -> Array:
-    """``[v0dot, w0dot, thetadd]`` on inertial axes by MuJoCo."""
-    return mujoco_acceleration(mujoco_model(robot), state, force)
-
-
-def mujoco_acceleration(model: mujoco.MjModel, state: State, force: Array) -> Array:
-    """`mujoco_forward_dynamics` with a model made before."""
-    data = mujoco.MjData(model)
-    rotation = rotation_of(state.quaternion).as_matrix()
-    data.qpos[3:7], data.qpos[7:] = state.quaternion, state.theta
-    data.qvel[:3], data.qvel[6:] = state.v0, state.rate
-    data.qvel[3:6] = rotation.T @ state.w0  # MuJoCo: base turn in the base frame, the rest inertial
-    data.qfrc_applied[:] = force
-    data.qfrc_applied[3:6] = rotation.T @ force[3:6]
-    mujoco.mj_forward(model, data)
-    acceleration = data.qacc.copy()
-    acceleration[3:6] = rotation @ acceleration[3:6]
-    return acceleration
 
 
 JOINTS = {

@@ -244,22 +244,6 @@ def free_path(position: ArrayLike, velocity: ArrayLike, times: ArrayLike, has_j2
     return np.asarray(path.y.T)
 
 
-def clohessy_wiltshire(n: float, position: ArrayLike, velocity: ArrayLike, time: float) -> Array:
-    """Return position and velocity (6,): radial, along the path, along the normal."""
-    (x, y, z), (u, v, w) = np.asarray(position), np.asarray(velocity)
-    s, c, t = np.sin(n * time), np.cos(n * time), n * time
-    return np.array(
-        [
-            (4.0 - 3.0 * c) * x + s / n * u + 2.0 / n * (1.0 - c) * v,
-            6.0 * (s - t) * x + y - 2.0 / n * (1.0 - c) * u + (4.0 * s - 3.0 * t) / n * v,
-            c * z + s / n * w,
-            3.0 * n * s * x + c * u + 2.0 * s * v,
-            6.0 * n * (c - 1.0) * x - 2.0 * s * u + (4.0 * c - 3.0) * v,
-            -n * s * z + c * w,
-        ]
-    )
-
-
 def tumbled(
     inertia: Array, quaternion: ArrayLike, omega: ArrayLike, path: ArrayLike, time: float
 ) -> tuple[Array, Array]:

@@ -1,4 +1,4 @@
-"""Rotors as bodies of their own, in Pinocchio and MuJoCo: wheels of the base, motors behind gears.
+"""Rotors as bodies of their own, in Pinocchio: wheels of the base, motors behind gears.
 
 A robot's file has its rotors, locked, in the bodies that carry them. So here they are taken out of
 these bodies, whatever their mass and wherever they are, before they are put on them as bodies.
@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
-import mujoco
 import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
@@ -18,9 +17,6 @@ from strategies import State
 
 from oracles import (
     attitude_jacobian_inertial,
-    mujoco_inertial,
-    mujoco_model,
-    mujoco_numbers,
     pinocchio_model,
     pinocchio_state,
     to_base_axes,
@@ -116,19 +112,6 @@ def pinocchio_with_wheels(robot: Robot, rotors: Sequence[Rotor]) -> pin.Model:
         body = pin.Inertia(rotor.mass, np.zeros(3), rotor.tensor)
         model.appendBodyToJoint(joint, body, pin.SE3.Identity())
     return model
-
-
-def mujoco_with_wheels(robot: Robot, rotors: Sequence[Rotor]) -> mujoco.MjModel:
-    """`mujoco_model` with a hinge for each rotor on the base, behind the joints."""
-    base = base_alone(robot, rotors)
-    bodies = [
-        f'<body pos="{mujoco_numbers(rotor.position)}">'
-        f'<joint type="hinge" axis="{mujoco_numbers(rotor.axis)}"/>'
-        f"{mujoco_inertial(np.zeros(3), rotor.mass, rotor.tensor)}</body>"
-        for rotor in rotors
-    ]
-    inertial = mujoco_inertial(base.lever, base.mass, base.inertia)
-    return mujoco_model(robot, inertial, "".join(bodies))
 
 
 def gear_of(robot: Robot, joint: int) -> Gear:

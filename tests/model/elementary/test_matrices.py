@@ -214,19 +214,6 @@ def test_factor_and_solution_are_those_of_numpy(rng: np.random.Generator, size: 
     assert np.abs(error).max() <= 1e-14 * size * condition * (size_of + np.abs(right / scale).max())
 
 
-@given(RNGS, st.integers(1, 7))
-def test_a_block_of_a_matrix_is_solved_in_place(rng: np.random.Generator, size: int) -> None:
-    """As for the joints' part of an inertia and of an acceleration."""
-    matrix, right = positive(rng, size + 3), rng.normal(size=size + 3)
-    factor, whole = np.zeros((size, size)), right.copy()
-    cholesky_into(matrix, 3, factor)
-    solve_cholesky(factor, whole[3:])
-    np.testing.assert_array_equal(whole[:3], right[:3])
-    residual = matrix[3:, 3:] @ whole[3:] - right[3:]
-    size_of = np.abs(matrix[3:, 3:]) @ np.abs(whole[3:]) + np.abs(right[3:])
-    np.testing.assert_array_less(np.abs(residual), 1e-13 * size_of)
-
-
 def symmetric(rng: np.random.Generator, size: int) -> Array:
     matrix = rng.normal(size=(size, size))
     return matrix + matrix.T

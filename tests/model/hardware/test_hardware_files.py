@@ -1,4 +1,4 @@
-"""Files of config/sensors and config/actuators, and what is said of wrong ones."""
+"""Files of config/sensors and config/actuators, what is said of wrong ones, what sets can give."""
 
 from __future__ import annotations
 
@@ -8,12 +8,22 @@ from typing import Any
 import numpy as np
 import pytest
 import yaml
+from benches import WHEEL_AXES as PYRAMID
+from benches import flat, hardware, random_thrusters
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from paths import CONFIG, DATA
+from scipy.optimize import linprog
+from strategies import SEEDS
 
-from space_robot_control.allocation.assumed_actuators import assumed_actuators
 from space_robot_model.hardware.base_actuators import BaseActuatorSettings
+from space_robot_model.hardware.capability import (
+    ThrusterTorques,
+    actuator_load,
+    largest_momentum,
+    largest_torque,
+    wheel_shares,
+)
 from space_robot_model.hardware.magnetic_torquers import MagneticTorquerSettings
 from space_robot_model.hardware.sensors import SensorSettings
 from space_robot_model.robot import Robot
@@ -97,13 +107,6 @@ def test_sizes_are_not_negative(part: str, key: str, zero_is_allowed: bool) -> N
             resolved(**{f"{part}.{key}": [value]})
 
 
-def test_there_are_the_files_that_the_manual_names() -> None:
-    names = {kind: {path.stem for path in paths} for kind, paths in FILES.items()}
-    hardware = ("wheels", "small_wheels", "thrusters", "wheels_and_thrusters")
-    assert names["actuators"] == {"ideal", "none", *hardware, "wheels_and_torquers"}
-    assert names["sensors"] == {"ideal", "fine", "tactical", "coarse", "white_l1", "white_l2"}
-
-
 @pytest.mark.parametrize(
     ("kind", "path"), [(kind, path) for kind in FILES for path in FILES[kind]], ids=str
 )
@@ -136,16 +139,6 @@ def test_without_a_choice_everything_is_ideal_and_single_numbers_come_over_a_fil
     assert settings.wheels.axes == plain.wheels.axes
     assert settings.star_tracker.delay == 0.3
     assert settings.star_tracker.rate == plain.star_tracker.rate
-
-
-def test_wheels_and_thrusters_may_span_together() -> None:
-    """Two wheels, and thrusters for the axis that is missing."""
-    found = resolved(actuators="thrusters", **{"wheels.axes": [1.0, 0.0, 0.0, 0.0, 1.0, 0.0]})
-    flat = found.thrusters.model_dump()
-    about_z = {key: flat[key][24:] for key in ("positions", "directions")}
-    parts = {"wheels": found.wheels.model_dump(), "thrusters": {**flat, **about_z}}
-    settings = BaseActuatorSettings.model_validate({"base_actuation": "hardware", **parts})
-    settings.check(PAPER, "mine")
 
 
 @given(st.integers(0, 8), st.integers(0, 24), st.integers(0, MOST_TORQUERS))
@@ -190,20 +183,6 @@ def test_axes_of_torquers_are_directions_and_one_dipole_may_stand_for_all() -> N
         MagneticTorquerSettings(axes=[1.0, 0.0, 0.0] * 7)
 
 
-def test_the_file_of_torquers_has_the_wheels_of_the_other_file() -> None:
-    """The flight software needs no orbit to know its torquers: it reads a magnetometer."""
-    settings = resolved(actuators="wheels_and_torquers", orbit="iss")
-    wheels = resolved(actuators="wheels").wheels
-    assert settings.names[-3:] == TORQUERS
-    assert assumed_actuators("wheels_and_torquers", PAPER).names[-3:] == TORQUERS
-    np.testing.assert_array_equal(settings.magnetic_torquers.unit_axes, np.eye(3))
-    np.testing.assert_array_equal(settings.magnetic_torquers.largest, np.full(3, 400.0))
-    speeds = {"initial_speed": settings.wheels.initial_speed}
-    assert settings.wheels == wheels.model_copy(update=speeds)
-    stored = settings.wheels.spin_momenta(settings.wheels.values("initial_speed"))
-    np.testing.assert_allclose(stored, 0.25 * settings.wheels.values("max_momentum"), rtol=0.01)
-
-
 @pytest.mark.parametrize(
     "orbit", [{"orbit": "gto"}, {"orbital_elements.height": 420e3, "magnetism.strength": 1e-12}]
 )
@@ -245,3 +224,124 @@ def test_any_file_makes_hardware_or_one_line(
     except InputError as error:
         said = str(error)
     assert "\n" not in said
+
+
+def test_three_wheels_have_their_own_limits_on_the_axes() -> None:
+    wheels = {"axes": flat(np.eye(3)), "max_torque": [1.0, 2.0, 3.0], "max_momentum": [4.0, 5.0, 0]}
+    found = hardware(wheels=wheels)
+    np.testing.assert_allclose(largest_torque(found), [1.0, 2.0, 3.0])
+    np.testing.assert_allclose(largest_momentum(found.wheels), [4.0, 5.0, np.inf])
+    np.testing.assert_allclose(wheel_shares(found.wheels), np.eye(3), atol=1e-15)
+
+
+def test_thrusters_help_wheels() -> None:
+    """A pair about +x alone: about -x there are the wheels only, so that both ways is theirs."""
+    thrusters = {
+        "positions": [0.0, 1.0, 0.0, 0.0, -1.0, 0.0],
+        "directions": [0.0, 0.0, 1.0, 0.0, 0.0, -1.0],
+        "force": [5.0],
+    }
+    wheels = {"axes": flat(np.eye(3)), "max_torque": [1.0]}
+    assert largest_torque(hardware(wheels=wheels, thrusters=thrusters))[0] == pytest.approx(1.0)
+    both = {
+        **thrusters,
+        "positions": thrusters["positions"] * 2,
+        "directions": [*thrusters["directions"], 0.0, 0.0, -1.0, 0.0, 0.0, 1.0],
+    }
+    assert largest_torque(hardware(wheels=wheels, thrusters=both))[0] == pytest.approx(11.0)
+
+
+@settings(deadline=None, max_examples=30)
+@given(SEEDS, st.integers(3, 12))
+def test_the_least_propellant_is_the_linear_programmes(seed: int, count: int) -> None:
+    rng = np.random.default_rng(seed)
+    thrusters = random_thrusters(rng, count).thrusters
+    rates, torques = thrusters.mass_flow, thrusters.torques
+    np.testing.assert_allclose(
+        rates, np.array(thrusters.force) / np.array(thrusters.specific_impulse) / 9.80665
+    )
+    wanted = rng.normal(size=(5, 3))
+    found = ThrusterTorques.of(thrusters).propellant(wanted)
+    for torque, rate in zip(wanted, found, strict=True):
+        solved = linprog(rates, A_eq=torques.T, b_eq=torque, bounds=(0.0, None))
+        assert rate == pytest.approx(solved.fun, rel=1e-6)
+    assert ThrusterTorques.of(thrusters).propellant(np.zeros((1, 3))) == 0.0
+
+
+def test_wheels_turn_their_momentum_with_the_base() -> None:
+    """A base that turns steadily about z, with what its wheels hold about x, wants w x h about y.
+
+    One wheel gives it; the wheels' friction comes on top.
+    """
+    wheels = {
+        "axes": flat(np.eye(3)),
+        "max_torque": [2.0],
+        "max_momentum": [40.0],
+        "rotor_inertia": [0.5],
+        "initial_speed": [20.0, 0.0, 0.0],
+        "coulomb": [0.0, 0.0, 0.1],
+    }
+    omega, still = np.array([[0.0, 0.0, 0.1]]), np.zeros((1, 3))
+    load = actuator_load(hardware(wheels=wheels), still, np.array([[-10.0, 0.0, -4.0]]), omega)
+    np.testing.assert_allclose(load.torque, [[0.0, 0.1 * 20.0, 0.0]])
+    np.testing.assert_allclose(load.torque_share, [1.0])
+    np.testing.assert_allclose(load.momentum_share, [0.5])
+
+
+@settings(deadline=None)
+@given(SEEDS)
+def test_the_share_of_a_pyramid_is_its_fullest_wheels(seed: int) -> None:
+    """By the pseudoinverse, as the allocation shares it; about several axes it is more than about
+    each."""
+    rng = np.random.default_rng(seed)
+    torque, still = rng.normal(size=(8, 3)), np.zeros((8, 3))
+    found = hardware(wheels={"axes": PYRAMID, "max_torque": [0.2], "max_momentum": [7.0]})
+    load = actuator_load(found, torque, torque, still)
+    shares = np.abs(torque @ np.linalg.pinv(found.wheels.unit_axes.T).T).max(axis=1)
+    np.testing.assert_allclose(load.torque_share, shares / 0.2)
+    np.testing.assert_allclose(load.momentum_share, shares / 7.0)
+    assert np.all(load.torque_share >= np.abs(torque).max(axis=1) / (0.8 / np.sqrt(3.0)) - 1e-9)
+
+
+@settings(deadline=None, max_examples=30)
+@given(SEEDS)
+def test_wheels_and_thrusters_give_what_the_linear_programme_says(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    wheels = {"axes": rng.normal(size=6).tolist(), "max_torque": rng.uniform(0.1, 5.0, 2).tolist()}
+    thrusters = random_thrusters(rng, 5)
+    found = hardware(wheels=wheels, thrusters=thrusters.thrusters.model_dump())
+    wanted, still = rng.normal(size=(4, 3)), np.zeros((4, 3))
+    load = actuator_load(found, wanted, still, still)
+    limits: list[tuple[float, float | None]]
+    limits = [(-limit, limit) for limit in found.wheels.limits("max_torque")]
+    limits += [(0.0, 1.0)] * found.thruster_count + [(0.0, None)]
+    columns = np.vstack([found.wheels.unit_axes, found.thrusters.torques]).T
+    for torque, share in zip(wanted, load.torque_share, strict=True):
+        solved = linprog(
+            np.append(np.zeros(len(columns.T)), -1.0),
+            A_eq=np.column_stack([columns, -torque]),
+            b_eq=np.zeros(3),
+            bounds=limits,
+        )
+        assert 1.0 / share == pytest.approx(-solved.fun, rel=1e-6)
+    np.testing.assert_array_equal(load.momentum_share, 0.0)
+
+
+def test_wheels_without_a_limit_are_asked_for_no_share() -> None:
+    found = hardware(wheels={"axes": PYRAMID, "max_torque": [0.0], "max_momentum": [0.0]})
+    load = actuator_load(found, np.ones((2, 3)), np.ones((2, 3)), np.zeros((2, 3)))
+    np.testing.assert_array_equal(load.torque_share, 0.0)
+    np.testing.assert_array_equal(load.momentum_share, 0.0)
+
+
+@given(SEEDS, st.integers(3, 8))
+def test_wheels_share_a_torque_by_least_squares_of_what_each_can_give(
+    seed: int, count: int
+) -> None:
+    """``W A^T (A W A^T)^-1`` with the squares of the motors' torques as weights W."""
+    rng = np.random.default_rng(seed)
+    most, axes = rng.uniform(0.1, 5.0, count), rng.normal(size=(count, 3))
+    found = hardware(wheels={"axes": flat(axes), "max_torque": most.tolist()}).wheels
+    weighted = found.unit_axes.T * most**2
+    expected = weighted.T @ np.linalg.inv(weighted @ found.unit_axes)
+    np.testing.assert_allclose(wheel_shares(found), expected, rtol=1e-7, atol=1e-9)

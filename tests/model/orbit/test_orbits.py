@@ -108,20 +108,6 @@ def period(elements: dict[str, float]) -> float:
     return float(2.0 * np.pi * np.sqrt((EARTH_RADIUS + elements["height"]) ** 3 / MU))
 
 
-@pytest.mark.parametrize("elements", [ISS, GTO])
-def test_without_j2_it_agrees_with_keplers_equation(elements: dict[str, float]) -> None:
-    """The elements' state of a later mean anomaly, to the digits of the perigee's time."""
-    known = ephemeris(orbital_elements=elements, j2=False)
-    times = np.linspace(0.0, 1.5 * period(elements), 31)
-    motion = known.motion(times)
-    for k, time in enumerate(times):
-        turned = elements["anomaly_deg"] + 360.0 * time / period(elements)
-        later = elements | {"anomaly_deg": float(np.remainder(turned, 360.0))}
-        position, velocity = state_of(ElementSettings.model_validate(later))
-        np.testing.assert_allclose(motion.position[k], position, rtol=0, atol=1e-4)
-        np.testing.assert_allclose(motion.velocity[k], velocity, rtol=0, atol=1e-7)
-
-
 @settings(max_examples=60)
 @given(st.floats(200e3, 4e7), st.floats(0.0, 180.0), st.floats(0.0, 20_000.0), st.booleans())
 def test_acceleration_and_jerk_are_those_of_gravity_at_the_place(
@@ -193,12 +179,16 @@ def test_gravity_is_the_textbooks_and_the_gradient_of_its_potential(
         np.testing.assert_allclose(out, wanted, rtol=0, atol=1e-15 * np.linalg.norm(expected))
 
 
-def test_an_orbit_with_j2_and_a_target_beside_it_agree_with_scipy() -> None:
-    known, times = ephemeris(target=TARGET), np.linspace(0.0, period(ISS), 200)
+@pytest.mark.parametrize(("elements", "has_j2", "atol"), [(ISS, True, 1e-5), (GTO, False, 1e-3)])
+def test_an_orbit_and_a_target_beside_it_agree_with_scipy(
+    elements: dict[str, float], has_j2: bool, atol: float
+) -> None:
+    known = ephemeris(orbital_elements=elements, target=TARGET, j2=has_j2)
+    times = np.linspace(0.0, period(elements), 200)
     r, v = state_of(known.assumed.orbital_elements)
-    expected = free_path(r, v, times, has_j2=True)
+    expected = free_path(r, v, times, has_j2)
     place, speed = np.array(TARGET["position"]), np.array(TARGET["velocity"])
-    apart = free_path(r + place, v + speed, times, has_j2=True) - expected
+    apart = free_path(r + place, v + speed, times, has_j2) - expected
     for motion, path in ((known.motion(times), expected), (known.target_motion(times), apart)):
-        np.testing.assert_allclose(motion.position, path[:, :3], rtol=0, atol=1e-5)
-        np.testing.assert_allclose(motion.velocity, path[:, 3:], rtol=0, atol=1e-8)
+        np.testing.assert_allclose(motion.position, path[:, :3], rtol=0, atol=atol)
+        np.testing.assert_allclose(motion.velocity, path[:, 3:], rtol=0, atol=1e-3 * atol)

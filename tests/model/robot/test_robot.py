@@ -19,7 +19,6 @@ from scipy.spatial.transform import Rotation
 from strategies import random_bodies, random_robot, random_robot_file
 
 from space_robot_model.robot import Robot
-from space_robot_model.robot.file import MOST_LINKS
 from space_robot_model.robot.find import find_robot
 from space_robot_model.robot.source import document_of
 from space_robot_model.robot.tree.bodies import JointLimits
@@ -178,33 +177,6 @@ def test_shapes_are_part_of_the_numbers() -> None:
         assert (after.mesh, after.colour) == (before.mesh, before.colour)
         np.testing.assert_allclose(after.rotation, before.rotation, atol=1e-15)
         np.testing.assert_allclose(after.position, before.position, atol=1e-15)
-
-
-MATTER = (
-    '<inertial><mass value="1"/>'
-    '<inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial>'
-)
-
-
-def urdf(links: int, kind: str, matter: str = MATTER) -> str:
-    """A chain."""
-    joints = "".join(
-        f'<link name="l{k}">{matter}</link><joint name="j{k}" type="{kind}"><parent link="l{k - 1}"'
-        f'/><child link="l{k}"/></joint>'
-        for k in range(1, links)
-    )
-    return f'<robot name="long"><link name="l0">{MATTER}</link>{joints}</robot>'
-
-
-def test_a_yaml_is_counted_before_its_links_are_compared() -> None:
-    link = {"mass": 1.0, "inertia": [1.0] * 3 + [0.0] * 3, "com": [0.0] * 3}
-    content: dict[str, Any] = {
-        "name": "long",
-        "base": {"mass": 1.0, "inertia": link["inertia"]},
-        "links": [{"name": f"j{k}", **link} for k in range(MOST_LINKS + 1)],
-    }
-    with pytest.raises(InputError, match="links: List should have at most 4000 items"):
-        Robot.from_dict({"robot": content})
 
 
 def edited(content: dict[str, Any], changes: dict[str, Any]) -> None:

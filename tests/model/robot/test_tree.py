@@ -1,4 +1,4 @@
-"""A tree of bodies becomes the robot that moves as they would: compared with Pinocchio's."""
+"""Trees of bodies and their momenta, motors behind gears too, against Pinocchio."""
 
 from __future__ import annotations
 
@@ -6,17 +6,39 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
+import pinocchio as pin
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from oracles import TreeOracle, assert_same_dynamics, pinocchio_tree
+from oracles import (
+    TreeOracle,
+    assert_same_dynamics,
+    pinocchio_model,
+    pinocchio_state,
+    pinocchio_tree,
+    rotation_of,
+)
+from oracles.rotors import RotorEquations, pinocchio_momentum, random_motor_rotors
+from robots import oscillator
 from scipy.spatial.transform import Rotation
-from strategies import BASE, KINDS, SEEDS, random_bodies
+from strategies import (
+    BASE,
+    KINDS,
+    SEEDS,
+    random_bodies,
+    random_gears,
+    random_quaternion,
+    random_robot,
+    random_state,
+    with_gears,
+)
 
 from space_robot_model.robot import Robot
+from space_robot_model.robot.frames import body_frames
+from space_robot_model.robot.gears import flexible_model, geared_joints, motor_momentum, rotor_rows
 from space_robot_model.robot.mission_document import QUATERNION
-from space_robot_model.robot.tool import tool_pose
-from space_robot_model.robot.tree import Body, Joint, Spring, flatten, other_meaning
+from space_robot_model.robot.momentum import Motion, robot_momentum
+from space_robot_model.robot.tree import Body, Gear, Joint, Spring, flatten, other_meaning
 from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.topics import BASE_AXES
 from space_robot_sim.environment.disturbance_table import BASE as BASE_LOADS
@@ -55,19 +77,6 @@ def test_nominal_robot_is_locked_at_rest(seed: int, kinds: list[str]) -> None:
     assert_same_dynamics(robot.nominal, oracle, seed)
 
 
-@settings(max_examples=30)
-@given(seed=SEEDS, kinds=SOME_TREES)
-def test_nominal_tool_is_where_the_true_one_is_at_rest(seed: int, kinds: list[str]) -> None:
-    robot, rng = Robot.of_tree("tree", tree_of(seed, kinds)), np.random.default_rng(seed)
-    quaternion = Rotation.random(3, random_state=seed).as_quat()[:, [3, 0, 1, 2]]
-    joints = rng.uniform(-3.0, 3.0, (3, robot.n))
-    rest = np.broadcast_to([spring.rest for spring in robot.springs], (3, len(robot.springs)))
-    rotation, position = tool_pose(robot, quaternion, np.hstack([joints, rest]))
-    nominal_rotation, nominal_position = tool_pose(robot.nominal, quaternion, joints)
-    np.testing.assert_allclose(nominal_rotation, rotation, atol=1e-12)
-    np.testing.assert_allclose(nominal_position, position, atol=1e-11)
-
-
 def _locked(body: Body) -> Body:
     joint = body.joint
     if joint is None or joint.spring is None:
@@ -87,32 +96,6 @@ def test_no_joint_has_the_name_of_something_else() -> None:
     assert all(map(other_meaning, names))
     assert other_meaning("elbow_rate", ["elbow"])
     assert not any(map(other_meaning, ["elbow_rate", "joint_1", "base_yaw", "wheel", "time_1"]))
-
-
-@given(seed=SEEDS, kinds=SOME_TREES)
-def test_structure(seed: int, kinds: list[str]) -> None:
-    bodies = tree_of(seed, kinds)
-    robot, by_name = Robot.of_tree("tree", bodies), {body.name: body for body in bodies}
-    joints = {body.joint.name: body.joint for body in bodies if body.joint}
-    moving = {name for name, joint in joints.items() if joint.kind != "fixed"}
-    assert set(robot.all_joint_names) == moving
-    assert all(joints[name].spring is None for name in robot.joint_names)
-    assert robot.springs == tuple(joints[name].spring for name in robot.passive_names)
-    assert robot.mass.sum() == pytest.approx(sum(body.mass for body in bodies))
-    for number, name in enumerate(robot.body_names[1:]):
-        above = by_name[by_name[name].parent]
-        while above.joint and above.joint.kind == "fixed":
-            above = by_name[above.parent]
-        assert robot.body_names[robot.parent[number]] == above.name
-        assert robot.is_prismatic[number] == (by_name[name].joint.kind == "prismatic")  # type: ignore[union-attr]
-    seen = {-1}
-    for joint in robot.order:
-        assert robot.parent[joint] - 1 in seen, "a parent's before its children's"
-        seen.add(joint)
-    assert seen == set(range(-1, robot.joint_count))
-    assert len(robot.tools) == len(bodies), "those of merged bodies are kept"
-    for array in (robot.mass, robot.com, robot.inertia, robot.rotation, robot.offset):
-        assert np.all(np.isfinite(array))
 
 
 @given(seed=SEEDS, kinds=SOME_TREES)
@@ -196,3 +179,113 @@ def test_many_bodies_in_a_row_are_walked_without_recursion() -> None:
     ]
     walked = flatten([HULL, *chain[::-1]])
     assert [link.body.mass for link in walked[1:]] == [3000.0]
+
+
+def motion_of(states: list) -> Motion:
+    """Random states as a flight; their velocities are on inertial axes, a flight's in the base."""
+    omega = [rotation_of(state.quaternion).as_matrix().T @ state.w0 for state in states]
+    return Motion(
+        np.array([state.quaternion for state in states]),
+        np.array(omega),
+        np.array([state.theta for state in states]),
+        np.array([state.rate for state in states]),
+    )
+
+
+@given(SEEDS, st.integers(1, 8))
+def test_it_is_pinocchios_centroidal_momentum(seed: int, n: int) -> None:
+    rng = np.random.default_rng(seed)
+    robot, states = random_robot(rng, n), [random_state(rng, n) for _ in range(3)]
+    model = pinocchio_model(robot)
+    data, found = model.createData(), robot_momentum(robot, motion_of(states))
+    for k, state in enumerate(states):
+        wanted = pin.computeCentroidalMomentum(model, data, *pinocchio_state(state)).angular
+        size = np.linalg.norm(wanted) + np.linalg.norm(state.velocity)
+        np.testing.assert_allclose(found.angular[k], wanted, rtol=0.0, atol=1e-12 * size * 1e3)
+        np.testing.assert_allclose(found.centre_of_mass[k], data.com[0], rtol=1e-11, atol=1e-12)
+
+
+def test_the_base_has_its_own_about_the_common_centre_of_mass(paper_robot: Robot) -> None:
+    still, theta = np.zeros((3, 6)), np.tile([0.3, -0.8, 1.1, 0.2, -0.5, 0.9], (3, 1))
+    upright = np.tile([1.0, 0.0, 0.0, 0.0], (3, 1))
+    found = robot_momentum(paper_robot, Motion(upright, np.eye(3), theta, still))
+    lever = found.centre_of_mass[0]
+    alone = paper_robot.inertia[0] + paper_robot.mass[0] * (
+        lever @ lever * np.eye(3) - np.outer(lever, lever)
+    )
+    np.testing.assert_allclose(found.base, alone, rtol=1e-12, atol=1e-10)
+
+
+def test_wrong_shapes_are_named(paper_robot: Robot) -> None:
+    still = Motion(np.zeros((2, 4)), np.zeros((2, 3)), np.zeros((2, 6)), np.zeros((2, 5)))
+    with pytest.raises(ValueError, match=r"joint_velocities: shape \(2, 6\)"):
+        robot_momentum(paper_robot, still)
+
+
+TREE = ("revolute", "passive revolute", "prismatic", "revolute", "fixed", "passive prismatic")
+
+
+def tree(seed: int) -> tuple[Robot, np.random.Generator]:
+    rng = np.random.default_rng(seed)
+    return random_gears(rng, Robot.of_tree("tree", random_bodies(rng, TREE))), rng
+
+
+@given(SEEDS)
+@settings(max_examples=40)
+def test_couplings_of_rotors_are_those_of_the_inertia_matrix(seed: int) -> None:
+    """In any attitude and posture; and all of it at rest upright."""
+    robot, rng = tree(seed)
+    equations, n = RotorEquations(robot, random_motor_rotors(rng, robot)), robot.joint_count
+    quaternion, theta = random_quaternion(rng), rng.uniform(-3.0, 3.0, n)
+    expected, _ = equations.matrices(quaternion, theta, np.zeros(equations.size))
+    upright, _ = equations.matrices(np.eye(4)[0], theta, np.zeros(equations.size))
+    size = 1e-12 * np.abs(expected).max()
+    model = flexible_model(robot, theta)
+    np.testing.assert_allclose(model.inertia, upright, rtol=0.0, atol=size)
+    axes = rotation_of(quaternion).as_matrix().T[:, :, np.newaxis]
+    frames = body_frames(robot, (axes[0], axes[1], axes[2]), theta[:, np.newaxis])
+    rows, reflected = rotor_rows(robot, {frame.body: frame for frame in frames})
+    np.testing.assert_allclose(
+        rows, expected[6 + n :, : 6 + n], rtol=0.0, atol=1e-12 * np.abs(rows).max()
+    )
+    np.testing.assert_allclose(
+        np.diag(reflected), expected[6 + n :, 6 + n :], rtol=0.0, atol=1e-12 * reflected.max()
+    )
+
+
+@given(SEEDS)
+@settings(max_examples=30)
+def test_robot_and_motors_have_the_momentum_of_all_bodies(seed: int) -> None:
+    """By Pinocchio, about the common centre of mass."""
+    robot, rng = tree(seed)
+    rotors, state = random_motor_rotors(rng, robot), random_state(rng, robot.joint_count)
+    speeds = 10.0 * rng.normal(size=len(rotors))
+    _, expected = pinocchio_momentum(robot, rotors, state, speeds)
+    quaternion, theta = state.quaternion[None], state.theta[None]
+    omega = rotation_of(state.quaternion).inv().apply(state.w0)
+    motion = Motion(quaternion, omega[None], theta, state.rate[None])
+    motors = motor_momentum(robot, quaternion, theta, speeds[None])
+    actual = (robot_momentum(robot, motion).angular + motors)[0]
+    np.testing.assert_allclose(actual, expected, rtol=0.0, atol=1e-12 * np.abs(expected).max())
+
+
+@pytest.mark.parametrize("damping", [0.0, 0.4, 1e4])
+def test_the_fastest_motion_is_the_two_masses(damping: float) -> None:
+    """Absolute roots of ``s^2 + (1/B + 1/I) (D s + K)``."""
+    gear, link = Gear(2e-5, 100.0, 150.0, damping), 0.5
+    lighter = 1.0 / gear.reflected_inertia + 1.0 / link
+    roots = np.roots([1.0, lighter * damping, lighter * gear.stiffness])
+    fastest = flexible_model(oscillator(gear, link), np.zeros(1)).fastest
+    assert fastest == pytest.approx(np.abs(roots).max(), rel=1e-9)
+
+
+def test_stiffness_stands_between_joint_and_motor() -> None:
+    rng = np.random.default_rng(3)
+    robot = with_gears(
+        random_robot(rng, 3), [Gear(1e-3, 10.0, 7.0, 2.0), None, Gear(1e-3, 5.0, 9.0)]
+    )
+    assert geared_joints(robot) == [0, 2]
+    model, stretch = flexible_model(robot, np.zeros(3)), np.zeros((2, 11))
+    stretch[0, [6, 9]] = stretch[1, [8, 10]] = -1.0, 1.0
+    for matrix, values in ((model.stiffness, [7.0, 9.0]), (model.damping, [2.0, 0.0])):
+        np.testing.assert_array_equal(matrix, stretch.T @ np.diag(values) @ stretch)

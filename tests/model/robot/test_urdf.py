@@ -305,15 +305,3 @@ def test_links_are_counted_before_one_is_read(
     monkeypatch.setattr("space_robot_model.robot.urdf.read.read_links", read)
     with pytest.raises(InputError, match=said):
         parse_urdf(text, Path("my.urdf"))
-
-
-def test_what_can_be_locked_still_counts_as_read() -> None:
-    """More moving joints than can be flown, of which all but one carry nothing that has mass."""
-    tips = "".join(
-        f'<link name="tip{k}"/><joint name="t{k}" type="continuous"><parent link="l1"/>'
-        f'<child link="tip{k}"/></joint>'
-        for k in range(80)
-    )
-    text = chain(2, "continuous").replace("</robot>", f"{tips}</robot>")
-    robot = Robot.of_tree("tips", parse_urdf(text, Path("my.urdf"), repair=True).bodies)
-    assert (robot.n, len(robot.tools)) == (1, 80)

@@ -129,16 +129,6 @@ def test_a_robot_or_one_line(path: Path, text: str | bytes, base: str | None) ->
             assert all(len(str(finding).splitlines()) == 1 for finding in found.findings)
 
 
-@pytest.mark.parametrize(
-    "data", [b"\xff\xfe<robot/>", b"\0" * 100, b"<robot name='\xe9'/>", GOOD.encode("utf-16")]
-)
-def test_other_bytes(path: Path, data: bytes) -> None:
-    path.write_bytes(data)
-    with pytest.raises(InputError) as error:
-        read_urdf(path)
-    assert "\n" not in str(error.value)
-
-
 def test_no_file(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="no such file"):
         read_urdf(tmp_path / "nothing.urdf")

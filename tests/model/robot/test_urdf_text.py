@@ -13,12 +13,13 @@ import pinocchio as pin
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from oracles import TreeOracle, assert_same_dynamics, quaternion_of
+from oracles import TreeOracle, assert_close, assert_same_dynamics, quaternion_of
 from paths import DATA
 from scipy.spatial.transform import Rotation
 from strategies import KINDS, SEEDS, random_bodies
 
 from space_robot_model.robot import Robot
+from space_robot_model.robot.dynamics import bias_force, mass_matrix
 from space_robot_model.robot.find import find_robot, robot_names
 from space_robot_model.robot.frame_names import frame_names
 from space_robot_model.robot.shapes import shapes_of
@@ -107,6 +108,25 @@ def assert_frames_of_transforms(robot: Robot, oracle: TreeOracle) -> None:
         np.testing.assert_allclose(given * np.sign(given @ turn), turn, atol=1e-9)
 
 
+def assert_mujoco_moves_joints_alike(robot: Robot, model: mujoco.MjModel) -> None:
+    """Of a base that stands, as MuJoCo's is: the joints' part of H and c."""
+    model.opt.gravity[:] = 0.0
+    data, rng = mujoco.MjData(model), np.random.default_rng(2)
+    theta, rates = rng.uniform(-1.0, 1.0, (2, robot.joint_count))
+    dofs = [model.joint(name).dofadr[0] for name in robot.all_joint_names]
+    data.qpos[dofs], data.qvel[dofs] = theta, rates
+    mujoco.mj_forward(model, data)
+    inertia = np.zeros((model.nv, model.nv))
+    mujoco.mj_fullM(model, data, inertia)
+    upright, still = [1.0, 0.0, 0.0, 0.0], np.zeros(3)
+    found, bias = (
+        mass_matrix(robot, upright, theta)[6:, 6:],
+        bias_force(robot, upright, theta, still, rates)[6:],
+    )
+    assert_close(inertia[np.ix_(dofs, dofs)], found, 1e-9)
+    assert_close(data.qfrc_bias[dofs], bias, 1e-9)
+
+
 @settings(max_examples=40)
 @given(seed=SEEDS, kinds=SOME_TREES)
 def test_random_trees(seed: int, kinds: list[str]) -> None:
@@ -136,6 +156,7 @@ def test_shipped_robots(name: str) -> None:
     assert {model.joint(i).name for i in range(model.njnt)} == set(robot.all_joint_names)
     masses = [model.body(name).mass[0] for name in frame_names(robot).bodies[1:]]
     np.testing.assert_allclose(masses, robot.mass[1:], rtol=1e-15)
+    assert_mujoco_moves_joints_alike(robot, model)
 
 
 @pytest.mark.parametrize("name", ROBOTS, ids=lambda name: Path(name).stem)

@@ -236,16 +236,6 @@ def test_propellant_is_the_impulse_over_the_exhausts_speed(period: float) -> Non
     assert found.record.thrusters.pulses[:2].tolist() == [1.0, 1.0]
 
 
-def test_wheels_and_thrusters_act_together() -> None:
-    wheels = {"axes": [1.0, 0.0, 0.0], "max_torque": [2.0]}
-    found = thrusters("wheel_fail@0.0005:1", more={"wheels": wheels})
-    found.act(np.array([*np.zeros(N + 3), 1.5, 10.0, 0.0]))
-    assert found.truth.applied_torque[:3].tolist() == [8.5, 0.0, 0.0]
-    assert found.record.base_wrench.tolist() == [0.0, 0.0, 10.0, 10.0, 0.0, 0.0]
-    found.act(np.array([*np.zeros(N + 3), 1.5, 10.0, 0.0]))
-    assert found.truth.applied_torque[:3].tolist() == [10.0, 0.0, 0.0]
-
-
 PAPER = Robot.from_yaml(CONFIG / "robots/paper.yaml")
 FOUR_WHEELS = {"axes": PYRAMID, "rotor_inertia": [0.03], "initial_speed": [50.0, -20.0, 30.0, 90.0]}
 FIELD_ONLY = {"gravity": {"gradient": False}, "magnetism": {"strength": 3e-5}}

@@ -116,14 +116,6 @@ def test_faults_are_wrong_in_their_time_on_their_axes_and_leave_no_trace() -> No
     assert drives.record.drive.tobytes() == sound[0].drive.tobytes()
 
 
-def test_sound_drives_that_a_fault_spoils_are_sound_again() -> None:
-    drives, wrong = Bench(), faults("drive_scale@0.005-0.01:3=0.5")
-    for tick, torque in enumerate(torques(6)):
-        wrong.apply(tick, drives.block[0].drive)
-        spoilt = np.flatnonzero(drives.act(torque)[1] != torque).tolist()
-        assert spoilt == ([5] if 10 <= tick < 20 else [])
-
-
 def test_numbers_changed_in_flight_count_once_judged() -> None:
     drives = Bench()
     drives.block[0].drive.dead_band[4] = 1e9

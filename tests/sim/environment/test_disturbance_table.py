@@ -65,16 +65,6 @@ def test_friction_of_the_largest_robot_with_the_most_wheels_is_each_ones_own() -
     assert joints.count == out.size
 
 
-def friction(joints: Friction, joint: int, rate: float) -> float:
-    """The friction of one joint that turns alone."""
-    velocities = np.zeros(int(joints.count))
-    velocities[joint] = rate
-    out = np.full(velocities.size, np.nan)
-    friction_torque(joints, velocities, np.sign(velocities), out)
-    assert not np.delete(out, joint).any()
-    return float(out[joint])
-
-
 def equation_61(n: int, k: float, t: float) -> Array:
     """As printed, joints beyond the third like the fourth."""
     pi = np.pi
@@ -91,16 +81,6 @@ def test_disturbance_is_equation_61(n: int, scale: float, time: float) -> None:
     np.testing.assert_allclose(
         disturbance(n, scale, time), equation_61(n, scale, time), rtol=1e-12, atol=1e-15
     )
-
-
-@given(st.floats(-50.0, 50.0), st.integers(0, 3))
-def test_friction_opposes_the_motion(rate: float, joint: int) -> None:
-    """(27): the torque it takes from the joint has the sign of the rate, so power is lost."""
-    torque = friction(Friction.build(FOUR, FrictionSettings()), joint, rate)
-    expected = 0.02 * (rate > 0) - 0.02 * (rate < 0) + 0.2 * rate
-    assert torque == pytest.approx(expected, rel=1e-14)
-    assert torque * rate >= 0.0
-    assert friction(Friction.build(FOUR, FrictionSettings()), joint, -rate) == -torque
 
 
 def test_a_robots_own_friction_comes_before_the_settings() -> None:

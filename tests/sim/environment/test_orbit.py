@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from decimal import localcontext
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -15,19 +14,15 @@ from oracles.orbit import (
     DIGITS,
     EARTH_RADIUS,
     EARTH_RATE,
-    J2,
     MU,
     body_motions,
     body_places,
     centre_of_mass,
     exact,
     exact_gravity,
-    free_path,
-    mean_motion,
     plus,
     whole_momenta,
 )
-from paths import CONFIG
 from robots import MOTORS, NO_FRICTION, coast, orbiting_plant, rigid_robot, set_motion, set_orbit
 from scipy.spatial.transform import Rotation
 from strategies import random_quaternion, random_robot_file
@@ -38,7 +33,7 @@ from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.samples import RobotState
 from space_robot_sim.environment.gravity_gradient import add_gravity_gradient
 from space_robot_sim.environment.orbit import Orbit, magnetic_field
-from space_robot_sim.environment.orbit_file import orbit_layers, read_orbit
+from space_robot_sim.environment.orbit_file import orbit_layers
 from space_robot_sim.environment.orbit_settings import OrbitSettings
 from space_robot_sim.plant.plant import Plant
 
@@ -135,35 +130,10 @@ def test_the_shadow_begins_where_the_earths_cylinder_is(beta: float) -> None:
     assert sunlit(a, 0.0, beta_angle_deg=beta)
 
 
-SHIPPED = sorted((CONFIG / "orbits").glob("*.yaml"))
-
-
-@pytest.mark.parametrize("path", SHIPPED, ids=lambda path: path.stem)
-def test_shipped_orbits_stay_above_the_air_that_would_stop_them(path: Path) -> None:
-    orbit = read_orbit(path)
-    assert orbit.has_orbit == (path.stem != "none")
-    if orbit.has_orbit:
-        elements = orbit.orbital_elements
-        perigee = elements.semi_major_axis * (1.0 - elements.eccentricity) - 6378137.0
-        assert perigee > 200e3
-    else:
-        assert orbit == OrbitSettings()
-
-
 def test_no_file_is_read_without_an_orbit() -> None:
     """So a resolved scenario flies where there are no files."""
     assert orbit_layers("none") == orbit_layers("given") == []
     assert [path.stem for path in orbit_layers("iss")] == ["iss"]
-
-
-@pytest.mark.parametrize("section", ["/**", "plant_node", "/plant_node", "/**/plant_node"])
-def test_sections_are_those_that_ros_would_apply(section: str, tmp_path: Path) -> None:
-    path = tmp_path / "mine.yaml"
-    text = "{ros__parameters: {orbital_elements.height: 5.0e5, sunlight: {pressure: 4.56e-6}}}"
-    path.write_text(f"{section}: {text}\n")
-    orbit = read_orbit(path)
-    assert orbit.orbital_elements.height == 5e5
-    assert orbit.sunlight.pressure == 4.56e-6
 
 
 def test_settings_without_an_orbit_are_refused_by_their_key() -> None:
@@ -216,44 +186,6 @@ def test_gravity_difference_loses_no_digits(
     size = MU * distance / (EARTH_RADIUS + height) ** 3
     expected = exact_difference(r, d, has_j2)
     np.testing.assert_allclose(difference(r, d, has_j2), expected, rtol=0, atol=1e-14 * size)
-
-
-def node_of(position: Array, velocity: Array) -> float:
-    """Return the right ascension of the ascending node, rad."""
-    normal = np.cross(position, velocity)
-    return float(np.arctan2(normal[0], -normal[1]))
-
-
-@pytest.mark.parametrize("inclination_deg", [51.64, 98.19])
-def test_j2_turns_the_node_at_the_secular_rate(inclination_deg: float) -> None:
-    """``-3/2 n J2 (R_E / a)^2 cos i`` over eight orbits, to the next order, which is J2 itself.
-
-    There, a is the mean semi-major axis: at a node, that of the elements is larger by
-    ``3/2 J2 R_E^2 / a sin^2 i`` (Brouwer 1959). Beside it, the same orbit by SciPy.
-    """
-    a, inclination = EARTH_RADIUS + 700e3, np.radians(inclination_deg)
-    elements = {"height": 700e3, "inclination_deg": inclination_deg, "raan_deg": 40.0}
-    period = 2.0
-    plant = orbiting_plant(
-        POINT, period, orbital_elements=elements, gravity={"gradient": False, "j2": True}
-    )
-    start = np.concatenate([plant.truth.orbit_position, plant.truth.orbit_velocity])
-    nodes = []  # at the ascending nodes, where what J2 does within an orbit is the same
-    state, z = plant.truth, 0.0
-    while len(nodes) < 9:
-        before, z = z, coast(plant, 1).orbit_position[2]
-        if before < 0.0 <= z:
-            nodes.append((plant.tick * period, node_of(state.orbit_position, state.orbit_velocity)))
-    (first, node), (last, end) = nodes[0], nodes[-1]
-    rate = (end - node) / (last - first)
-    mean = a - 1.5 * J2 * EARTH_RADIUS**2 / a * np.sin(inclination) ** 2
-    secular = -1.5 * mean_motion(mean) * J2 * (EARTH_RADIUS / mean) ** 2 * np.cos(inclination)
-    assert rate == pytest.approx(secular, rel=2.0 * J2)
-
-    (expected,) = free_path(start[:3], start[3:], last, has_j2=True)
-    flown = np.concatenate([state.orbit_position, state.orbit_velocity])
-    np.testing.assert_allclose(flown[:3], expected[:3], rtol=0, atol=1e-3)
-    np.testing.assert_allclose(flown[3:], expected[3:], rtol=0, atol=1e-6)
 
 
 PERIOD = 0.1

@@ -1,4 +1,4 @@
-"""Robots in orbit: energy and momentum about the Earth, librations, Hill's equations, torques."""
+"""Robots in orbit: energy and momentum about the Earth, torques; targets met or missed."""
 
 from __future__ import annotations
 
@@ -9,26 +9,38 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
-from oracles import quaternion_of
+from oracles.momenta import momentum
 from oracles.orbit import (
-    EARTH_RADIUS,
     MU,
+    BodyMotion,
     EarthTotals,
     angular_momentum,
+    body_motions,
     centre_of_mass,
-    clohessy_wiltshire,
     earth_totals,
-    mean_motion,
     whole_inertia,
+    whole_momenta,
 )
 from paths import CONFIG
-from robots import ANGLES_DEG, MOTORS, NO_FRICTION, coast, orbiting_plant, rigid_robot, set_motion
-from scipy.spatial.transform import Rotation
-from scipy.special import ellipk
+from robots import (
+    ANGLES_DEG,
+    MOTORS,
+    NO_FRICTION,
+    circular_orbit,
+    coast,
+    held_place,
+    meeting_target,
+    orbiting_plant,
+    set_motion,
+    tensor_of,
+)
 from strategies import random_quaternion, random_robot
 
 from space_robot_model.robot import Robot
 from space_robot_msgs_py.samples import RobotState
+from space_robot_sim.environment.neighbouring_orbit import meet
+from space_robot_sim.environment.orbit_settings import OrbitSettings
+from space_robot_sim.environment.target import Target
 from space_robot_sim.plant.plant import Plant
 from space_robot_sim.plant.surroundings import REPORT_TICKS
 
@@ -105,106 +117,6 @@ def test_energy_and_angular_momentum_about_the_earth_are_conserved(
     assert np.abs(about_axis).max() < 1e-12
 
 
-SEMI_MAJOR_AXIS = EARTH_RADIUS + 400e3
-N = mean_motion(SEMI_MAJOR_AXIS)
-"""rad/s."""
-ORBIT_S = 2.0 * np.pi / N
-ROLL, PITCH, YAW = 50.0, 60.0, 20.0
-"""Moments of inertia about the velocity, the normal of the orbit and the vertical, kg m2."""
-LIBRATION_S = ORBIT_S / np.sqrt(3.0 * (ROLL - YAW) / PITCH)
-"""Small librations in the plane of the orbit."""
-DRIFT = 12.0 * np.pi
-ORBIT_TICKS = 11000
-PERIOD = ORBIT_S / ORBIT_TICKS
-"""Half a second, and an orbit is a whole number of ticks."""
-
-
-def attitudes(period: float, start: Rotation, ticks: int, skipped: int = 1) -> Array:
-    """Return rotation vectors (K, 3) on the orbit's axes: vertical, velocity, normal.
-
-    The robot's z lies along the normal of an equatorial orbit, its x along the vertical; it turns
-    with the orbit, but for the rotation ``start``.
-    """
-    robot = rigid_robot(100.0, [YAW, ROLL, PITCH])
-    plant = orbiting_plant(robot, period, initial_quaternion=quaternion_of(start).tolist())
-    set_motion(plant, omega=[0.0, 0.0, N])
-    states = [coast(plant, skipped).copy() for _ in range(ticks // skipped)]
-    x, y, _ = np.transpose([state.orbit_position for state in states])
-    orbit = Rotation.from_rotvec(np.outer(np.arctan2(y, x), [0.0, 0.0, 1.0]))
-    quaternions = np.array([state.quaternion for state in states])
-    turns = orbit.inv() * Rotation.from_quat(np.roll(quaternions, -1, axis=1))
-    return np.asarray(turns.as_rotvec())
-
-
-def pitch_period(period: float, amplitude: float, swings: int = 3) -> float:
-    """Return the time between zero crossings of the pitch, two by two, s."""
-    skipped = max(1, round(2.0 / period))
-    ticks = int((swings + 0.5) * LIBRATION_S / period)
-    pitch = attitudes(period, Rotation.from_euler("z", amplitude), ticks, skipped)[:, 2]
-    k = np.flatnonzero(pitch[:-1] * pitch[1:] < 0.0)
-    crossings = period * skipped * (k + pitch[k] / (pitch[k] - pitch[k + 1]))
-    assert len(crossings) >= 2 * swings
-    return float(2.0 * (crossings[-1] - crossings[0]) / (len(crossings) - 1))
-
-
-def test_pitch_librates_at_the_frequency_of_the_formula() -> None:
-    """``n sqrt(3 (I_roll - I_yaw) / I_pitch)`` to 1e-4, of an amplitude of 0.01 rad.
-
-    To 1e-8, if the period of a pendulum of that amplitude is taken: the pitch's equation is
-    ``I_pitch phi'' = -3/2 n^2 (I_roll - I_yaw) sin(2 phi)``.
-    """
-    amplitude = 0.01
-    measured = pitch_period(PERIOD, amplitude)
-    assert measured == pytest.approx(LIBRATION_S, rel=1e-4)
-    pendulum = LIBRATION_S * 2.0 / np.pi * ellipk(np.sin(amplitude) ** 2)
-    assert measured == pytest.approx(pendulum, rel=1e-8)
-
-
-def rotating(angle: float) -> Array:
-    """Return the axes vertical, velocity, normal of an equatorial orbit, as columns."""
-    return Rotation.from_euler("z", angle).as_matrix()
-
-
-def free_points(place: Array, motion: Array, times: Array) -> Array:
-    """Return relative positions (K, 3) of a free robot, rotating axes, m; ``times`` in ticks."""
-    plant = orbiting_plant(rigid_robot(100.0, [20.0] * 3), PERIOD)
-    velocity = motion + np.cross([0.0, 0.0, N], place)
-    set_motion(plant, position=place, velocity=velocity)
-    places = []
-    for tick in times:
-        state = coast(plant, int(tick) - plant.tick)
-        places.append(rotating(N * tick * PERIOD).T @ state.base_position)
-    return np.array(places)
-
-
-DIRECTIONS = {
-    "above": ([1.0, 0.0, 0.0], [0.0, 0.0, 0.0]),
-    "any": ([0.4, -0.6, 0.5], [0.7, 0.3, -0.8]),
-}
-"""Places and velocities, in units of a distance d and of n d."""
-
-
-@pytest.mark.parametrize("name", DIRECTIONS)
-def test_a_free_robot_moves_as_hills_equations_say(name: str) -> None:
-    """Over an orbit, to `DRIFT` times ``D^2 / R``, D the farthest distance: the rest is quadratic.
-
-    An offset of height, also one of ``D^2 / R``, drifts along the orbit by 12 pi times as much.
-    """
-    place, motion = (np.array(values) for values in DIRECTIONS[name])
-    ticks = np.linspace(1, ORBIT_TICKS, 13).astype(int)
-    shares = []
-    for distance in (10.0, 1000.0):
-        start, speed = distance * place, N * distance * motion
-        flown = free_points(start, speed, ticks)
-        linear = [clohessy_wiltshire(N, start, speed, tick * PERIOD)[:3] for tick in ticks]
-        farthest = np.linalg.norm(flown, axis=1).max()
-        apart = np.linalg.norm(flown - linear, axis=1).max()
-        shares.append(apart / (farthest**2 / SEMI_MAJOR_AXIS))
-    assert shares[0] < DRIFT
-    # the next order is smaller by D / R, and the share of a hundredth of the distance the same
-    assert shares[0] == pytest.approx(shares[1], rel=4.0 * farthest / SEMI_MAJOR_AXIS)
-
-
 ELEMENTS = {"height": 420e3, "inclination_deg": 51.6, "raan_deg": 30.0, "anomaly_deg": 20.0}
 
 
@@ -263,3 +175,118 @@ def test_without_an_orbit_nothing_of_it_is_told() -> None:
     state = coast(plant, 3)
     for name in ("orbit_position", "orbit_velocity", "magnetic_field", "external_torques"):
         assert not np.any(getattr(state, name)), name
+
+
+PERIOD = 1e-3
+CAPTURE, RELEASE, END = 200, 400, 500
+"""Ticks."""
+SPEED = 0.3
+"""m/s of the release."""
+REACH = 0.05
+ORBIT = circular_orbit(420e3)
+RATES = [0.1, -0.2, 0.15, 0.3, -0.1, 0.2]
+TUMBLING = {
+    "velocity": [0.2, -0.1, 0.3],
+    "quaternion": [0.5, -0.1, 0.7, 0.4],
+    "angular_velocity": [0.2, -0.1, 0.15],
+    "reach": REACH,
+}
+
+
+def flying_plant(robot: Robot, events: list[str], orbit: OrbitSettings = ORBIT) -> Plant:
+    """Return a plant whose base and arm move, and that nobody turns."""
+    plant = orbiting_plant(
+        robot,
+        PERIOD,
+        initial_joints_deg=ANGLES_DEG,
+        friction=NO_FRICTION,
+        events=events,
+        **orbit.model_dump(),
+    )
+    set_motion(plant, [0.1, 0.2, -0.1], [0.02, -0.01, 0.03], [0.1, -0.05, 0.08], RATES)
+    return plant
+
+
+@pytest.fixture(scope="module")
+def before(paper_robot: Robot) -> RobotState:
+    """The state in which the capture happens, a moment before it."""
+    return coast(flying_plant(paper_robot, []), CAPTURE).copy()
+
+
+@pytest.fixture(scope="module")
+def target(paper_robot: Robot, before: RobotState) -> Target:
+    """One that the tool meets."""
+    some = meeting_target(ORBIT, 0.0, np.zeros(3))
+    place, _ = held_place(paper_robot, before, some)
+    return meeting_target(ORBIT, CAPTURE * PERIOD, place, **TUMBLING)
+
+
+def beside(target: Target, distance: float) -> Target:
+    """Return a target that is as far as ``distance``, m, from the one that is met."""
+    start = np.array(target.motion.position) + distance * np.array([2.0, -1.0, 2.0]) / 3.0
+    motion = target.motion.model_copy(update={"position": start.tolist()})
+    return target.model_copy(update={"motion": motion})
+
+
+def events_of(target: Target) -> list[str]:
+    return [f"capture@{CAPTURE * PERIOD}:{target.inline}", f"release@{RELEASE * PERIOD}:{SPEED}"]
+
+
+def test_what_is_met_is_held_with_the_momenta_of_both(
+    paper_robot: Robot, before: RobotState, target: Target
+) -> None:
+    """Linear and angular about the origin, to 1e-12; not with a velocity from elsewhere."""
+    plant = flying_plant(paper_robot, events_of(target))
+    after = coast(plant, CAPTURE)
+    for name in ("base_position", "quaternion", "joint_positions"):
+        np.testing.assert_array_equal(getattr(after, name), getattr(before, name))
+    assert np.abs(after.joint_velocities - before.joint_velocities).max() > 1e-2
+    meeting = meet(target, ORBIT, CAPTURE * PERIOD)
+    # the target is a little beside its place: its momentum about the origin is that of the place
+    place, axes = held_place(paper_robot, before, target)
+    np.testing.assert_allclose(place, meeting.position, rtol=0.0, atol=1e-7)
+    motion = (np.array(v) for v in (meeting.motion.velocity, meeting.motion.angular_velocity))
+    own = BodyMotion.of(target.mass, place, axes, tensor_of(target), *motion)
+    expected = np.array(whole_momenta([*body_motions(paper_robot, before), own]))
+    scale = float(np.abs(expected).max())
+    assert scale > 1.0
+    found = momentum(plant.robot, after)
+    np.testing.assert_allclose(found, expected, rtol=0.0, atol=1e-12 * scale)
+    assert plant.robot.mass.sum() == pytest.approx(paper_robot.mass.sum() + target.mass)
+    assert plant.captures.misses == {}
+    coast(plant, RELEASE - CAPTURE)
+    assert plant.robot is plant.captures.robot_at(0)
+
+
+def states_of(plant: Plant, ticks: int) -> bytes:
+    """Return all bits of the truth at each tick of a flight."""
+    blocks = []
+    for _ in range(ticks):
+        coast(plant, 1)
+        blocks.append(plant.truth.block.tobytes())
+    return b"".join(blocks)
+
+
+def test_what_is_missed_changes_no_bit_nor_does_its_release(
+    paper_robot: Robot, target: Target
+) -> None:
+    missing = flying_plant(paper_robot, events_of(beside(target, 0.3)))
+    without = flying_plant(paper_robot, [])
+    assert states_of(missing, END) == states_of(without, END)
+    assert missing.robot is missing.captures.robot_at(0)
+    assert missing.robot.mass.sum() == paper_robot.mass.sum()
+    ((tick, distance),) = missing.captures.misses.items()
+    assert tick == CAPTURE
+    # distances stay what they were, but for some 1e-8 of relative gravity
+    assert distance == pytest.approx(0.3, rel=1e-6)
+
+
+@pytest.mark.parametrize(("distance", "hits"), [(REACH - 1e-4, True), (REACH + 1e-4, False)])
+def test_the_reach_is_the_largest_distance(
+    paper_robot: Robot, target: Target, distance: float, hits: bool
+) -> None:
+    plant = flying_plant(paper_robot, events_of(beside(target, distance)))
+    coast(plant, CAPTURE)
+    assert bool(plant.captures.misses) is not hits
+    held = target.mass if hits else 0.0
+    assert plant.robot.mass.sum() == pytest.approx(paper_robot.mass.sum() + held, rel=1e-14)

@@ -119,40 +119,6 @@ def test_a_start_with_a_rate_turns_the_robot_about_its_centre_of_mass(
     np.testing.assert_allclose(later[1], angular, rtol=1e-9, atol=1e-9)
 
 
-def test_kinetic_energy_is_the_work_done(seven_joint_robot: Robot) -> None:
-    """Power by Simpson's rule over two ticks of one torque; friction takes its share."""
-    rng, n, viscous = np.random.default_rng(4), seven_joint_robot.n, 0.2
-    plant = plant_of(
-        seven_joint_robot,
-        friction=FrictionSettings(coulomb=0.0, viscous=viscous),
-        initial_quaternion=[0.2, 0.9, -0.3, 0.25],
-    )
-
-    def power(torque: Array) -> float:
-        state = plant.state
-        actuators = torque[:3] @ state.omega_base + torque[3:] @ state.joint_velocities
-        return float(actuators - viscous * state.joint_velocities @ state.joint_velocities)
-
-    work, scale = 0.0, np.array([20.0] * 3 + [4.0] * (n - 3) + [0.5] * 3)
-    for k in range(300):
-        torque = scale * np.cos(0.01 * k + np.arange(n + 3)) + 0.1 * rng.normal(size=n + 3)
-        powers = [power(torque)]
-        for _ in range(2):
-            fly(plant, torque[np.newaxis])
-            powers.append(power(torque))
-        work += PERIOD / 3.0 * (powers[0] + 4.0 * powers[1] + powers[2])
-    energy = kinetic_energy(seven_joint_robot, plant.state)
-    assert energy > 0.1
-    assert energy == pytest.approx(work, rel=1e-8)
-
-
-def test_late_commands_move_the_robot_as_prompt_ones_sent_later(paper_robot: Robot) -> None:
-    torques = np.random.default_rng(5).normal(size=(20, 9))
-    late = fly(plant_of(paper_robot, command_latency_ticks=4), torques)
-    prompt = fly(plant_of(paper_robot), np.vstack([np.zeros((4, 9)), torques[:16]]))
-    np.testing.assert_array_equal(state_vector(late), state_vector(prompt))
-
-
 def test_plant_starts_at_rest_where_it_is_told(paper_robot: Robot) -> None:
     """The quaternion is normalised, degrees become radians."""
     quaternion = [2.0, 0.0, -2.0, 0.0]

@@ -111,20 +111,6 @@ def test_joints_stand_or_break_away_as_coulombs_law_has_it(n: int, seed: int) ->
     assert not accelerations[locked].any()
 
 
-@pytest.mark.parametrize("substeps", [1, 3])
-def test_a_joint_held_below_its_friction_stands_still(paper_robot: Robot, substeps: int) -> None:
-    """To the last bit, though the base is turned and the torque changes."""
-    plant = plant_of(paper_robot, 0.02, 0.2, substeps=substeps)
-    start = plant.state.joint_positions.copy()
-    for tick in range(400):
-        torque = np.full(9, 0.019 * np.sin(0.05 * tick))
-        torque[:3] *= 0.01
-        plant.step(Command(tick, torque))
-        assert not plant.state.joint_velocities.any()
-    np.testing.assert_array_equal(plant.state.joint_positions, start)
-    assert np.abs(plant.state.omega_base).max() < 1e-4
-
-
 def test_a_joint_comes_to_rest_when_and_where_it_should() -> None:
     """Thrown, it stops: against SciPy's events on Pinocchio's dynamics, to rounding."""
     rng = np.random.default_rng(5)

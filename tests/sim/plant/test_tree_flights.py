@@ -1,4 +1,4 @@
-"""Trees in flight: springs, panels, a user's disturbance, a target in the hand."""
+"""Trees in flight: springs, a user's disturbance, a target in the hand, wheels on the base."""
 
 from __future__ import annotations
 
@@ -7,12 +7,14 @@ from typing import Any
 
 import numpy as np
 import pytest
+from benches import WHEEL_AXES
 from numpy.typing import NDArray
 from oracles import assert_close, rotation_of
 from oracles.momenta import kinetic_energy, momentum, spring_energy, state_of
 from oracles.orbit import BodyMotion, body_motions, whole_momenta
-from oracles.rotors import RotorEquations
-from robots import NO_FRICTION, PERIOD, coast, held_place, tensor_of
+from oracles.rotors import RotorEquations, random_rotors, settings_of
+from paths import DATA
+from robots import LOCKED, NO_FRICTION, PERIOD, coast, held_place, rigid_robot, tensor_of
 from strategies import random_bodies, random_inertia, random_quaternion
 
 from space_robot_model.robot import Robot
@@ -183,44 +185,81 @@ def test_robot_and_target_keep_their_momenta(seed: int, hand: str) -> None:
     assert plant.robot is plant.captures.robot_at(0)
 
 
-MOTORS = 6
-"""As many as the paper's robot has, whose compiled kernels serve."""
-BASE_MASS, WHEEL_MASS, TANK_MASS = 40.0, 2.0, 8.0
-SPRING = {"stiffness": 90.0, "damping": 3.0, "rest_deg": 0.05}
-BALL = [0.5, 0.5, 0.5, 0.0, 0.0, 0.0]
+SMOOTH = FrictionSettings(coulomb=0.0, viscous=0.0)
 
 
-def sloshing(joint: str) -> Robot:
-    """A base whose motors turn balls about their own centres, and a ball on a spring along z."""
-    centred: dict[str, Any] = {"inertia": BALL, "com": [0.0, 0.0, 0.0], "parent": "base"}
-    links = [
-        *({"name": f"spinner{k}", "mass": WHEEL_MASS, **centred} for k in range(MOTORS)),
-        {"name": "tank", "mass": TANK_MASS, "joint": joint, "passive": SPRING, **centred},
-    ]
-    base = {"mass": BASE_MASS, "inertia": [9.0, 9.0, 9.0, 0.0, 0.0, 0.0]}
-    return Robot.from_dict({"robot": {"name": "sloshing", "base": base, "links": links}})
+def test_wheels_go_through_rest_and_come_to_rest_as_the_formulas_say() -> None:
+    """One is driven through zero speed, one stops and sticks, one breaks away, one stays.
+
+    The base is too heavy to be turned by them.
+    """
+    spin, coulomb, ticks = 0.02, 0.02, 800
+    speeds, motors = np.array([1.0, -0.4, 0.0, 0.0]), np.array([-0.07, 0.01, 0.05, -0.015])
+    wheels = {"axes": WHEEL_AXES, "rotor_inertia": [spin], "coulomb": [coulomb]}
+    settings = {
+        "initial_joints_deg": [0.0] * 6,
+        "friction": LOCKED,
+        "base_actuation": "hardware",
+        "wheels": {**wheels, "initial_speed": speeds.tolist()},
+    }
+    plant = Plant(rigid_robot(1e9, [1e12] * 3), PlantSettings.model_validate(settings), PERIOD)
+    rates = (motors - coulomb * np.array([-1.0, -1.0, 1.0, 0.0])) / spin
+    rates[0] = (motors[0] - coulomb) / spin
+    through = (motors[0] + coulomb) / spin
+    stops = -speeds[:2] / rates[:2]
+    for tick in range(ticks):
+        plant.step(Command(tick, np.concatenate([np.zeros(9), motors])))
+        time = plant.tick * PERIOD
+        first = speeds[0] + rates[0] * time if time < stops[0] else through * (time - stops[0])
+        second = min(speeds[1] + rates[1] * time, 0.0)
+        expected = [first, second, rates[2] * time, 0.0]
+        np.testing.assert_allclose(plant.truth.wheel_velocities[:4], expected, atol=1e-10)
+    assert stops.max() < time
+    assert plant.truth.wheel_velocities[1] == plant.truth.wheel_velocities[3] == 0.0
 
 
-@pytest.mark.parametrize("joint", ["prismatic", "revolute"])
-def test_two_bodies_on_a_spring_swing_as_the_formula_says(joint: str) -> None:
-    """``m x'' + c x' + k (x - rest) = 0``, m the reduced mass, or moment, of the two bodies."""
-    robot = sloshing(joint)
-    plant = Plant(
-        robot, PlantSettings(initial_joints_deg=[0.0] * MOTORS, friction=NO_FRICTION), PERIOD
+def test_wheels_of_a_robot_with_passive_joints_get_what_is_asked_of_them() -> None:
+    """Each one's own momentum grows by its motor's torque alone, whatever else moves.
+
+    Also over a capture, which gives it none: ``J (Omega + a . w0)`` stays as the base is struck.
+    """
+    robot, rng = Robot.from_yaml(DATA / "passive_robot" / "robot.yaml"), np.random.default_rng(5)
+    rotors = [rotor._replace(spin=0.05) for rotor in random_rotors(rng, robot, 4)]
+    wheels = settings_of(rotors, initial_speed=[20.0, -30.0, 40.0, 10.0])
+    axes, spins = np.array([rotor.axis for rotor in rotors]), np.array([r.spin for r in rotors])
+    target = Target.from_dict(
+        {
+            "target": {
+                "mass": 20.0,
+                "inertia": [2.0, 3.0, 4.0, 0.0, 0.0, 0.0],
+                "motion": {"velocity": [0.3, -0.2, 0.1], "angular_velocity": [0.2, 0.4, -0.3]},
+            }
+        }
     )
-    (spring,) = robot.springs
-    of_base, of_tank = (
-        (BASE_MASS + MOTORS * WHEEL_MASS, TANK_MASS) if joint == "prismatic" else (9.0, 0.5)
-    )  # the spinners do not turn with the base: nothing drives them
-    mass = of_base * of_tank / (of_base + of_tank)
-    stretched = 0.1
-    plant.memory.x[7 + MOTORS] = spring.rest + stretched
-    decay = 0.5 * spring.damping / mass
-    pulsation = np.sqrt(spring.stiffness / mass - decay**2)
-    for _ in range(4):
-        for _ in range(500):
-            plant.step(Command(plant.tick, np.zeros(3 + MOTORS)))
-        t = plant.tick * PERIOD
-        swing = np.cos(pulsation * t) + decay / pulsation * np.sin(pulsation * t)
-        expected = spring.rest + stretched * np.exp(-decay * t) * swing
-        assert plant.truth.passive_positions[0] == pytest.approx(expected, abs=1e-9)
+    settings = PlantSettings(
+        initial_joints_deg=[10.0, 0.3, 20.0, 0.0, 30.0, 0.0],
+        friction=SMOOTH,
+        wheels=wheels,
+        base_actuation="hardware",
+        initial_quaternion=[0.5, -0.5, 0.1, 0.7],
+        events=[f"capture@{100 * PERIOD}:{target.inline}"],
+    )
+    plant = Plant(robot, settings, PERIOD)
+
+    def own() -> Array:
+        truth = plant.truth
+        return spins * (truth.wheel_velocities[:4] + axes @ truth.omega_base)
+
+    torque = np.concatenate([np.zeros(3), 5.0 * rng.normal(size=6), 0.3 * rng.normal(size=4)])
+    before, energy = own(), kinetic_energy(robot, plant.truth, wheels)
+    assert energy == pytest.approx(0.5 * spins @ np.square(wheels.initial_speed))
+    turned = 0.0
+    for tick in range(200):
+        omega = plant.truth.omega_base.copy()
+        plant.step(Command(tick, torque))
+        if plant.tick == 100:
+            turned = float(np.abs(plant.truth.omega_base - omega).max())
+        expected = before + torque[9:] * plant.tick * PERIOD
+        np.testing.assert_allclose(own(), expected, rtol=0.0, atol=1e-11)
+    assert turned > 1e-3, "the base must be struck"
+    assert np.abs(plant.truth.passive_positions[:2]).max() > 1e-4
