@@ -15,7 +15,6 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from space_robot.analysis import analyze
-from space_robot.analysis.figures.figure_set import FigureSet
 from space_robot.analysis.report_tables import metrics_table, rms_table
 from space_robot.cli.report_display import print_comparison
 from space_robot.console.terminal import terminal
@@ -187,16 +186,6 @@ def test_keys_of_newer_software_are_no_fault(bag: Path) -> None:
     redescribed(bag, json.dumps(described))
     log = read_flight(bag)
     assert (log.damage, log.flight["orbit"]) == ((), {"altitude": 4e5})
-
-
-def test_markup_in_names_is_drawn_as_it_is(bag: Path, tmp_path: Path) -> None:
-    name, described = MARKUP[0], json.loads(DESCRIPTION)
-    redescribed(bag, json.dumps({**described, "controller": name, "case": name, "gains": name}))
-    log, figure_set = read_flight(bag), FigureSet()
-    log.joint_names = MARKUP[: len(log.joint_names)]
-    for name in MARKUP:
-        figure_set.add(name, log)
-    assert figure_set.save(tmp_path)
 
 
 # What the plant says, where the recorder was not told

@@ -29,7 +29,7 @@ from space_robot_msgs_py.bag import recorder as recorder_module
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.bag.folder import open_bag
 from space_robot_msgs_py.bag.reader import read_flight
-from space_robot_msgs_py.bag.recorder import FLIGHT_KEY, BagRecorder
+from space_robot_msgs_py.bag.recorder import BagRecorder
 from space_robot_msgs_py.errors import FlightError, InputError
 from space_robot_msgs_py.samples import Timebase
 
@@ -141,13 +141,6 @@ def test_a_whole_file_without_metadata_is_read_to_its_end_and_the_report_says_so
     assert report["unfinished"] == "the bag was not finished: read up to t = 0.0995 s"
     assert report["unfinished"] in shown.get()
     assert analyze(recorded.log)["unfinished"] == recorded.log.unfinished == ""
-
-
-def test_flight_is_described_from_the_beginning(tmp_path: Path) -> None:
-    BagRecorder(tmp_path / "bag", FLIGHT, TIMEBASE)
-    assert '"controller": "tde_stc"' in open_bag(tmp_path / "bag").custom_data()[FLIGHT_KEY]
-    with pytest.raises(InputError, match=r"no messages on /joint_states .* not finished"):
-        read_flight(tmp_path / "bag")
 
 
 def test_what_was_flushed_is_readable_while_the_recorder_runs(

@@ -52,18 +52,6 @@ def fill(record: Outer) -> int:
     return record.inner.matrix.shape[0]
 
 
-@pytest.mark.parametrize("n", [1, 6])
-def test_a_kernel_writes_what_python_reads(n: int) -> None:
-    block = Outer.block(n)
-    record: Outer = block[0]
-    view = record.vector
-    assert fill(record) == n + 1
-    np.testing.assert_array_equal(view, np.full(2 * n, 2.0))
-    assert block[0].scalar == 3.0
-    assert record.inner.matrix[1, 2] == 4.0
-    assert np.count_nonzero(record.inner.matrix) == 1
-
-
 def test_assign_copies_arrays_and_records() -> None:
     record, inner = Outer.allocate(2), Inner.allocate(2)
     inner.matrix[:] = 5.0

@@ -8,15 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from random_samples import (
-    BASE_AXES,
-    TIMEBASE,
-    joint_names,
-    random_sample,
-    ros_type,
-    serialization,
-    state_codec,
-)
+from random_samples import BASE_AXES, TIMEBASE, joint_names, ros_type, serialization
 from rosbags.typesys import Stores, get_typestore
 
 from space_robot_msgs_py import topics
@@ -128,19 +120,6 @@ def test_a_command_comes_back_whole(
     assert back.torque.tobytes() == torque.tobytes()
 
 
-def test_decoded_samples_do_not_change_with_the_next_message() -> None:
-    """The codec's buffer is its own."""
-    writer, reader = (state_codec(joint_names(2)) for _ in range(2))
-    first, back = random_sample(2, 1), RobotState.allocate(2)
-    sent = writer.encode(first)
-    for topic, data in zip((topics.JOINT_STATES, topics.BASE_STATE), sent, strict=True):
-        reader.decode(topic, data, back)
-    other = writer.encode(random_sample(2, 2))
-    assert not set(other) & set(sent)
-    reader.decode(topics.JOINT_STATES, other[0], RobotState.allocate(2))
-    assert back.numbers.tobytes() == first.numbers.tobytes()
-
-
 @pytest.mark.parametrize(("wheels", "thrusters", "torquers"), [(4, 0, 3), (0, 0, 0), (2, 3, 1)])
 def test_actuators_are_told_apart_by_their_number(
     wheels: int, thrusters: int, torquers: int
@@ -236,20 +215,6 @@ def test_a_state_is_read_as_ros_messages(n: int, read: Any) -> None:
     assert magnetometer.header.frame_id == topics.BASE_FRAME
     assert xyz(magnetometer.magnetic_field) == state.magnetic_field.tolist()
     assert not np.any(magnetometer.magnetic_field_covariance), "unknown"
-
-
-@READERS
-def test_a_command_is_read_as_a_joint_state_of_efforts(read: Any) -> None:
-    names = names_of(3, 2, 1, 1, 1, 2)
-    torque = np.arange(float(len(names.commanded))) - 2.5
-    data = CommandCodec(names.commanded, TIMEBASE).encode(Command(7, torque))
-    message = read(data, topics.COMMAND.type)
-    assert tick_of(message.header.stamp) == 7
-    assert tuple(message.name) == (*BASE_AXES, *names.joints, *names.actuators)
-    np.testing.assert_array_equal(message.effort, torque)
-    assert len(message.position) == len(message.velocity) == 0
-    with pytest.raises(MessageError, match="/command: names"):
-        CommandCodec(names.axes, TIMEBASE).decode(data, Command(-1, np.zeros(6)))
 
 
 @READERS
@@ -355,11 +320,3 @@ def test_tick_to_stamp_and_back(tick: int, period_ns: int, offset: int) -> None:
     assert timebase.period == pytest.approx(period_ns / 1e9, rel=1e-15)
     with pytest.raises(MessageError, match="same period"):
         TIMEBASE.tick(TIMEBASE.stamp_ns(tick) + offset)
-
-
-def test_a_state_of_another_period_is_an_error() -> None:
-    reader, back = state_codec(["a"], Timebase(1_000_000)), RobotState.allocate(1)
-    sent = state_codec(["a"]).encode(random_sample(1, 6, tick=3))
-    for topic, data in zip((topics.JOINT_STATES, topics.BASE_STATE), sent, strict=True):
-        with pytest.raises(MessageError, match="1500000 ns is not a whole number of 1000000 ns"):
-            reader.decode(topic, data, back)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from random_samples import TIMEBASE, joint_names, ros_type, serialization
+from random_samples import TIMEBASE, joint_names
 from rosbags.typesys import Stores, get_typestore
 
 from space_robot_msgs_py import topics
@@ -48,43 +48,6 @@ def test_chunk_round_trip(n: int, lengths: list[int], start: int, seed: int) -> 
         chunk = random_chunk(n, length, seed, start)
         for _ in range(2):  # by the general decoder, then by the fast way
             assert_decodes_to(reader, writer.encode(chunk), chunk)
-
-
-@pytest.mark.parametrize("reader", ["rclpy", "rosbags"])
-@pytest.mark.parametrize(("n", "length"), [(1, 1), (2, 2), (6, 50)])
-def test_chunk_is_read_as_trajectories(n: int, length: int, reader: str) -> None:
-    """Points one tick apart; quaternions x, y, z, w; angular parts only."""
-    chunk = random_chunk(n, length)
-    data = ReferenceCodec(joint_names(n), TIMEBASE).encode(chunk)
-    joints, base = (
-        serialization().deserialize_message(part, ros_type(kind))
-        if reader == "rclpy"
-        else STORE.deserialize_cdr(part, kind)
-        for part, kind in zip(data, (JOINTS, BASE), strict=True)
-    )
-    assert list(joints.joint_names) == joint_names(n)
-    assert list(base.joint_names) == [topics.BASE_JOINT]
-    assert base.header.frame_id == topics.INERTIAL_FRAME
-    for message in (joints, base):
-        assert (message.header.stamp.sec, message.header.stamp.nanosec) == (0, 50_000_000)
-        after = [(p.time_from_start.sec, p.time_from_start.nanosec) for p in message.points]
-        assert after == [(0, 500_000 * k) for k in range(length)]
-    for point, row in zip(joints.points, chunk.joints, strict=True):
-        np.testing.assert_array_equal(point.positions, row[0])
-        np.testing.assert_array_equal(point.velocities, row[1])
-        np.testing.assert_array_equal(point.accelerations, row[2])
-        assert len(point.effort) == 0
-    for point, row in zip(base.points, chunk.base, strict=True):
-        (transform,), (velocity,) = point.transforms, point.velocities
-        (acceleration,), q = point.accelerations, transform.rotation
-        assert [q.w, q.x, q.y, q.z] == row[:4].tolist()
-        for vector, expected in (
-            (velocity.angular, row[4:7]),
-            (acceleration.angular, row[7:]),
-            (velocity.linear, [0.0] * 3),
-            (transform.translation, [0.0] * 3),
-        ):
-            assert [vector.x, vector.y, vector.z] == list(expected)
 
 
 def test_points_more_than_a_second_apart_carry_into_the_seconds() -> None:
