@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import shutil
-import socket
 import sqlite3
 from collections.abc import Callable
 from pathlib import Path
@@ -326,19 +325,14 @@ def test_a_topic_not_needed_is_left_out_if_it_is_of_another_type(
 
 
 @pytest.mark.parametrize("name", ["bag_0.mcap", METADATA, "x.db3"])
-@pytest.mark.parametrize("kind", ["pipe", "device", "socket"])
+@pytest.mark.parametrize("kind", ["pipe", "device"])
 def test_only_files_are_read(bag: Path, name: str, kind: str) -> None:
     """Else a pipe without a writer, or /dev/zero, would be read for ever."""
     (path := bag / name).unlink(missing_ok=True)
     if kind == "pipe":
         os.mkfifo(path)
-    elif kind == "device":
-        path.symlink_to("/dev/zero")
     else:
-        with socket.socket(socket.AF_UNIX) as server:
-            directory = os.open(bag, os.O_RDONLY)  # the path itself may be too long for a socket
-            server.bind(f"/proc/self/fd/{directory}/{name}")
-            os.close(directory)
+        path.symlink_to("/dev/zero")
     if name == "bag_0.mcap":
         assert "not a file" in _error(bag)
     else:

@@ -124,18 +124,6 @@ def test_a_log_has_a_column_for_each(
     np.testing.assert_array_equal(back.state(9).numbers, log.state(9).numbers)
 
 
-def test_states_of_a_log_have_zero_where_no_actuator_is() -> None:
-    log = flown(EVERYTHING)
-    state = log.state(4)
-    assert state.wheel_velocities.shape == (MOST_WHEELS,)
-    assert state.wheel_velocities[:3].all()
-    assert not state.wheel_velocities[3:].any()
-    back = flown(EVERYTHING, seed=4)
-    back.put(4, state.block)
-    for name in ALL_FIELDS:
-        np.testing.assert_array_equal(getattr(back, name)[4], getattr(log, name)[4], name)
-
-
 def test_a_command_of_another_order_is_read_by_name(tmp_path: Path) -> None:
     """Actuators in between the axes; they keep their order."""
     log, actuators = flown(EVERYTHING), EVERYTHING.actuators

@@ -105,21 +105,6 @@ def test_what_a_pause_passed_over_is_no_gap(
     assert counted.gaps == 2
 
 
-@given(st.lists(st.integers(0, 500), unique=True, min_size=1).map(sorted), st.data())
-def test_bad_stamps_between_good_ones_are_counted_apart(
-    ticks: list[int], data: st.DataObject
-) -> None:
-    """They are strange, and the good ones are neither lost nor taken for repeated."""
-    counted, bad = MessageAccounting(topics.COMMAND), 0
-    for i, tick in enumerate(ticks):
-        for jump in data.draw(st.lists(st.sampled_from([10**6, 10**9]), max_size=3)) if i else ():
-            assert counted.take(tick + jump)
-            bad += 1
-        assert counted.take(tick)
-    assert (counted.received, counted.invalid_stamps) == (len(ticks), bad)
-    assert counted.missing(500) == len(set(range(501)) - set(ticks))
-
-
 @given(st.integers(1, 30), st.permutations(range(6)), st.integers(0, 5))
 def test_late_messages_count_for_the_period_too(period: int, order: list[int], start: int) -> None:
     """In any order all are there, from wherever the topic began."""

@@ -194,18 +194,6 @@ def test_splits_hold_every_message_once_and_each_shows_the_robot(split: Path, pl
     assert read_flight(split).ticks == read_flight(plain).ticks
 
 
-def test_splits_are_in_metadata_with_their_times_and_counts(split: Path) -> None:
-    content = _information(split)
-    assert content["relative_file_paths"] == [file.name for file in _files(split)]
-    for file, said in zip(_files(split), content["files"], strict=True):
-        statistics = _summary(file).statistics
-        start = said["starting_time"]["nanoseconds_since_epoch"]
-        assert (said["path"], said["message_count"]) == (file.name, statistics.message_count)
-        assert start == statistics.message_start_time
-        assert start + said["duration"]["nanoseconds"] == statistics.message_end_time
-    assert content["message_count"] == sum(said["message_count"] for said in content["files"])
-
-
 def test_every_file_says_what_was_flown_and_the_last_what_was_lost(split: Path) -> None:
     for file in _files(split):
         with file.open("rb") as stream:
@@ -225,17 +213,6 @@ def test_every_file_says_what_was_flown_and_the_last_what_was_lost(split: Path) 
         again = len(_files(split)) - 1 if name in LATCHED else 0
         assert counts["received"] == counts["expected"] == counted[name] - again
         assert counts["missing"] == counts["repeated"] == counts["invalid_stamps"] == 0
-
-
-def test_killed_after_a_split_all_before_is_whole(messages: Messages, tmp_path: Path) -> None:
-    """The files are as they were when the recorder had made the third."""
-    recorder = BagRecorder(tmp_path / "bag", FLIGHT, TIMEBASE, split_size=SPLIT)
-    for topic, data in messages:
-        recorder.record(topic, data)
-        if len(_files(tmp_path / "bag")) == 3:
-            break
-    assert all(_summary(file) is not None for file in _files(tmp_path / "bag")[:2])
-    assert read_flight(tmp_path / "bag").ticks == recorder.kept_tick + 1
 
 
 def test_no_place_for_the_next_file_keeps_those_before(messages: Messages, tmp_path: Path) -> None:

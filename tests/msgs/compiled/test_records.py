@@ -225,24 +225,6 @@ def test_a_kernel_finds_n_and_every_field_of_every_row(
     assert len(getattr(number_all, "signatures", [0])) == 1, "one code for all n"
 
 
-@kernel
-def copy_rows(source: Block, out: Block) -> int:
-    """Copy all rows but the first, backwards."""
-    rest = source[1:]
-    for k in range(rest.size):
-        out[rest.size - 1 - k] = rest[k]
-    return int(rest.size)
-
-
-def test_rows_are_copied_whole() -> None:
-    source = np.zeros(4, Mixed.dtype(3))
-    source.view(np.float64)[:] = np.arange(source.nbytes // 8)
-    out = np.zeros(5, Mixed.dtype(3))
-    assert copy_rows(source, out) == 3
-    assert out[:3].tobytes() == source[:0:-1].tobytes()
-    assert not out.view(np.float64).reshape(5, -1)[3:].any()
-
-
 class Curved(Record):
     array: Array = shaped(lambda n: (n * n,))
 

@@ -109,16 +109,6 @@ def test_slots_and_stamps_are_all_that_changes_with_the_numbers(type_name: str, 
         assert numbers(other.data, slot).tobytes() == expected.tobytes()
 
 
-def test_a_slot_is_found_by_its_path() -> None:
-    content = {"transforms": [{}, {}], "twist": [{"angular": {"x": 1.0, "y": 2.0, "z": 3.0}}]}
-    layout = MessageLayout(topics.BASE_STATE.type, content)
-    assert numbers(layout.data, layout.slots["twist[0].angular"]).tolist() == [1.0, 2.0, 3.0]
-    rotation, translation = (
-        layout.slots[f"transforms[1].{name}"] for name in ("rotation", "translation")
-    )
-    assert (rotation.offset - translation.offset, rotation.length) == (24, 4)
-
-
 @given(texts, names, stamps)
 def test_any_names_are_written_as_rosbags_does_and_read(
     frame: str, joints: list[str], stamp_ns: int
