@@ -159,19 +159,6 @@ def test_what_a_node_says_it_sent_and_never_came_is_missing(
     assert any(text.startswith("3 messages received, missing: {") for text in node.said)
 
 
-def test_counts_are_of_the_topics_as_they_are_heard(loop: RecorderLoop, node: Node) -> None:
-    """A remapped one under its other name; keys that are none of a topic say nothing."""
-    node.hear_clock([0])
-    node.hear(topics.DIAGNOSTICS, report("tick", "9", f"{SENT}/clock", "9", "/sat1/clock", "9"), 1)
-    node.hear(topics.DIAGNOSTICS, b"\0\1no message", 2)
-    node.hear(topics.DIAGNOSTICS, report(f"{SENT}/sat1/clock", "many"), 3)
-    rounds(loop)
-    assert not loop._recorder.is_behind
-    node.hear_sent("/joints_of_mine", 4)
-    rounds(loop)
-    assert loop._recorder.sources[topics.JOINT_STATES.full_name].tail == 4
-
-
 def test_topics_have_turns_and_a_chunk_is_ended_in_a_step_of_its_own(
     loop: RecorderLoop, node: Node
 ) -> None:

@@ -51,25 +51,6 @@ def test_overrides_for_ros2_bag_record_are_the_topics_own() -> None:
     assert yaml.safe_load(OVERRIDES.read_text("utf-8")) == expected
 
 
-def test_ros2_bag_reads_the_overrides_as_the_nodes_quality_of_service() -> None:
-    """Read key by key as ros2bag.api does, the profiles are those of our own endpoints."""
-    qos = pytest.importorskip("rclpy.qos")
-    from space_robot_msgs_py.ros.endpoints import qos as of_the_nodes
-
-    policies: dict[str, Any] = {
-        "history": qos.HistoryPolicy.get_from_short_key,
-        "reliability": qos.ReliabilityPolicy.get_from_short_key,
-        "durability": qos.DurabilityPolicy.get_from_short_key,
-        "depth": int,
-    }
-    for name, profile in yaml.safe_load(OVERRIDES.read_text("utf-8")).items():
-        read = qos.QoSProfile(**{key: policies[key](value) for key, value in profile.items()})
-        (topic,) = (
-            topic for topic in (*topics.RECORDED, *topics.FOR_OTHERS) if topic.full_name == name
-        )
-        assert read == of_the_nodes(topic), name
-
-
 @pytest.mark.parametrize("page", ["bags", "namespaces"])
 def test_overrides_of_a_robot_in_a_namespace_have_its_topics(page: str) -> None:
     """By the commands of the pages; topics of the whole domain keep their names."""

@@ -123,24 +123,6 @@ def test_bag_of_a_big_endian_machine_is_the_same_flight(
     assert_same_flight(read_flight(mcap_of(tmp_path / "x.mcap", others)), recorded.log)
 
 
-def test_a_trajectory_of_unequal_points_is_left_out_and_told(
-    entries: list[Entry], tmp_path: Path
-) -> None:
-    """One of its points has one position less than there are joints."""
-    names = [topic for topic, *_ in entries]
-    at = names.index(topics.REFERENCE_JOINTS.full_name)
-    topic, kind, log_ns, data = entries[at]
-    message = decode(data, kind)
-    message.points[1].positions = message.points[1].positions[:-1]
-    changed = (topic, kind, log_ns, bytes(jazzy().serialize_cdr(message, kind)))
-    log = read_flight(mcap_of(tmp_path / "x.mcap", [*entries[:at], changed, *entries[at + 1 :]]))
-    assert log.damage[0] == (
-        "1 messages on /reference/joints do not fit "
-        "(/reference/joints: a point lacks positions of some joint)"
-    )
-    assert np.flatnonzero(~log.whole).tolist() == list(range(len(message.points)))
-
-
 def test_split_bag_and_chunks_in_another_order_are_one_flight(
     recorded: Recorded, entries: list[Entry], tmp_path: Path
 ) -> None:
@@ -172,38 +154,6 @@ def test_messages_of_the_sample_are_those_that_rosbags_reads() -> None:
     assert len(ours) == 1208
     with pytest.raises(InputError, match="no messages on /reference/base"):
         read_flight(SAMPLE)
-
-
-@pytest.mark.parametrize("storage", ["mcap", "sqlite"])
-def test_sample_is_read_equally_from_every_storage(
-    recorded: Recorded, tmp_path: Path, storage: str
-) -> None:
-    """Completed with a reference of the base, which it has not."""
-    with Reader(SAMPLE) as reader:
-        found = [(c.topic, c.msgtype, stamp, bytes(raw)) for c, stamp, raw in reader.messages()]
-    topic = topics.REFERENCE_BASE
-    found += [
-        (topic.full_name, topic.type, 0, d) for t, d in messages_of(recorded.folder) if t is topic
-    ]
-    log = read_flight(rosbags_bag(tmp_path / storage, found, _plain))
-    assert log.damage == ()
-    assert log.whole.all()
-    for name, kind, _, data in found:
-        if name not in ("/joint_states", "/base/state", "/command"):
-            continue
-        message = decode(data, kind)
-        tick = message.header.stamp.nanosec // TIMEBASE.period_ns
-        if tick >= log.ticks:  # behind the reference that was put in
-            continue
-        if name == "/joint_states":
-            order = [message.name.index(joint) for joint in log.joint_names]
-            np.testing.assert_array_equal(log.joint_positions[tick], message.position[order])
-        elif name == "/base/state":
-            q = message.transforms[0].rotation
-            assert log.quaternion[tick].tolist() == [q.w, q.x, q.y, q.z]
-        else:
-            assert log.commanded_torque is not None
-            np.testing.assert_array_equal(log.commanded_torque[tick], message.effort)
 
 
 # Other names, other clocks
@@ -348,19 +298,6 @@ def test_a_flight_by_any_clock_begins_with_its_first_state(
         np.testing.assert_array_equal(column[rows], true[first:], name)
 
 
-def test_period_of_a_bag_of_others_is_that_of_its_stamps(
-    recorded: Recorded, tmp_path: Path
-) -> None:
-    sent = [(t.full_name, t.type, 0, data) for t, data in messages_of(recorded.folder)]
-    states = [e for e in sent if e[0] in ("/joint_states", "/base/state")]
-    every_other = [entry for entry in states if stamp_of(entry) % 1_000_000 == 0]
-    with pytest.raises(InputError, match="no messages on /reference/joints"):
-        read_flight(mcap_of(tmp_path / "x.mcap", every_other))
-    references = [entry for entry in sent if entry[0].startswith("/reference")]
-    with pytest.raises(InputError, match="point 1 is not 1 ticks after its message's stamp"):
-        read_flight(mcap_of(tmp_path / "x.mcap", every_other + references))
-
-
 def test_latency_is_the_time_between_the_senders(recorded: Recorded, tmp_path: Path) -> None:
     assert recorded.log.latency_s is None
     rng, sent = np.random.default_rng(1), {"/base/state": 0, "/command": 0}
@@ -398,28 +335,6 @@ def test_latency_is_the_time_between_the_senders(recorded: Recorded, tmp_path: P
 
 
 # The arrays of a log
-
-
-def test_arrays_have_the_shapes_they_say(recorded: Recorded) -> None:
-    log = load_bag(str(recorded.folder))
-    n = len(log.joint_names)
-    np.testing.assert_allclose(log.time, np.arange(200) * 0.0005)
-    for array, shape in (
-        (log.quaternion, (4,)),
-        (log.angular_velocity, (3,)),
-        (log.base_position, (3,)),
-        (log.base_velocity, (3,)),
-        (log.joint_positions, (n,)),
-        (log.joint_velocities, (n,)),
-        (log.applied_torque, (n + 3,)),
-        (log.commanded_torque, (n + 3,)),
-        (log.reference_joints, (3, n)),
-        (log.reference_base, (10,)),
-    ):
-        assert array is not None
-        assert array.shape == (200, *shape)
-        assert array.dtype == np.float64
-        assert array.flags.c_contiguous
 
 
 def test_longest_stretch_is_the_longest_without_a_gap(recorded: Recorded) -> None:

@@ -18,14 +18,12 @@ from space_robot_msgs_py.samples import (
     ALL_FIELDS,
     MOST_PASSIVE,
     MOST_WHEELS,
-    PASSIVE_FIELDS,
     Command,
     ReferenceChunk,
     RobotNames,
 )
 from space_robot_msgs_py.wire.codecs import CommandCodec, StateCodec
 from space_robot_msgs_py.wire.reference_codec import ReferenceCodec
-from space_robot_msgs_py.wire.truth_writer import TruthWriter
 
 JOINTS = ("a", "b", "c")
 WHEELS, THRUSTERS = ("wheel_1", "wheel_2", "wheel_3"), ("thruster_1", "thruster_2")
@@ -126,18 +124,6 @@ def test_a_log_has_a_column_for_each(
     np.testing.assert_array_equal(back.state(9).numbers, log.state(9).numbers)
 
 
-def test_states_of_a_log_have_zero_where_no_actuator_is() -> None:
-    log = flown(EVERYTHING)
-    state = log.state(4)
-    assert state.wheel_velocities.shape == (MOST_WHEELS,)
-    assert state.wheel_velocities[:3].all()
-    assert not state.wheel_velocities[3:].any()
-    back = flown(EVERYTHING, seed=4)
-    back.put(4, state.block)
-    for name in ALL_FIELDS:
-        np.testing.assert_array_equal(getattr(back, name)[4], getattr(log, name)[4], name)
-
-
 def test_a_command_of_another_order_is_read_by_name(tmp_path: Path) -> None:
     """Actuators in between the axes; they keep their order."""
     log, actuators = flown(EVERYTHING), EVERYTHING.actuators
@@ -169,24 +155,6 @@ def test_a_lost_message_leaves_a_gap_in_its_own_columns(
             column, true = column[kept], true[kept]
         np.testing.assert_array_equal(column, true, name)
     assert back.geared_names == EVERYTHING.geared
-
-
-def test_states_that_a_fault_kept_back_are_filled_whole(tmp_path: Path) -> None:
-    """All parts of a state are kept back as one, and filled as one; none is called lost."""
-    log = flown(EVERYTHING)
-    messages = reference(log, JOINTS) + sent(log, EVERYTHING)
-    back = read(
-        tmp_path,
-        messages,
-        lambda topic, tick: topic not in topics.STATES or tick != 50,
-        ("drop_state@0",),
-    )
-    assert back.filled == 1
-    assert not any(back.lost[topic.full_name] for topic in topics.STATES)
-    for name in ALL_FIELDS:
-        column, true = getattr(back, name), getattr(log, name)
-        np.testing.assert_array_equal(column[50], true[49], name)
-        np.testing.assert_array_equal(np.delete(column, 50, 0), np.delete(true, 50, 0), name)
 
 
 MANY = tuple(f"wheel_{k}" for k in range(MOST_WHEELS + 1))
@@ -237,21 +205,6 @@ def test_the_reference_of_another_robot_tells_nothing(tmp_path: Path) -> None:
     log, foreign = flown(names), reference(flown(other), other.joints, 1)
     back = read(tmp_path, [foreign[0], *reference(log, JOINTS), *sent(log, names)])
     assert back.passive_names == PANELS
-
-
-def test_the_true_motion_stands_beside_what_was_measured(tmp_path: Path) -> None:
-    names = RobotNames(JOINTS, passive=PANELS)
-    log, measured = flown(names), flown(names, seed=4)
-    writer, truth = TruthWriter(names, TIMEBASE, topics.TRUTH), []
-    for tick in range(TICKS):
-        truth += [(topic, tick, data) for topic, data in writer.add(log.state(tick))]
-    truth += [(topic, TICKS, data) for topic, data in writer.flush()]
-    back = read(tmp_path, reference(log, JOINTS) + sent(measured, names) + truth)
-    assert back.measured is not None
-    for name in PASSIVE_FIELDS:
-        np.testing.assert_array_equal(getattr(back, name), getattr(log, name), name)
-        np.testing.assert_array_equal(getattr(back.measured, name), getattr(measured, name), name)
-    assert back.as_measured().passive_positions is back.measured.passive_positions
 
 
 def test_more_joints_without_motors_than_there_may_be_are_no_robot_of_ours(tmp_path: Path) -> None:

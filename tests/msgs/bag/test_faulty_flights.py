@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from bags import FLIGHT, TIMEBASE, Recorded, chunks_of, mcap_file, messages_of, record
+from bags import FLIGHT, TIMEBASE, Recorded, messages_of, record
 
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.bag.flight_log import REFERENCE, FlightLog
@@ -71,23 +71,6 @@ def test_states_kept_back_are_filled_with_the_one_before(
         before[tick] = before[tick - 1]
     np.testing.assert_array_equal(log.joint_positions, recorded.log.joint_positions[before])
     np.testing.assert_array_equal(log.reference_base, recorded.log.reference_base)
-
-
-def test_nothing_is_filled_where_messages_are_gone(recorded: Recorded, tmp_path: Path) -> None:
-    """Nobody knows then which ticks the fault has taken and which the break."""
-    bag = _faulty(recorded, tmp_path / "bag")
-    start, length = chunks_of(bag)[1]
-    content = bytearray(mcap_file(bag).read_bytes())
-    content[start + length // 2] ^= 0x10
-    mcap_file(bag).write_bytes(content)
-    log = read_flight(bag)
-    there = np.isfinite(log.joint_positions[:, 0])
-    assert log.filled == 0
-    assert log.damage
-    assert not there[list(KEPT_BACK)].any()
-    gone = 400 - len(KEPT_BACK) - int(np.count_nonzero(there))
-    assert gone > 50
-    assert (log.lost["/joint_states"], log.lost["/base/state"]) == (gone, gone)
 
 
 def test_nothing_is_filled_where_the_recorder_lost_states(

@@ -105,35 +105,6 @@ def test_what_a_pause_passed_over_is_no_gap(
     assert counted.gaps == 2
 
 
-@given(st.lists(st.integers(0, 500), unique=True, min_size=1).map(sorted), st.data())
-def test_bad_stamps_between_good_ones_are_counted_apart(
-    ticks: list[int], data: st.DataObject
-) -> None:
-    """They are strange, and the good ones are neither lost nor taken for repeated."""
-    counted, bad = MessageAccounting(topics.COMMAND), 0
-    for i, tick in enumerate(ticks):
-        for jump in data.draw(st.lists(st.sampled_from([10**6, 10**9]), max_size=3)) if i else ():
-            assert counted.take(tick + jump)
-            bad += 1
-        assert counted.take(tick)
-    assert (counted.received, counted.invalid_stamps) == (len(ticks), bad)
-    assert counted.missing(500) == len(set(range(501)) - set(ticks))
-
-
-@given(st.integers(1, 200), st.integers(1, 3 * LONGEST_JUMP), st.sampled_from([-1, 0, 1]))
-def test_a_batch_is_where_the_next_message_goes_on_from(
-    period: int, count: int, beyond: int
-) -> None:
-    """However long it was: the next stamp is judged by its end."""
-    counted = MessageAccounting(topics.CLOCK)
-    counted.take_all(np.array([0, period]))
-    counted.take_all(period * np.arange(2, count + 2))
-    last = period * (count + 1)
-    assert counted.take(last + LONGEST_JUMP + beyond)
-    assert counted.invalid_stamps == (beyond > 0)
-    assert counted.received == count + 2 + (beyond <= 0)
-
-
 @given(st.integers(1, 30), st.permutations(range(6)), st.integers(0, 5))
 def test_late_messages_count_for_the_period_too(period: int, order: list[int], start: int) -> None:
     """In any order all are there, from wherever the topic began."""
@@ -144,11 +115,3 @@ def test_late_messages_count_for_the_period_too(period: int, order: list[int], s
     assert counted.received == 6
     assert counted.missing(10**6) == 0
     assert (counted.first, counted.last) == (period * start, period * (start + 5))
-
-
-def test_a_message_between_two_halves_the_period() -> None:
-    for ticks in ((0, 20, 10), (40, 60, 30), (0, 30, 10), (0, 30, 20)):
-        counted = MessageAccounting(topics.CLOCK)
-        for tick in ticks:
-            counted.take(tick)
-        assert counted.unit == 10

@@ -8,13 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 from bags import messages_of, read_accounts
-from benches import SensorBench as Bench
 
-from space_robot.analysis import analyze, excerpt
+from space_robot.analysis import analyze
 from space_robot.flight.plan import Flight, FlightPlan, resolve
 from space_robot.flight.simulate import simulate
 from space_robot_msgs_py import topics
-from space_robot_msgs_py.bag.blocks import last_rows
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.bag.reader import read_flight
 from space_robot_msgs_py.bag.recorder import BagRecorder
@@ -43,25 +41,6 @@ def recorded_anew(bag: Path, folder: Path, keep: Callable[[Topic, int], bool]) -
             recorder.record(topic, data)
     recorder.close()
     return read_flight(folder)
-
-
-def test_measured_is_what_the_sensors_make_of_the_truth(flown: tuple[FlightLog, Path]) -> None:
-    """Shown the truth of the bag alone, with the same faults, they tell the same to the bit."""
-    log = read_flight(flown[1])
-    assert log.measured is not None
-    sensors = Bench(*NOISE, truth=log.state(0))
-    told = log.as_measured()
-    for tick in range(TICKS):
-        measured = sensors.measure(log.state(tick))
-        for name in STATE_FIELDS[:-1]:
-            expected = getattr(measured, name)
-            np.testing.assert_array_equal(getattr(told.state(tick), name), expected, name)
-    noise = log.measured.joint_positions - log.joint_positions
-    assert np.std(noise) == pytest.approx(1e-5, rel=0.05)
-    # numbers of 5e-1 rad, subtracted, have lost their last bits
-    assert np.abs(log.applied_torque[200:, 3:] / log.measured.applied_torque[200:, 3:]).max() == (
-        pytest.approx(0.998)
-    )
 
 
 def test_sensors_that_tell_the_truth_need_no_second_word(tmp_path: Path) -> None:
@@ -122,19 +101,3 @@ def test_states_kept_back_are_filled_in_beside_a_whole_truth(
             told[tick] = told[tick - 1]
         np.testing.assert_array_equal(getattr(log.measured, name), told, name)
     assert analyze(log)["rms"] == analyze(original)["rms"]
-
-
-def test_rows_take_what_was_measured_along(flown: tuple[FlightLog, Path]) -> None:
-    whole = flown[0]
-    part = excerpt(whole, 0.05, 0.1)
-    assert part.measured is not None
-    assert whole.measured is not None
-    np.testing.assert_array_equal(part.measured.quaternion, whole.measured.quaternion[100:200])
-    last = last_rows(part, 3)
-    assert last.measured is not None
-    assert last.measured.quaternion.base is None  # a copy
-    np.testing.assert_array_equal(last.measured.quaternion, whole.measured.quaternion[197:200])
-    told = part.as_measured()
-    assert told.measured is None
-    np.testing.assert_array_equal(told.quaternion, part.measured.quaternion)
-    np.testing.assert_array_equal(told.reference_base, part.reference_base)

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import json
-import struct
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, get_args
 
@@ -13,22 +11,18 @@ import yaml
 from bags import as_sent, read_accounts
 from hypothesis import given
 from hypothesis import strategies as st
-from mcap.opcode import Opcode
 from mcap.reader import make_reader
-from mcap.stream_reader import StreamReader
 from paths import DATA
 from robots import driven_paper
 from rosbags.highlevel import AnyReader
-from rosbags.rosbag2 import Reader, StoragePlugin, Writer
+from rosbags.rosbag2 import Reader
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from rosbags.typesys.store import Typestore
 
-from space_robot.analysis import analyze
 from space_robot.flight.plan import Flight, FlightPlan, resolve
 from space_robot.flight.simulate import simulate
 from space_robot_model.robot import Robot
 from space_robot_msgs_py import topics
-from space_robot_msgs_py.bag.folder import open_bag
 from space_robot_msgs_py.bag.mcap_file import Compression
 from space_robot_msgs_py.bag.message_accounting import MessageAccounting, lost_messages
 from space_robot_msgs_py.bag.reader import read_flight
@@ -39,7 +33,6 @@ from space_robot_msgs_py.errors import FlightError, InputError
 from space_robot_msgs_py.samples import RobotNames, RobotState, Timebase
 from space_robot_msgs_py.wire.clock import ClockCodec
 from space_robot_msgs_py.wire.codecs import StateCodec
-from space_robot_msgs_py.wire.definitions import definition, jazzy
 
 TIMEBASE = Timebase(500_000)
 FLIGHT = {"controller": "tde_stc", "period": 0.0005}
@@ -135,84 +128,6 @@ def test_every_message_serialised_again_is_the_same_bytes(bag: Path) -> None:
     assert seen == {t.recorded.full_name for t in topics.RECORDED if t not in absent}
 
 
-def test_copied_by_rosbags_it_is_the_same_flight(bag: Path, tmp_path: Path) -> None:
-    store = _types_in(bag)
-    copy = Writer(tmp_path / "copy", version=9, storage_plugin=StoragePlugin.MCAP)
-    with Reader(bag) as reader, copy:
-        for key, value in open_bag(bag).custom_data().items():
-            copy.set_custom_data(key, value)
-        connections = {
-            c.topic: copy.add_connection(c.topic, c.msgtype, typestore=store)
-            for c in reader.connections
-        }
-        for connection, time, raw in reader.messages():
-            copy.write(connections[connection.topic], time, raw)
-    assert analyze(read_flight(tmp_path / "copy")) == analyze(read_flight(bag))
-
-
-@pytest.mark.parametrize("topic", topics.ALL, ids=lambda topic: topic.full_name)
-def test_definition_parses_to_the_type_it_names(topic: topics.Topic) -> None:
-    types = get_types_from_msg(definition(topic.type), topic.type)
-    for name, fields in types.items():
-        assert fields == jazzy().fielddefs[name]
-
-
-HEAD = struct.Struct("<BQ")
-
-
-def _walk(data: bytes) -> Iterator[tuple[int, int, int]]:
-    """Offset, opcode and length of each record, its head included."""
-    offset = 8
-    while offset < len(data) - 8:
-        opcode, length = HEAD.unpack_from(data, offset)
-        yield offset, opcode, HEAD.size + length
-        offset += HEAD.size + length
-    assert offset == len(data) - 8
-
-
-@pytest.mark.parametrize("ticks", [0, 1200])
-def test_every_offset_leads_to_the_record_it_is_said_to_lead_to(ticks: int, tmp_path: Path) -> None:
-    """Readers follow some of them only, so the file is walked byte by byte."""
-    if ticks:
-        simulate(Flight(resolve(FlightPlan(duration=ticks * 0.0005))), tmp_path / "bag")
-    else:
-        BagRecorder(tmp_path / "bag", FLIGHT, TIMEBASE).close()
-    file, records = tmp_path / "bag" / "bag_0.mcap", dict[str, list[Any]]()
-    with file.open("rb") as stream:
-        for record in StreamReader(stream, emit_chunks=True, validate_crcs=True).records:
-            records.setdefault(type(record).__name__, []).append(record)
-    places = list(_walk(file.read_bytes()))
-    at = {offset: (opcode, length) for offset, opcode, length in places}
-    (footer,), (statistics,) = records["Footer"], records["Statistics"]
-    assert at[footer.summary_offset_start][0] == Opcode.SUMMARY_OFFSET
-    covered = []
-    for group in records["SummaryOffset"]:
-        end = group.group_start + group.group_length
-        members = [place for place in places if group.group_start <= place[0] < end]
-        assert (members[0][0], sum(members[-1][::2])) == (group.group_start, end)
-        assert {opcode for _, opcode, _ in members} == {group.group_opcode}
-        covered += members
-    begin, end = footer.summary_start, footer.summary_offset_start
-    assert covered == [place for place in places if begin <= place[0] < end]
-    chunks, metadata = records.get("Chunk", []), records["Metadata"]
-    for index, chunk in zip(records.get("ChunkIndex", []), chunks, strict=True):
-        assert at[index.chunk_start_offset] == (Opcode.CHUNK, index.chunk_length)
-        assert index.compressed_size == len(chunk.data)
-        for name in ("uncompressed_size", "compression", "message_start_time", "message_end_time"):
-            assert getattr(index, name) == getattr(chunk, name)
-        behind = index.chunk_start_offset + index.chunk_length
-        assert min(index.message_index_offsets.values()) == behind
-        indexes = [at[offset] for offset in index.message_index_offsets.values()]
-        assert {opcode for opcode, _ in indexes} == {Opcode.MESSAGE_INDEX}
-        assert sum(length for _, length in indexes) == index.message_index_length
-        assert at[behind + index.message_index_length][0] != Opcode.MESSAGE_INDEX
-    for index, named in zip(records["MetadataIndex"], metadata, strict=True):
-        assert index.name == named.name
-        assert at[index.offset] == (Opcode.METADATA, index.length)
-    assert (statistics.metadata_count, statistics.chunk_count) == (len(metadata), len(chunks))
-    assert bool(chunks) == bool(ticks)
-
-
 # Chunks, compressions, splits
 
 
@@ -279,18 +194,6 @@ def test_splits_hold_every_message_once_and_each_shows_the_robot(split: Path, pl
     assert read_flight(split).ticks == read_flight(plain).ticks
 
 
-def test_splits_are_in_metadata_with_their_times_and_counts(split: Path) -> None:
-    content = _information(split)
-    assert content["relative_file_paths"] == [file.name for file in _files(split)]
-    for file, said in zip(_files(split), content["files"], strict=True):
-        statistics = _summary(file).statistics
-        start = said["starting_time"]["nanoseconds_since_epoch"]
-        assert (said["path"], said["message_count"]) == (file.name, statistics.message_count)
-        assert start == statistics.message_start_time
-        assert start + said["duration"]["nanoseconds"] == statistics.message_end_time
-    assert content["message_count"] == sum(said["message_count"] for said in content["files"])
-
-
 def test_every_file_says_what_was_flown_and_the_last_what_was_lost(split: Path) -> None:
     for file in _files(split):
         with file.open("rb") as stream:
@@ -310,17 +213,6 @@ def test_every_file_says_what_was_flown_and_the_last_what_was_lost(split: Path) 
         again = len(_files(split)) - 1 if name in LATCHED else 0
         assert counts["received"] == counts["expected"] == counted[name] - again
         assert counts["missing"] == counts["repeated"] == counts["invalid_stamps"] == 0
-
-
-def test_killed_after_a_split_all_before_is_whole(messages: Messages, tmp_path: Path) -> None:
-    """The files are as they were when the recorder had made the third."""
-    recorder = BagRecorder(tmp_path / "bag", FLIGHT, TIMEBASE, split_size=SPLIT)
-    for topic, data in messages:
-        recorder.record(topic, data)
-        if len(_files(tmp_path / "bag")) == 3:
-            break
-    assert all(_summary(file) is not None for file in _files(tmp_path / "bag")[:2])
-    assert read_flight(tmp_path / "bag").ticks == recorder.kept_tick + 1
 
 
 def test_no_place_for_the_next_file_keeps_those_before(messages: Messages, tmp_path: Path) -> None:

@@ -27,7 +27,7 @@ from space_robot_msgs_py.compiled.lanes import (
     whole,
     with_lane,
 )
-from space_robot_msgs_py.compiled.records import Block, Record, nested, shaped
+from space_robot_msgs_py.compiled.records import Record, nested, shaped
 
 Array = NDArray[np.float64]
 RESULTS = 22
@@ -113,27 +113,6 @@ def test_plain_numbers_have_one_lane() -> None:
 
 
 @kernel
-def doubled(values: Array) -> None:
-    numbers = as_numbers(values)
-    for i in range(numbers.shape[0]):
-        for lane in range(numbers.shape[1]):
-            numbers[i, lane] *= 2.0
-
-
-@kernel
-def doubled_in_lanes(numbers: Array) -> None:
-    doubled(as_lanes(numbers))
-
-
-def test_numbers_of_lanes_and_of_floats_are_the_same_memory() -> None:
-    wide, plain = np.arange(24.0).reshape(3, WIDTH), np.arange(3.0)
-    doubled_in_lanes(wide)
-    doubled(plain)
-    assert wide.ravel().tolist() == (2.0 * np.arange(24.0)).tolist()
-    assert plain.tolist() == [0.0, 2.0, 4.0]
-
-
-@kernel
 def branches(numbers: Array) -> float:
     return 1.0 if as_lanes(numbers)[0] > 0.0 else 2.0
 
@@ -153,31 +132,6 @@ class Whole(Record):
     row: Array = shaped(lambda n: (n + 1,))
     part: Part = nested(Part)
     order: Array = shaped(lambda n: (n,), uniform=True)
-
-
-@kernel
-def mix(block: Block) -> None:
-    record = block[0]
-    for i in range(record.part.matrix.shape[0]):
-        for k in range(3):
-            record.part.matrix[i, k] += record.row[i] * record.row[i + 1]
-    record.part.number = record.row[0] * whole(record.kind)
-    record.row[1:] = record.part.number
-
-
-@pytest.mark.parametrize("n", [0, 1, 4])
-def test_a_record_in_lanes_is_eight_records(n: int) -> None:
-    generator, lanes = np.random.default_rng(n), Whole.lanes(n)
-    alone = np.zeros(WIDTH, Whole.dtype(n))
-    numbers = alone.view(np.float64).reshape(WIDTH, -1)
-    numbers[:] = generator.normal(size=numbers.shape)
-    alone["kind"] = 3.0
-    lanes.view(np.float64).reshape(-1, WIDTH)[:] = numbers.T
-    mix(lanes)
-    for k in range(WIDTH):
-        mix(alone[k : k + 1])
-    assert lanes.view(np.float64).reshape(-1, WIDTH).T.tobytes() == numbers.tobytes()
-    assert lanes.ctypes.data % (8 * WIDTH) == 0
 
 
 def test_uniform_numbers_are_those_that_lanes_share() -> None:

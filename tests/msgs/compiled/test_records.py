@@ -52,18 +52,6 @@ def fill(record: Outer) -> int:
     return record.inner.matrix.shape[0]
 
 
-@pytest.mark.parametrize("n", [1, 6])
-def test_a_kernel_writes_what_python_reads(n: int) -> None:
-    block = Outer.block(n)
-    record: Outer = block[0]
-    view = record.vector
-    assert fill(record) == n + 1
-    np.testing.assert_array_equal(view, np.full(2 * n, 2.0))
-    assert block[0].scalar == 3.0
-    assert record.inner.matrix[1, 2] == 4.0
-    assert np.count_nonzero(record.inner.matrix) == 1
-
-
 def test_assign_copies_arrays_and_records() -> None:
     record, inner = Outer.allocate(2), Inner.allocate(2)
     inner.matrix[:] = 5.0
@@ -235,24 +223,6 @@ def test_a_kernel_finds_n_and_every_field_of_every_row(
     np.testing.assert_array_equal(numbers[row], wanted)
     assert np.count_nonzero(numbers) == wanted.size
     assert len(getattr(number_all, "signatures", [0])) == 1, "one code for all n"
-
-
-@kernel
-def copy_rows(source: Block, out: Block) -> int:
-    """Copy all rows but the first, backwards."""
-    rest = source[1:]
-    for k in range(rest.size):
-        out[rest.size - 1 - k] = rest[k]
-    return int(rest.size)
-
-
-def test_rows_are_copied_whole() -> None:
-    source = np.zeros(4, Mixed.dtype(3))
-    source.view(np.float64)[:] = np.arange(source.nbytes // 8)
-    out = np.zeros(5, Mixed.dtype(3))
-    assert copy_rows(source, out) == 3
-    assert out[:3].tobytes() == source[:0:-1].tobytes()
-    assert not out.view(np.float64).reshape(5, -1)[3:].any()
 
 
 class Curved(Record):

@@ -108,18 +108,3 @@ def test_too_many_rows_are_refused_before_they_are_unpacked(
 
     monkeypatch.delattr(ParquetFile, "read")
     assert refusal(path) == "more than 100000 rows"
-
-
-def test_a_damaged_parquet_file_is_read_or_refused_in_one_line(tmp_path: Path) -> None:
-    whole = parquet(tmp_path / "a.parquet", np.linspace(0.0, 1.0, 50)).read_bytes()
-    rng, said, path = np.random.default_rng(1), set(), tmp_path / "b.parquet"
-    for number in range(100):
-        damaged = bytearray(whole)
-        damaged[rng.integers(len(whole))] ^= 1 << rng.integers(8)
-        path.write_bytes(damaged[: rng.integers(len(whole))] if number % 10 == 0 else damaged)
-        try:
-            read_columns(path)
-        except InputError as error:
-            said.add(str(error).removeprefix(f"{path}: "))
-    assert "damaged, or not a Parquet file" in said
-    assert all("\n" not in line and "thrift" not in line for line in said)

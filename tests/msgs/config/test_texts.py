@@ -19,7 +19,6 @@ from pydantic import Field
 from space_robot_msgs_py.config.arguments import as_numbers, as_path, as_whole_number, path_text
 from space_robot_msgs_py.config.choices import MOST_LISTED, choices, nearest
 from space_robot_msgs_py.config.extras import extra_packages, install_command
-from space_robot_msgs_py.config.html import html_table
 from space_robot_msgs_py.config.namespace import full_namespace, relative
 from space_robot_msgs_py.config.text import one_line_of, printable, shortened
 from space_robot_msgs_py.config.validation import StrictModel, one_of, read_yaml, short, validate
@@ -75,16 +74,6 @@ def test_names_relative_to_a_namespace() -> None:
     assert relative("/a/b/plant_node", "/a/b") == "plant_node"
     for namespace in ("/", "/a", "/a/b/plant_node", "/b"):
         assert relative("/a/b/plant_node", namespace) == ""
-
-
-def test_tables_in_html_have_texts_as_they_are_and_numbers_to_the_right() -> None:
-    assert html_table(("a<b", "c"), [["<script>", "-1.5e3"]], "x & y") == (
-        "<p>x &amp; y</p><table><tr><th>a&lt;b</th><th>c</th></tr>"
-        '<tr><td style="text-align: left">&lt;script&gt;</td>'
-        '<td style="text-align: right">-1.5e3</td></tr></table>'
-    )
-    assert f">{200 * 'x'}...<" in html_table(("a",), [[300 * "x"]])
-    assert html_table(("a",), [], "nothing") == "<p>nothing</p>"
 
 
 # Suggestions
@@ -267,28 +256,6 @@ def test_numbers_may_stand_for_names_whole_ones_for_numbers_and_tuples_for_lists
     assert type(read.mass) is float
     assert (read.name, read.names) == ("4", ["a", "b"])
     assert [type(value) for value in read.values] == [float, float]
-
-
-_ANY = st.recursive(
-    st.none() | st.booleans() | st.integers() | st.floats() | st.text(max_size=4) | st.binary(),
-    lambda inner: (
-        st.lists(inner, max_size=3)
-        | st.dictionaries(st.text("abmns", max_size=3) | st.integers(), inner, max_size=3)
-    ),
-    max_leaves=8,
-)
-
-
-@given(st.dictionaries(st.sampled_from([*{*Typed.model_fields} - {"name"}, "x", 5, None]), _ANY))
-def test_any_content_fits_or_is_refused_in_one_line(content: dict[object, object]) -> None:
-    try:
-        read = validate(Typed, content, "file.yaml")
-    except InputError as error:
-        assert len(str(error).splitlines()) == 1  # noqa: PT017
-    else:
-        for name, value in content.items():
-            assert getattr(read, str(name)) == value
-            assert type(value) is not bool or name == "on"
 
 
 @pytest.mark.parametrize(

@@ -15,7 +15,6 @@ from space_robot_msgs_py.config.validation import read_yaml
 from space_robot_msgs_py.config.yaml_text import (
     DEEPEST,
     LARGEST_FILE,
-    LONGEST_NAME,
     YamlTextError,
     check_file,
     parse_yaml,
@@ -81,54 +80,6 @@ def test_mistakes_have_one_line(text: str, said: str) -> None:
     assert str(caught.value).isprintable()
 
 
-_WORDS = st.sampled_from(
-    [
-        *(
-            "a",
-            "b:",
-            "- ",
-            "[",
-            "]",
-            "{",
-            "}",
-            ",",
-            ": ",
-            "&a ",
-            "*a",
-            "<<: ",
-            "? ",
-            "|",
-            ">",
-            "\n",
-        ),
-        *("!!int ", "!!map ", "!!set ", "!!float ", "!!binary ", "!x ", "\n  ", "'", '"', "#", "%"),
-        *(
-            "@",
-            "1",
-            "1e9999",
-            ".nan",
-            "-.inf",
-            "0x",
-            "1:30",
-            "2020-13-45",
-            "~",
-            "---\n",
-            "...",
-            "é",
-        ),
-        *("é", "\n", "\t", "\0", "\x7f", "true", "yes", "=", "9" * 30),
-    ]
-)
-
-
-@given(st.lists(_WORDS, max_size=30).map("".join) | st.text(max_size=50))
-def test_any_text_is_read_or_refused_in_one_line(text: str) -> None:
-    try:
-        parse_yaml(text)
-    except YamlTextError as error:
-        assert str(error).isprintable()  # noqa: PT017
-
-
 _PLAIN = st.recursive(
     st.none()
     | st.booleans()
@@ -182,12 +133,3 @@ def test_what_is_no_readable_file(tmp_path: Path, kind: str, said: str) -> None:
         assert str(caught.value).isprintable()
         assert len(str(caught.value)) < 400
     assert len(os.listdir("/proc/self/fd")) == before, "none is left open"
-
-
-def test_a_long_name_is_shown_by_its_ends() -> None:
-    for length in (LONGEST_NAME, LONGEST_NAME + 1):
-        name = f"b/{'a' * (length - 7)}/no.e"[-length:]
-        with pytest.raises(InputError) as caught:
-            read_file(Path(name))
-        shown = name if length == LONGEST_NAME else f"{name[:40]}...{name[-40:]}"
-        assert str(caught.value) == f"{shown}: no such file"

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import os
 import subprocess
 import sys
@@ -16,13 +15,11 @@ from hypothesis import strategies as st
 
 from space_robot_msgs_py.ros import lifeline
 from space_robot_msgs_py.ros.locks import (
-    MOST_NOTES,
     FileLock,
     HeldError,
     Holder,
     commands_in,
     domain_lock,
-    look,
     newest_node,
     node_lock,
     nodes_in,
@@ -46,19 +43,6 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """Locks of the test's own."""
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
     return tmp_path
-
-
-def test_notes_of_earlier_holders_are_found_the_newest_last() -> None:
-    path, notes = topic_lock(42, "/command"), [f"note{i}" for i in range(2 * MOST_NOTES)]
-    assert look(path) == (False, [])
-    for first, second in itertools.pairwise(notes):
-        lock = FileLock(path, "controller_node", [first, second])
-        assert look(path)[0]
-        lock.release()
-    is_held, found = look(path)
-    assert not is_held
-    assert len(found) == MOST_NOTES
-    assert found[-4:] == [notes[-3], notes[-2], notes[-2], notes[-1]]
 
 
 def test_killed_holder_is_named_and_leaves_the_lock_at_once() -> None:

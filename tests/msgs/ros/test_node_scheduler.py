@@ -302,18 +302,3 @@ def test_calls_one_behind_another_take_no_more_than_their_share(
     gaps = [b - a for a, b in itertools.pairwise(at)]
     assert min(gaps) == pytest.approx(lasts + pause, abs=3e-3)
     assert node.reports == pytest.approx((clock.now - 1000.0) / PERIOD_S, rel=0.5)
-
-
-def test_where_both_are_overdue_calls_and_reports_take_turns(clock: Clock) -> None:
-    node: Any = Node(None)
-    kept = Upkeep(node)
-    for _ in range(10):
-        kept.run()
-        clock.now += 1.0
-    assert (node.looks, node.reports) == (5, 5)
-    assert kept.run() < clock.now, "the report is overdue"
-    assert kept.run() == pytest.approx(clock.now + PERIOD_S, abs=1e-4)
-    clock.now += 1.0
-    node.looks = node.reports = 5
-    kept.run(timeout_s=0.5)
-    assert (node.looks, node.reports, node.waited_s) == (6, 6, 0.5)

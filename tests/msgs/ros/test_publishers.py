@@ -21,12 +21,7 @@ set_defaults()
 rclpy = pytest.importorskip("rclpy")
 
 from space_robot_msgs_py.ros.endpoints import PolledCallbackGroup, RawPublisher, RawSubscription  # noqa: E402
-from space_robot_msgs_py.ros.exclusive import (  # noqa: E402
-    GraphPublishers,
-    TopicClaim,
-    claim_name,
-    foreign_publishers,
-)
+from space_robot_msgs_py.ros.exclusive import GraphPublishers, TopicClaim, foreign_publishers  # noqa: E402
 from space_robot_msgs_py.ros.locks import MOST_NOTES  # noqa: E402
 from space_robot_msgs_py.ros.serialized_take import ROOM, Received  # noqa: E402
 
@@ -107,27 +102,6 @@ def test_the_publisher_of_a_topic_is_alone_and_killed_leaves_its_place_at_once(
     finally:
         process.kill()
         process.communicate()
-
-
-def test_remapped_topics_and_other_topics_do_not_meet(make_node: Make) -> None:
-    node = make_node("controller")
-    moved = make_node("controller", cli_args=["--ros-args", "-r", "/command:=/spare/command"])
-    claims = [TopicClaim(node, ["/command"]), TopicClaim(moved, ["/command"])]
-    with pytest.raises(InputError, match="/spare/command of ROS domain"):
-        TopicClaim(node, ["/spare/command"])
-    for claim in claims:
-        claim.release()
-
-
-def test_two_nodes_of_one_name_are_refused(make_node: Make, domain: int) -> None:
-    """Whoever asks /recorder_node to configure means one of them."""
-    name = claim_name(make_node("recorder_node"))
-    said = f"ROS domain {domain} has a /recorder_node already: recorder_node (pid {os.getpid()})"
-    with pytest.raises(InputError, match=re.escape(said)):
-        claim_name(make_node("recorder_node"))
-    claim_name(make_node("recorder_node", namespace="/other")).release()
-    name.release()
-    claim_name(make_node("recorder_node")).release()
 
 
 # Messages and their publishers

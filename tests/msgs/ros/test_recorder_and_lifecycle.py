@@ -24,7 +24,7 @@ from space_robot_msgs_py.wire.codecs import StateCodec
 set_defaults()
 pytest.importorskip("rclpy")
 
-from space_robot_msgs_py.ros.endpoints import PolledCallbackGroup, RawPublisher, RawSubscription  # noqa: E402
+from space_robot_msgs_py.ros.endpoints import PolledCallbackGroup, RawSubscription  # noqa: E402
 
 if TYPE_CHECKING:
     from ground import Ground
@@ -101,10 +101,6 @@ def go_on(ground: Ground, seconds: float = 0.1) -> None:
     ground.until(lambda: ground.monitor.simulated_s > begin + seconds, "a flight")
 
 
-def size(bag: Path) -> int:
-    return sum(file.stat().st_size for file in bag.glob("*.mcap"))
-
-
 def test_deactivated_controller_leaves_no_torque_and_comes_back(
     flying: Nodes, ground: Ground
 ) -> None:
@@ -142,27 +138,6 @@ def test_a_signal_ends_the_recorder_in_flight(
     assert {name: count["missing"] for name, count in counts.items() if count["missing"]} == {}
 
 
-def test_inactive_the_recorder_writes_nothing_and_then_goes_on(
-    flying: Nodes, ground: Ground, bag: Path
-) -> None:
-    assert ground.change("recorder", "deactivate")
-    inactive = size(bag)
-    go_on(ground, 0.5)
-    assert size(bag) == inactive
-    assert ground.change("recorder", "activate")
-    go_on(ground, 0.5)  # until a reference has come, too
-    assert ground.change("recorder", "deactivate")
-    assert ground.change("recorder", "cleanup")  # while the plant flies
-    assert ground.state("recorder") == "unconfigured"
-    assert all(node.poll() is None for node in flying.values())
-    log = read_flight(bag)
-    assert not log.unfinished
-    assert not any(log.lost.values())
-    assert any("sent while the recorder was inactive" in text for text in log.damage)
-    assert any("lack state or reference" in text for text in log.damage)
-    ended(flying["recorder"])
-
-
 def test_what_was_never_sent_is_not_lost_and_all_are_cleaned_up_in_flight(
     flying: Nodes, ground: Ground, bag: Path
 ) -> None:
@@ -186,24 +161,3 @@ def test_what_was_never_sent_is_not_lost_and_all_are_cleaned_up_in_flight(
     assert log.unanswered > 200
     assert not any(log.lost.values())
     assert {name: count["missing"] for name, count in counts.items() if count["missing"]} == {}
-
-
-OPTIONAL = (*topics.TRUTH, topics.WHEELS_STATE, topics.THRUSTERS_STATE)
-
-
-def test_topics_of_some_flights_are_listened_to_once_they_are_published(
-    start: Start, ground: Ground, bag: Path
-) -> None:
-    """Nobody is told of subscribers without publishers."""
-
-    def heard() -> set[topics.Topic]:
-        every = (*OPTIONAL, topics.JOINT_STATES)
-        return {topic for topic in every if ground.node.count_subscribers(topic.name)}
-
-    start("recorder", bag=bag)
-    ground.until(lambda: ground.monitor.modes.get("recorder_node") == "nominal", "the recorder")
-    ground.until(lambda: topics.JOINT_STATES in heard(), "what every flight has")
-    assert heard() == {topics.JOINT_STATES}
-    wheels = RawPublisher(ground.node, topics.WHEELS_STATE)
-    ground.until(lambda: wheels.listener_count == 1, "a listener")
-    assert heard() == {topics.JOINT_STATES, topics.WHEELS_STATE}

@@ -74,51 +74,6 @@ def test_lost_is_what_was_sent_and_did_not_come(
     assert sources.is_behind == (is_told and len(sent[OURS]) > max(came, default=0))
 
 
-def test_what_is_sent_in_a_pause_is_passed_over(graph: Graph) -> None:
-    sources = Sources(TOPIC, graph)
-    sources.note_sent(FOREIGN[:PARTICIPANT_BYTES], 1000)
-    assert (sources.tail, sources.is_behind) == (0, False)
-    for sequence in (1, 2, 4):
-        sources.take(OURS, sequence)
-    sources.pause()
-    sources.note_sent(OURS[:PARTICIPANT_BYTES], 9)
-    assert (sources.holes, sources.is_behind) == (1, False)
-    for sequence in (11, 12, 14):
-        sources.take(OURS, sequence)
-    assert (sources.holes, sources.passed_over) == (2, 6)
-
-
-@given(st.integers(0, 5), st.booleans(), st.integers(1, 20), st.integers(1, 20))
-def test_who_is_first_heard_after_a_pause_has_lost_nothing(
-    before: int, pauses: bool, first: int, after: int
-) -> None:
-    """What it sent until then was not to be recorded; without a pause it is lost."""
-    graph = Graph()
-    graph.claim = Claimed((OURS, AGAIN), True)
-    sources = Sources(TOPIC, graph)
-    for sequence in range(1, before + 1):
-        sources.take(OURS, sequence)
-    if pauses:
-        sources.pause()
-    for sequence in range(first, first + after):
-        assert sources.take(AGAIN, sequence)
-    passed = first - 1
-    assert (sources.holes, sources.passed_over) == ((0, passed) if pauses else (passed, 0))
-    assert sources.take(AGAIN, first + after + 2)
-    assert sources.holes == (2 if pauses else passed + 2)
-
-
-def test_foreign_publishers_are_named_when_their_names_are_known(graph: Graph) -> None:
-    sources = Sources(TOPIC, graph)
-    for publisher in (OURS, FOREIGN, OTHER):
-        sources.take(publisher, 1)
-    sources.find_names()
-    assert sources.foreign_names == ["2 publishers without a name"]
-    graph.listed = {OURS: "/controller_node", FOREIGN: "/rogue"}
-    sources.find_names()
-    assert sources.foreign_names == ["/rogue", "1 publisher without a name"]
-
-
 def _command(tick: int, torque: float) -> bytes:
     return CommandCodec(("j",), TIMEBASE).encode(Command(tick, np.array([torque])))
 
@@ -168,23 +123,6 @@ def test_lost_is_told_by_the_numbers_of_the_messages(
     assert foreign(noted_accounts({"space_robot.accounting": told})) == [said]
 
 
-def test_where_messages_tell_no_publisher_all_are_ours(tmp_path: Path) -> None:
-    """What was lost cannot be known then from their numbers."""
-    recorder = BagRecorder(tmp_path / "bag", {}, TIMEBASE)
-    numbers = (1, 2, 500, 3, 501)
-    kept = [
-        recorder.record(topics.COMMAND, _command(tick, 1.0), 1_000_000, b"", number)
-        for tick, number in enumerate(numbers)
-    ]
-    recorder.note_sent(TOPIC, b"", 3)
-    assert kept == [True] * 5
-    assert not recorder.foreign
-    assert not recorder.is_behind
-    assert recorder.lost[TOPIC] == 0
-    recorder.close()
-    assert read_accounts(tmp_path / "bag")[TOPIC]["received"] == 5
-
-
 JUMP = 8
 
 steps = st.lists(st.integers(1, JUMP), max_size=30)
@@ -200,14 +138,6 @@ def rising(begin: int, steps: list[int]) -> list[int]:
 
 def passing(guard: StampGuard, ticks: list[int]) -> list[bool]:
     return [guard.passes(tick) for tick in ticks]
-
-
-@given(st.integers(0, 10**9), steps)
-def test_stamps_that_rise_are_believed(begin: int, steps: list[int]) -> None:
-    guard, ticks = StampGuard(JUMP), rising(begin, steps)
-    assert guard.last == -1, "none yet"
-    assert all(passing(guard, ticks))
-    assert guard.last == ticks[-1]
 
 
 @given(st.integers(0, 10**6), steps, st.integers(0, 10**9), st.integers(0, 29), st.integers(1, 4))
@@ -254,14 +184,6 @@ def test_a_new_time_is_believed_by_its_fifth_stamp_at_the_latest(
     verdicts = passing(guard, rising(begin, [1] * AGREEING + steps))
     assert any(verdicts[:AGREEING])
     assert all(verdicts[AGREEING - 1 :])
-
-
-def test_a_plant_that_asks_again_from_tick_0_is_believed() -> None:
-    """In lockstep it repeats its first state until that is answered."""
-    guard = StampGuard(JUMP)
-    passing(guard, list(range(100, 120)))
-    assert passing(guard, [0] * AGREEING) == [False] * (AGREEING - 1) + [True]
-    assert guard.passes(1)
 
 
 @given(st.integers(0, 10**6), st.integers(0, 10**9))
