@@ -16,12 +16,10 @@ from .bag.set_aside import set_aside
 from .config.text import parse_json
 from .errors import InputError, MessageError
 from .ros.endpoints import PolledCallbackGroup, RawPublisher, RawSubscription
-from .ros.exclusive import GraphPublishers
 from .ros.health import SENT, Health, Level
 from .ros.loop import Wait
 from .ros.managed_node import ManagedNode
 from .ros.node_host import NodeKind, run_nodes
-from .ros.serialized_take import serialized_take, take_by_rclpy
 from .wire.definitions import decode
 
 SILENCE_S = 0.3
@@ -92,7 +90,6 @@ class RecorderLoop:
             settings.timebase,
             settings.compression,
             settings.split_size,
-            GraphPublishers(node),
             {topic.name: name for topic, name in self._names.items()},
             namespace,
         )
@@ -109,8 +106,6 @@ class RecorderLoop:
         """Time when this recorder was requested to stop; None while it records."""
         of_whom = "" if namespace == topics.ROOT else f" the topics in {namespace}"
         node.log(f"recording{of_whom} to {path}")
-        if serialized_take() is take_by_rclpy:
-            node.log("this rclpy does not tell publishers: they are told apart by their numbers")
 
     @property
     def failure(self) -> str:
@@ -152,14 +147,10 @@ class RecorderLoop:
     def health(self) -> Health:
         """Tell what has come, and whether it is kept."""
         recorder = self._recorder
-        foreign = {f"foreign {name}": count for name, count in recorder.foreign.items()}
         tick = recorder.accounting[topics.JOINT_STATES.full_name].last
-        values = {"tick": max(0, tick), "received": recorder.received, **foreign}
+        values = {"tick": max(0, tick), "received": recorder.received}
         if self.failure:
             return Health(f"not recording: {self.failure}", Level.ERROR, values)
-        if foreign:
-            names = ", ".join(recorder.foreign_names())
-            return Health(f"messages of {names} are left out", Level.WARN, values)
         return Health("nominal", values=values)
 
     def close(self) -> None:
@@ -170,9 +161,6 @@ class RecorderLoop:
         """
         lost = {name: count for name, count in self._recorder.lost.items() if count}
         self._node.log(f"{self._recorder.received} messages received, missing: {lost or 0}")
-        if foreign := self._recorder.foreign:
-            names = ", ".join(self._recorder.foreign_names())
-            self._node.log(f"messages of {names} were left out: {foreign}")
         self._recorder.close()
 
     def _listen_to(self, topic: topics.Topic) -> RawSubscription:
@@ -213,7 +201,7 @@ class RecorderLoop:
         begin_ns = 0 if entry.topic in AHEAD_OF_NEED else self._from_ns
         until_ns = self._end_ns
         for count in range(TURN):
-            if (taken := entry.take_with_source()) is None:
+            if (taken := entry.take_with_info()) is None:
                 return count, timely
             if taken.sent_ns <= until_ns:
                 timely += 1
@@ -225,15 +213,15 @@ class RecorderLoop:
 
     def _take_description(self) -> None:
         """Note what the plant says that it flies."""
-        if (taken := self._description.take_with_source()) is not None:
+        if (taken := self._description.take_with_info()) is not None:
             with suppress(MessageError, ValueError):
                 flown = parse_json(decode(taken.data, topics.PLANT_DESCRIPTION.type).data)
-                self._recorder.describe(flown, taken.publisher, taken.sequence)
+                self._recorder.describe(flown)
 
     def _take_counts(self) -> None:
         """Hear from the nodes how much they have sent."""
         for _ in range(REPORTS):
-            if (taken := self._diagnostics.take_with_source()) is None:
+            if (taken := self._diagnostics.take_with_info()) is None:
                 return
             if not self._from_ns <= taken.sent_ns <= self._end_ns:
                 continue
@@ -242,7 +230,7 @@ class RecorderLoop:
                     for item in status.values:
                         if item.key.startswith(SENT):
                             name = self._ours.get(item.key.removeprefix(SENT), "")
-                            self._recorder.note_sent(name, taken.publisher, int(item.value))
+                            self._recorder.note_sent(name, int(item.value))
 
     @property
     def _end_ns(self) -> int:

@@ -8,7 +8,7 @@ from space_robot_msgs_py import topics
 
 
 class QueuedInput:
-    """A `TrustedSubscription` that hears what the test sends."""
+    """A `RawSubscription` that hears what the test sends."""
 
     def __init__(self, node: object, topic: topics.Topic, group: object, depth: int = 1) -> None:
         self.topic, self.full_name = topic, topic.full_name

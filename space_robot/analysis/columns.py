@@ -52,7 +52,6 @@ def recording(log: FlightLog) -> dict[str, Any]:
         "filled_ticks": log.filled,
         "unfinished": log.unfinished,
         "damage": list(log.damage),
-        "foreign": list(log.foreign),
     }
 
 

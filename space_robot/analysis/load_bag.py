@@ -31,7 +31,6 @@ def load_bag(
     - ``joint_names``, and ``description``: what was flown (controller, case, gains, ...)
     - ``damage``, ``unfinished``, ``lost``: what is wrong with the bag, empty or zero if nothing.
       Ticks that could not be read are NaN; ``whole`` (N,) says which are not.
-    - ``foreign``: whose messages the recorder left out
 
     Args:
         path: the bag's folder, or a single .mcap or .db3 file.

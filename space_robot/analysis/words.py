@@ -87,9 +87,7 @@ def remarks(report: Report) -> list[str]:
     if full := report["wheel_saturation"]:
         remarks += _saturated_wheels(full)
     remarks += [*_limit_cycles(report), *_standing_joints(report), *_beyond_limits(report)]
-    remarks += [
-        text for text in (report["unfinished"], *report["damage"], *report["foreign"]) if text
-    ]
+    remarks += [text for text in (report["unfinished"], *report["damage"]) if text]
     if report["unanswered_ticks"]:
         remarks.append(f"ticks that no command was recorded for: {report['unanswered_ticks']}")
     if report["filled_ticks"]:

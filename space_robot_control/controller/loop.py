@@ -172,8 +172,6 @@ class ControllerLoop:
             **allocation.values,
             **{f"rejected: {reason}": count for reason, count in rejected.items()},
         }
-        for entry in (*self._states.inputs, *references.inputs):
-            values |= entry.counts("rejected")
         if references.is_waited_for:
             return Health("waiting for the reference: no mission sends it", Level.WARN, values)
         if supervisor.answered < 0:

@@ -14,9 +14,8 @@ from space_robot_model.robot import Robot
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.compiled.records import Block
 from space_robot_msgs_py.errors import FlightError, MessageError
-from space_robot_msgs_py.ros.endpoints import PolledCallbackGroup
+from space_robot_msgs_py.ros.endpoints import PolledCallbackGroup, RawSubscription
 from space_robot_msgs_py.ros.loop import Wait
-from space_robot_msgs_py.ros.trusted_subscription import TrustedSubscription
 from space_robot_msgs_py.samples import Timebase
 from space_robot_msgs_py.wire.reference_codec import ReferenceCodec
 
@@ -70,12 +69,12 @@ class ReferenceInput:
         group = PolledCallbackGroup()
         self._halves = (
             _Half(
-                TrustedSubscription(node, topics.REFERENCE_JOINTS, group, QUEUE_DEPTH),
+                RawSubscription(node, topics.REFERENCE_JOINTS, group, QUEUE_DEPTH),
                 codec.decode_joints,
                 buffer.add_joints,
             ),
             _Half(
-                TrustedSubscription(node, topics.REFERENCE_BASE, group, QUEUE_DEPTH),
+                RawSubscription(node, topics.REFERENCE_BASE, group, QUEUE_DEPTH),
                 codec.decode_base,
                 buffer.add_base,
             ),
@@ -145,7 +144,7 @@ class _Half:
 
     def __init__(
         self,
-        source: TrustedSubscription,
+        source: RawSubscription,
         decode: Callable[[bytes], tuple[int, Array]],
         add: Callable[[int, Array], None],
     ) -> None:

@@ -8,9 +8,8 @@ from collections import Counter, deque
 from rclpy.node import Node
 
 from space_robot_msgs_py.errors import MessageError
-from space_robot_msgs_py.ros.endpoints import PolledCallbackGroup
+from space_robot_msgs_py.ros.endpoints import PolledCallbackGroup, RawSubscription
 from space_robot_msgs_py.ros.loop import Wait
-from space_robot_msgs_py.ros.trusted_subscription import TrustedSubscription
 from space_robot_msgs_py.samples import RobotNames, RobotState, Timebase
 from space_robot_msgs_py.wire.cdr import header_stamp_ns
 from space_robot_msgs_py.wire.codecs import StateCodec
@@ -33,7 +32,7 @@ class StateInput:
         self.codec = StateCodec(names, timebase)
         group = PolledCallbackGroup()
         first, *others = (
-            TrustedSubscription(node, topic, group) for topic in self.codec.control_topics
+            RawSubscription(node, topic, group) for topic in self.codec.control_topics
         )
         self.inputs = (first, *others)
         self._first = first
@@ -105,7 +104,7 @@ class StateInput:
 class _LaterPart:
     """A part of the state that is read after the first part."""
 
-    def __init__(self, entry: TrustedSubscription, codec: StateCodec, timebase: Timebase) -> None:
+    def __init__(self, entry: RawSubscription, codec: StateCodec, timebase: Timebase) -> None:
         self.input, self._codec, self._timebase = entry, codec, timebase
         self._ahead: bytes | None = None
         """Of a later tick than the one that was looked for: that one's part was never heard."""

@@ -7,11 +7,10 @@ import time
 from space_robot_model.robot.find import find_robot
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.errors import MessageError
-from space_robot_msgs_py.ros.endpoints import PolledCallbackGroup, RawPublisher
+from space_robot_msgs_py.ros.endpoints import PolledCallbackGroup, RawPublisher, RawSubscription
 from space_robot_msgs_py.ros.health import Health, Level
 from space_robot_msgs_py.ros.loop import Wait
 from space_robot_msgs_py.ros.managed_node import ManagedNode
-from space_robot_msgs_py.ros.trusted_subscription import TrustedSubscription
 from space_robot_msgs_py.samples import RobotNames
 from space_robot_msgs_py.wire.cdr import header_stamp_ns
 from space_robot_msgs_py.wire.reference_codec import ReferenceCodec
@@ -21,8 +20,6 @@ from .mission import Mission
 from .mission_changes import MissionChanges
 from .settings import MissionNodeSettings
 
-CLOCK_DEPTH = 1_000
-"""All of a plant's messages are needed to tell them from another's."""
 MOST_AT_ONCE = 100
 """Messages taken before the stream goes on: somebody may flood the topic."""
 CLOCK_WAIT_S = GREET_S = 0.05
@@ -47,9 +44,7 @@ class MissionLoop:
         self._joints = RawPublisher(node, topics.REFERENCE_JOINTS)
         self._base = RawPublisher(node, topics.REFERENCE_BASE)
         self.outputs = (self._joints, self._base)
-        self._clock = TrustedSubscription(
-            node, topics.CLOCK, PolledCallbackGroup(), depth=CLOCK_DEPTH
-        )
+        self._clock = RawSubscription(node, topics.CLOCK, PolledCallbackGroup())
         self._for_clock = Wait(CLOCK_WAIT_S, (self._clock,))
         self._stamps = StampGuard(round(MOST_OWED_S / settings.period))
         self._is_resumed = True
@@ -93,7 +88,6 @@ class MissionLoop:
         """Report the progress of the stream."""
         values = {"tick": max(self._stamps.last, 0), "rejected: stamp": self._invalid_stamps}
         values |= self._changes.counts
-        values |= self._clock.counts("rejected")
         if warning := self._changes.next_warning():
             return Health(warning, Level.WARN, values)
         return Health("nominal", values=values)

@@ -19,10 +19,9 @@ from rclpy.time import Time
 
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.errors import InputError, MessageError
-from space_robot_msgs_py.ros.endpoints import PolledCallbackGroup
+from space_robot_msgs_py.ros.endpoints import PolledCallbackGroup, RawSubscription
 from space_robot_msgs_py.ros.managed_node import ManagedNode
 from space_robot_msgs_py.ros.restart import until
-from space_robot_msgs_py.ros.trusted_subscription import TrustedSubscription
 from space_robot_msgs_py.samples import RobotNames
 from space_robot_msgs_py.wire.compiled_codec import CompiledCodec
 from space_robot_msgs_py.wire.joint_states import JointStates
@@ -86,7 +85,7 @@ class MeasuredJoints:
     def __init__(self, node: ManagedNode[Any], names: RobotNames) -> None:
         """Subscribe."""
         assert node.settings is not None
-        self._subscription = TrustedSubscription(node, topics.JOINT_STATES, PolledCallbackGroup())
+        self._subscription = RawSubscription(node, topics.JOINT_STATES, PolledCallbackGroup())
         self._codec = CompiledCodec(JointStates.of_robot(names, node.settings.timebase))
         self._motors, self._all = len(names.joints), len(names.all_joints)
 

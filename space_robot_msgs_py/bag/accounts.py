@@ -25,9 +25,6 @@ class Account(BaseModel):
     """Messages excluded because they had arrived before."""
     invalid_stamps: Count = 0
     """Messages in the bag whose stamp is not plausible."""
-    foreign: Count = 0
-    """Messages excluded because a foreign publisher sent them."""
-    foreign_publishers: list[str] = []
     while_inactive: Count = 0
     """Messages excluded because the recorder was inactive when they were sent."""
 
@@ -41,16 +38,6 @@ def noted_accounts(noted: Mapping[str, str]) -> dict[str, Account]:
         return _ACCOUNTS.validate_python(parse_json(noted.get(ACCOUNTS_KEY, "{}")))
     except (ValueError, ValidationError):
         return {}
-
-
-def foreign(accounts: Mapping[str, Account]) -> list[str]:
-    """Describe the foreign messages excluded, one sentence per publisher."""
-    return [
-        f"{account.foreign} messages on {name} were left out: they are from "
-        f"{', '.join(account.foreign_publishers) or 'a foreign publisher'}"
-        for name, account in accounts.items()
-        if account.foreign
-    ]
 
 
 def paused(accounts: Mapping[str, Account]) -> list[str]:

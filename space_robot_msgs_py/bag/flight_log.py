@@ -162,8 +162,6 @@ class FlightLog:
     """Description of the end of an unfinished bag; empty for a finished one."""
     damage: tuple[str, ...] = ()
     """Damage of the bag, one sentence each."""
-    foreign: tuple[str, ...] = ()
-    """Foreign messages excluded from the log, one sentence per publisher."""
     commanded_torque: Array | None = None
     """(N, n+3) N m, the controller's answer to the tick (NaN: none); None: not recorded."""
     latency_s: Array | None = None

@@ -135,6 +135,60 @@ class MessageAccounting:
         return (self.last - self.first) // (self.unit or 1) + 1 - self.received
 
 
+class SequenceCount:
+    """Count of one topic's messages by its publisher's numbers, which begin at 1 in each node."""
+
+    def __init__(self) -> None:
+        self.is_counted = False
+        """True if the publisher numbers its messages."""
+        self.passed_over = 0
+        """Number of messages sent while recording was paused."""
+        self._received = self._last = self._reported = 0
+        self._earlier_holes = self._earlier_tail = 0
+        """Of publishers that have ended."""
+        self._is_resuming = False
+
+    def take(self, sequence: int) -> None:
+        """Count a message; a ``sequence`` of 0 is unknown and ignored."""
+        if not sequence:
+            return
+        self.is_counted = True
+        if sequence <= self._last:  # of a restarted node
+            self._earlier_holes, self._earlier_tail = self.holes, self.tail
+            self._received = self._last = self._reported = 0
+        if self._is_resuming:
+            self._is_resuming = False
+            passed_over = sequence - self._last - 1
+            self.passed_over += passed_over
+            self._received += passed_over
+        self._received += 1
+        self._last = sequence
+
+    def note_sent(self, count: int) -> None:
+        """Store the number of sent messages that the publisher's node reports."""
+        self._reported = count
+        self.is_counted = self.is_counted or count > 0
+
+    def pause(self) -> None:
+        """Ignore what is sent until the next received message."""
+        self._is_resuming = True
+
+    @property
+    def holes(self) -> int:
+        """Number of missing messages that were sent before the last received one."""
+        return self._earlier_holes + self._last - self._received
+
+    @property
+    def tail(self) -> int:
+        """Number of messages that were sent after the last received one."""
+        return self._earlier_tail + self.awaited
+
+    @property
+    def awaited(self) -> int:
+        """Number of messages that the publisher has sent and that may still arrive."""
+        return 0 if self._is_resuming else max(0, self._reported - self._last)
+
+
 def lost_messages(
     accounting: Mapping[str, MessageAccounting],
     excused: frozenset[str] = frozenset(),

@@ -22,7 +22,7 @@ from ..samples import (
     Timebase,
 )
 from ..wire.definitions import decode
-from .accounts import Account, foreign, noted_accounts, paused
+from .accounts import Account, noted_accounts, paused
 from .batch import Batch
 from .contents import Bag
 from .description import read_description
@@ -136,7 +136,6 @@ def _read(bag: Bag, remap: Mapping[str, str], namespace: str | None) -> FlightLo
         raise InputError(f"not one tick with its state and reference ({context})")
     damage += missing_ticks(whole[:ticks], log.timebase)
     log.damage = tuple(printable(text) for text in damage)
-    log.foreign = tuple(printable(text) for text in foreign(accounts))
     if not bag.finished:
         last_s = log.timebase.stamp_ns(ticks - 1) / 1e9
         log.unfinished = f"the bag was not finished: read up to t = {last_s:.4f} s"

@@ -12,11 +12,11 @@ from .. import topics
 from ..errors import FlightError, MessageError
 from ..samples import Timebase
 from ..wire.carrier import unwrap
-from ..wire.sources import PARTICIPANT_BYTES, Publishers, Sources, Unknown
 from .accounts import ACCOUNTS_KEY
 from .mcap_file import Compression
 from .message_accounting import (
     MessageAccounting,
+    SequenceCount,
     lost_messages,
     message_tick,
     topics_with_allowed_gaps,
@@ -53,14 +53,12 @@ class BagRecorder:
         timebase: Timebase,
         compression: Compression = "lz4",
         split_size: int = 0,
-        publishers: Publishers | None = None,
         names: Mapping[str, str] | None = None,
         namespace: str = topics.ROOT,
     ) -> None:
         """Open the bag; ``flight`` says what was flown and is stored with it.
 
         A file of the bag that has ``split_size`` bytes is followed by another (0: never).
-        ``publishers`` tells the graph's own from foreign ones; None: all are the graph's.
         ``names``: full name of each topic, by its own; None: that in the ``namespace``.
 
         Raises:
@@ -84,11 +82,7 @@ class BagRecorder:
         self._most_bytes = min(MOST_CHUNKS * CHUNK_BYTES, split_size or MOST_CHUNKS * CHUNK_BYTES)
         self._timebase = timebase
         self.accounting = {topic.full_name: MessageAccounting(topic) for topic in topics.RECORDED}
-        self.sources = {
-            topic.full_name: Sources(topic.name, publishers or Unknown())
-            for topic in topics.RECORDED
-        }
-        self._plants = Sources(topics.PLANT_DESCRIPTION.name, publishers or Unknown())
+        self._sequences = {topic.full_name: SequenceCount() for topic in topics.RECORDED}
         self.failure = ""
         """Reason why writing has stopped; empty without failure."""
         self.kept_tick = -1
@@ -97,15 +91,8 @@ class BagRecorder:
         self._flush_at, self._open_bytes = time.monotonic() + CHUNK_AGE_S, 0
         self._closed = False
 
-    def record(
-        self,
-        topic: topics.Topic,
-        data: bytes,
-        sent_ns: int = 0,
-        publisher: bytes = b"",
-        sequence: int = 0,
-    ) -> bool:
-        """Add one serialized message, if it is from the graph's own publisher; whether it is.
+    def record(self, topic: topics.Topic, data: bytes, sent_ns: int = 0, sequence: int = 0) -> None:
+        """Add one serialized message.
 
         One whose stamp cannot be right is kept at the time of the last good one.
 
@@ -113,16 +100,10 @@ class BagRecorder:
             topic: it came on.
             data: the message.
             sent_ns: when, by the sender's clock (0: not known).
-            publisher: by whom: a GID (empty: not known).
             sequence: its place among all of its publisher, from 1 on (0: not known).
         """
         name = topic.full_name
-        sources = self.sources[name]
-        if not sources.take(publisher, sequence):
-            return False
-        if sources.begins_anew:
-            sources.begins_anew = False
-            self.accounting[name] = MessageAccounting(topic)
+        self._sequences[name].take(sequence)
         counted = self.accounting[name]
         data = unwrap(data) if topic.carries else data
         try:
@@ -132,25 +113,21 @@ class BagRecorder:
             tick, is_new = counted.last, True
             counted.invalid_stamps += 1
         if not is_new or self.failure:
-            return True
+            return
         log_ns = self._timebase.stamp_ns(max(0, min(tick, counted.last)))
         self._open_bytes = self._writer.write(
             self._written[topic.name], log_ns, sent_ns or log_ns, tick, data
         )
         if self._open_bytes > self._most_bytes:  # no time to flush so far
             self.flush()
-        return True
 
-    def describe(self, flown: Any, publisher: bytes = b"", sequence: int = 0) -> None:
+    def describe(self, flown: Any) -> None:
         """Add to the flight's description what the plant says, where nobody has said more.
 
         Args:
-            flown: the plant's description; from a foreign publisher, or no mapping: it is ignored.
-            publisher: GID (empty: not known).
-            sequence: the message's place among all of its publisher.
+            flown: the plant's description; no mapping: it is ignored.
         """
-        is_ours = not publisher or self._plants.take(publisher, sequence)
-        if not is_ours or not isinstance(flown, dict) or ROBOT_KEY in self._flight:
+        if not isinstance(flown, dict) or ROBOT_KEY in self._flight:
             return
         self._flight = flown | self._flight
         self._excused = topics_with_allowed_gaps(self._flight)
@@ -160,39 +137,25 @@ class BagRecorder:
             except OSError as error:
                 self._fail(error)
 
-    def note_sent(self, topic_name: str, publisher: bytes, count: int) -> None:
+    def note_sent(self, topic_name: str, count: int) -> None:
         """Record how many messages a node reports to have sent on a topic.
 
         Args:
             topic_name: the topic; others than those recorded are ignored.
-            publisher: GID of the publisher it says so with, of the same participant.
             count: messages.
         """
-        if sources := self.sources.get(topic_name):
-            sources.note_sent(publisher[:PARTICIPANT_BYTES], count)
+        if sequences := self._sequences.get(topic_name):
+            sequences.note_sent(count)
 
     @property
     def is_behind(self) -> bool:
         """True if a node has sent more messages than have arrived."""
-        return any(sources.is_behind for sources in self.sources.values())
-
-    @property
-    def foreign(self) -> dict[str, int]:
-        """Messages a topic of foreign publishers, which are left out; topics without: no entry."""
-        return {name: count for name, s in self.sources.items() if (count := s.foreign)}
-
-    def foreign_names(self) -> list[str]:
-        """Nodes whose messages are excluded."""
-        names = set()
-        for topic in self.foreign:
-            self.sources[topic].find_names()
-            names |= set(self.sources[topic].foreign_names)
-        return sorted(names)
+        return any(sequences.awaited for sequences in self._sequences.values())
 
     def pause(self) -> None:
         """Exclude on purpose all messages until the next recorded one."""
-        for name, sources in self.sources.items():
-            sources.pause()
+        for name, sequences in self._sequences.items():
+            sequences.pause()
             self.accounting[name].pause()
 
     def flush(self) -> None:
@@ -237,14 +200,14 @@ class BagRecorder:
         By their publishers' own counts; by the ticks, if no publisher counts. What was sent again
         and has come then is not lost.
         """
-        if not any(sources.is_counted for sources in self.sources.values()):
+        if not any(sequences.is_counted for sequences in self._sequences.values()):
             return lost_messages(self.accounting, self._excused)
-        return {name: self._lost(name) for name in self.sources}
+        return {name: self._lost(name) for name in self._sequences}
 
     def _lost(self, name: str) -> int:
-        sources, counted = self.sources[name], self.accounting[name]
-        holes = sources.holes
-        return sources.tail + (holes if counted.topic.is_event else min(holes, counted.gaps))
+        sequences, counted = self._sequences[name], self.accounting[name]
+        holes = sequences.holes
+        return sequences.tail + (holes if counted.topic.is_event else min(holes, counted.gaps))
 
     def close(self) -> None:
         """Close the bag, with the flight's description and the counts in its metadata.
@@ -279,21 +242,11 @@ class BagRecorder:
                 "missing": lost,
                 "repeated": c.repeated,
                 "invalid_stamps": c.invalid_stamps,
-                **self._left_out(name),
+                "while_inactive": self._sequences[name].passed_over,
             }
             for (name, c), lost in zip(self.accounting.items(), self.lost.values(), strict=True)
         }
         self._writer.close({ACCOUNTS_KEY: json.dumps(counts)})
-
-    def _left_out(self, name: str) -> dict[str, Any]:
-        sources = self.sources[name]
-        left_out: dict[str, Any] = {}
-        if sources.foreign:
-            sources.find_names()
-            left_out = {"foreign": sources.foreign, "foreign_publishers": sources.foreign_names}
-        if sources.passed_over:
-            left_out["while_inactive"] = sources.passed_over
-        return left_out
 
     def _fail(self, error: OSError) -> None:
         self.failure = error.strerror or str(error)

@@ -10,7 +10,7 @@ from __future__ import annotations
 import importlib
 import time
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 from rclpy.callback_groups import CallbackGroup
 from rclpy.node import Node
@@ -19,7 +19,6 @@ from rclpy.topic_endpoint_info import TopicEndpointInfo
 
 from ..topics import Topic
 from .rclpy_internals import raw_publish, take_serialized
-from .serialized_take import Received, serialized_take
 
 
 class PolledCallbackGroup(CallbackGroup):
@@ -116,6 +115,20 @@ def flush(outputs: Sequence[RawPublisher], timeout_s: float) -> None:
         output.flush(max(0.0, until - time.monotonic()))
 
 
+NOT_COUNTED = (1 << 64) - 1
+"""Sequence number in rmw of a middleware without sequence numbers."""
+
+
+class Received(NamedTuple):
+    """A serialized message with its origin."""
+
+    data: bytes
+    sent_ns: int
+    """Time of sending by the sender's clock, ns since 1970."""
+    sequence: int
+    """The publisher's number of the message, from 1; 0: unknown."""
+
+
 class RawSubscription:
     """A subscription to serialized messages, which are taken without executor."""
 
@@ -153,7 +166,6 @@ class RawSubscription:
         """Full topic name: in the node's namespace, with remappings."""
         self.handle = self._subscription.handle
         self._type = self._subscription.msg_type
-        self._take_serialized = serialized_take()
 
     def close(self) -> None:
         """End the subscription."""
@@ -164,6 +176,11 @@ class RawSubscription:
         taken = take_serialized(self.handle, self._type)
         return None if taken is None else taken[0]
 
-    def take_with_source(self) -> Received | None:
-        """Take the next message with its time and publisher; None if there is none."""
-        return self._take_serialized(self.handle, self._type)
+    def take_with_info(self) -> Received | None:
+        """Take the next message with its time and number; None if there is none."""
+        taken = take_serialized(self.handle, self._type)
+        if taken is None:
+            return None
+        data, info = taken
+        sequence = info["publication_sequence_number"]
+        return Received(data, info["source_timestamp"], 0 if sequence == NOT_COUNTED else sequence)

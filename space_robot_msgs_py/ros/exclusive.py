@@ -13,9 +13,8 @@ from rclpy.node import Node
 from rclpy.topic_endpoint_info import TopicEndpointInfo
 
 from ..errors import InputError
-from ..wire.sources import Claimed
 from .endpoints import full_name_of
-from .locks import FileLock, HeldError, look, node_lock, topic_lock
+from .locks import FileLock, HeldError, node_lock, topic_lock
 
 UNNAMED = "_NODE_NAME_UNKNOWN_"
 """Node name shown by discovery until the participant has announced its name."""
@@ -32,19 +31,16 @@ class TopicClaim:
         """
         self._held = ExitStack()
         domain = node.context.get_domain_id()
-        own = node.get_fully_qualified_name()
         try:
             for name in topic_names:
-                listed = node.get_publishers_info_by_topic(name)
-                gids = [gid_of(info).hex() for info in listed if _full_name(info) == own]
-                self._take(domain, node.resolve_topic_name(name), node.get_name(), gids)
+                self._take(domain, node.resolve_topic_name(name), node.get_name())
         except BaseException:
             self.release()
             raise
 
-    def _take(self, domain: int, topic: str, holder: str, gids: Sequence[str]) -> None:
+    def _take(self, domain: int, topic: str, holder: str) -> None:
         try:
-            lock = FileLock(topic_lock(domain, topic), holder, gids)
+            lock = FileLock(topic_lock(domain, topic), holder)
         except HeldError as error:
             raise InputError(
                 f"{topic} of ROS domain {domain} is already published by {error.holder.name}"
@@ -70,38 +66,6 @@ def claim_name(node: Node) -> FileLock:
             f"ROS domain {domain} has a {name} already: {error.holder.name}; end that one, "
             "or use another domain (ROS_DOMAIN_ID) or name (--ros-args -r __node:=...)"
         ) from None
-
-
-class GraphPublishers:
-    """Publishers of the topics of a node's domain, from claims and discovery."""
-
-    def __init__(self, node: Node) -> None:
-        self._node = node
-
-    def claimed(self, topic: str) -> Claimed:
-        """Return the claim on a topic on this machine."""
-        domain = self._node.context.get_domain_id()
-        is_held, notes = look(topic_lock(domain, self._node.resolve_topic_name(topic)))
-        return Claimed(tuple(gid for text in notes if (gid := _gid(text))), is_held)
-
-    def names(self, topic: str) -> dict[bytes, str]:
-        """Return the full node name of each discovered publisher by GID; empty if unknown."""
-        infos = self._node.get_publishers_info_by_topic(topic)
-        return {
-            gid_of(info): "" if info.node_name == UNNAMED else _full_name(info) for info in infos
-        }
-
-
-def gid_of(info: TopicEndpointInfo) -> bytes:
-    """Return the GID of a publisher, which its messages contain."""
-    return bytes(info.endpoint_gid)
-
-
-def _gid(text: str) -> bytes:
-    try:
-        return bytes.fromhex(text)
-    except ValueError:
-        return b""
 
 
 def foreign_publishers(

@@ -10,7 +10,7 @@ import fcntl
 import os
 import tempfile
 import time
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import NamedTuple
 
@@ -20,8 +20,6 @@ from .lifeline import starter
 
 TRIES, PAUSE_S = 5, 0.01
 """Time to retry: a lock that is only being inspected is free again at once."""
-MOST_NOTES = 16
-"""Number of stored notes, including earlier holders', for readers that come late."""
 
 
 class Holder(NamedTuple):
@@ -64,8 +62,8 @@ def _path(name: str) -> Path:
 class FileLock:
     """A lock, held until `release` or the end of the process."""
 
-    def __init__(self, path: Path, name: str, notes: Sequence[str] = ()) -> None:
-        """Acquire the lock as ``name``, and add ``notes``, a word each, for `look`.
+    def __init__(self, path: Path, name: str) -> None:
+        """Acquire the lock as ``name``.
 
         Raises:
             HeldError: another process holds it.
@@ -80,10 +78,8 @@ class FileLock:
             holder = _holder(self._descriptor)
             self.release()
             raise HeldError(path, holder)
-        noted = [*_lines(self._descriptor)[2].split(), *notes][-MOST_NOTES:]
         os.ftruncate(self._descriptor, 0)
-        lines = (f"{name} (pid {os.getpid()})", str(starter()), " ".join(noted))
-        os.pwrite(self._descriptor, "\n".join(lines).encode(), 0)
+        os.pwrite(self._descriptor, f"{name} (pid {os.getpid()})\n{starter()}".encode(), 0)
 
     def release(self) -> None:
         """Release the lock."""
@@ -115,7 +111,7 @@ def living_nodes(name: str, namespace: str = "") -> Iterator[tuple[int, str]]:
     for path in sorted(files, key=lambda file: file.stat().st_mtime, reverse=True):
         domain, _, dotted = path.name.removeprefix(start).removesuffix(end).partition("@")
         own_namespace = dotted.replace(".", "/") or ROOT
-        if domain.isdecimal() and namespace in ("", own_namespace) and look(path)[0]:
+        if domain.isdecimal() and namespace in ("", own_namespace) and is_held(path):
             yield int(domain), own_namespace
 
 
@@ -137,15 +133,14 @@ def _holders(paths: Iterable[Path]) -> list[Holder]:
     return holders
 
 
-def look(path: Path) -> tuple[bool, list[str]]:
-    """Return True if a lock is held, and the notes of its holders, the newest last."""
+def is_held(path: Path) -> bool:
+    """Return True if a lock is held."""
     try:
         descriptor = _open(path)
     except InputError:
-        return False, []
+        return False
     try:
-        is_held = not _try(descriptor, fcntl.LOCK_SH)
-        return is_held, _lines(descriptor)[2].split()
+        return not _try(descriptor, fcntl.LOCK_SH)
     finally:
         os.close(descriptor)
 
@@ -159,14 +154,9 @@ def _try(descriptor: int, kind: int) -> bool:
 
 
 def _holder(descriptor: int) -> Holder:
-    name, started_by, _ = _lines(descriptor)
+    text = os.pread(descriptor, 1000, 0).decode(errors="replace")
+    name, _, started_by = text.partition("\n")
     return Holder(name or "another process", int(started_by) if started_by.isdecimal() else 0)
-
-
-def _lines(descriptor: int) -> list[str]:
-    """Return holder, starter and notes; empty texts if missing."""
-    lines = os.pread(descriptor, 1000, 0).decode(errors="replace").split("\n")
-    return [*lines, "", "", ""][:3]
 
 
 def _open(path: Path) -> int:

@@ -1,4 +1,4 @@
-"""Access to private parts of rclpy, of the `VERSIONS` 7.1 of ROS 2 Jazzy.
+"""Access to private parts of rclpy, of versions 7.x, those of ROS 2 Jazzy.
 
 These have no public interface: wait sets (the executor's takes more time than a loop's work),
 taking messages without executor, the user's parameters of a node, undeclaring read-only
@@ -8,7 +8,6 @@ parameters, and a lifecycle node that survives an impossible transition.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from importlib import metadata
 from typing import Any
 
 from rclpy.context import Context
@@ -16,27 +15,6 @@ from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
 from rclpy.lifecycle import LifecycleNode
 from rclpy.node import Node
 from rclpy.publisher import Publisher
-
-VERSIONS = ("7.",)
-"""Prefixes of supported versions of rclpy: those of Jazzy."""
-
-
-def is_known_version() -> bool:
-    """Return True if rclpy has one of the `VERSIONS`, with its rcl and rmw."""
-    try:
-        return metadata.version("rclpy").startswith(VERSIONS)
-    except metadata.PackageNotFoundError:
-        return False
-
-
-def tells_pointers() -> bool:
-    """Return True if `pointer` is available."""
-    return hasattr(_rclpy.Subscription, "pointer")
-
-
-def pointer(handle: Any) -> int:
-    """Return the address of the ``rcl_subscription_t`` of a subscription's handle."""
-    return handle.pointer  # type: ignore[no-any-return]
 
 
 def take_serialized(handle: Any, message_type: Any) -> tuple[bytes, dict[str, int]] | None:

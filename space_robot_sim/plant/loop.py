@@ -14,12 +14,16 @@ from std_msgs.msg import String
 from space_robot_model.robot.find import robot_source
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.errors import MessageError
-from space_robot_msgs_py.ros.endpoints import PolledCallbackGroup, RawPublisher, flush
+from space_robot_msgs_py.ros.endpoints import (
+    PolledCallbackGroup,
+    RawPublisher,
+    RawSubscription,
+    flush,
+)
 from space_robot_msgs_py.ros.health import Health, Level
 from space_robot_msgs_py.ros.loop import Wait
 from space_robot_msgs_py.ros.managed_node import ManagedNode
 from space_robot_msgs_py.ros.paused import PausedOutput
-from space_robot_msgs_py.ros.trusted_subscription import TrustedSubscription
 from space_robot_msgs_py.samples import Command
 from space_robot_msgs_py.wire.clock import ClockCodec
 from space_robot_msgs_py.wire.codecs import CommandCodec, StateCodec
@@ -82,7 +86,7 @@ class PlantLoop:
         self._exchange = exchange_of(settings, names, settings.period, self._states, self._guard)
         self._state_out = tuple(RawPublisher(node, topic) for topic in self._states.topics)
         self._clock_out = RawPublisher(node, topics.CLOCK)
-        self._command_in = TrustedSubscription(node, topics.COMMAND, PolledCallbackGroup())
+        self._command_in = RawSubscription(node, topics.COMMAND, PolledCallbackGroup())
         self._for_answer = Wait(TIMEOUT_S, (self._command_in,), is_brief=True)
         self._truth = TruthOutput(node, self._plant, timebase)
         self._scene = SceneOutput(node, robot, timebase)
@@ -199,7 +203,6 @@ class PlantLoop:
             "saturated_ticks": self._plant.saturated_ticks,
             **self._actuators.values,
             **{f"refused: {reason}": count for reason, count in guard.refused.items()},
-            **self._command_in.counts("refused"),
             **({"faults": "injected"} if any(self._settings.faults) else {}),
         }
         if self._answers:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import time
 from collections import deque
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -18,17 +18,15 @@ from space_robot_msgs_py.bag.recorder_settings import RecorderNodeSettings
 from space_robot_msgs_py.errors import FlightError, InputError
 from space_robot_msgs_py.wire.clock import ClockCodec
 from space_robot_msgs_py.wire.definitions import jazzy
-from space_robot_msgs_py.wire.sources import Claimed, Unknown
 
 pytest.importorskip("rclpy")
 
 from space_robot_msgs_py import recorder_node
 from space_robot_msgs_py.recorder_node import LOOK_PERIOD_S, REPORTS, TIMEOUT_S, TURN, RecorderLoop
+from space_robot_msgs_py.ros.endpoints import Received
 from space_robot_msgs_py.ros.health import SENT, Level
 from space_robot_msgs_py.ros.loop import Wait
-from space_robot_msgs_py.ros.serialized_take import Received
 
-OURS, FOREIGN = b"our publisher 00", b"a foreign one 00"
 OPTIONAL = [topic for topic in topics.RECORDED if topic.is_optional]
 PERIOD_NS = 500_000
 
@@ -56,21 +54,14 @@ class Node:
         self.looks += 1
         return int(name in self.published)
 
-    def hear(
-        self,
-        topic: topics.Topic,
-        data: bytes,
-        sequence: int,
-        sent_ns: int = 1,
-        publisher: bytes = OURS,
-    ) -> None:
-        self.queues[topic].append(Received(data, sent_ns, publisher, sequence))
+    def hear(self, topic: topics.Topic, data: bytes, sequence: int, sent_ns: int = 1) -> None:
+        self.queues[topic].append(Received(data, sent_ns, sequence))
 
-    def hear_clock(self, ticks: Sequence[int], sent_ns: int = 1, publisher: bytes = OURS) -> None:
+    def hear_clock(self, ticks: Sequence[int], sent_ns: int = 1) -> None:
         """Messages whose place among all of their publisher is that of their tick."""
         for tick in ticks:
             data = ClockCodec().encode(tick * PERIOD_NS)
-            self.hear(topics.CLOCK, data, tick + 1, sent_ns, publisher)
+            self.hear(topics.CLOCK, data, tick + 1, sent_ns)
 
     def hear_sent(self, name: str, count: int, sent_ns: int = 1) -> None:
         self.hear(topics.DIAGNOSTICS, report(f"{SENT}{name}", str(count)), 1, sent_ns)
@@ -80,18 +71,8 @@ class Subscription:
     def __init__(self, node: Node, topic: topics.Topic, group: object, depth: int = 0) -> None:
         self.topic, self._queue = topic, node.queues.setdefault(topic, deque())
 
-    def take_with_source(self) -> Received | None:
+    def take_with_info(self) -> Received | None:
         return self._queue.popleft() if self._queue else None
-
-
-class Publishers(Unknown):
-    """Our publisher has claimed every topic; the other one has a name."""
-
-    def claimed(self, topic: str) -> Claimed:
-        return Claimed((OURS,), is_held=True)
-
-    def names(self, topic: str) -> Mapping[bytes, str]:
-        return {FOREIGN: "/a_stranger"}
 
 
 def report(*pairs: str) -> bytes:
@@ -114,7 +95,6 @@ def report(*pairs: str) -> bytes:
 @pytest.fixture
 def node(monkeypatch: pytest.MonkeyPatch) -> Node:
     monkeypatch.setattr(recorder_node, "RawSubscription", Subscription)
-    monkeypatch.setattr(recorder_node, "GraphPublishers", lambda node: Publishers())
     monkeypatch.setattr(recorder_node, "SILENCE_S", 0.03)
     return Node()
 

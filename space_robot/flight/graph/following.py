@@ -33,7 +33,7 @@ LISTENER_TIMEOUT_S = 5.0
 
 
 MISSION_FAULTS = frozenset({"kill_mission", "stop_mission"})
-_NOT_USED = re.compile(r"(rejected|refused): (another publisher's on /|reference: )")
+_NOT_USED = re.compile(r"rejected: reference: ")
 
 
 class Degradation(NamedTuple):

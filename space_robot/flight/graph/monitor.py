@@ -20,8 +20,6 @@ from .temporary_node import TemporaryNode
 
 Array = NDArray[np.float64]
 
-CLOCK_DEPTH = 1_000
-"""Queue depth; all messages of a plant are needed to distinguish it from another."""
 MOST_AT_ONCE = 1_000
 """Messages of a topic read in one poll, in case of a flood."""
 
@@ -58,13 +56,12 @@ class Monitor:
                 are heard of.
         """
         from space_robot_msgs_py.ros.endpoints import PolledCallbackGroup, RawSubscription
-        from space_robot_msgs_py.ros.trusted_subscription import TrustedSubscription
 
         self._visitor = TemporaryNode(name, domain, namespace)
         self._namespace, self._period = namespace, period
         self.node = self._visitor.node
         group = PolledCallbackGroup()
-        self._clock = TrustedSubscription(self.node, topics.CLOCK, group, depth=CLOCK_DEPTH)
+        self._clock = RawSubscription(self.node, topics.CLOCK, group, depth=1)
         self._telemetry = RawSubscription(self.node, topics.TELEMETRY, group, depth=1)
         self._diagnostics = RawSubscription(self.node, topics.DIAGNOSTICS, group)
         self.simulated_s = 0.0

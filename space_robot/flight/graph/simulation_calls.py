@@ -8,7 +8,7 @@ from typing import Any
 
 from space_robot_msgs_py.config.namespace import full_namespace
 from space_robot_msgs_py.errors import FlightError, InputError
-from space_robot_msgs_py.ros.locks import living_nodes, look, node_lock
+from space_robot_msgs_py.ros.locks import is_held, living_nodes, node_lock
 from space_robot_sim.plant.settings import MOST_TICKS
 
 from .domain import domain_asked_for
@@ -103,10 +103,10 @@ def _wait_for(node: Any, service: str, domain: int) -> Check:
         time.sleep(LOOK_S)
     name = service.rpartition("/")[0]
     lock = node_lock(domain, node.resolve_service_name(name))
-    is_here = look(lock)[0]  # on this machine: discovery lists a killed node for another 20 s
+    is_here = is_held(lock)  # on this machine: discovery lists a killed node for another 20 s
 
     def check() -> None:
-        if not node.count_services(service) or (is_here and not look(lock)[0]):
+        if not node.count_services(service) or (is_here and not is_held(lock)):
             raise FlightError(f"{name} has gone")
 
     return check

@@ -46,7 +46,7 @@ class States:
         self._wheels = wheels
         names = RobotNames(robot.joint_names, tuple(f"wheel_{k + 1}" for k in range(wheels)))
         with pytest.MonkeyPatch.context() as patch:
-            patch.setattr(state_input, "TrustedSubscription", QueuedInput)
+            patch.setattr(state_input, "RawSubscription", QueuedInput)
             no_node: Any = None
             self.input = StateInput(no_node, names, TIMEBASE)
         self._codec = StateCodec(names, TIMEBASE)
@@ -154,7 +154,7 @@ class References:
         self.now = 100.0
         clock = SimpleNamespace(monotonic=lambda: self.now)
         monkeypatch.setattr(reference_input, "time", clock)
-        monkeypatch.setattr(reference_input, "TrustedSubscription", QueuedInput)
+        monkeypatch.setattr(reference_input, "RawSubscription", QueuedInput)
         no_node: Any = None
         self.input = ReferenceInput(no_node, ROBOT, TIMEBASE, TIMEOUT_S, join_timeout_s)
         self._codec = ReferenceCodec(ROBOT.joint_names, TIMEBASE)

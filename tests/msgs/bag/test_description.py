@@ -205,7 +205,7 @@ def test_what_the_plant_says_is_in_the_bag_and_what_the_recorder_was_told_counts
     tmp_path: Path, told: dict[str, Any], said: object, expected: dict[str, Any]
 ) -> None:
     bag = BagRecorder(tmp_path / "bag", told, Timebase(500_000))
-    bag.describe(said, b"", 1)
+    bag.describe(said)
     for _ in range(2):  # of an unfinished bag, and of one that is
         assert read_description(open_bag(tmp_path / "bag").custom_data()) == expected
         bag.close()

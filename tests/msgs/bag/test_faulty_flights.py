@@ -53,7 +53,7 @@ def _faulty(
         if drop is None:
             recorder.record(topic, data)
         elif not drop(topic, tick):
-            recorder.record(topic, data, 0, topic.full_name.encode(), sent[topic])
+            recorder.record(topic, data, 0, sent[topic])
     recorder.close()
     return folder
 

@@ -11,7 +11,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from space_robot_msgs_py import topics
-from space_robot_msgs_py.bag.message_accounting import LONGEST_JUMP, MessageAccounting
+from space_robot_msgs_py.bag.message_accounting import (
+    LONGEST_JUMP,
+    MessageAccounting,
+    SequenceCount,
+)
 
 steps = st.sampled_from([1, 1, 1, 1, 2, 5, 0, -1, -3, 19_999, 20_001, 10**12])
 batches = st.lists(st.lists(steps, max_size=12), max_size=6)
@@ -115,3 +119,42 @@ def test_late_messages_count_for_the_period_too(period: int, order: list[int], s
     assert counted.received == 6
     assert counted.missing(10**6) == 0
     assert (counted.first, counted.last) == (period * start, period * (start + 5))
+
+
+# By the publisher's own numbers
+
+
+@given(
+    st.lists(st.tuples(st.integers(1, 30), st.sets(st.integers(1, 30)), st.booleans()), min_size=1)
+)
+def test_lost_is_what_was_sent_and_did_not_come(
+    publishers: list[tuple[int, set[int], bool]],
+) -> None:
+    """Of a node and those started again in its place, which may report what they sent."""
+    counted, lost, last = SequenceCount(), 0, 0
+    for sent, dropped, reports in publishers:
+        came = sorted(set(range(1, sent + 1)) - dropped)
+        if not came or came[0] > last > 0:
+            continue  # not to be told from the one before
+        last = came[-1]
+        for number in came:
+            counted.take(number)
+        if reports:
+            counted.note_sent(sent)
+        lost += (sent if reports else last) - len(came)
+        assert counted.is_counted
+        assert counted.holes + counted.tail == lost
+        assert counted.awaited == (sent - last if reports else 0)
+
+
+def test_what_was_sent_in_a_pause_is_passed_over() -> None:
+    counted = SequenceCount()
+    counted.take(1)
+    counted.pause()
+    counted.note_sent(5)
+    assert counted.tail == counted.awaited == 0
+    counted.take(9)
+    counted.take(0)  # not known
+    assert (counted.passed_over, counted.holes, counted.tail) == (7, 0, 0)
+    counted.note_sent(10)
+    assert counted.tail == 1

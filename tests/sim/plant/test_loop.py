@@ -55,9 +55,6 @@ class Topic:
     def take(self) -> bytes | None:
         return self.waiting.popleft() if self.waiting else None
 
-    def counts(self, word: str) -> dict[str, int]:
-        return {}
-
     def flush(self, timeout_s: float) -> None:
         pass
 
@@ -85,7 +82,7 @@ class Bench:
         patch.setattr(time, "monotonic", lambda: self.now)
         for module in (loop, base_output, scene_output, truth_output):
             patch.setattr(module, "RawPublisher", Topic)
-        patch.setattr(loop, "TrustedSubscription", Topic)
+        patch.setattr(loop, "RawSubscription", Topic)
         patch.setattr(loop, "PausedOutput", lambda node: Topic(node, topics.SIMULATION_PAUSED))
         patch.setattr(scene_output, "find_spec", lambda name: None)
         self.settings = PlantNodeSettings.resolve(
