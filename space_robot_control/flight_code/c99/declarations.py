@@ -21,7 +21,15 @@ MARK = "§"
 
 def names_in(nodes: Iterable[ast.AST], only: type[ast.expr_context] | None = None) -> Counter[str]:
     """Return how often names are mentioned; ``only`` ast.Store: how often they get a value."""
-    names = (n for node in nodes for n in ast.walk(node) if isinstance(n, ast.Name))
+    counted: Counter[str] = Counter()
+    for node in nodes:
+        counted.update(_names_in(node, only))
+    return counted
+
+
+@cache
+def _names_in(node: ast.AST, only: type[ast.expr_context] | None) -> Counter[str]:
+    names = (n for n in ast.walk(node) if isinstance(n, ast.Name))
     return Counter(n.id for n in names if only is None or isinstance(n.ctx, only))
 
 
