@@ -12,6 +12,7 @@ from .numbers import FiniteRange
 from .options import NAMESPACE, REMAP, TRUST, file_option
 
 SECTION = "Results"
+SUFFIXES = (".html", ".htm")
 
 
 @click.command()
@@ -105,6 +106,7 @@ def view(
       space-robot view --live --domain 7 --namespace /sat1
     """
     from space_robot_msgs_py.bag.reader import read_flight
+    from space_robot_msgs_py.errors import InputError
 
     from ..analysis import excerpt
     from ..console.files import check_writable, make_folder, whole_file
@@ -122,6 +124,8 @@ def view(
         return
     names = bag_names(bags)
     page = out or Path(f"{'_'.join(names)}_view.html")
+    if page.suffix not in SUFFIXES and not page.is_dir():
+        raise InputError(f"--out {page}: a page's name ends in {' or '.join(SUFFIXES)}")
     make_folder(page.parent)
     check_writable(page)
     logs = {
