@@ -19,18 +19,18 @@ MARK = "§"
 """Stands around a local name where it gets a value."""
 
 
-def names_in(nodes: Iterable[ast.AST], only: type[ast.expr_context] | None = None) -> Counter[str]:
-    """Return how often names are mentioned; ``only`` ast.Store: how often they get a value."""
+def names_in(nodes: Iterable[ast.AST], stored: bool = False) -> Counter[str]:
+    """Return how often names are mentioned; ``stored``: how often they get a value."""
     counted: Counter[str] = Counter()
     for node in nodes:
-        counted.update(_names_in(node, only))
+        counted.update(_names_in(node, stored))
     return counted
 
 
 @cache
-def _names_in(node: ast.AST, only: type[ast.expr_context] | None) -> Counter[str]:
+def _names_in(node: ast.AST, stored: bool) -> Counter[str]:
     names = (n for n in ast.walk(node) if isinstance(n, ast.Name))
-    return Counter(n.id for n in names if only is None or isinstance(n.ctx, only))
+    return Counter(n.id for n in names if not stored or isinstance(n.ctx, ast.Store))
 
 
 @cache
@@ -43,7 +43,7 @@ def assigned_in(tree: ast.FunctionDef) -> Counter[str]:
     inside: Counter[str] = Counter()
     for loop in (n for n in ast.walk(tree) if isinstance(n, ast.For)):
         for name in names_in([loop.target]):
-            if name in names_in(loop.body, ast.Store):
+            if name in names_in(loop.body, stored=True):
                 raise RefusedError(f"{name!r} set beside its loop", "use another name")
             inside[name] += names_in([loop])[name]
     mentioned = names_in([tree])
@@ -52,7 +52,7 @@ def assigned_in(tree: ast.FunctionDef) -> Counter[str]:
     for name, count in inside.items():
         if mentioned[name] != count and name != "_":
             raise RefusedError(f"{name!r} outside of its loop", "use another name")
-    return names_in([tree], ast.Store)
+    return names_in([tree], stored=True)
 
 
 def declared(lines: Sequence[str], declarations: Mapping[str, str]) -> list[str]:

@@ -306,7 +306,7 @@ class Statements(Expressions):
         nodes = list(ast.walk(bound))
         if any(isinstance(n, (ast.Attribute, ast.Subscript, ast.Call)) for n in nodes):
             return False
-        return not names_in([bound]).keys() & names_in(loop.body, ast.Store).keys()
+        return not names_in([bound]).keys() & names_in(loop.body, stored=True).keys()
 
     def _over_tuple(self, node: ast.For, items: ast.Tuple) -> None:
         rows = [row.elts if isinstance(row, ast.Tuple) else [row] for row in items.elts]
