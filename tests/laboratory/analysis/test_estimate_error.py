@@ -3,6 +3,7 @@ the law assumed."""
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -20,8 +21,6 @@ from space_robot.analysis.report_tables import comparison_table, rms_table
 from space_robot_msgs_py.bag.flight_log import FlightLog
 
 Array = NDArray[np.float64]
-EVERY = 20
-"""Ticks from one telemetry to the next."""
 FAULTS = [
     "noise_attitude@0:1e-5",
     "noise_joint_position@0:2e-5",
@@ -48,9 +47,7 @@ def estimate_error(log: FlightLog, h_bar: Array) -> Array:
     "options",
     [
         {"controller": "tde_smc", "case": "4-2"},
-        {"controller": "tde_tsmc", "case": "4-2"},
-        {"controller": "tde_stc", "case": "4-2"},
-        {"command_latency_ticks": 3},
+        {"controller": "tde_tsmc", "case": "4-2", "command_latency_ticks": 3},
         {"parameters": {"controller": {"acceleration_filter_hz": 100.0}}},
     ],
 )
@@ -79,8 +76,7 @@ def test_the_error_is_what_changed_in_a_tick() -> None:
     assert report["rms"]["4_6"] == pytest.approx(np.mean(rms))
     part = estimate_error(excerpt(log, 0.1, 0.2), h_bar)
     np.testing.assert_array_equal(part, error[200 : 200 + len(part)])
-    log.quaternion[200:] *= -1.0
-    log.quaternion[300:] *= -1.0
+    log.quaternion[200:300] *= -1.0
     turned = estimate_error(log, h_bar)
     np.testing.assert_allclose(np.abs(turned), np.abs(error), atol=1e-8)
     for name in STATE:
@@ -91,7 +87,7 @@ def test_the_error_is_what_changed_in_a_tick() -> None:
     assert np.max(np.abs(filled)) <= np.max(np.abs(error))
 
 
-@pytest.mark.parametrize("n", [1, 3, 6, 7])
+@pytest.mark.parametrize("n", [1, 7])
 def test_it_is_that_of_a_plain_loop(n: int) -> None:
     """(33), (35), (36) with J0 of (1) and (22), tick by tick in plain NumPy."""
     log = random_log(n, 20, n)
@@ -146,12 +142,7 @@ def test_without_an_estimate_the_report_says_why(change: dict[str, Any], reason:
     log.flight.pop("gains_used", None)
     log.flight |= change
     assert reason in analyze(log)["unavailable"]["estimate_error"]
-
-
-def test_the_gains_of_the_bag_come_before_those_of_the_name() -> None:
-    log = flown(duration=0.01)
-    log.laws = ()
-    log.flight["gains_used"] = {"h_bar": [2.0] * 9}
+    log.flight |= {"controller": "tde_stc", "swaps": [], "gains_used": {"h_bar": [2.0] * 9}}
     np.testing.assert_array_equal(estimator(log)[0](log), [2.0] * 9)
 
 
@@ -162,10 +153,10 @@ def rms_of(values: Array) -> float:
 def test_the_navigation_error_is_measured_less_true_at_the_telemetry(noisy: FlightLog) -> None:
     found, told = analyze(noisy)["navigation_error"], noisy.measured
     assert told is not None
-    joints = (told.joint_positions - noisy.joint_positions)[::EVERY]
-    assert found["ticks"] == len(joints) == noisy.ticks // EVERY
+    joints = (told.joint_positions - noisy.joint_positions)[::20]
+    assert found["ticks"] == len(joints) == noisy.ticks // 20
     for name, error in (
-        ("attitude", (told.quaternion - noisy.quaternion)[::EVERY, 1:]),
+        ("attitude", (told.quaternion - noisy.quaternion)[::20, 1:]),
         ("joints_1_3", joints[:, :3]),
         ("joints_4_6", joints[:, 3:]),
     ):
@@ -187,24 +178,13 @@ def test_errors_and_torques_are_the_true_ones(noisy: FlightLog) -> None:
     assert reported["joints_1_3"] > 20.0 * true["joints_1_3"]
     assert true["base_torque"] == pytest.approx(0.999 * reported["base_torque"], rel=1e-12)
     assert (report["truth_recorded"], told["truth_recorded"]) == (True, False)
+    h_bar = np.array(noisy.flight["gains_used"]["h_bar"])
+    force = neglected_force(replace(noisy, measured=None), h_bar)
+    assert noisy.telemetry is not None
+    estimated = force[1:] - noisy.telemetry[1:-1, 2]
+    np.testing.assert_allclose(EstimateErrors(lambda log: h_bar).of(noisy), estimated, atol=1e-7)
     assert report["missed_deadlines"]["differing_ticks"] == 0
     assert report["missed_deadlines"]["compared_ticks"] > 2900
-
-
-def test_the_estimates_error_is_of_the_true_force(noisy: FlightLog) -> None:
-    """N by the formulas of true motion and torque given, N_hat as in the telemetry."""
-    h_bar = np.array(noisy.flight["gains_used"]["h_bar"])
-    assert noisy.telemetry is not None
-    eta, eps = noisy.quaternion[:, :1], noisy.quaternion[:, 1:]
-    omega = noisy.omega_base
-    rate = np.hstack([0.5 * (eta * omega + np.cross(eps, omega)), noisy.joint_velocities])
-    force = noisy.applied_torque[2:].copy()
-    for k, (w, x, y, z) in enumerate(noisy.quaternion[1:-1]):
-        skew = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
-        force[k, :3] = np.linalg.inv(0.5 * (w * np.eye(3) + skew)).T @ force[k, :3]
-    true = force - h_bar * np.diff(rate, axis=0)[1:] / 0.0005
-    errors = EstimateErrors(lambda log: h_bar).of(noisy)
-    np.testing.assert_allclose(errors, true - noisy.telemetry[1:-1, 2], atol=1e-7)
 
 
 def test_tables_say_of_what_they_are(noisy: FlightLog) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 from pathlib import Path
 
@@ -118,7 +119,7 @@ def test_every_actuator_has_its_columns(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("is_late", [False, True])
-def test_nothing_is_overwritten(tmp_path: Path, is_late: bool) -> None:
+def test_files_are_whole_and_overwrite_none(log: FlightLog, tmp_path: Path, is_late: bool) -> None:
     """Nor what came while a file was written."""
     path = tmp_path / "x"
 
@@ -133,38 +134,22 @@ def test_nothing_is_overwritten(tmp_path: Path, is_late: bool) -> None:
     with pytest.raises(InputError, match="x: exists already"):
         write()
     assert path.read_text() == "theirs"
+    with contextlib.suppress(RuntimeError), whole_file(tmp_path / "y") as file:
+        file.write(b"half")
+        raise RuntimeError
     assert list(tmp_path.iterdir()) == [path]
-
-
-def test_a_file_begun_and_not_ended_leaves_nothing(log: FlightLog, tmp_path: Path) -> None:
-    def fail() -> None:
-        with whole_file(tmp_path / "x") as file:
-            file.write(b"half")
-            raise RuntimeError
-
-    with pytest.raises(RuntimeError):
-        fail()
-    assert list(tmp_path.iterdir()) == []
-    (tmp_path / "file").write_text("")
     with pytest.raises(InputError, match="the folder cannot be created"):
-        write_parquet(log, tmp_path / "file" / "flight.parquet")
+        write_parquet(log, path / "flight.parquet")
 
 
-@given(st.integers(0, 600), st.integers(0, 600), st.integers(0, 600))
-def test_parts_add_up_to_the_whole(log: FlightLog, a: int, b: int, c: int) -> None:
-    low, middle, high = sorted((a, b, c))
-    if low == middle or middle == high:
-        return
-    first, second = (
-        excerpt(log, low * 5e-4, middle * 5e-4),
-        excerpt(log, middle * 5e-4, high * 5e-4),
-    )
-    assert (first.first_tick, first.ticks) == (low, middle - low)
-    assert (second.first_tick, second.ticks) == (middle, high - middle)
-    joined = np.concatenate([first.quaternion, second.quaternion])
-    np.testing.assert_array_equal(joined, log.quaternion[low:high])
-    again = excerpt(excerpt(log, low * 5e-4, high * 5e-4), middle * 5e-4, None)
-    np.testing.assert_array_equal(again.quaternion, second.quaternion)
+@given(st.sets(st.integers(0, 600), min_size=3, max_size=3))
+def test_a_part_has_the_rows_of_its_time(log: FlightLog, edges: set[int]) -> None:
+    low, middle, high = sorted(edges)
+    part = excerpt(log, low * 5e-4, high * 5e-4)
+    assert (part.first_tick, part.ticks) == (low, high - low)
+    np.testing.assert_array_equal(part.quaternion, log.quaternion[low:high])
+    again = excerpt(part, middle * 5e-4, None)
+    np.testing.assert_array_equal(again.quaternion, log.quaternion[middle:high])
 
 
 def test_the_report_is_of_the_excerpt_and_so_are_unanswered_ticks(log: FlightLog) -> None:

@@ -5,13 +5,12 @@ from __future__ import annotations
 import functools
 import json
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 from click.testing import CliRunner, Result
 
-from space_robot import FlownFlight, Scenario, load_bag
+from space_robot import Scenario, load_bag
 from space_robot.analysis.own_metric import SESSION, call, check_names, function_of, parse, text_of
 from space_robot.analysis.page import render
 from space_robot.cli.main import cli
@@ -31,39 +30,36 @@ NUMBER = 3
 """
 
 
-@pytest.fixture
-def flight() -> FlownFlight:
-    return Scenario(duration=0.05).fly()
+@pytest.fixture(scope="module")
+def recorded(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("flight") / "bag"
+    Scenario(duration=0.05).fly(folder)
+    return folder
 
 
 @pytest.fixture
-def bag(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+def bag(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, recorded: Path) -> Path:
+    """In the folder of the file."""
     monkeypatch.chdir(tmp_path)
     Path("mine.py").write_text(FILE, "utf-8")
-    Scenario(duration=0.05).fly("bag")
-    return Path("bag")
+    return recorded
 
 
 def analyze(*arguments: str) -> Result:
     return CliRunner().invoke(cli, ["analyze", *arguments])
 
 
-def test_a_function_of_a_log_is_a_metric_of_a_flight(flight: FlownFlight, tmp_path: Path) -> None:
-    file = tmp_path / "mine.py"
-    file.write_text(FILE, "utf-8")
+def test_it_is_a_number_of_a_flight_and_analyze_shows_it(bag: Path) -> None:
+    flight = Scenario(duration=0.05).fly()
     expected = float(np.abs(flight.log.joint_positions - flight.log.reference_joints[:, 0]).max())
-    assert flight.metric(f"{file}:largest_error") == expected
+    assert flight.metric("mine.py:largest_error") == expected
     assert flight.metric(lambda log: np.int64(log.ticks)) == 100.0
     assert flight.metric(lambda log: np.array(2.5)) == 2.5
-
-
-def test_analyze_shows_it(bag: Path) -> None:
     own = ["--metric", "mine.py:largest_error", "--metric", "rows=mine.py:ticks"]
     report = json.loads(analyze(str(bag), *own, "--json").stdout)
     assert report["own_metrics"]["rows"] == 100.0
-    assert 0.0 < report["own_metrics"]["largest_error"] < 1e-6
+    assert report["own_metrics"]["largest_error"] == expected
     one = analyze(str(bag), *own)
-    assert one.exit_code == 0
     Scenario(duration=0.1).fly("other")
     both = analyze(str(bag), "other", *own)
     assert "own metric" in both.stdout
@@ -124,13 +120,10 @@ def test_functions_that_no_other_process_can_import_are_of_the_session() -> None
         function_of("session:overshoot#99")
 
 
-@pytest.mark.parametrize("wrong", [3, None, int, np.zeros(3)])
-def test_only_functions_are_metrics(wrong: Any) -> None:
-    with pytest.raises(InputError, match=r"a function or file\.py:FUNCTION was expected"):
-        text_of(wrong)
-
-
-def test_names() -> None:
+def test_names_and_what_is_no_function() -> None:
+    for wrong in (3, None, int, np.zeros(3)):
+        with pytest.raises(InputError, match=r"a function or file\.py:FUNCTION was expected"):
+            text_of(wrong)
     assert parse("math:fsum").name == "fsum"
     check_names(["a", "b_2"])
     with pytest.raises(InputError, match="attitude_rms is the name of a metric that every flight"):

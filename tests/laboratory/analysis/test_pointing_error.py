@@ -20,11 +20,9 @@ from space_robot.analysis.pointing import (
     BasePointing,
     Pointing,
     PointingBudget,
-    angle_between,
     base_pointing_error,
     pointed_axis,
     pointing_error,
-    rotation_angle,
 )
 from space_robot.analysis.words import remarks
 from space_robot_model.robot import Robot
@@ -51,7 +49,7 @@ def log_of(robot: Robot, rng: np.random.Generator, size: float, ticks: int = 4) 
     return log
 
 
-@given(SEEDS, st.sampled_from([0.0, 1e-9, 1e-4, 1.0]))
+@given(SEEDS, st.sampled_from([0.0, 1e-9, 1e-4, 1.0, 3.0]))
 def test_angles_are_scipys(seed: int, size: float) -> None:
     rng = np.random.default_rng(seed)
     robot = random_robot(rng, 6)
@@ -67,21 +65,6 @@ def test_angles_are_scipys(seed: int, size: float) -> None:
         assert error.boresight[k] == pytest.approx(angle, rel=1e-6, abs=1e-14)
         assert error.boresight[k] <= error.rotation[k] * (1.0 + 1e-6) + 1e-13
         assert error.position[k] == pytest.approx(np.linalg.norm(place[k] - wanted[k]))
-
-
-@given(st.floats(0.0, np.pi), SEEDS)
-def test_small_and_large_angles_are_exact(angle: float, seed: int) -> None:
-    """The formula by the cosine alone would give zero below 1e-8 rad."""
-    rng = np.random.default_rng(seed)
-    frame = rotation_of(random_quaternion(rng))
-    turned = frame * Rotation.from_euler("x", angle)
-    first, second = frame.as_matrix()[np.newaxis], turned.as_matrix()[np.newaxis]
-    assert angle_between(first[:, :, 2], second[:, :, 2])[0] == pytest.approx(
-        angle, abs=1e-14, rel=1e-14
-    )
-    assert rotation_angle(first, second)[0] == pytest.approx(
-        angle, abs=3e-8 if angle > 3.0 else 1e-14
-    )
 
 
 def test_a_roll_is_rotation_but_not_pointing_and_the_bases_drift_is_told_apart(
@@ -179,13 +162,10 @@ def test_the_axis_that_points_is_that_of_the_first_pointing_segment(
     assert PointingBudget().of(segments).axis == pytest.approx(axis)
     axis = pointed_axis(segments)
     assert axis is None or np.linalg.norm(axis) > 0.0
-
-
-def test_a_start_that_points_gives_the_axis_where_no_segment_does() -> None:
     start = '{"point": "nadir", "axis": [0, 2, 0]}'
     assert PointingBudget().of([], start).axis == [0.0, 1.0, 0.0]
     assert PointingBudget().of(MISSIONS[0][0], start).axis == pytest.approx([0.0, 0.6, 0.8])
-    assert PointingBudget(axis=[5, 0, 0]).of(MISSIONS[0][0], start).axis == [1.0, 0.0, 0.0]
+    assert PointingBudget(axis=[5, 0, 0]).of(segments, start).axis == [1.0, 0.0, 0.0]
     with pytest.raises(ValueError, match="axis must have a norm"):
         PointingBudget(axis=[0, 0, 0])
 
