@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
-
 import numpy as np
 import pytest
 from hypothesis import given
@@ -11,7 +9,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from space_robot.analysis import excerpt
-from space_robot.analysis.settling import BAND, Settling
+from space_robot.analysis.settling import Settling
 from space_robot.analysis.waypoints import Waypoints, junction_ticks, waypoint_ticks
 from space_robot.flight.flown_log import empty_log
 from space_robot.flight.plan import Flight, FlightPlan, resolve
@@ -22,7 +20,6 @@ from space_robot_msgs_py.samples import Timebase
 
 PERIOD = 0.0005
 SPEEDS = st.sampled_from([0.0, 0.0, 1e-12, 5e-10, 1e-6, 2e-5, 9e-5, 0.5, 1.0, 3.0])
-CUTS = st.lists(st.integers(0, 300), max_size=5)
 
 
 def log_with(speed: np.ndarray, first_tick: int = 0) -> FlightLog:
@@ -38,37 +35,25 @@ def planned_log(duration: float) -> FlightLog:
     return empty_log(Flight(resolve(FlightPlan(duration=duration))))
 
 
-def settling_of(log: FlightLog, error: np.ndarray, cuts: list[int] | None = None) -> Settling:
-    metric = Settling(log, band=1.0)
-    for start, stop in itertools.pairwise([0, *sorted(cuts or []), log.ticks]):
-        metric.add(log.rows(start, stop), error[start:stop])
-    return metric
-
-
-def last_waypoint(log: FlightLog) -> int | None:
-    metric = Settling(log)
-    for block in blocks_of(log):
-        metric.add(block, np.zeros((block.ticks, log.axes)))
-    return metric.last_waypoint
-
-
 @given(
     arrays(np.float64, (300, 4), elements=st.floats(-2.0, 2.0)),
     st.integers(0, 100),
     st.integers(0, 300),
     st.sets(st.integers(0, 299), max_size=40),
     st.integers(0, 50),
-    CUTS,
 )
 def test_after_it_the_error_stays_in_the_band_and_before_it_does_not(
-    error: np.ndarray, start: int, calm_from: int, loud: set[int], first_tick: int, cuts: list[int]
+    error: np.ndarray, start: int, calm_from: int, loud: set[int], first_tick: int
 ) -> None:
     """Of the base's and the joint's column alike; the largest in size of the axes counts."""
     error[calm_from:] *= 0.4
     error[sorted(loud), 2] = -1.5
     speed = np.ones(300)
     speed[start] = 0.0
-    found = settling_of(log_with(speed, first_tick), error, cuts).result()
+    log = log_with(speed, first_tick)
+    metric = Settling(log, band=1.0)
+    metric.add(log, error)
+    found = metric.result()
     assert found["band"] == 1.0
     assert found["after_s"] == pytest.approx((first_tick + start) * PERIOD)
     for name, axes in (("attitude", slice(0, 3)), ("joints_1_1", slice(3, 4))):
@@ -78,29 +63,38 @@ def test_after_it_the_error_stays_in_the_band_and_before_it_does_not(
         assert found["settled_s"][name] == pytest.approx(expected)
 
 
-def test_a_flight_that_never_rests_settles_nowhere() -> None:
-    with pytest.raises(InputError, match="does not come to rest"):
-        settling_of(log_with(np.ones(300)), np.zeros((300, 4))).result()
-    assert BAND == 1e-5  # as documented
-
-
 @pytest.mark.parametrize(
-    ("duration", "expected"), [(30.0, 30_000), (31.0, 60_000), (14.0, 0), (0.5, 0), (0.05, None)]
+    ("log", "expected"),
+    [
+        (planned_log(30.0), 30_000),
+        (planned_log(31.0), 60_000),
+        (planned_log(14.0), 0),
+        *((log_with(np.array([0.0, 0.0] + [1.0] * n)), k) for n, k in ((199, 1), (198, 0))),
+        (log_with(np.array([0.0, 0.0] + [1.0] * 197)), None),
+        (log_with(np.ones(300)), None),
+    ],
 )
-def test_the_last_waypoint_has_flight_after_it(duration: float, expected: int | None) -> None:
-    assert last_waypoint(planned_log(duration)) == expected
+def test_the_last_waypoint_has_flight_after_it(log: FlightLog, expected: int | None) -> None:
+    metric = Settling(log)
+    for block in blocks_of(log):
+        metric.add(block, np.zeros((block.ticks, log.axes)))
+    assert metric.last_waypoint == expected
+    if expected is None:
+        with pytest.raises(InputError, match="does not come to rest"):
+            metric.result()
+    else:
+        assert metric.result()["band"] == 1e-5  # as documented
 
 
-@pytest.mark.parametrize(("rows", "expected"), [(201, 1), (200, 0), (199, None)])
-def test_the_shortest_flight_after_it(rows: int, expected: int | None) -> None:
-    speed = np.ones(rows)
-    speed[:2] = 0.0
-    assert last_waypoint(log_with(speed)) == expected
-
-
-def plain_waypoints(speed: list[float]) -> list[int]:
+@given(st.lists(SPEEDS, max_size=60), st.integers(0, 60))
+def test_waypoints_are_those_of_a_plain_loop(speed: list[float], first: int) -> None:
     """Slow stretches beside the highest speed so far, and in each the rest, or the slowest row."""
-    found: set[int] = set()
+    rows = np.zeros((len(speed), 3, 2))
+    rows[:, 1, 1] = np.negative(speed)
+    waypoints = Waypoints()
+    waypoints.add(rows[:first])
+    waypoints.add(rows[first:])
+    expected: set[int] = set()
     highest, stretch = 0.0, []
     for k, v in enumerate([*speed, np.inf]):
         highest = max(highest, v)
@@ -108,20 +102,9 @@ def plain_waypoints(speed: list[float]) -> list[int]:
             stretch.append((v, k, v <= 1e-9 * highest))
         elif stretch:
             resting = [row for _, row, rests in stretch if rests]
-            found |= {resting[0], resting[-1]} if resting else {min(stretch)[1]}
+            expected |= {resting[0], resting[-1]} if resting else {min(stretch)[1]}
             stretch = []
-    return sorted(found)
-
-
-@given(st.lists(SPEEDS, max_size=60), CUTS)
-def test_waypoints_are_those_of_a_plain_loop(speed: list[float], cuts: list[int]) -> None:
-    rows = np.zeros((len(speed), 3, 2))
-    rows[:, 1, 1] = np.negative(speed)
-    waypoints = Waypoints()
-    edges = [0, *sorted(min(cut, len(speed)) for cut in cuts), len(speed)]
-    for start, stop in itertools.pairwise(edges):
-        waypoints.add(rows[start:stop])
-    assert waypoints.found().tolist() == plain_waypoints(speed)
+    assert waypoints.found().tolist() == sorted(expected)
     assert waypoints.rows == len(speed)
     assert waypoints.highest == max(speed, default=0.0)
 
