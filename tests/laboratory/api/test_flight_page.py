@@ -4,28 +4,18 @@ from __future__ import annotations
 
 import html
 import re
-import sys
 import webbrowser
-from html.parser import HTMLParser
 from pathlib import Path
-from typing import Any
+from types import SimpleNamespace
 
 import pytest
-from paths import DOCS
 from scene_pages import Scene, plot_data
 
-from space_robot import FlownFlight, Scenario
+from space_robot import Campaign, FlownFlight, Scenario
 from space_robot.api.flight_page import unique_names
 from space_robot_model.robot.find import find_robot
 from space_robot_msgs_py.errors import InputError
 
-CELLS = (
-    "import space_robot as sr\nscenario = sr.Scenario(case='3', duration=0.5, seed=7)\nscenario",
-    "flight = scenario.fly()\nflight",
-    "flight.view(rate=2.0)",
-    "sr.Campaign.load('first')",
-    "from space_robot_model.robot.find import find_robot\nfind_robot('dual_arm')",
-)
 LARGEST = 2.5e6
 """Bytes of an output: Jupyter's server passes on 1e6 a second, measured over 3 s."""
 
@@ -64,74 +54,74 @@ def test_others_are_drawn_over_it(flight: FlownFlight, opened: list[str], tmp_pa
     assert len(roots) == 3
     plots = plot_data(page.html)["plots"]
     assert any("ctc" in series["label"] for plot in plots for series in plot["series"])
+    chosen = flight.view(plots=["momentum"], opens=False)
+    assert chosen.html != flight.view(opens=False).html
+    with pytest.raises(InputError, match="unknown plot 'moment'"):
+        flight.view(plots=["moment"])
+    with pytest.raises(InputError, match="tde_stc_view"):
+        flight.view(path="tde_stc_view.html/page.html")
     assert unique_names(["ctc", "pd", "ctc", "ctc"]) == ["ctc", "pd", "ctc 2", "ctc 3"]
 
 
-def test_plots_are_chosen_and_what_cannot_be_is_told(
-    flight: FlownFlight, opened: list[str]
+class Output:
+    """Of a cell: what it shows in the end."""
+
+    def __init__(self, bundle: dict[str, str]) -> None:
+        self.update(bundle)
+
+    def update(self, bundle: dict[str, str], **_: object) -> None:
+        self.bundle = bundle
+
+
+@pytest.fixture
+def outputs(monkeypatch: pytest.MonkeyPatch, opened: list[str]) -> list[Output]:
+    """Those of a cell of a notebook, in which nothing is opened."""
+    ipython = pytest.importorskip("IPython")
+    shown: list[Output] = []
+    monkeypatch.setattr(ipython, "get_ipython", lambda: SimpleNamespace(kernel=object()))
+
+    def display(bundle: dict[str, str], **_: object) -> Output:
+        shown.append(Output(bundle))
+        return shown[-1]
+
+    monkeypatch.setattr(ipython.display, "display", display)
+    return shown
+
+
+def test_a_page_in_a_cell_is_small_and_needs_no_network(
+    flight: FlownFlight, outputs: list[Output], opened: list[str], tmp_path: Path
 ) -> None:
-    page = flight.view(plots=["momentum"], opens=False)
-    assert page.html != flight.view(opens=False).html
-    with pytest.raises(InputError, match="unknown plot 'moment'"):
-        flight.view(plots=["moment"])
-    Path("file").touch()
-    with pytest.raises(InputError, match="file"):
-        flight.view(path="file/page.html")
+    shown = flight.view(rate=2.0)._repr_html_()
+    assert (opened, [*tmp_path.iterdir()]) == ([], [])
+    assert len(shown.encode()) < LARGEST
+    frame = re.fullmatch(r'<iframe srcdoc="([^"]*)" [^<>]*></iframe>', shown)
+    assert frame
+    document = html.unescape(frame[1])
+    assert "<title>tde_stc</title>" in document
+    assert not re.findall(r'(?:src|href)="(?!data:|#)([^"]*)"', document)
+    assert Scene(document).duration > 0.0
+    assert [output.bundle["text/html"] for output in outputs] == [""]  # its progress is over
 
 
-class Frame(HTMLParser):
-    """The document in the frame of an output."""
-
-    def __init__(self, output: str) -> None:
-        super().__init__()
-        self.document = ""
-        self.feed(output)
-
-    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
-        if tag == "iframe":
-            self.document = dict(attrs)["srcdoc"] or ""
-
-
-@pytest.fixture(scope="module")
-def outputs(tmp_path_factory: pytest.TempPathFactory) -> list[str]:
-    """The HTML of each cell's last output."""
-    pytest.importorskip("ipykernel")
-    nbformat = pytest.importorskip("nbformat")
-    sys.path.insert(0, str(DOCS / "notebooks"))
-    from execute import executed
-
-    notebook = nbformat.v4.new_notebook(
-        cells=[nbformat.v4.new_code_cell(cell) for cell in CELLS],
-        metadata={"language_info": {"name": "python", "version": ""}},
-    )
-    file: Path = tmp_path_factory.mktemp("notebook") / "own.ipynb"
-    nbformat.write(notebook, file)
-    cells: Any = executed(file).cells
-    return [str(cell.outputs[-1].data["text/html"]) for cell in cells]
-
-
-def test_scenario_flight_campaign_and_robot_show_themselves_in_a_cell(outputs: list[str]) -> None:
-    scenario, flight, _, campaign, robot = outputs
-    rows = [re.findall(r"<td[^>]*>(.*?)</td>", row) for row in scenario.split("<tr>")[2:]]
+def test_scenario_flight_campaign_and_robot_show_themselves_in_a_cell(
+    outputs: list[Output],
+) -> None:
+    scenario = Scenario(case="3", duration=0.5, seed=7)
+    rows = [
+        re.findall(r"<td[^>]*>(.*?)</td>", row) for row in scenario._repr_html_().split("<tr>")[2:]
+    ]
     assert rows == [
         ["case", "3", "1"],
         ["duration", "0.5", "the mission&#x27;s"],
         ["seed", "7", "0"],
     ]
-    assert "complete" in flight
+    assert "complete" in scenario.fly(progress=True)._repr_html_()
+    assert '<progress value="0.5" max="0.5">' in outputs[-1].bundle["text/html"]
+    campaign = Campaign.load("first")._repr_html_()
     assert "tde_stc, ctc, 20 runs, 40 flights" in campaign
     assert "{normal: 1.0, relative: true, sigma: 0.05}" in campaign
     assert "attitude_max below 0.001 in 90 % of the cases, with 90 % confidence" in campaign
     dual_arm = find_robot("dual_arm")
+    robot = dual_arm._repr_html_()
     assert f"{float(dual_arm.mass.sum()):g} kg" in robot
     assert all(f">{n}<" in robot for n in (*dual_arm.body_names, *dual_arm.all_joint_names))
-
-
-def test_a_page_in_a_cell_is_small_and_needs_no_network(outputs: list[str]) -> None:
-    assert len(outputs[2].encode()) < LARGEST
-    document = Frame(outputs[2]).document
-    assert "<title>tde_stc</title>" in document
-    assert not re.findall(r'(?:src|href)="(?!data:|#)([^"]*)"', document)
-    scene = re.search(r'srcdoc="([^"]*)"', document)
-    assert scene
-    assert "__VISER_EMBED_DATA__" in html.unescape(scene[1])

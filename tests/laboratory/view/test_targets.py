@@ -28,11 +28,6 @@ Array = NDArray[np.float64]
 TICK_S, TICKS = 0.1, 41
 
 
-def rotations(quaternions: Array) -> Array:
-    axes: Array = Rotation.from_quat(quaternions, scalar_first=True).as_matrix()
-    return axes
-
-
 def capture(relative_to: str, velocity: list[float], rate: list[float]) -> Capture:
     content = {
         "name": "box",
@@ -42,6 +37,11 @@ def capture(relative_to: str, velocity: list[float], rate: list[float]) -> Captu
         "motion": {"relative_to": relative_to, "velocity": velocity, "angular_velocity": rate},
     }
     return Capture(0.0051, Target.from_dict({"target": content}))
+
+
+def rotations(quaternions: Array) -> Array:
+    axes: Array = Rotation.from_quat(quaternions, scalar_first=True).as_matrix()
+    return axes
 
 
 STILL = capture("tool", [0.0] * 3, [0.0] * 3)

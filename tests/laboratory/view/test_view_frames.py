@@ -91,46 +91,32 @@ class DrawnLines:
     def __init__(self) -> None:
         self.lines: dict[str, Any] = {}
 
-    def add_line_segments(
-        self, path: str, points: Array, colour: Any, thickness: float, visible: bool
-    ) -> Any:
+    def add_line_segments(self, path: str, points: Array, colour: Any, **looks: Any) -> Any:
         assert path not in self.lines
-        line = SimpleNamespace(points=points, colour=colour, width=thickness, visible=visible)
-        self.lines[path] = line
-        return line
+        self.lines[path] = SimpleNamespace(points=points, colour=colour, **looks)
+        return self.lines[path]
 
 
-@pytest.mark.parametrize("count", [2, 3, PIECES, PIECES + 1, 4 * PIECES + 7])
-@pytest.mark.parametrize("has_desired", [False, True])
-def test_trails_are_the_whole_ways_and_no_more_than_has_been_flown(
-    count: int, has_desired: bool
-) -> None:
+@pytest.mark.parametrize("count", [2, PIECES + 1, 4 * PIECES + 7])
+def test_trails_are_the_whole_ways_and_no_more_than_has_been_flown(count: int) -> None:
     random = np.random.default_rng(count)
-    ways = {name: random.normal(size=(count, 3)) for name in ("left/hand", "right")}
-    desired = random.normal(size=(count, 3)) if has_desired else None
+    ways = {name: random.normal(size=(count, 3)) for name in ("left/hand", "right", "desired")}
+    desired = ways.pop("desired")
     frames: Any = SimpleNamespace(time=np.arange(count), tools=ways, desired=desired)
     scene: Any = DrawnLines()
     moves = trails(scene, "/robot", frames, (1, 2, 3), 0.5)
-    assert len(moves) == len(ways)
-    wish = scene.lines.pop("/robot/desired", None)
-    assert (wish is not None) == has_desired
-    if wish:
-        assert (wish.colour, wish.width, wish.visible) == (DESIRED, 0.15, True)
-        np.testing.assert_array_equal(wish.points, np.stack([desired[:-1], desired[1:]], axis=1))
-    pieces = {
-        name: [x for path, x in scene.lines.items() if f"/trail_{name.replace('/', '_')}/" in path]
-        for name in ways
-    }
-    for name, places in ways.items():
-        points = np.concatenate([line.points for line in pieces[name]])
-        np.testing.assert_array_equal(points, np.stack([places[:-1], places[1:]], axis=1))
-        assert len(pieces[name]) == min(PIECES, count - 1)
-        sizes = [len(line.points) for line in pieces[name]]
+    wish = scene.lines.pop("/robot/desired")
+    assert (wish.colour, wish.thickness, wish.visible) == (DESIRED, 0.15, True)
+    np.testing.assert_array_equal(wish.points, np.stack([desired[:-1], desired[1:]], axis=1))
+    for move, name in zip(moves, ways, strict=True):
+        root = f"/robot/trail_{name.replace('/', '_')}/"
+        pieces = [line for path, line in scene.lines.items() if path.startswith(root)]
+        points = np.concatenate([line.points for line in pieces])
+        np.testing.assert_array_equal(points, np.stack([ways[name][:-1], ways[name][1:]], axis=1))
+        sizes = [len(line.points) for line in pieces]
+        assert len(sizes) == min(PIECES, count - 1)
         assert max(sizes) - min(sizes) <= 1
-        assert all((x.colour, x.width) == ((1, 2, 3), 0.5) for x in pieces[name])
-    for k in range(count):
-        for move in moves:
+        assert all((x.colour, x.thickness) == ((1, 2, 3), 0.5) for x in pieces)
+        for k in range(count):
             move(k)
-        for lines in pieces.values():
-            ends = np.cumsum([len(line.points) for line in lines])
-            assert [line.visible for line in lines] == (ends <= k).tolist()
+            assert [line.visible for line in pieces] == (np.cumsum(sizes) <= k).tolist()
