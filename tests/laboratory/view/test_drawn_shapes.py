@@ -144,7 +144,8 @@ def test_a_body_whose_meshes_cannot_be_read_is_drawn_from_its_numbers(
 def test_files_that_are_too_large_or_none_are_told_and_the_others_share_the_faces(
     ball: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    archive, pipe, empty = (tmp_path / name for name in ("archive.zip", "pipe.stl", "empty.stl"))
+    names = ("archive.zip", "pipe.stl", "lacking.stl", "empty.stl", "broken.glb")
+    archive, pipe, lacking, empty, broken = (tmp_path / name for name in names)
     with zipfile.ZipFile(archive, "w") as written:
         written.write(ball, "ball.stl")
     content = bytearray(archive.read_bytes())
@@ -153,31 +154,22 @@ def test_files_that_are_too_large_or_none_are_told_and_the_others_share_the_face
     archive.write_bytes(content)
     os.mkfifo(pipe)
     empty.write_text("solid nothing\nendsolid nothing\n")
-    broken = tmp_path / "broken.glb"
     broken.write_bytes(b"glTF" + bytes(30))
-    files = [archive, pipe, ball, tmp_path / "lacking.stl", empty, broken]
-    read = read_meshes(tuple(map(str, files)), 6 * 2_000)
-    assert [read[0].reason, read[1].reason, read[3].reason] == [
-        "has 3e+03 MB, at most 500 MB are allowed",
-        "not a file",
-        "no such file",
-    ]
-    assert [result.mesh for result in read[4:]] == [None, None]
-    assert all(result.reason for result in read[4:])
-    assert read[2].mesh is not None
-    assert read[2].whole == 20_480
-    assert 500 < len(read[2].mesh.faces) <= 2_000  # its share
-    for limit, why in (
-        (("MOST_READ", 20_480), ""),
-        (("MOST_READ", 20_479), r"^20480 faces, at most 20479 are allowed$"),
-        (("MOST_READ", 10_000), r"^10242 vertices, "),
-        (("MOST_BYTES", 1000), "at most 0.001 MB are allowed"),
+    files = tuple(map(str, (archive, pipe, lacking, empty, broken, ball)))
+    *unreadable, read = read_meshes(files, 6 * 2_000)
+    reasons = ["has 3e+03 MB, at most 500 MB are allowed", "not a file", "no such file"]
+    assert [result.reason for result in unreadable[:3]] == reasons
+    assert all(result.reason and result.mesh is None for result in unreadable)
+    assert read.mesh is not None
+    assert read.whole == 20_480
+    assert 500 < len(read.mesh.faces) <= 2_000  # its share
+    for name, limit, why in (
+        ("MOST_READ", 20_479, r"^20480 faces, at most 20479 are allowed$"),
+        ("MOST_READ", 10_000, r"^10242 vertices, "),
+        ("MOST_BYTES", 1000, "at most 0.001 MB are allowed"),
     ):
-        monkeypatch.setattr(mesh, *limit)
-        if why:
-            with pytest.raises(mesh.UnreadableMeshError, match=why):
-                read_mesh(str(ball))
-        else:
+        monkeypatch.setattr(mesh, name, limit)
+        with pytest.raises(mesh.UnreadableMeshError, match=why):
             read_mesh(str(ball))
 
 

@@ -17,7 +17,7 @@ from oracles import pinocchio_tree
 from scene_pages import Scene, page_of, quiet
 from strategies import random_bodies
 
-from space_robot import FlownFlight, Scenario
+from space_robot import Scenario
 from space_robot.analysis import excerpt
 from space_robot.view.film import FilmedFlight, film
 from space_robot.view.flights import ViewOptions, shown_robot
@@ -91,9 +91,8 @@ def flown(tmp_path_factory: pytest.TempPathFactory) -> Flown:
 def test_the_poses_on_the_page_are_the_bags(flown: Flown) -> None:
     log = flown("dual_arm")
     robot, times = shown_robot(log), shown_times([log], 30.0)
-    assert len(times) == 31
     scene = Scene(page_of(robot, one=log))
-    assert scene.duration == pytest.approx(times[-1] - times[0])
+    assert (len(times), scene.duration) == (31, pytest.approx(times[-1] - times[0]))
     assert_shown(scene, log, robot, times)
 
 
@@ -158,40 +157,9 @@ def test_the_trail_grows_and_rows_without_a_state_show_the_one_before(flown: Flo
     assert 14 <= counts[1] <= 16
 
 
-@pytest.fixture(scope="module")
-def line() -> FlownFlight:
-    mission = {"start": START, "segments": [LINE, {"hold": 0.2}]}
-    return Scenario(controller="ctc", mission=mission).fly()
-
-
-def test_the_tool_ends_at_its_goal(line: FlownFlight) -> None:
-    log, robot = line.log, line.flight.robot
-    scene = Scene(page_of(robot, one=log))
-    poses = scene.poses(log.time[-1])
-    goals = [pose for name, pose in sorted(poses.items()) if "/goal_" in name]
-    for goal, row in ((goals[0], 0), (goals[-1], -1)):
-        rotation, offset = tool_pose(robot, log.quaternion[[row]], log.joint_positions[[row]])
-        place = poses["/one"].position + log.base_position[row] + offset[0]
-        np.testing.assert_allclose(goal.position, place, atol=1e-5)
-        np.testing.assert_allclose(goal.rotation, rotation[0], atol=1e-4)
-    assert np.linalg.norm(goals[-1].position - goals[0].position) > 0.07
-
-
-def test_the_distance_from_the_path_is_plotted_where_there_is_one(
-    line: FlownFlight, flown: Flown
-) -> None:
-    quantities = quantities_of(line.log, line.flight.robot)
-    (tool,) = [quantity for quantity in quantities if quantity.title == "tool error"]
-    assert tool.values.max() == line.metrics["tool"]["largest_m"]
-    plain = flown("paper")
-    assert not any("/goal_" in name for name in Scene(page_of(shown_robot(plain), a=plain)).names())
-    titles = [quantity.title for quantity in quantities_of(plain, shown_robot(plain))]
-    assert "tool error" not in titles
-
-
-@pytest.fixture(scope="module")
-def marked(flown: Flown) -> FlightLog:
-    return flown(
+def test_events_faults_and_laws_are_marked_by_time(flown: Flown) -> None:
+    """What makes no sense is left out; of several flights it is said which had it."""
+    marked = flown(
         "marked",
         robot="paper",
         duration=0.3,
@@ -199,27 +167,32 @@ def marked(flown: Flown) -> FlightLog:
         events=["capture@0.1:small_satellite", "release@0.28"],
         faults=["stuck_joint@0.18:3=20", "drive_scale@0.15-0.2:all=0.9", "noise_gyro@2:1e-6"],
     )
-
-
-def test_events_faults_and_laws_are_marked_by_time(marked: FlightLog) -> None:
     assert marks_of(marked) == [CAPTURE, SCALE, STICK, SWAP, RELEASE]
     assert marks_of(excerpt(marked, 0.16, 0.24)) == [SCALE, STICK]
     assert marks_of(excerpt(marked, 0.1, 0.14)) == [CAPTURE]  # it begins with the excerpt
-
-
-def test_what_makes_no_sense_is_left_out(marked: FlightLog) -> None:
     faults = ["drive_scale@0.15-0.2:all=0.9", "no_such@1", "", 7]
     broken = replace(marked, laws=(), flight={"faults": faults, "events": ["capture@x", 3]})
     assert marks_of(broken) == [SCALE]
-    assert marks_of(replace(marked, laws=(), flight={})) == []
-
-
-def test_what_not_all_flights_had_says_which(marked: FlightLog) -> None:
     other = replace(marked, flight={**marked.flight, "faults": []})
-    assert [mark.text for mark in shared_marks({"one": marked, "two": other})] == [
-        CAPTURE.text,
-        f"one: {SCALE.text}",
-        f"one: {STICK.text}",
-        SWAP.text,
-        RELEASE.text,
-    ]
+    shared = [mark.text for mark in shared_marks({"one": marked, "two": other})]
+    faulty = [f"one: {SCALE.text}", f"one: {STICK.text}"]
+    assert shared == [CAPTURE.text, *faulty, SWAP.text, RELEASE.text]
+
+
+def test_the_tool_ends_at_its_goal_and_its_distance_from_the_path_is_plotted(flown: Flown) -> None:
+    mission = {"start": START, "segments": [LINE, {"hold": 0.2}]}
+    flight = Scenario(controller="ctc", mission=mission).fly()
+    log, robot = flight.log, flight.flight.robot
+    poses = Scene(page_of(robot, one=log)).poses(log.time[-1])
+    goals = [pose for name, pose in sorted(poses.items()) if "/goal_" in name]
+    for goal, row in ((goals[0], 0), (goals[-1], -1)):
+        rotation, offset = tool_pose(robot, log.quaternion[[row]], log.joint_positions[[row]])
+        place = poses["/one"].position + log.base_position[row] + offset[0]
+        np.testing.assert_allclose(goal.position, place, atol=1e-5)
+        np.testing.assert_allclose(goal.rotation, rotation[0], atol=1e-4)
+    assert np.linalg.norm(goals[-1].position - goals[0].position) > 0.07
+    (tool,) = [q for q in quantities_of(log, robot) if q.title == "tool error"]
+    assert tool.values.max() == flight.metrics["tool"]["largest_m"]
+    plain = flown("paper")
+    assert not any("/goal_" in name for name in Scene(page_of(robot, a=plain)).names())
+    assert "tool error" not in [q.title for q in quantities_of(plain, shown_robot(plain))]

@@ -22,7 +22,6 @@ from space_robot_model.robot.transforms import joint_transforms
 from space_robot_msgs_py.bag.reader import read_flight
 
 TIMEOUT_S = 120.0
-Z = np.array([0.0, 0.0, 1.0])
 
 
 class EndedError(Exception):
@@ -65,10 +64,6 @@ class Seen(LiveView):
         type(self).last = self
 
 
-def axes_of(node: Any) -> Rotation:
-    return Rotation.from_quat(np.asarray(node.wxyz), scalar_first=True)
-
-
 def test_a_flight_is_shown_as_it_is_in_truth(
     tmp_path: Path, free_domain: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -105,20 +100,18 @@ def test_a_flight_is_shown_as_it_is_in_truth(
     assert rows == sorted(rows)
     for row, sample in zip(rows, Seen.samples, strict=True):
         np.testing.assert_array_equal(sample.base_position, log.base_position[row])
-        np.testing.assert_array_equal(sample.base_quaternion, log.quaternion[row])
-        np.testing.assert_array_equal(sample.angles, log.joint_positions[row])
         np.testing.assert_allclose(sample.torque, log.applied_torque[row], atol=1e-9)
     row, sample = rows[-1], Seen.samples[-1]
     close = {"rtol": 0.0, "atol": 3e-5}  # viser sends no smaller changes
-    base = view._scene.base
-    np.testing.assert_allclose(base.position, log.base_position[row], **close)
-    np.testing.assert_allclose(base.wxyz, log.quaternion[row], **close)
+    np.testing.assert_allclose(view._scene.base.position, log.base_position[row], **close)
+    np.testing.assert_allclose(view._scene.base.wxyz, log.quaternion[row], **close)
     for link in joint_transforms(view._robot, log.joint_positions[[row, row]]):
         shown = view._scene._frames[link.child].wxyz
         np.testing.assert_allclose(shown, link.quaternion[0], **close)
     assert sample.orbit is not None
     away = sample.orbit[:3] / np.linalg.norm(sample.orbit[:3])
-    np.testing.assert_allclose(axes_of(view._orbit._arrows._nodes[0]).apply(Z), -away, **close)
+    nadir = Rotation.from_quat(view._orbit._arrows._nodes[0].wxyz, scalar_first=True)
+    np.testing.assert_allclose(nadir.apply([0.0, 0.0, 1.0]), -away, **close)
     newest = np.abs(log.orbit_position - sample.orbit[:3]).max(axis=1)
     assert newest.min() == 0.0
     assert abs(int(newest.argmin()) - row) < 50
