@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 import pytest
 import yaml
@@ -28,11 +26,6 @@ TICKS = 5
 SEEDS = st.integers(0, 2**31 - 1)
 
 
-def of(robot: Robot) -> Captures:
-    """No captures."""
-    return Captures([], robot, 5e-4, OrbitSettings())
-
-
 def on_its_path(robot: Robot, seed: int) -> FlightLog:
     """A log that is on its reference, and whose centre of mass does not move."""
     rng = np.random.default_rng(seed)
@@ -54,7 +47,7 @@ def test_a_displaced_and_turned_base_displaces_and_turns_the_tool(seed: int, n: 
     rng = np.random.default_rng(seed)
     robot = random_robot(rng, n)
     log = on_its_path(robot, seed)
-    metric = ToolError(log, of(robot), robot)
+    metric = ToolError(log, Captures([], robot, 5e-4, OrbitSettings()), robot)
     np.testing.assert_allclose(metric.errors(log), 0.0, atol=1e-12)
     shift, angle = rng.normal(size=3), 0.3
     turn = Rotation.from_rotvec([0.0, 0.0, angle])
@@ -67,21 +60,16 @@ def test_a_displaced_and_turned_base_displaces_and_turns_the_tool(seed: int, n: 
     np.testing.assert_allclose(metric.errors(log)[:, 1], angle, rtol=1e-9)
 
 
-def one_sided_panel() -> dict[str, Any]:
-    """The shipped robot with flexible panels, without the right one."""
-    content: dict[str, Any] = yaml.safe_load((CONFIG / "robots/flexible_panels.yaml").read_text())
-    robot = content["robot"]
-    robot["links"] = [link for link in robot["links"] if not link["name"].startswith("right")]
-    return content
-
-
 @pytest.mark.parametrize("frame", ["inertial", "base"])
 def test_a_panel_on_one_side_does_not_displace_the_tool(frame: str) -> None:
     """A locked panel moves the base's centre of mass, not the frame that goals are given in."""
     goal = [1.8, 0.2, 0.3]
+    panels = yaml.safe_load((CONFIG / "robots/flexible_panels.yaml").read_text())
+    links = panels["robot"]["links"]
+    panels["robot"]["links"] = [x for x in links if not x["name"].startswith("right")]
     segments = [{"tool": {"xyz": goal, "frame": frame}, "duration": 3}]
     flown = sr.Scenario(
-        robot=one_sided_panel(),
+        robot=panels,
         mission={"start": {"joints_deg": [10, -60, 120]}, "segments": segments},
         controller="ctc",
         gains=str(CONFIG / "gains/flexible_panels/tuned/ctc.yaml"),
@@ -147,13 +135,10 @@ def test_a_line_is_flown_within_a_micrometre_and_a_payload_moves_it() -> None:
         controller="ctc", mission=mission, friction=False, case={"payload": {"mass": 20.0}}
     )
     assert loaded.fly().report()["tool"]["largest_m"] > 1e-3
-
-
-def test_waypoints_lead_no_tool_unless_changed_in_flight() -> None:
-    log = sr.Scenario(duration=0.1).fly().log
-    assert not leads_tool(log)
-    for column in (log.reference_joints[-1, 0], log.reference_base[-1, :4]):
+    plain = sr.Scenario(duration=0.1).fly().log  # waypoints lead no tool
+    assert not leads_tool(plain)
+    for column in (plain.reference_joints[-1, 0], plain.reference_base[-1, :4]):
         before = column.copy()
-        column += 0.01
-        assert leads_tool(log)
+        column += 0.01  # unless changed in flight
+        assert leads_tool(plain)
         column[:] = before
