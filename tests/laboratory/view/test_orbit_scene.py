@@ -13,11 +13,18 @@ import pytest
 import trimesh
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from moving_logs import EARTH_RADIUS, CircularOrbit, moving_log, orbiting_log
 from numpy.linalg import norm
 from numpy.typing import NDArray
 from paths import CONFIG
-from scene_pages import Scene, page_of, plot_data
+from scene_pages import (
+    EARTH_RADIUS,
+    CircularOrbit,
+    Scene,
+    moving_log,
+    orbiting_log,
+    page_of,
+    plot_data,
+)
 from scipy.spatial.transform import Rotation
 
 from space_robot.view.arrows import turns_from_z

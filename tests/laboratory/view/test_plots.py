@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from moving_logs import moving_log
 from numpy.typing import NDArray
+from scene_pages import moving_log
 from scipy.spatial.transform import Rotation
 
 from space_robot.view.page import Shown, render

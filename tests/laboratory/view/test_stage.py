@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from moving_logs import EARTH_RADIUS, CircularOrbit
 from numpy.typing import NDArray
+from scene_pages import EARTH_RADIUS, CircularOrbit
 
 from space_robot.flight.plan import FlightPlan, resolve
 from space_robot.view.base_surface import clearest_side

@@ -7,10 +7,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from moving_logs import moving_log
 from numpy.typing import NDArray
 from robots import circular_orbit, meeting_target, target_of
-from scene_pages import Scene, page_of
+from scene_pages import Scene, moving_log, page_of
 from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
