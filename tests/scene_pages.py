@@ -6,7 +6,6 @@ import base64
 import html
 import json
 import re
-from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import msgspec
@@ -24,14 +23,9 @@ Array = NDArray[np.float64]
 Message = dict[str, Any]
 
 
-def quiet(total: int) -> Callable[[], None]:
-    """Show no progress."""
-    return lambda: None
-
-
 def page_of(robot: Robot, options: ViewOptions = ViewOptions(), **logs: FlightLog) -> str:  # noqa: B008
     """Return the page of flights of one robot."""
-    return flights_page(logs, dict.fromkeys(logs, robot), options, quiet)
+    return flights_page(logs, dict.fromkeys(logs, robot), options, lambda total: lambda: None)
 
 
 class Pose(NamedTuple):
@@ -60,10 +54,6 @@ class Scene:
             start = end + -end % 8
             end = start + length
             self._buffers.append(raw[start:end])
-
-    def times(self) -> list[float]:
-        """The times at which something moves."""
-        return sorted({time for time, _ in self.messages})
 
     def names(self) -> set[str]:
         """All nodes."""
@@ -118,10 +108,8 @@ def plot_data(page: str) -> dict[str, Any]:
     return content
 
 
-MU = 3.986004418e14
-"""m3/s2."""
-EARTH_RADIUS = 6378137.0
-"""m."""
+MU = 3.986004418e14  # m3/s2
+EARTH_RADIUS = 6378137.0  # m
 
 
 def moving_log(
@@ -143,20 +131,18 @@ def moving_log(
 
 
 class CircularOrbit(NamedTuple):
-    """An orbit with the Sun."""
+    """An orbit with the Sun; m, rad, N/m2.
+
+    ``start`` is the angle from the ascending node, on x, at time 0; ``beta`` that of the Sun above
+    the orbit's plane, ``noon`` that in the orbit at which it is noon; ``pressure`` is of sunlight.
+    """
 
     height: float = 420e3
-    """m."""
     inclination: float = 0.9
-    """rad."""
     start: float = 0.0
-    """Angle from the ascending node, on x, at time 0, rad."""
     beta: float = 0.5
-    """Angle of the Sun above the plane of the orbit, rad."""
     noon: float = 0.0
-    """Angle in the orbit at which it is noon, rad."""
     pressure: float = 4.56e-6
-    """Of sunlight, N/m2."""
 
     @property
     def radius(self) -> float:
@@ -186,9 +172,7 @@ class CircularOrbit(NamedTuple):
 
     def velocity(self, time: Array) -> Array:
         """(K, 3) m/s."""
-        angle = self.start + self.rate * time
-        on_plane = np.column_stack([-np.sin(angle), np.cos(angle), 0.0 * angle])
-        return self.radius * self.rate * on_plane @ self._axes.T
+        return self.rate * self._replace(start=self.start + 0.5 * np.pi).position(time)
 
     @property
     def parameters(self) -> dict[str, Any]:

@@ -120,30 +120,6 @@ def test_a_flight_that_ends_early_ends_as_that_of_the_scenario(options: dict[str
     assert own.log.unanswered == whole.log.unanswered
 
 
-@settings(max_examples=10)
-@given(
-    st.integers(0, 100),
-    st.integers(1, 60),
-    st.integers(0, 100),
-    st.integers(0, 2**31 - 1),
-    st.booleans(),
-)
-def test_a_restored_flight_goes_on_to_the_same_bits(
-    rich: Bench, before: int, after: int, elsewhere: int, seed: int, pickled: bool
-) -> None:
-    """Whatever was flown in between, with whatever seed; on this bench and on another."""
-    rich.reset(seed)
-    fly_on(rich, before)
-    snapshot = rich.save()
-    here = seen(rich)
-    expected = fly_on(rich, after)
-    rich.reset(seed ^ 1)
-    fly_on(rich, elsewhere)
-    rich.restore(pickle.loads(pickle.dumps(snapshot)) if pickled else snapshot)
-    assert (seen(rich), rich.tick) == (here, before)
-    assert fly_on(rich, after) == expected
-
-
 def test_a_snapshot_and_a_seed_are_of_a_scenario(rich: Bench) -> None:
     other = RICH.bench()
     rich.reset(5)

@@ -16,7 +16,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 from oracles import pinocchio_tree
-from scene_pages import Scene, moving_log, page_of, quiet
+from scene_pages import Scene, moving_log, page_of
 from strategies import random_bodies
 
 from space_robot import Scenario
@@ -99,6 +99,10 @@ def test_the_poses_on_the_page_are_the_bags(flown: Flown) -> None:
     scene = Scene(page_of(robot, one=log))
     assert (len(times), scene.duration) == (31, pytest.approx(times[-1] - times[0]))
     assert_shown(scene, log, robot, times)
+    pieces = [n for n in scene.names() if n.startswith(f"/one/trail_{robot.tool.name}/")]
+    counts = [sum(scene.visible(time)[name] for name in pieces) for time in (0.0, 0.5, 1.0)]
+    assert (len(pieces), counts[0], counts[2]) == (30, 0, 30)
+    assert 14 <= counts[1] <= 16
 
 
 def test_the_poses_of_a_tree_with_all_kinds_of_joints() -> None:
@@ -109,7 +113,8 @@ def test_the_poses_of_a_tree_with_all_kinds_of_joints() -> None:
     log.base_position[:] = rng.normal(size=(40, 3))
     log.passive_positions[:] = rng.uniform(-0.2, 0.2, log.passive_positions.shape)
     times = shown_times([log], 100.0)
-    page = film([FilmedFlight("tree", log, robot, "", "#112233")], times, False, True, quiet)
+    flight = FilmedFlight("tree", log, robot, "", "#112233")
+    page = film([flight], times, False, True, lambda total: lambda: None)
     assert_shown(Scene(page), log, robot, times)
 
 
@@ -147,19 +152,6 @@ def test_a_target_waits_where_it_is_grasped_and_is_seen_while_it_is_held(flown: 
     place, hand = poses[f"{free}/box"], poses[held]
     np.testing.assert_allclose(place.position, hand.position, atol=1e-5)
     np.testing.assert_allclose(place.rotation, hand.rotation, atol=1e-4)
-
-
-def test_the_trail_grows_and_rows_without_a_state_show_the_one_before(flown: Flown) -> None:
-    log = flown("paper")
-    robot = shown_robot(log)
-    log.quaternion[900:1100] = np.nan
-    scene = Scene(page_of(robot, one=log))
-    held, before = scene.poses(0.5)["/one/base_link/link1"], expected(robot, log, 899)["link1"]
-    np.testing.assert_allclose(held.position, before.translation, atol=TOLERANCE)
-    pieces = [name for name in scene.names() if name.startswith("/one/trail_tool/")]
-    counts = [sum(scene.visible(time)[name] for name in pieces) for time in (0.0, 0.5, 1.0)]
-    assert (len(pieces), counts[0], counts[2]) == (30, 0, 30)
-    assert 14 <= counts[1] <= 16
 
 
 def test_events_faults_and_laws_are_marked_by_time(flown: Flown) -> None:
