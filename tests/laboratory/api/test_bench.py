@@ -98,26 +98,15 @@ def test_its_own_command_reference_and_law_are_those_of_the_flight(rich: Bench) 
     assert rich.done
 
 
-@pytest.mark.filterwarnings("ignore:start")
-@pytest.mark.parametrize(
-    "options",
-    [
-        {"controller": lambda signals: np.full(9, 1e7)},  # diverges
-        # the law has no command for a base that has turned by 180 degrees
-        {"parameters": {"plant": {"initial_quaternion": [0.0, 1.0, 0.0, 0.0]}}},
-    ],
-)
-def test_a_flight_that_ends_early_ends_as_that_of_the_scenario(options: dict[str, Any]) -> None:
-    scenario = Scenario(**{"controller": "ctc", "duration": 0.05, **options})
+def test_a_flight_that_ends_early_has_the_metrics_of_the_scenarios() -> None:
+    scenario = Scenario(controller=lambda signals: np.full(9, 1e7), duration=0.05)
     bench = scenario.bench()
     while not bench.done:
         bench.step()
     own, whole = bench.flown(), scenario.fly()
-    assert bits(own.log) == bits(whole.log)
     assert (own.log.flight, own.log.laws) == (whole.log.flight, whole.log.laws)
     for name in ("outcome", "reason", "ended_at_s", "metrics"):
         assert getattr(own, name) == getattr(whole, name)
-    assert own.log.unanswered == whole.log.unanswered
 
 
 def test_a_snapshot_and_a_seed_are_of_a_scenario(rich: Bench) -> None:
