@@ -181,6 +181,8 @@ def test_files_that_are_too_large_or_none_are_told_and_the_others_share_the_face
     assert read.mesh is not None
     assert read.whole == 20_480
     assert 500 < len(read.mesh.faces) <= 2_000  # its share
+    monkeypatch.setattr(mesh, "MOST_READ", 20_480)
+    assert len(read_mesh(str(ball)).faces) == 20_480
     for name, limit, why in (
         ("MOST_READ", 20_479, r"^20480 faces, at most 20479 are allowed$"),
         ("MOST_READ", 10_000, r"^10242 vertices, "),
