@@ -261,7 +261,7 @@ def test_a_burst_does_not_last(desired: FlightLog) -> None:
     A sine whose second half has a share of the power of the first: a tenth of the mean counts.
     """
     sine = np.sin(2.0 * np.pi * 5.0 * TIME)
-    for share, lasting in ((0.04, 0.8), (0.07, 1.0)):
+    for share, lasting in ((0.05, 0.8), (0.055, 1.0)):
         halves = SIZES * sine * np.where(TIME < 4.0, 1.0, np.sqrt(share))
         found = analyze(with_torque(desired, halves))["ripple"]["lasting"]
         assert found == dict.fromkeys(GROUPS, lasting)
