@@ -26,7 +26,7 @@ from space_robot.view.mesh import read_mesh, simplify
 from space_robot.view.meshes import read_meshes, shown_shapes
 from space_robot.view.plumes import SHORTEST, PlumeFrames
 from space_robot.view.scene import RobotScene
-from space_robot.view.solids import foil, frame, panel
+from space_robot.view.solids import cone, foil, frame, panel
 from space_robot.view.spacecraft import BACK_COLOUR, THICKNESS, panels_of_plates, parts_of
 from space_robot.view.wheels import (
     FASTEST,
@@ -78,6 +78,9 @@ def test_the_base_has_the_size_of_its_box_and_its_faces_look_outwards(
     assert 0.85 * np.prod(size) < skin.volume < np.prod(size)  # positive: outwards
     struts = trimesh.Trimesh(*frame(np.array(size), 0.01), process=False)
     assert all(part.volume > 0.0 for part in struts.split(only_watertight=False))
+    base, tip, height = size
+    frustum = np.pi * height / 3.0 * (base * base + base * tip + tip * tip)
+    assert trimesh.Trimesh(*cone(base, tip, height)).volume == pytest.approx(frustum, rel=0.05)
 
 
 @settings(max_examples=30)
