@@ -24,34 +24,6 @@ from space_robot_msgs_py.bag.reader import read_flight
 TIMEOUT_S = 120.0
 
 
-class EndedError(Exception):
-    """The test has seen enough."""
-
-
-class Server(threading.Thread):
-    """Serves one flight in a thread."""
-
-    def __init__(self, domain: int) -> None:
-        super().__init__(daemon=True)
-        self._options = LiveOptions(domain=domain, port=0)
-        self.lines: list[str] = []
-        self.waits = threading.Event()
-        self.ended = False
-
-    def run(self) -> None:
-        try:
-            serve(self._options, self._say, lambda address: None)
-        except EndedError:
-            self.ended = True
-
-    def _say(self, line: str) -> None:
-        self.lines.append(line)
-        if line == serving.WAITING:
-            if self.waits.is_set():
-                raise EndedError
-            self.waits.set()
-
-
 class Seen(LiveView):
     """Keeps what it has shown."""
 
@@ -70,9 +42,24 @@ def test_a_flight_is_shown_as_it_is_in_truth(
     """In orbit, with wheels, and sensors so far off that their poses are none of the truth's."""
     Seen.samples = []
     monkeypatch.setattr(serving, "LiveView", Seen)
-    server = Server(free_domain)
+    lines: list[str] = []
+    waits = threading.Event()
+
+    def say(line: str) -> None:
+        lines.append(line)
+        if line == serving.WAITING and waits.is_set():
+            raise EOFError
+        waits.set()
+
+    def run() -> None:
+        try:
+            serve(LiveOptions(domain=free_domain, port=0), say, lambda address: None)
+        except EOFError:  # the test has seen enough
+            lines.append("ended")
+
+    server = threading.Thread(target=run, daemon=True)
     server.start()
-    assert server.waits.wait(TIMEOUT_S)
+    assert waits.wait(TIMEOUT_S)
     what = ("--orbit", "iss", "--actuators", "wheels", "--sensors", "tactical")
     how = ("--paused", "--realtime", "--duration", "1", "--bag", str(tmp_path / "bag"))
     where = ("--domain", str(free_domain))
@@ -85,14 +72,14 @@ def test_a_flight_is_shown_as_it_is_in_truth(
         _, errors = process.communicate(timeout=TIMEOUT_S)
     assert process.returncode == 0, errors
     server.join(TIMEOUT_S)
-    assert server.ended
-    assert [line.partition(" from")[0] for line in server.lines if "still " not in line] == [
+    assert [line.partition(" from")[0] for line in lines if "still " not in line] == [
         serving.WAITING,
         f"following the flight in ROS domain {free_domain}",
         "its robot is paper; waiting for its first state",
         "showing it",
         serving.OVER,
         serving.WAITING,
+        "ended",
     ]
     log, view = read_flight(tmp_path / "bag"), Seen.last
     rows = [round(sample.time / log.timebase.period) for sample in Seen.samples]
