@@ -1,4 +1,4 @@
-"""What a page made by `space-robot view` shows, read from the page alone."""
+"""What a page made by `space-robot view` shows, read from the page alone, and logs for it."""
 
 from __future__ import annotations
 
@@ -6,7 +6,6 @@ import base64
 import html
 import json
 import re
-from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import msgspec
@@ -18,19 +17,15 @@ from scipy.spatial.transform import Rotation
 from space_robot.view.flights import ViewOptions, flights_page
 from space_robot_model.robot import Robot
 from space_robot_msgs_py.bag.flight_log import FlightLog
+from space_robot_msgs_py.samples import Timebase
 
 Array = NDArray[np.float64]
 Message = dict[str, Any]
 
 
-def quiet(total: int) -> Callable[[], None]:
-    """Show no progress."""
-    return lambda: None
-
-
 def page_of(robot: Robot, options: ViewOptions = ViewOptions(), **logs: FlightLog) -> str:  # noqa: B008
     """Return the page of flights of one robot."""
-    return flights_page(logs, dict.fromkeys(logs, robot), options, quiet)
+    return flights_page(logs, dict.fromkeys(logs, robot), options, lambda total: lambda: None)
 
 
 class Pose(NamedTuple):
@@ -59,10 +54,6 @@ class Scene:
             start = end + -end % 8
             end = start + length
             self._buffers.append(raw[start:end])
-
-    def times(self) -> list[float]:
-        """The times at which something moves."""
-        return sorted({time for time, _ in self.messages})
 
     def names(self) -> set[str]:
         """All nodes."""
@@ -115,3 +106,109 @@ def plot_data(page: str) -> dict[str, Any]:
     assert found
     content: dict[str, Any] = json.loads(found[1])
     return content
+
+
+MU = 3.986004418e14  # m3/s2
+EARTH_RADIUS = 6378137.0  # m
+
+
+def moving_log(
+    robot: Robot, ticks: int, first_tick: int = 0, period_ns: int = 500_000
+) -> FlightLog:
+    """A log whose rows all differ, and tell their numbers: x of the base is the row."""
+    log = FlightLog.allocate(
+        ticks, robot.joint_names, Timebase(period_ns), passive_names=robot.passive_names
+    )
+    log.first_tick = first_tick
+    rng = np.random.default_rng(ticks + first_tick)
+    log.base_position[:] = np.column_stack([np.arange(ticks), np.zeros((ticks, 2))])
+    log.quaternion[:] = Rotation.random(ticks, rng=rng).as_quat()
+    log.joint_positions[:] = rng.uniform(-3.0, 3.0, log.joint_positions.shape)
+    log.passive_positions[:] = 0.0
+    log.reference_base[:, :4] = Rotation.random(ticks, rng=rng).as_quat()
+    log.reference_joints[:, 0] = log.joint_positions + 0.1
+    return log
+
+
+class CircularOrbit(NamedTuple):
+    """An orbit with the Sun; m, rad, N/m2.
+
+    ``start`` is the angle from the ascending node, on x, at time 0; ``beta`` that of the Sun above
+    the orbit's plane, ``noon`` that in the orbit at which it is noon; ``pressure`` is of sunlight.
+    """
+
+    height: float = 420e3
+    inclination: float = 0.9
+    start: float = 0.0
+    beta: float = 0.5
+    noon: float = 0.0
+    pressure: float = 4.56e-6
+
+    @property
+    def radius(self) -> float:
+        return EARTH_RADIUS + self.height
+
+    @property
+    def rate(self) -> float:
+        """rad/s."""
+        return float(np.sqrt(MU / self.radius**3))
+
+    @property
+    def _axes(self) -> Array:
+        """Columns: to the node, 90 degrees ahead of it, normal."""
+        s, c = np.sin(self.inclination), np.cos(self.inclination)
+        return np.array([[1.0, 0.0, 0.0], [0.0, c, -s], [0.0, s, c]])
+
+    @property
+    def sun(self) -> Array:
+        in_plane = np.cos(self.beta) * np.array([np.cos(self.noon), np.sin(self.noon)])
+        return np.asarray(self._axes @ [*in_plane, np.sin(self.beta)])
+
+    def position(self, time: Array) -> Array:
+        """(K, 3) m."""
+        angle = self.start + self.rate * time
+        on_plane = np.column_stack([np.cos(angle), np.sin(angle), 0.0 * angle])
+        return self.radius * on_plane @ self._axes.T
+
+    def velocity(self, time: Array) -> Array:
+        """(K, 3) m/s."""
+        return self.rate * self._replace(start=self.start + 0.5 * np.pi).position(time)
+
+    @property
+    def parameters(self) -> dict[str, Any]:
+        """The plant's, as a bag has them: every number of an orbit."""
+        return {
+            "orbital_elements.height": self.height,
+            "orbital_elements.eccentricity": 0.0,
+            "orbital_elements.inclination_deg": float(np.degrees(self.inclination)),
+            "orbital_elements.raan_deg": 0.0,
+            "orbital_elements.perigee_deg": 0.0,
+            "orbital_elements.anomaly_deg": float(np.degrees(self.start)),
+            "gravity.gradient": True,
+            "gravity.j2": False,
+            "atmosphere.density": 0.0,
+            "atmosphere.at_height": 400e3,
+            "atmosphere.scale_height": 58.5e3,
+            "sunlight.pressure": self.pressure,
+            "sunlight.beta_angle_deg": float(np.degrees(self.beta)),
+            "sunlight.noon_deg": float(np.degrees(self.noon)),
+            "magnetism.strength": 0.0,
+            "magnetism.tilt_deg": 9.41,
+            "magnetism.pole_deg": -72.68,
+            "magnetism.residual_dipole": [0.0, 0.0, 0.0],
+        }
+
+
+def orbiting_log(robot: Robot, orbit: CircularOrbit, ticks: int, period_ns: int) -> FlightLog:
+    """Return a log in an orbit, with the base at the origin and no reference."""
+    log = moving_log(robot, ticks, period_ns=period_ns)
+    log.base_position[:] = 0.0
+    log.reference_base[:], log.reference_joints[:] = np.nan, np.nan
+    log.orbit_position, log.orbit_velocity = orbit.position(log.time), orbit.velocity(log.time)
+    log.magnetic_field, log.external_torques = np.zeros((ticks, 3)), np.zeros((ticks, 12))
+    log.flight = {
+        "robot": robot.name,
+        "robot_file": robot.content,
+        "parameters": {"plant": orbit.parameters},
+    }
+    return log

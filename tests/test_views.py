@@ -23,33 +23,19 @@ VIEWS = CONFIG / "views"
 SHOWN = {topic.full_name: topic for topic in (topics.ROBOT_DESCRIPTION, topics.MARKERS)}
 PANEL_TITLES = {"foxglovePanelTitle", "lichtblickPanelTitle"}
 PANELS = {
-    "3D": {
-        "cameraState",
-        "followMode",
-        "followTf",
-        "scene",
-        "transforms",
-        "topics",
-        "layers",
-        "publish",
-    },
-    "Plot": {
-        "paths",
-        "showLegend",
-        "legendDisplay",
-        "showPlotValuesInLegend",
-        "showXAxisLabels",
-        "showYAxisLabels",
-        "isSynced",
-        "xAxisVal",
-        "sidebarDimension",
-        "yAxisLabel",
-        "minYValue",
-        "maxYValue",
-    },
+    "3D": "cameraState followMode followTf scene transforms topics layers publish",
+    "Plot": "paths showLegend legendDisplay showPlotValuesInLegend showXAxisLabels showYAxisLabels "
+    "isSynced xAxisVal sidebarDimension yAxisLabel minYValue maxYValue",
 }
 """Keys of a panel's settings, from the sources of Lichtblick, which Foxglove's are named as."""
 PATH = {"value", "label", "enabled", "timestampMethod", "color"}
+
+
+def test_there_are_three_layouts_and_none_names_a_file_of_a_machine() -> None:
+    files = [path for path in VIEWS.iterdir() if path.is_file()]
+    assert {path.name for path in files} == {"fly.rviz", "foxglove.json", "plotjuggler.xml"}
+    for path in files:
+        assert not re.search(r"/(home|tmp|root|work)/", path.read_text("utf-8")), path
 
 
 @pytest.fixture(scope="module")
@@ -75,11 +61,6 @@ def value_of(path: str, seen: dict[str, Any]) -> Any:
     return found
 
 
-def foxglove() -> dict[str, Any]:
-    found: dict[str, Any] = json.loads((VIEWS / "foxglove.json").read_text("utf-8"))
-    return found
-
-
 def panels_of(node: Any) -> Iterator[str]:
     """The panels that the layout places."""
     if isinstance(node, str):
@@ -91,24 +72,19 @@ def panels_of(node: Any) -> Iterator[str]:
     yield from panels_of(node["second"])
 
 
-def test_foxglove_paths_are_numbers_of_a_bag(seen: dict[str, Any]) -> None:
-    found = foxglove()
+def test_foxglove_shows_the_robot_and_numbers_of_a_bag(seen: dict[str, Any]) -> None:
+    found = json.loads((VIEWS / "foxglove.json").read_text("utf-8"))
     assert {*found} == {"configById", "globalVariables", "userNodes", "playbackConfig", "layout"}
     assert sorted(panels_of(found["layout"])) == sorted(found["configById"])
     for name, panel in found["configById"].items():
-        assert set(panel) <= PANELS[name.partition("!")[0]] | PANEL_TITLES, name
+        assert set(panel) <= {*PANELS[name.partition("!")[0]].split(), *PANEL_TITLES}, name
         for path in panel.get("paths", ()):
             assert set(path) == PATH
             assert isinstance(value_of(path["value"], seen), float), path
-
-
-def test_foxglove_shows_the_robot_in_the_inertial_frame(seen: dict[str, Any]) -> None:
-    panel = foxglove()["configById"]["3D!robot"]
+    panel = found["configById"]["3D!robot"]
     assert panel["topics"]["/robot_description"]["visible"]
     assert set(panel["topics"]) <= set(SHOWN)
-    assert panel["followTf"] == topics.INERTIAL_FRAME
-    assert seen["/tf"].transforms[0].header.frame_id == topics.INERTIAL_FRAME
-    assert seen["/robot_description"].data.startswith("<?xml")
+    assert panel["followTf"] == seen["/tf"].transforms[0].header.frame_id == topics.INERTIAL_FRAME
 
 
 def test_errors_are_those_of_the_law_by_the_names_of_the_axes(
@@ -129,33 +105,28 @@ def test_errors_are_those_of_the_law_by_the_names_of_the_axes(
     assert re.findall(rf"{plotted}/(\w+)/position", curves) == names
 
 
-def plotjuggler_names(topic: str, message: Any) -> Iterator[str]:
+def curves_of(path: str, value: Any) -> Iterator[str]:
     """Names of the curves that PlotJuggler makes of a message."""
-    if message.__msgtype__ == "sensor_msgs/msg/JointState":
+    if getattr(value, "__msgtype__", "") == "sensor_msgs/msg/JointState":
         for field in ("position", "velocity", "effort"):
-            for name, _ in zip(message.name, getattr(message, field), strict=False):
-                yield f"{topic}/{name}/{field}"
-        return
-    yield from _leaves(topic, message)
-
-
-def _leaves(path: str, value: Any) -> Iterator[str]:
-    if hasattr(value, "__msgtype__"):
+            for name, _ in zip(value.name, getattr(value, field), strict=False):
+                yield f"{path}/{name}/{field}"
+    elif hasattr(value, "__msgtype__"):
         for field in value.__dataclass_fields__:
             if field != "__msgtype__":
-                yield from _leaves(f"{path}/{field}", getattr(value, field))
+                yield from curves_of(f"{path}/{field}", getattr(value, field))
     elif isinstance(value, str) or not hasattr(value, "__len__"):
         yield path
     else:
         for number, item in enumerate(value):
-            yield from _leaves(f"{path}[{number}]", item)
+            yield from curves_of(f"{path}[{number}]", item)
 
 
 def test_plotjuggler_curves_are_in_a_bag(seen: dict[str, Any]) -> None:
     root = ElementTree.parse(VIEWS / "plotjuggler.xml").getroot()
     (area,) = root.iter("tabbed_widget")
     assert area.attrib == {"name": "Main Window", "parent": "main_window"}
-    known = {name for topic, message in seen.items() for name in plotjuggler_names(topic, message)}
+    known = {name for topic, message in seen.items() for name in curves_of(topic, message)}
     curves = [curve.attrib["name"] for curve in root.iter("curve")]
     assert set(curves) <= known
     assert len(curves) > 30
@@ -181,10 +152,3 @@ def test_rviz_listens_as_we_send(seen: dict[str, Any]) -> None:
         durability = "Transient Local" if topic.transient_local else "Volatile"
         assert (given["Durability Policy"], given["Depth"]) == (durability, topic.depth)
         assert given["Reliability Policy"] == "Reliable"
-
-
-def test_no_layout_names_a_file_of_a_machine() -> None:
-    files = [path for path in VIEWS.iterdir() if path.is_file()]
-    assert {path.name for path in files} == {"fly.rviz", "foxglove.json", "plotjuggler.xml"}
-    for path in files:
-        assert not re.search(r"/(home|tmp|root|work)/", path.read_text("utf-8")), path

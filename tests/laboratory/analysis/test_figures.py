@@ -5,21 +5,20 @@ from __future__ import annotations
 import math
 import xml.etree.ElementTree as ET
 from pathlib import Path
-from typing import Any
 
 import matplotlib
 import numpy as np
 import pytest
+from benches import IDEAL, flat, hardware, still_log
 from benches import WHEEL_AXES as PYRAMID
-from benches import flat, hardware, still_log
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
-from matplotlib.legend import Legend
 from matplotlib.lines import Line2D
+from matplotlib.text import Text
 from matplotlib.transforms import Bbox
 from numpy.typing import NDArray
 from PIL import Image
@@ -44,7 +43,7 @@ from space_robot.analysis.figures import (
 )
 from space_robot.analysis.figures.base_torque import common_limits, power_spectral_density
 from space_robot.analysis.figures.figure_set import FigureSet
-from space_robot.analysis.figures.overlay import words
+from space_robot.analysis.figures.overlay import base_pointing
 from space_robot.analysis.figures.style import LineStyle, house_style, thinned
 from space_robot.analysis.metrics import attitude_angles
 from space_robot.analysis.momentum import Momentum
@@ -94,10 +93,6 @@ def flown(
     return log
 
 
-def base_torques(logs: dict[str, FlightLog]) -> dict[str, BaseTorque]:
-    return {name: BaseTorque.of(log) for name, log in logs.items()}
-
-
 def data_of(line: Line2D) -> tuple[Array, Array]:
     return np.asarray(line.get_xdata(), float), np.asarray(line.get_ydata(), float)
 
@@ -113,14 +108,11 @@ def by_look(axes: Axes, index: int) -> Line2D:
     return found
 
 
-def legends(figure: Figure) -> list[Legend]:
-    """Of the figure, its parts and its panels."""
-    found = [*figure.legends, *(x for part in figure.subfigs for x in part.legends)]
-    return found + [x for axes in figure.axes if (x := axes.get_legend()) is not None]
-
-
 def legend_names(figure: Figure) -> list[list[str]]:
-    return [[text.get_text() for text in legend.get_texts()] for legend in legends(figure)]
+    """Of the figure, its parts and its panels."""
+    legends = [*figure.legends, *(x for part in figure.subfigs for x in part.legends)]
+    legends += [x for axes in figure.axes if (x := axes.get_legend()) is not None]
+    return [[text.get_text() for text in legend.get_texts()] for legend in legends]
 
 
 @given(
@@ -148,33 +140,16 @@ def test_thinning_keeps_ends_and_the_extremes_of_every_column(values: Array, col
     ("largest", "power"), [(0.8, ""), (3e-8, "1e-8"), (6.77e7, "1e7"), (1e300, "1e300")]
 )
 def test_a_power_of_ten_stands_once_above_its_axis(largest: float, power: str) -> None:
-    def hyphened(number: str) -> str:
-        return number.replace("\u2212", "-")
-
     log = flown(duration=1.0, error=0.0)
     log.applied_torque[:] = largest * np.linspace(-1.0, 1.0, 2000)[:, np.newaxis]
     figure = control_results(log, "x")
     with house_style():
         FigureCanvasAgg(figure).draw()
     axis = figure.axes[1].yaxis
-    assert hyphened(axis.get_offset_text().get_text()) == power
+    assert axis.get_offset_text().get_text().replace("\u2212", "-") == power
     for tick in axis.get_major_ticks():
-        shown = hyphened(tick.label1.get_text())
-        assert len(shown) <= 6
-        value = float(shown) * float(power or 1.0)
+        value = float(tick.label1.get_text().replace("\u2212", "-")) * float(power or 1.0)
         assert value == pytest.approx(tick.get_loc(), abs=1e-9 * largest)
-
-
-@pytest.mark.parametrize(("samples", "length"), [(6000, 2048), (801, 801), (100, 100), (65, 65)])
-def test_the_spectrum_is_welchs_without_each_segments_trend(samples: int, length: int) -> None:
-    values = np.cumsum(np.random.default_rng(1).normal(size=(samples, 3)), axis=0)
-    f, expected = signal.welch(values, 1.0 / PERIOD, nperseg=length, detrend="linear", axis=0)
-    frequency, density = power_spectral_density(values, PERIOD)
-    np.testing.assert_allclose(frequency, f[1:], rtol=1e-12)
-    np.testing.assert_allclose(density, expected[1:].sum(axis=1), rtol=1e-9)
-    for nothing in (np.ones((10, 3)), np.full((5000, 3), math.nan)):
-        assert len(power_spectral_density(nothing, PERIOD)[0]) == 0
-    assert np.isnan(power_spectral_density(np.zeros((5000, 3)), PERIOD)[1]).all()
 
 
 def test_desired_joints_are_the_missions_in_degrees() -> None:
@@ -192,7 +167,7 @@ def test_desired_joints_are_the_missions_in_degrees() -> None:
 
 
 def test_control_results_hold_errors_and_torques_of_base_and_joints() -> None:
-    """Torques are enlarged round the junction; one tick of 60,000 is seen."""
+    """Torques are enlarged round up to three junctions; one tick of 60,000 is seen."""
     log = flown(ripple=0.1)
     log.applied_torque[41111, 1] = 7.0
     log.applied_torque[29990, 0] = 9.0
@@ -221,29 +196,10 @@ def test_control_results_hold_errors_and_torques_of_base_and_joints() -> None:
     assert figure.axes[2].get_xlabel() == "time from 15 s (ms)"
     assert (x[0], x[-1]) == pytest.approx((-150.0, 150.0))
     assert x[np.argmax(y)] == pytest.approx(-5.0)
-
-
-@pytest.mark.parametrize(
-    ("n", "times", "panels"),
-    [
-        (1, (0.0, 1.0), 4),
-        (12, (0.0, 1.0, 2.0), 6),
-        (6, (0.0, 1.0, 2.0, 3.0), 8),
-        (6, tuple(np.arange(9.0).tolist()), 10),
-    ],
-)
-def test_as_many_enlargements_as_junctions_up_to_three(
-    n: int, times: tuple[float, ...], panels: int
-) -> None:
-    figure = control_results(flown(n, times), "x")
-    assert len(figure.axes) == panels
-    assert len(legend_names(figure)[1]) == n
-    per_side = (panels - 4) // 2
-    for axes in figure.axes:
-        if "s (ms)" in axes.get_xlabel():
-            assert axes.get_xlabel().startswith("time from" if per_side < 3 else "from")
-            shown = np.abs(axes.get_xticks()) <= 150.0
-            assert shown.sum() == (7 if per_side == 1 else 3), "more would overlap"
+    for n, times, panels in ((1, (0.0, 1.0), 4), (12, tuple(np.arange(9.0).tolist()), 10)):
+        figure = control_results(flown(n, times), "x")
+        assert len(figure.axes) == panels
+        assert len(legend_names(figure)[1]) == n
 
 
 @pytest.mark.filterwarnings("error")
@@ -259,26 +215,25 @@ def test_flights_that_diverged_or_never_rest_are_drawn(tmp_path: Path) -> None:
 
 def test_junctions_have_one_scale_and_say_what_it_cuts_off() -> None:
     logs = {"TDE-SMC": flown(ripple=5.0), "TDE-TSMC": flown(ripple=0.02), "TDE-STC": flown()}
-    figure = junctions(base_torques({**logs, "CTC": flown(duration=0.0055)}))
+    logs["CTC"] = flown(duration=0.0055)
+    figure = junctions({name: BaseTorque.of(log) for name, log in logs.items()})
     smc, tsmc, stc, ctc = figure.axes
     assert len({axes.get_ylim() for axes in figure.axes}) == 1
     assert {axes.get_xlim() for axes in figure.axes} == {(-150.0, 150.0)}
     assert smc.get_title("left").startswith("TDE-SMC, cut: -")
     assert [a.get_title("left") for a in (tsmc, stc, ctc)] == ["TDE-TSMC", "TDE-STC", "CTC"]
     assert ctc.texts[0].get_text() == "ended at 0.0055 s"
-    assert ctc.get_xlabel() == "time from 15 s (ms)"
-    assert smc.get_ylabel() == "base torque x (N m)"
     _, y = data_of(by_look(tsmc, 0))
     shown = logs["TDE-TSMC"].applied_torque[29700:30301, 0]
     assert (y.min(), y.max()) == pytest.approx((shown.min(), shown.max()))
-    none = junctions(base_torques({"TDE-STC": flown(duration=1.0)}))
+    none = junctions({"TDE-STC": BaseTorque.of(flown(duration=1.0))})
     assert none.axes == []
     assert "None of these flights" in none.get_suptitle()
 
 
 def test_chatter_shows_ticks_and_spectra() -> None:
     logs = {"TDE-SMC": flown(ripple=0.5), "TDE-STC": flown(), "CTC": flown(duration=0.0055)}
-    figure = chatter(base_torques(logs))
+    figure = chatter({name: BaseTorque.of(log) for name, log in logs.items()})
     smc, stc, ctc, spectrum = figure.axes
     assert smc.get_ylim() == stc.get_ylim() == ctc.get_ylim()
     assert smc.get_xlabel() == "time from 7.5 s (ms)"
@@ -288,27 +243,24 @@ def test_chatter_shows_ticks_and_spectra() -> None:
         drawn = logs["TDE-SMC"].applied_torque[15000:15101, axis]
         np.testing.assert_array_equal(line.get_ydata(), drawn)
     frequency, rough = data_of(by_look(spectrum, 0))
-    high = frequency > 100.0
-    assert np.all(rough[high] > data_of(by_look(spectrum, 1))[1][high])
+    above, torque = frequency > 100.0, logs["TDE-SMC"].applied_torque[:, :3]
+    f, expected = signal.welch(torque, 1.0 / PERIOD, nperseg=2048, detrend="linear", axis=0)
+    np.testing.assert_allclose(frequency, f[1:], rtol=1e-12)
+    np.testing.assert_allclose(rough, expected[1:].sum(axis=1), rtol=1e-9)
+    assert np.all(rough[above] > data_of(by_look(spectrum, 1))[1][above])
     assert spectrum.get_xscale() == spectrum.get_yscale() == "log"
-    assert spectrum.get_ylabel() == "PSD of base torque, x + y + z ((N m)²/Hz)"
-    (mark,) = (line for line in spectrum.get_lines() if line.get_linestyle() == ":")
-    assert data_of(mark)[0].tolist() == [100.0, 100.0]
     assert legend_names(figure)[1] == ["TDE-SMC", "TDE-STC", "CTC: too short"]
-
-
-def test_a_loud_one_does_not_set_the_scale() -> None:
-    quiet, loud = np.linspace(-1.0, 1.0, 9), np.array([-9.0, 9.0])
-    assert common_limits([quiet, loud, 1.5 * quiet]) == pytest.approx((-1.65, 1.65))
-    assert common_limits([np.array([math.nan])]) == (-1.0, 1.0)
+    broken = np.full((5000, 3), math.nan)
+    assert len(power_spectral_density(broken, PERIOD)[0]) == 0
+    assert np.isnan(power_spectral_density(np.zeros((5000, 3)), PERIOD)[1]).all()
+    assert common_limits([broken]) == (-1.0, 1.0)
     low, high = common_limits([np.zeros(5)])
     assert low < 0.0 < high
 
 
-@pytest.mark.parametrize("n", [1, 7])
-def test_nothing_overlaps_or_leaves_the_page(n: int) -> None:
-    names = tuple(f"upper_arm_{i}" for i in range(n))
-    log = flown(n, (0.0, 1.0, 2.0), ripple=0.1, names=names)
+def test_nothing_overlaps_or_leaves_the_page() -> None:
+    names = tuple(f"upper_arm_{i}" for i in range(7))
+    log = flown(7, (0.0, 1.0, 2.0), ripple=0.1, names=names)
     laws = ("CTC (printed)", "CTC-SMC (printed)", "TDE-SMC", "TDE-TSMC", "TDE-STC")
     flights = {law: BaseTorque.of(log) for law in laws}
     title = "TDE-STC, case 4-2, gains printed, friction, payload of 20 kg, disturbances " * 2
@@ -317,7 +269,6 @@ def test_nothing_overlaps_or_leaves_the_page(n: int) -> None:
         control_results(log, title),
         junctions(flights),
         chatter(flights),
-        control_results(flown(n, (0.0, 1.0), error=0.0126), title),
     ):
         boxes, page = text_boxes(figure), figure.bbox
         for index, (text, box) in enumerate(boxes):
@@ -332,53 +283,39 @@ def text_boxes(figure: Figure) -> list[tuple[str, Bbox]]:
     with house_style():
         canvas = FigureCanvasAgg(figure)
         canvas.draw()
-        texts = list(figure.texts)
-        texts += [text for legend in legends(figure) for text in legend.get_texts()]
-        if figure._suptitle is not None:
-            texts.append(figure._suptitle)
+        outside = set()
         for axes in figure.axes:
-            texts += [axes.xaxis.label, axes.yaxis.label, axes._left_title, *axes.texts]
             for axis in (axes.xaxis, axes.yaxis):
                 low, high = sorted(axis.get_view_interval())
-                texts.append(axis.get_offset_text())
-                texts += [
-                    tick.label1
-                    for tick in axis.get_major_ticks()
-                    if tick.label1.get_visible() and low <= tick.get_loc() <= high
-                ]
-        unique = {id(text): text for text in texts if text.get_text() and text.get_visible()}
+                ticks = axis.get_major_ticks()
+                outside |= {t.label1 for t in ticks if not low <= t.get_loc() <= high}
+        texts = [text for text in figure.findobj(Text) if text.get_text() and text.get_visible()]
         renderer = canvas.get_renderer()
-        return [(text.get_text(), text.get_window_extent(renderer)) for text in unique.values()]
+        return [(x.get_text(), x.get_window_extent(renderer)) for x in texts if x not in outside]
 
 
-def test_files_are_the_same_bytes_whatever_the_users_settings(tmp_path: Path) -> None:
+def test_files_are_180_mm_wide_small_and_the_same_bytes_whatever_the_users_settings(
+    tmp_path: Path,
+) -> None:
     assert len({LineStyle.of(index)[:2] for index in range(63)}) == 63
-    log = flown(times=(0.0, 0.5, 1.0))
-    first = save_figure(desired_joints(log), tmp_path / "a" / "case_4.2")
+    log = flown(ripple=0.3, error=1e-9)
+    log.joint_positions += 1e-9 * np.random.default_rng(1).normal(size=(60000, 6))
+    first = save_figure(control_results(log, "chatter everywhere"), tmp_path / "a" / "case_4.2")
+    with Image.open(first[0]) as image:
+        assert image.size[0] == pytest.approx(180 / 25.4 * 150, abs=1)
+        assert image.info["dpi"] == pytest.approx((150.0, 150.0), rel=1e-3)
+    width = ET.parse(first[1]).getroot().attrib["width"]
+    assert float(width.removesuffix("pt")) == pytest.approx(180 / 25.4 * 72)
+    assert first[1].stat().st_size < 400_000
     assert [path.name for path in first] == ["case_4.2.png", "case_4.2.svg"]
     with matplotlib.rc_context({"font.size": 20.0, "lines.linewidth": 5.0}):
-        second = save_figure(desired_joints(log), tmp_path / "b")
+        second = save_figure(control_results(log, "chatter everywhere"), tmp_path / "b")
         assert matplotlib.rcParams["font.size"] == 20.0
     for one, two in zip(first, second, strict=True):
         assert one.read_bytes() == two.read_bytes()
     alone = save_figure(desired_joints(log), tmp_path / "svg" / "x", png=False)
     assert alone == (tmp_path / "svg" / "x.svg",)
     assert list((tmp_path / "svg").iterdir()) == [*alone]
-
-
-def test_files_are_180_mm_wide_and_small(tmp_path: Path) -> None:
-    log = flown(ripple=0.3, error=1e-9)
-    log.joint_positions += 1e-9 * np.random.default_rng(1).normal(size=(60000, 6))
-    png, svg = save_figure(control_results(log, "chatter everywhere"), tmp_path / "picture")
-    with Image.open(png) as image:
-        assert image.format == "PNG"
-        assert image.size[0] == pytest.approx(180 / 25.4 * 150, abs=1)
-        assert image.info["dpi"] == pytest.approx((150.0, 150.0), rel=1e-3)
-    root = ET.parse(svg).getroot()
-    assert root.tag == "{http://www.w3.org/2000/svg}svg"
-    assert float(root.attrib["width"].removesuffix("pt")) == pytest.approx(180 / 25.4 * 72)
-    assert b"<image" not in svg.read_bytes()
-    assert svg.stat().st_size < 400_000
 
 
 @pytest.fixture(scope="module")
@@ -407,42 +344,29 @@ def test_each_panel_has_a_line_a_flight_over_its_time(overlaid: dict[str, PlotSe
     sizes = [series.errors["attitude_deg"] for series in overlaid.values()]
     lowest = min(np.percentile(size[size > 0.0], 0.5) for size in sizes)
     assert error.get_ylim()[0] == pytest.approx(0.5 * lowest)
+    assert error.get_ylabel() == "|attitude error| (deg)"
+    assert torque.get_ylabel() == "|base torque| (N m)"
     unknown = {name: series._replace(pointing=None) for name, series in overlaid.items()}
     assert not pointing(unknown).axes
+    drawn = base_pointing(overlaid, 0.5)
+    limits = [axes.get_lines()[-1] for axes in drawn.axes]
+    assert [line.get_linestyle() for line in limits] == [":"] * 3
+    assert [data_of(line)[1].tolist() for line in limits] == [[1800.0, 1800.0]] * 3
+    assert all(axes.get_ylim()[1] >= 3600.0 for axes in drawn.axes)
 
 
 def test_the_histogram_counts_every_answer(overlaid: dict[str, PlotSeries]) -> None:
-    def steps(figure: Figure) -> list[Any]:
-        return [patch.get_data() for patch in figure.axes[0].patches]  # type: ignore[attr-defined]
-
     figure = latency_histogram(overlaid)
-    assert [step.values.sum() for step in steps(figure)] == [400, 400]
+    (axes,) = figure.axes
+    steps = [patch.get_data() for patch in axes.patches]  # type: ignore[attr-defined]
+    assert [step.values.sum() for step in steps] == [400, 400]
+    assert steps[0].edges[[0, -1]] == pytest.approx((0.1 + 1.9 / 3.0, 2.0), rel=2e-3)
     assert legend_names(figure)[0] == ["tde_stc", "tde_smc"]
     assert not latency_histogram({"ctc": overlaid["ctc"]}).axes
-    (axes,) = figure.axes
-    for axis in (axes.xaxis, axes.yaxis):
-        assert axis.get_major_formatter()(0.1) == "0.1", "not as a power of ten"
-    assert axes.xaxis.get_minor_formatter()(0.2) == ""
-    known = np.concatenate([overlaid[law].latency_ms for law in ("tde_stc", "tde_smc")])  # type: ignore[misc]
-    assert steps(figure)[0].edges[[0, -1]] == pytest.approx((known.min(), known.max()))
-    assert axes.get_ylim()[0] == 0.7
     for latency in (0.0, 0.5):
         same = overlaid["tde_stc"]._replace(latency_ms=np.full(30, latency))
-        assert steps(latency_histogram({"same": same}))[0].values.sum() == 30
-
-
-@pytest.mark.parametrize(
-    ("key", "text"),
-    [
-        ("joints_1_3", "joints 1-3"),
-        ("joints_4", "joints 4"),
-        ("attitude_deg", "attitude"),
-        ("half_cone_arcsec_jitter", "half cone jitter"),
-        ("base_torque", "base torque"),
-    ],
-)
-def test_keys_as_words(key: str, text: str) -> None:
-    assert words(key) == text
+        (patch,) = latency_histogram({"same": same}).axes[0].patches
+        assert patch.get_data().values.sum() == 30  # type: ignore[attr-defined]
 
 
 def lively_log(robot: Robot, actuators: BaseActuatorSettings, ticks: int = 50) -> FlightLog:
@@ -453,41 +377,34 @@ def lively_log(robot: Robot, actuators: BaseActuatorSettings, ticks: int = 50) -
     return log
 
 
-def has_curve(axes: Axes, values: Array) -> bool:
-    return any(np.array_equal(data_of(line)[1], values) for line in axes.get_lines())
-
-
-def test_momentum_of_robot_wheels_and_sum(paper_robot: Robot) -> None:
+def test_momentum_and_wheels_between_their_limits(paper_robot: Robot) -> None:
     """Of a free base what arm and base exchange."""
     log = lively_log(paper_robot, hardware(wheels=WHEELS))
     found = momentum_of(log).add(log)
     figure = momentum(log, found, hardware(wheels=WHEELS))
     assert legend_names(figure)[0] == ["robot", "wheels", "sum"]
     for i, axes in enumerate(figure.axes):
+        drawn = [data_of(line)[1].tolist() for line in axes.get_lines()]
         for wanted in (found.robot, found.wheels, found.robot + found.wheels):
-            assert has_curve(axes, wanted[:, i])
+            assert wanted[:, i].tolist() in drawn
     free = lively_log(paper_robot, FREE)
     found = momentum_of(free).add(free)
     assert legend_names(momentum(free, found, FREE))[0] == ["base", "arm", "sum"]
     outside = Momentum(*found._replace(outside=found.outside + 1.0))
     assert len(legend_names(momentum(free, outside, FREE))[0]) == 4
-
-
-def test_wheels_stand_between_their_limits(paper_robot: Robot) -> None:
-    log = lively_log(paper_robot, hardware(wheels=WHEELS))
     above, below = wheels(log, BOTH.wheels).axes
     for axes, values, limit in (
         (above, log.wheel_velocities * 0.01, 3.0),
         (below, log.wheel_torques, 0.5),
     ):
-        drawn = [data_of(line)[1] for line in axes.get_lines()]
-        shown = [y for y in drawn if len(y) == log.ticks]
+        ordinates = [data_of(line)[1] for line in axes.get_lines()]
+        shown = [y for y in ordinates if len(y) == log.ticks]
         assert len(shown) == 4
         assert all(any(np.allclose(y, column) for y in shown) for column in values.T)
-        assert sorted(y[0] for y in drawn if len(y) == 2) == [-limit, limit]
+        assert sorted(y[0] for y in ordinates if len(y) == 2) == [-limit, limit]
 
 
-@pytest.mark.parametrize("ticks", [1, 50, 1300])
+@pytest.mark.parametrize("ticks", [1, 1300])
 def test_the_raster_is_dark_where_a_thruster_is_open(paper_robot: Robot, ticks: int) -> None:
     log = lively_log(paper_robot, hardware(thrusters=THRUSTERS), ticks)
     pulses, used, *_ = thrusters(log, np.zeros((ticks, 3)), BOTH.thrusters).axes
@@ -504,30 +421,21 @@ def test_the_raster_is_dark_where_a_thruster_is_open(paper_robot: Robot, ticks: 
 
 
 @pytest.mark.filterwarnings("ignore:Data has no positive values")
-@pytest.mark.parametrize(
-    ("actuators", "names"),
-    [
+def test_of_several_flights_each_has_its_own(paper_robot: Robot, tmp_path: Path) -> None:
+    """A free base has no torque and drift in the place of errors; a bag may lie about its base.
+
+    Thrusters that never fired gave no torque at all, which has no spectrum.
+    """
+    for actuators, names in (
         (BOTH, {"momentum", "wheels", "thrusters"}),
         (hardware(wheels=WHEELS), {"momentum", "wheels"}),
-        (hardware(thrusters=THRUSTERS), {"momentum", "thrusters"}),
-        (FREE, {"momentum"}),
-        (BaseActuatorSettings(), set()),
-    ],
-)
-def test_each_flight_has_the_figures_of_its_base(
-    paper_robot: Robot, tmp_path: Path, actuators: BaseActuatorSettings, names: set[str]
-) -> None:
-    """Thrusters that never fired gave no torque at all, which has no spectrum."""
-    figures = FigureSet()
-    figures.add("one", still_log(paper_robot, 100, actuators))
-    own = {k: v for k, v in figures.drawings().items() if k in {"momentum", "wheels", "thrusters"}}
-    saved = {k for k, v in own.items() if save_figure(v.draw(), tmp_path / k, png=False)}
-    assert saved == names
-
-
-@pytest.mark.filterwarnings("ignore:Data has no positive values")
-def test_of_several_flights_each_has_its_own(paper_robot: Robot, tmp_path: Path) -> None:
-    """A free base has no torque and drift in the place of errors; a bag may lie about its base."""
+        (IDEAL, set()),
+    ):
+        still = FigureSet()
+        still.add("one", still_log(paper_robot, 100, actuators))
+        drawn = still.drawings()
+        assert {*drawn} & {"momentum", "wheels", "thrusters"} == names
+        assert all(drawn[name].draw().axes for name in names)
     lying = lively_log(paper_robot, FREE)
     lying.flight["base_actuators"] = hardware(wheels=WHEELS).model_dump()
     alone = FigureSet()

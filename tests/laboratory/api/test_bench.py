@@ -45,7 +45,6 @@ COPIES: dict[str, Callable[[Any], Any]] = {
     "deepcopy": copy.deepcopy,
     "pickle": lambda thing: pickle.loads(pickle.dumps(thing)),
 }
-copies = pytest.mark.parametrize("copied", COPIES.values(), ids=COPIES)
 
 
 @pytest.fixture(scope="module")
@@ -79,26 +78,9 @@ def fly_on(bench: Bench, ticks: int, torque: Array | None = None) -> list[bytes]
 
 
 def bits(log: FlightLog) -> dict[str, bytes]:
-    columns = {name: column.tobytes() for name, column in log.columns.items()}
-    if log.measured is not None:
-        columns |= {f"measured {k}": v.tobytes() for k, v in log.measured.columns.items()}
-    return columns
-
-
-def test_a_law_under_development() -> None:
-    """The twenty lines: reset, step until done, save, restore."""
-    bench = Scenario(controller=None, duration=0.01).bench()
-    state = bench.reset(seed=1)
-    while not bench.done:
-        state = bench.step(np.zeros(9))
-    assert (state.tick, bench.tick, bench.outcome, bench.reason) == (20, 20, "complete", "")
-    snapshot = bench.save()
-    bench.reset()
-    assert not bench.done
-    bench.restore(snapshot)
-    assert bench.done
-    with pytest.raises(InputError, match="the flight is over \\(complete\\)"):
-        bench.step(np.zeros(9))
+    told = {} if log.measured is None else log.measured.columns
+    columns = {f"measured {k}": v for k, v in told.items()} | log.columns
+    return {name: column.tobytes() for name, column in columns.items()}
 
 
 def test_its_own_command_reference_and_law_are_those_of_the_flight(rich: Bench) -> None:
@@ -116,50 +98,15 @@ def test_its_own_command_reference_and_law_are_those_of_the_flight(rich: Bench) 
     assert rich.done
 
 
-@pytest.mark.filterwarnings("ignore:start")
-@pytest.mark.parametrize(
-    "options",
-    [
-        {"controller": lambda signals: np.full(9, 1e7)},  # diverges
-        # the law has no command for a base that has turned by 180 degrees
-        {"parameters": {"plant": {"initial_quaternion": [0.0, 1.0, 0.0, 0.0]}}},
-    ],
-)
-def test_a_flight_that_ends_early_ends_as_that_of_the_scenario(options: dict[str, Any]) -> None:
-    scenario = Scenario(**{"controller": "ctc", "duration": 0.05, **options})
+def test_a_flight_that_ends_early_has_the_metrics_of_the_scenarios() -> None:
+    scenario = Scenario(controller=lambda signals: np.full(9, 1e7), duration=0.05)
     bench = scenario.bench()
     while not bench.done:
         bench.step()
     own, whole = bench.flown(), scenario.fly()
-    assert bits(own.log) == bits(whole.log)
     assert (own.log.flight, own.log.laws) == (whole.log.flight, whole.log.laws)
     for name in ("outcome", "reason", "ended_at_s", "metrics"):
         assert getattr(own, name) == getattr(whole, name)
-    assert own.log.unanswered == whole.log.unanswered
-
-
-@settings(max_examples=10)
-@given(
-    st.integers(0, 100),
-    st.integers(1, 60),
-    st.integers(0, 100),
-    st.integers(0, 2**31 - 1),
-    st.booleans(),
-)
-def test_a_restored_flight_goes_on_to_the_same_bits(
-    rich: Bench, before: int, after: int, elsewhere: int, seed: int, pickled: bool
-) -> None:
-    """Whatever was flown in between, with whatever seed; on this bench and on another."""
-    rich.reset(seed)
-    fly_on(rich, before)
-    snapshot = rich.save()
-    here = seen(rich)
-    expected = fly_on(rich, after)
-    rich.reset(seed ^ 1)
-    fly_on(rich, elsewhere)
-    rich.restore(pickle.loads(pickle.dumps(snapshot)) if pickled else snapshot)
-    assert (seen(rich), rich.tick) == (here, before)
-    assert fly_on(rich, after) == expected
 
 
 def test_a_snapshot_and_a_seed_are_of_a_scenario(rich: Bench) -> None:
@@ -170,9 +117,6 @@ def test_a_snapshot_and_a_seed_are_of_a_scenario(rich: Bench) -> None:
     assert fly_on(other, 50) == fly_on(rich, 50)
     with pytest.raises(InputError, match=r"of another scenario: seed is \d+ there, 77 here"):
         RICH.replace(seed=77).bench().restore(rich.save())
-    for option in ({"robot": "seven_joint"}, {"case": "1"}, {"duration": 1.0}):
-        with pytest.raises(InputError, match="of another scenario: "):
-            RICH.replace(**option).bench().restore(rich.save())
     rich.reset(seed=11)
     theirs = RICH.replace(seed=11).bench()
     assert fly_on(rich, 20) == fly_on(theirs, 20)
@@ -180,8 +124,7 @@ def test_a_snapshot_and_a_seed_are_of_a_scenario(rich: Bench) -> None:
     assert seen(rich) != seen(theirs)
 
 
-@pytest.mark.parametrize("unanswered", [1, 2, 7])
-@pytest.mark.parametrize("law", ["tde_stc", "ctc_smc"])
+@pytest.mark.parametrize(("law", "unanswered"), [("tde_stc", 1), ("ctc_smc", 7)])
 def test_after_ticks_without_it_the_law_takes_over(law: str, unanswered: int) -> None:
     """Against a controller that takes over there; one that goes on commands something else."""
     bench = Scenario(controller=law, case="3", duration=0.05).bench()
@@ -209,7 +152,18 @@ def test_torques_are_shared_out_over_the_wheels() -> None:
         bench.step(np.zeros(4))
 
 
-def test_a_diverged_flight_is_done_and_every_step_needs_a_torque(plain: Bench) -> None:
+def test_every_step_needs_a_torque_until_the_flight_is_over(plain: Bench) -> None:
+    state = plain.reset(seed=1)
+    while not plain.done:
+        state = plain.step(np.zeros(9))
+    assert (state.tick, plain.tick, plain.outcome, plain.reason) == (200, 200, "complete", "")
+    snapshot = plain.save()
+    plain.reset()
+    assert not plain.done
+    plain.restore(snapshot)
+    assert plain.done
+    with pytest.raises(InputError, match="the flight is over \\(complete\\)"):
+        plain.step(np.zeros(9))
     plain.reset()
     with pytest.raises(InputError, match="controller is None: give every step a torque"):
         plain.step()
@@ -243,15 +197,13 @@ def test_a_log_is_of_what_was_flown_after_restoring_anything(parts: list[int], s
     straight.reset(seed)
     truths = []
     for torque in torques:
-        truths.append(straight.truth.copy())
+        truths.append(straight.truth.quaternion.tobytes())
         straight.step(torque)
     log = bench.log()
     assert bits(log) == bits(straight.log())
     assert log.commanded_torque is not None
     np.testing.assert_array_equal(log.commanded_torque, torques)
-    for row, truth in enumerate(truths):
-        assert log.quaternion[row].tobytes() == truth.quaternion.tobytes()
-        assert log.joint_velocities[row].tobytes() == truth.joint_velocities.tobytes()
+    assert [row.tobytes() for row in log.quaternion] == truths
     assert log.flight["parameters"]["plant"]["fault_seed"] == seed
 
 
@@ -310,7 +262,7 @@ def test_a_saved_flight_has_the_messages_of_a_recorded_one(rich: Bench, tmp_path
 
 
 def test_what_was_not_recorded_is_told(plain: Bench) -> None:
-    silent = PLAIN.bench(record=False)
+    silent, other = PLAIN.bench(record=False), PLAIN.replace(case="3").bench()
     plain.reset()
     with pytest.raises(InputError, match="no tick has been flown yet"):
         plain.log()
@@ -320,9 +272,7 @@ def test_what_was_not_recorded_is_told(plain: Bench) -> None:
     plain.restore(silent.save())
     with pytest.raises(InputError, match="or a snapshot restored that was not"):
         plain.log()
-    other = PLAIN.replace(case="3").bench()
-    for _ in range(5):
-        other.step(np.ones(9))
+    fly_on(other, 5, np.ones(9))
     plain.restore(other.save()._replace(scenario=plain.save().scenario))
     plain.step(np.ones(9))
     with pytest.raises(InputError, match="lead to another state: the plant was changed"):
@@ -332,7 +282,7 @@ def test_what_was_not_recorded_is_told(plain: Bench) -> None:
     assert plain.log() is plain.log()
 
 
-@copies
+@pytest.mark.parametrize("copied", COPIES.values(), ids=COPIES)
 def test_a_copied_bench_flies_on_to_the_same_bits(midway: Bench, copied: Any) -> None:
     """Past a swap of the law and the end of a fault; the original stands still meanwhile."""
     here, other = seen(midway), copied(midway)

@@ -64,9 +64,14 @@ def test_a_seed_gives_an_episode(env: SpaceRobotEnv, seed: int, other: int) -> N
 
 
 def test_observation_and_reward_are_as_documented(env: SpaceRobotEnv) -> None:
-    action = np.linspace(-0.1, 0.1, 9)
-    env.reset(seed=4)
-    seen, reward, *_ = env.step(action)
+    """The action may be a list, or of another length of float."""
+    action = np.linspace(-0.1, 0.1, 9).astype(np.float32).astype(float)
+    rewards = []
+    for numbers in (action.tolist(), action.astype(np.float32), action):
+        env.reset(seed=4)
+        seen, reward, *_ = env.step(numbers)
+        rewards.append(reward)
+    assert len({*rewards}) == 1
     bench = env.bench
     truth, measured, reference = bench.truth, bench.state, bench.reference
     assert bench.tick == 20
@@ -91,7 +96,7 @@ def test_a_quaternion_and_its_negative_are_one_attitude() -> None:
     """Of the mission and of the robot: the errors are those of the nearer one."""
     half = float(np.sqrt(0.5))
     episodes = []
-    for wanted, placed in ((1.0, 1.0), (-1.0, 1.0), (1.0, -1.0), (-1.0, -1.0)):
+    for wanted, placed in ((1.0, 1.0), (-1.0, 1.0), (1.0, -1.0)):
         turned = [half, 0.0, half, 0.0]
         away = [half * np.cos(0.05), half * np.sin(0.05), half * np.cos(0.05), 0.0]
         parameters = {

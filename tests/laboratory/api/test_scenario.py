@@ -1,11 +1,15 @@
-"""Flights from Python: objects in the place of names, ends as results, several at a time."""
+"""Flights from Python: objects in the place of names, ends as results, pages, several at a time."""
 
 from __future__ import annotations
 
+import html
 import json
 import pickle
+import re
+import webbrowser
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -13,13 +17,16 @@ import pytest
 import yaml
 from flights import space_robot_here
 from paths import CONFIG
+from scene_pages import Scene, plot_data
 
 import space_robot
-from space_robot import FlownFlight, Scenario
+from space_robot import Campaign, FlownFlight, Scenario, fly_many
 from space_robot.analysis import analyze
+from space_robot.api.flight_page import unique_names
 from space_robot_control.guidance.mission import MissionSettings
 from space_robot_control.laws import Signals, find_law
 from space_robot_model.robot import Robot
+from space_robot_model.robot.find import find_robot
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.bag.reader import read_flight
 from space_robot_msgs_py.errors import DivergedError, InputError
@@ -44,10 +51,10 @@ def file_of(name: str, node: str) -> dict[str, Any]:
 
 
 def same_bits(one: FlightLog, other: FlightLog) -> bool:
-    pairs = [(one.columns, other.columns)]
-    if one.measured and other.measured:
-        pairs.append((one.measured.columns, other.measured.columns))
-    return all(a[key].tobytes() == b[key].tobytes() for a, b in pairs for key in a)
+    pairs = [(one, other), (one.measured or one, other.measured or other)]
+    return all(
+        a.columns[k].tobytes() == b.columns[k].tobytes() for a, b in pairs for k in a.columns
+    )
 
 
 @pytest.fixture(scope="module")
@@ -60,7 +67,7 @@ def paper_mission() -> dict[str, Any]:
     return file_of("missions/paper", "mission")
 
 
-def pd(signals: Signals) -> Any:
+def tuned(signals: Signals) -> Any:
     """Computed torque with the gains of the tuned set."""
     u = signals.acceleration_desired + 1e4 * signals.error + 200.0 * signals.error_rate
     return signals.nominal.inertia @ u + signals.nominal.bias
@@ -74,7 +81,6 @@ def test_a_flown_flight_has_its_metrics_and_the_report_that_the_command_prints(
     metrics = analyze(named.log)
     attitude = {"attitude_deg": metrics["attitude_error_deg"]["mean_axis"]}
     assert named.metrics == {**metrics["rms"]["mean_axis"], **attitude, **metrics}
-    assert named.metrics["attitude"] == metrics["rms"]["mean_axis"]["attitude"]
     assert "tde_stc" in repr(named)
     assert "<table>" in named._repr_html_()
     words = [f"--{key}={value}" for key, value in NAMED.items()]
@@ -105,12 +111,12 @@ def test_objects_in_the_place_of_names_fly_the_same_bits(
     assert analyze(recorded)["rms"] == named.metrics["rms"]
 
 
-@pytest.mark.parametrize("own", [pd, type("Own", (find_law("ctc"),), {"name": "own"})])
+@pytest.mark.parametrize("own", [tuned, type("Own", (find_law("ctc"),), {"name": "own"})])
 def test_robots_and_laws_of_nobody_fly(
     own: Any, paper_robot: Robot, paper_mission: dict[str, Any]
 ) -> None:
     heavy = replace(paper_robot, name="heavy", mass=1.1 * paper_robot.mass)
-    gains = "default" if own is pd else {"k_p": 1e4, "k_d": [200.0]}
+    gains = "default" if own is tuned else {"k_p": 1e4, "k_d": [200.0]}
     flight = Scenario(
         robot=heavy, mission=paper_mission, controller=own, gains=gains, duration=0.1
     ).fly()
@@ -154,21 +160,25 @@ def test_a_law_as_an_object_brings_gains_and_keeps_its_memory(named: FlownFlight
         Scenario(controller=law, period=0.001).check()
 
 
-def test_a_flight_that_diverged_or_was_not_answered_is_a_result() -> None:
+def test_a_flight_that_diverged_or_was_not_answered_is_a_result(tmp_path: Path) -> None:
     flight = Scenario(controller=lambda signals: np.full(9, 1e7), duration=0.1).fly()
     assert flight.outcome == "diverged"
     assert flight.reason == "the flight diverged at tick 2 (t = 0.0010 s): 1.69e+04 rad/s"
     assert (flight.log.ticks, flight.ended_at_s) == (2, 0.001)
     report = flight.report()
     assert report["diverged"] == {"tick": 2, "time_s": 0.001}
-    assert (report["outcome"], report["planned_ticks"]) == ("diverged", 200)
+    expected = {"outcome": "diverged", "planned_ticks": 200, "bag": None, "error": flight.reason}
+    assert expected.items() <= report.items()
+    assert (report["case"], report["faults"], report["ended_at_s"]) == ("1", [], 0.001)
     assert "diverged" in repr(flight)
     with pytest.raises(DivergedError):
         flight.check()
-    flight = Scenario(parameters={"plant": {"initial_quaternion": [0.0, 1, 0, 0]}}).fly()
+    turned = {"plant": {"initial_quaternion": [0.0, 1, 0, 0]}}
+    flight = Scenario(parameters=turned).fly(tmp_path / "bag")
     assert flight.outcome == "unanswered"
     assert (flight.log.ticks, flight.log.unanswered) == (1, 1)
-    assert flight.report()["diverged"] is None
+    expected = {"diverged": None, "bag": str(tmp_path / "bag"), "error": flight.reason}
+    assert expected.items() <= flight.report().items()
 
 
 def test_metrics_without_a_log(named: FlownFlight, tmp_path: Path) -> None:
@@ -198,3 +208,139 @@ def test_scenarios_are_values() -> None:
     assert pickle.loads(pickle.dumps(other)) == other
     assert repr(other) == "Scenario(case='4', friction=False, seed=7)"
     assert set(space_robot.__all__) <= set(dir(space_robot))
+
+
+@pytest.mark.filterwarnings("ignore:the start")
+def test_each_is_the_flight_alone_in_the_given_order() -> None:
+    """Several at a time: of two batches, one in plain Python, one that ends early."""
+    common: dict[str, Any] = {"duration": 0.05, "sensors": "fine"}
+    scenarios = [
+        Scenario(**common),
+        Scenario(**common, controller="ctc"),
+        Scenario(**common, seed=3),
+        Scenario(**common, controller=tuned),
+        Scenario(**common, controller="ctc", case="3"),
+        Scenario(**common, faults=["torque_scale@0:all=0.05"]),
+    ]
+    over: list[int] = []
+    flights = fly_many(scenarios, progress=over.append)
+    dropped = fly_many(scenarios, keep_log=False)
+    assert over[-1] == len(flights) == 6
+    for flight, other, scenario in zip(flights, dropped, scenarios, strict=True):
+        alone = scenario.fly()
+        assert flight.report() == alone.report()
+        assert flight.outcome == alone.outcome
+        assert same_bits(flight.log, alone.log)
+        assert other.metrics == flight.metrics
+    assert fly_many([]) == []
+
+
+LARGEST = 2.5e6
+"""Bytes of an output: Jupyter's server passes on 1e6 a second, measured over 3 s."""
+
+
+@pytest.fixture(scope="module")
+def flight() -> FlownFlight:
+    return Scenario(duration=0.1).fly()
+
+
+@pytest.fixture
+def opened(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> list[str]:
+    """Addresses that a browser was asked to open."""
+    addresses: list[str] = []
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(webbrowser, "open", lambda url: addresses.append(url) or True)
+    return addresses
+
+
+def test_the_page_is_written_and_opened(
+    flight: FlownFlight, opened: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    page = flight.view()
+    assert (tmp_path / "tde_stc_view.html").read_text("utf-8") == page.html
+    assert opened == [(tmp_path / "tde_stc_view.html").as_uri()]
+    assert "wrote tde_stc_view.html (" in capsys.readouterr().err
+    assert "MB" in repr(page)
+
+
+def test_others_are_drawn_over_it(flight: FlownFlight, opened: list[str], tmp_path: Path) -> None:
+    others = [Scenario(controller="ctc", duration=0.1).fly(), flight]
+    page = flight.view(*others, path="pages/laws.html", opens=False, rate=10.0, title="Laws")
+    assert (tmp_path / "pages/laws.html").read_text("utf-8") == page.html
+    assert not opened
+    assert "<title>Laws</title>" in page.html
+    roots = {name.split("/")[1] for name in Scene(page.html).names() if "base_link" in name}
+    assert len(roots) == 3
+    plots = plot_data(page.html)["plots"]
+    assert any("ctc" in series["label"] for plot in plots for series in plot["series"])
+    chosen = flight.view(plots=["momentum"], opens=False)
+    assert chosen.html != flight.view(opens=False).html
+    with pytest.raises(InputError, match="unknown plot 'moment'"):
+        flight.view(plots=["moment"])
+    with pytest.raises(InputError, match="tde_stc_view"):
+        flight.view(path="tde_stc_view.html/page.html")
+    assert unique_names(["ctc", "pd", "ctc", "ctc"]) == ["ctc", "pd", "ctc 2", "ctc 3"]
+
+
+class Output:
+    """Of a cell: what it shows in the end."""
+
+    def __init__(self, bundle: dict[str, str]) -> None:
+        self.update(bundle)
+
+    def update(self, bundle: dict[str, str], **_: object) -> None:
+        self.bundle = bundle
+
+
+@pytest.fixture
+def outputs(monkeypatch: pytest.MonkeyPatch, opened: list[str]) -> list[Output]:
+    """Those of a cell of a notebook, in which nothing is opened."""
+    ipython = pytest.importorskip("IPython")
+    shown: list[Output] = []
+    monkeypatch.setattr(ipython, "get_ipython", lambda: SimpleNamespace(kernel=object()))
+
+    def display(bundle: dict[str, str], **_: object) -> Output:
+        shown.append(Output(bundle))
+        return shown[-1]
+
+    monkeypatch.setattr(ipython.display, "display", display)
+    return shown
+
+
+def test_a_page_in_a_cell_is_small_and_needs_no_network(
+    flight: FlownFlight, outputs: list[Output], opened: list[str], tmp_path: Path
+) -> None:
+    shown = flight.view(rate=2.0)._repr_html_()
+    assert (opened, [*tmp_path.iterdir()]) == ([], [])
+    assert len(shown.encode()) < LARGEST
+    frame = re.fullmatch(r'<iframe srcdoc="([^"]*)" [^<>]*></iframe>', shown)
+    assert frame
+    document = html.unescape(frame[1])
+    assert "<title>tde_stc</title>" in document
+    assert not re.findall(r'(?:src|href)="(?!data:|#)([^"]*)"', document)
+    assert Scene(document).duration > 0.0
+    assert [output.bundle["text/html"] for output in outputs] == [""]  # its progress is over
+
+
+def test_scenario_flight_campaign_and_robot_show_themselves_in_a_cell(
+    outputs: list[Output],
+) -> None:
+    scenario = Scenario(case="3", duration=0.5, seed=7)
+    rows = [
+        re.findall(r"<td[^>]*>(.*?)</td>", row) for row in scenario._repr_html_().split("<tr>")[2:]
+    ]
+    assert rows == [
+        ["case", "3", "1"],
+        ["duration", "0.5", "the mission&#x27;s"],
+        ["seed", "7", "0"],
+    ]
+    assert "complete" in scenario.fly(progress=True)._repr_html_()
+    assert '<progress value="0.5" max="0.5">' in outputs[-1].bundle["text/html"]
+    campaign = Campaign.load("first")._repr_html_()
+    assert "tde_stc, ctc, 20 runs, 40 flights" in campaign
+    assert "{normal: 1.0, relative: true, sigma: 0.05}" in campaign
+    assert "attitude_max below 0.001 in 90 % of the cases, with 90 % confidence" in campaign
+    dual_arm = find_robot("dual_arm")
+    robot = dual_arm._repr_html_()
+    assert f"{float(dual_arm.mass.sum()):g} kg" in robot
+    assert all(f">{n}<" in robot for n in (*dual_arm.body_names, *dual_arm.all_joint_names))

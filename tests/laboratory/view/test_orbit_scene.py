@@ -1,30 +1,40 @@
-"""Earth, Sun and shadow in a flight's orbit, and how the Earth and arrows are drawn."""
+"""Earth, Sun and shadow in a flight's orbit, how they are drawn, and a page read back."""
 
 from __future__ import annotations
 
-import json
-import struct
+import io
+import re
 from dataclasses import replace
 from pathlib import Path
-from types import SimpleNamespace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
+import trimesh
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from moving_logs import EARTH_RADIUS, CircularOrbit, moving_log, orbiting_log
 from numpy.linalg import norm
 from numpy.typing import NDArray
 from paths import CONFIG
+from scene_pages import (
+    EARTH_RADIUS,
+    CircularOrbit,
+    Scene,
+    moving_log,
+    orbiting_log,
+    page_of,
+    plot_data,
+)
 from scipy.spatial.transform import Rotation
 
-from space_robot.view.arrows import ArrowSize, BaseArrows, arrow_directions, arrow_kinds
-from space_robot.view.earth import ON_DARK_PAGE, Earth, Shades, earth_glb
+from space_robot.view.arrows import turns_from_z
+from space_robot.view.earth import ON_DARK_PAGE, Shades, earth_glb
+from space_robot.view.flights import ViewOptions
 from space_robot.view.frames import shown_times
 from space_robot.view.marks import Mark, marks_of
 from space_robot.view.orbit_frames import OrbitFrames, shadow_intervals, sun_direction
 from space_robot_model.robot import Robot
+from space_robot_msgs_py.bag.flight_log import ORBIT_WIDTHS, FlightLog
 
 Array = NDArray[np.float64]
 SECOND = 1_000_000_000
@@ -32,41 +42,40 @@ GRAY = Shades(((255,) * 3, (0,) * 3), ((9,) * 3, (9,) * 3), (((99,) * 3, (99,) *
 """The ground is white by day and black by night."""
 CLOSE = np.radians(0.06)
 """Of the limb: two pixels of the first picture."""
-Z = np.array([0.0, 0.0, 1.0])
-DIRECTIONS = st.tuples(*[st.floats(-1.0, 1.0)] * 3).filter(lambda v: norm(v) > 0.1)
-TYPES = {5126: "<f4", 5123: "<u2", 5125: "<u4"}
-COLUMNS = {"SCALAR": 1, "VEC3": 3, "VEC4": 4}
+NOON = CircularOrbit(beta=0.5)
+DUSK = np.pi - np.arccos(np.sqrt(1.0 - (EARTH_RADIUS / NOON.radius) ** 2) / np.cos(NOON.beta))
+"""Angle from noon at which the shadow begins, rad."""
+EVENING = NOON._replace(start=float(DUSK) - 9.8 * NOON.rate)
+"""Enters the shadow after 9.8 s."""
+ARROWS = ("nadir", "orbital_velocity", "Sun")
 
 
-class EarthFile:
-    """The parts of the Earth's GLB file, read as the standard of glTF 2.0 says."""
+class Earth(NamedTuple):
+    """The parts of the Earth's GLB file, by trimesh."""
 
-    def __init__(self, data: bytes) -> None:
-        assert struct.unpack("<4sII", data[:12]) == (b"glTF", 2, len(data))
-        size, kind = struct.unpack("<I4s", data[12:20])
-        assert kind == b"JSON"
-        self.document: dict[str, Any] = json.loads(data[20 : 20 + size])
-        assert struct.unpack("<I4s", data[20 + size : 28 + size])[1] == b"BIN\0"
-        self._data = data[28 + size :]
-        parts = {p["mode"]: p for p in self.document["meshes"][0]["primitives"]}
-        attributes = parts[4]["attributes"]
-        vertices: Array = self._numbers(attributes["POSITION"]).astype(np.float64)
-        faces = self._numbers(parts[4]["indices"]).reshape(-1, 3)
-        self.lines = vertices[self._numbers(parts[1]["indices"]).reshape(-1, 2)]
-        of_face = norm(vertices, axis=1)[faces[:, 0]]
-        self.radius = float(of_face.min())
-        is_ground = of_face < 1.000001 * self.radius
-        self.faces, self.haze = vertices[faces[is_ground]], vertices[faces[~is_ground]]
-        used = np.unique(faces[is_ground])
-        colours = self._numbers(attributes["COLOR_0"])[:, 0] / 65535.0
-        self.vertices, self.colours = vertices[used], colours[used]
+    vertices: Array
+    colours: Array
+    """Linear, of the vertices."""
+    ground: Array
+    """(F, 3, 3) triangles."""
+    haze: Array
+    circles: Array
+    """(K, 3) points."""
 
-    def _numbers(self, accessor: int) -> NDArray[Any]:
-        held = self.document["accessors"][accessor]
-        view = self.document["bufferViews"][held["bufferView"]]
-        part = self._data[view["byteOffset"] :][: view["byteLength"]]
-        numbers = np.frombuffer(part, TYPES[held["componentType"]])
-        return numbers.reshape(held["count"], COLUMNS[held["type"]])
+    @classmethod
+    def of(cls, data: bytes) -> Earth:
+        surface = trimesh.load(io.BytesIO(data), "glb", process=False).geometry["GLTF"]
+        heights = norm(surface.vertices, axis=1)[surface.faces[:, 0]]
+        is_ground = heights < 1.000001 * heights.min()
+        used = np.unique(surface.faces[is_ground])
+        colours = surface.visual.vertex_attributes["color"][used, 0] / 65535.0
+        return cls(
+            np.asarray(surface.vertices[used]),
+            np.asarray(colours),
+            np.asarray(surface.triangles[is_ground]),
+            np.asarray(surface.triangles[~is_ground]),
+            np.delete(surface.vertices, surface.faces.ravel(), axis=0),
+        )
 
 
 def frames_of(orbit: CircularOrbit, times: Array, has_sun: bool = True) -> OrbitFrames:
@@ -75,7 +84,7 @@ def frames_of(orbit: CircularOrbit, times: Array, has_sun: bool = True) -> Orbit
     return OrbitFrames(orbit.position(times), orbit.velocity(times), sun, dark)
 
 
-def test_the_frames_are_the_logs_rows(paper_robot: Robot) -> None:
+def test_the_frames_are_the_logs_rows_if_they_are_of_an_orbit(paper_robot: Robot) -> None:
     orbit = CircularOrbit(start=0.3)
     log = orbiting_log(paper_robot, orbit, 50, SECOND)
     log.orbit_velocity[7] = np.nan
@@ -88,21 +97,18 @@ def test_the_frames_are_the_logs_rows(paper_robot: Robot) -> None:
     assert frames.sun is not None
     np.testing.assert_allclose(frames.sun, orbit.sun, atol=1e-14)
     assert not frames.is_dark.any()
-
-
-@pytest.mark.parametrize("row", [0, 5])
-@pytest.mark.parametrize("numbers", [(0.0, 0.0, 0.0), (1e6, 0.0, 0.0), (1e300, 0.0, 0.0)])
-def test_numbers_of_no_orbit(paper_robot: Robot, row: int, numbers: tuple[float, ...]) -> None:
-    log = orbiting_log(paper_robot, CircularOrbit(), 10, SECOND)
-    log.orbit_position[row] = numbers
-    assert OrbitFrames.of(log, log.time) is None
-    fallen = orbiting_log(paper_robot, CircularOrbit(), 10, SECOND)
-    fallen.orbit_velocity[row] = 0.0
-    assert OrbitFrames.of(fallen, fallen.time) is None
-    fallen.orbit_velocity[:] = np.nan
-    assert OrbitFrames.of(fallen, fallen.time) is None
+    for column, numbers in (
+        (log.orbit_position, [(0.0, 0.0, 0.0), (1e6, 0.0, 0.0), (1e300, 0.0, 0.0)]),
+        (log.orbit_velocity, [(0.0, 0.0, 0.0)]),
+    ):
+        for wrong in numbers:
+            before = column[5].copy()
+            column[5] = wrong
+            assert OrbitFrames.of(log, log.time) is None
+            column[5] = before
+    log.orbit_velocity[:] = np.nan
     plain = moving_log(paper_robot, 10)
-    assert OrbitFrames.of(plain, plain.time) is None
+    assert OrbitFrames.of(log, log.time) is OrbitFrames.of(plain, plain.time) is None
     assert shadow_intervals(plain) == []
 
 
@@ -168,109 +174,146 @@ def limb(triangles: Array, eye: Array) -> Array:
 def test_the_limb_is_where_it_is_in_orbit(
     height: float, inclination: float, start: float, part: float
 ) -> None:
-    """``asin(R / r)`` from nadir, all around, wherever the robot is in its flight."""
+    """``asin(R / r)`` from nadir, all around, wherever the robot is; the haze is seen beyond."""
     orbit = CircularOrbit(10.0**height, inclination, start)
     frames = frames_of(orbit, np.linspace(0.0, part * 2.0 * np.pi / orbit.rate, 40))
-    earth = EarthFile(earth_glb(frames, 1e-3, ON_DARK_PAGE))
-    assert earth.radius == pytest.approx(1e-3 * EARTH_RADIUS)
+    earth = Earth.of(earth_glb(frames, 1e-3, ON_DARK_PAGE))
+    np.testing.assert_allclose(norm(earth.vertices, axis=1), 1e-3 * EARTH_RADIUS, rtol=1e-6)
+    expected = np.arcsin(EARTH_RADIUS / orbit.radius)
     for k in (0, 17, 39):
-        seen = limb(earth.faces, 1e-3 * frames.position[k])
-        expected = np.arcsin(EARTH_RADIUS / orbit.radius)
+        seen = limb(earth.ground, 1e-3 * frames.position[k])
         assert np.all(seen < expected + 1e-6)
         assert np.all(seen > expected - (CLOSE if part < 0.1 else 4.0 * CLOSE))
-
-
-def test_the_ground_is_seen_from_outside_and_the_haze_only_beyond_the_limb() -> None:
-    frames = frames_of(CircularOrbit(), np.array([0.0, 20.0]))
-    earth = EarthFile(earth_glb(frames, 1.0, ON_DARK_PAGE))
-    for triangles, side in ((earth.faces, 1.0), (earth.haze, -1.0)):
+    for triangles, side in ((earth.ground, 1.0), (earth.haze, -1.0)):
         a, b, c = triangles.transpose(1, 0, 2)
         normals = np.cross(b - a, c - a)
         area = norm(normals, axis=1)
-        outwards = np.sum(normals * (a + b + c), axis=1)
         real = area > 1e-9 * area.max()  # not those at the pole
-        assert np.all(side * outwards[real] > 0.0)
-    nadir, eye = -frames.up[0], frames.position[0]
-    a, b, c = earth.haze.transpose(1, 0, 2)
-    facing = np.sum(np.cross(b - a, c - a) * (eye - a), axis=1) > 0.0
-    rays = earth.haze[facing].reshape(-1, 3) - eye
-    angle = np.arccos(rays @ nadir / norm(rays, axis=1))
-    distance, limb_at = norm(rays, axis=1), np.arcsin(EARTH_RADIUS / norm(eye))
-    inside = angle < limb_at
-    along, off = norm(eye) * np.cos(angle[inside]), norm(eye) * np.sin(angle[inside])
-    ground_at = along - np.sqrt(EARTH_RADIUS**2 - off**2)
-    assert np.all(distance[inside] > ground_at)  # the ground hides it
-    assert angle.max() > limb_at + np.radians(0.5)
+        assert np.all(side * np.sum(normals * (a + b + c), axis=1)[real] > 0.0)
+    assert norm(earth.haze, axis=2).min() > 1e-3 * EARTH_RADIUS
+    assert np.all(limb(earth.haze, 1e-3 * frames.position[0]) > expected)
 
 
 def test_day_is_where_the_sun_is_and_circles_are_of_right_ascension_and_declination() -> None:
     """In linear colours that no light changes."""
     orbit = CircularOrbit(beta=0.2)
     whole = np.linspace(0.0, 2.0 * np.pi / orbit.rate, 60)
-    earth = EarthFile(earth_glb(frames_of(orbit, whole), 1.0, GRAY))
+    data = earth_glb(frames_of(orbit, whole), 1.0, GRAY)
+    assert b"KHR_materials_unlit" in data
+    earth = Earth.of(data)
     height = earth.vertices @ orbit.sun / EARTH_RADIUS
     assert np.all(earth.colours[height < -0.1] == 0.0)
     assert np.all(earth.colours[height > 0.3] > 0.3)
     assert np.all(np.diff(earth.colours[np.argsort(height)]) > -1e-3)  # lighter towards the Sun
-    assert earth.document["materials"] == [{"extensions": {"KHR_materials_unlit": {}}}]
     half = GRAY._replace(ground=((188,) * 3, (188,) * 3))
-    unknown = EarthFile(earth_glb(frames_of(orbit, whole, has_sun=False), 1.0, half))
+    unknown = Earth.of(earth_glb(frames_of(orbit, whole, has_sun=False), 1.0, half))
     np.testing.assert_allclose(unknown.colours, 0.5, atol=0.005)  # of the light: 188 of 255 in CSS
-    x, y, z = earth.lines.reshape(-1, 3).T
+    x, y, z = earth.circles.T
     for_each = np.degrees([np.arcsin(z / np.sqrt(x * x + y * y + z * z)), np.arctan2(y, x)])
     off = np.abs(for_each - 10.0 * np.round(for_each / 10.0))
     assert np.all(off.min(axis=0) < 1e-3)
-    assert len(earth.lines) > 30
+    assert len(earth.circles) > 60
 
 
-class FakeScene:
-    """Keeps the nodes that are added."""
-
-    def __init__(self) -> None:
-        self.nodes: dict[str, Any] = {}
-
-    def add_frame(self, path: str, **_: object) -> Any:
-        self.nodes[path] = SimpleNamespace(position=np.zeros(3), wxyz=np.array([1.0, 0, 0, 0]))
-        return self.nodes[path]
-
-    def add_label(self, path: str, text: str, position: tuple[float, ...]) -> None:
-        self.nodes[path] = SimpleNamespace(text=text, position=position)
-
-    def add_glb(self, path: str, data: bytes, **options: Any) -> Any:
-        self.nodes[path] = SimpleNamespace(position=np.zeros(3), options=options)
-        return self.nodes[path]
+def test_arrows_are_turned_from_z() -> None:
+    directions = np.random.default_rng(1).normal(size=(50, 3))
+    directions[:2] = [0.0, 0.0, -1.0], [0.0, 0.0, 1.0]
+    directions /= norm(directions, axis=1, keepdims=True)
+    turns = Rotation.from_quat(turns_from_z(directions), scalar_first=True)
+    np.testing.assert_allclose(turns.apply([0.0, 0.0, 1.0]), directions, atol=1e-12)
 
 
-def test_the_earth_moves_as_the_robot_flies_and_throws_no_shadow() -> None:
-    orbit = CircularOrbit(20e6)
-    shown: Any = FakeScene()
-    frames = frames_of(orbit, np.linspace(0.0, 600.0, 50))
-    middle = np.array([1.0, -2.0, 3.0])
-    earth = Earth(shown, frames, middle, 15e3, True)
-    assert shown.nodes["/earth"].options == {"cast_shadow": False, "receive_shadow": False}
-    for k in (0, 20, 49):
-        earth.move(frames.position[k])
-        offset = np.asarray(earth.node.position) - middle
-        assert norm(offset) == pytest.approx(15e3, rel=1e-5)
-        np.testing.assert_allclose(offset / norm(offset), -frames.up[k], atol=2e-6)
+@pytest.fixture(scope="module")
+def log(paper_robot: Robot) -> FlightLog:
+    """A flight of 20 s that enters the shadow between two ticks; its base moves."""
+    log = orbiting_log(paper_robot, EVENING, 41, SECOND // 2)
+    log.base_position[:] = 0.01 * log.time[:, np.newaxis] * [1.0, 2.0, 3.0]
+    log.magnetic_field[:] = [1e-5, 2e-5, 3e-5]
+    log.external_torques[:, :3], log.external_torques[:, 9:] = [1e-3, 0.0, 0.0], [0.0, 0.0, 2e-6]
+    return log
 
 
-@given(st.lists(st.one_of(DIRECTIONS, st.just((0.0, 0.0, -1.0))), min_size=3, max_size=3))
-def test_arrows_stand_at_the_base_point_to_their_directions_and_have_labels(
-    vectors: list[tuple[float, ...]],
+@pytest.fixture(scope="module")
+def page(paper_robot: Robot, log: FlightLog) -> str:
+    return page_of(paper_robot, one=log)
+
+
+def test_the_earth_and_the_arrows_are_where_they_are_in_orbit(page: str, log: FlightLog) -> None:
+    scene = Scene(page)
+    up = log.orbit_position / norm(log.orbit_position, axis=1, keepdims=True)
+    ahead = log.orbit_velocity / norm(log.orbit_velocity, axis=1, keepdims=True)
+    for row in (0, 1, 20, 40):
+        poses = scene.poses(log.time[row] + 1e-6)
+        earth = poses["/earth"].position
+        assert np.degrees(np.arccos(-up[row] @ earth / norm(earth))) < 0.1
+        base = poses["/one/base_link"].position
+        for name, direction in zip(ARROWS, (-up[row], ahead[row], EVENING.sun), strict=True):
+            arrow = poses[f"/one/orbit/{name}/arrow"]
+            np.testing.assert_allclose(arrow.rotation[:, 2], direction, atol=1e-7)
+            np.testing.assert_allclose(arrow.position, base, atol=1e-8)
+    glbs = [message["props"] for _, message in scene.messages if message["type"] == "GlbMessage"]
+    assert len(glbs) == 4
+    assert not any(props["cast_shadow"] or props["receive_shadow"] for props in glbs)
+
+
+def test_legend_labels_and_the_shadow(page: str) -> None:
+    names = [name.replace("_", " ") for name in ARROWS]
+    assert re.findall(r'<span><i style="background: #\w+"></i>(.*?)</span>', page) == names
+    scene = Scene(page)
+    labels = {m["props"]["text"] for _, m in scene.messages if m["type"] == "LabelMessage"}
+    assert set(names) < labels
+    shadow = {"start": 10.0, "stop": None, "text": "in the Earth's shadow", "kind": "shadow"}
+    assert plot_data(page)["marks"] == [shadow]
+    ((time, intensity),) = [
+        (time, message["updates"]["intensity"])
+        for time, message in scene.messages
+        if message["type"] == "SceneNodeUpdateMessage" and message["name"] == "/lamp_0"
+    ]
+    assert time == pytest.approx(10.0)
+    assert intensity < 0.5
+
+
+def test_the_torques_by_source_and_the_magnetic_field_are_plotted(page: str) -> None:
+    """No air and no sunlight acted."""
+    plots = {plot["title"]: plot for plot in plot_data(page)["plots"]}
+    expected: dict[str, Any] = {
+        "gravity gradient torque": ("N m", [1e-3, 0.0, 0.0]),
+        "magnetic torque": ("N m", [0.0, 0.0, 2e-6]),
+        "magnetic field": ("T", [1e-5, 2e-5, 3e-5]),
+    }
+    shown = [title for title in plots if title.endswith(("torque", "field"))]
+    assert shown == ["base torque", *expected]
+    for title, (unit, largest) in expected.items():
+        series = plots[title]["series"]
+        assert [max(v for v in s["values"] if v is not None) for s in series] == largest
+        assert plots[title]["unit"] == unit
+
+
+def test_side_by_side_each_has_its_arrows_and_over_one_another_the_first(
+    paper_robot: Robot, log: FlightLog
 ) -> None:
-    position, velocity, sun = (np.array(v) for v in vectors)
-    sun /= norm(sun)
-    scene: Any = FakeScene()
-    arrows = BaseArrows(scene, "/one", ArrowSize(1.5, 4.0), arrow_kinds(True, True))
-    base = np.array([0.1, 0.2, 0.3])
-    arrows.move(base, arrow_directions(5e6 * position, 4e3 * velocity, sun))
-    np.testing.assert_array_equal(scene.nodes["/one/orbit"].position, base)
-    expected = {"nadir": -position / norm(position), "orbital_velocity": velocity / norm(velocity)}
-    for name, direction in {**expected, "Sun": sun}.items():
-        turn = Rotation.from_quat(scene.nodes[f"/one/orbit/{name}"].wxyz, scalar_first=True)
-        np.testing.assert_allclose(turn.apply(Z), direction, atol=1e-6)
-        label = scene.nodes[f"/one/orbit/{name}/label"]
-        assert label.text == name.replace("_", " ")
-        assert label.position[2] > 1.5
-    assert len(arrow_directions(position, velocity, None)) == 2
+    logs = {"plain": moving_log(paper_robot, 41, period_ns=SECOND // 2), "one": log, "two": log}
+    together = Scene(page_of(paper_robot, **logs)).names()
+    assert {name for name in together if name.endswith("orbit")} == {"/one/orbit"}
+    apart = Scene(page_of(paper_robot, ViewOptions(side_by_side=True), **logs))
+    assert {n for n in apart.names() if n.endswith("orbit")} == {"/one/orbit", "/two/orbit"}
+    poses = apart.poses(0.0)
+    track = log.orbit_velocity[0] / norm(log.orbit_velocity[0])
+    offset = poses["/two"].position - poses["/one"].position
+    assert offset @ track > 1.0
+    np.testing.assert_allclose(offset, (offset @ track) * track, atol=1e-9)
+
+
+def test_a_flight_without_orbit_and_gears_has_nothing_of_them(
+    paper_robot: Robot, log: FlightLog
+) -> None:
+    columns: dict[str, Any] = {name: np.empty((log.ticks, 0)) for name in ORBIT_WIDTHS}
+    page = page_of(paper_robot, one=replace(log, **columns))
+    scene = Scene(page)
+    assert not [n for n in scene.names() if "orbit" in n or n in ("/earth", "/sun")]
+    assert not {m["type"] for _, m in scene.messages} & {"GlbMessage", "SceneNodeUpdateMessage"}
+    titles = [plot["title"] for plot in plot_data(page)["plots"] if plot["shown"]]
+    errors = ["attitude error", "joints 1-3 error", "joints 4-6 error", "base drift"]
+    assert titles == [*errors, "base torque", "torque 1-3", "torque 4-6"]
+    assert "--shadow" not in page
+    assert 'id="arrows"' not in page

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from moving_logs import EARTH_RADIUS, CircularOrbit
 from numpy.typing import NDArray
+from scene_pages import EARTH_RADIUS, CircularOrbit
 
 from space_robot.flight.plan import FlightPlan, resolve
 from space_robot.view.base_surface import clearest_side
@@ -26,25 +27,16 @@ def random_points(seed: int, size: float) -> Array:
     return points
 
 
-class View(NamedTuple):
-    """What a camera sees of points: how far right and up, 1 at the edge, and how deep."""
-
-    right: Array
-    axes: Array
-    wide: Array
-    high: Array
-    depth: Array
-
-    @classmethod
-    def of(cls, camera: Any, up: Array, points: Array) -> View:
-        position, slope = np.array(camera.position), np.tan(0.5 * FIELD_OF_VIEW)
-        forward = np.array(camera.look_at) - position
-        forward /= np.linalg.norm(forward)
-        right = np.cross(forward, up)
-        right /= np.linalg.norm(right)
-        axes = np.array([right, np.cross(right, forward), forward])
-        x, y, depth = axes @ (points - position).T
-        return cls(right, axes, np.abs(x / depth / slope) / 1.1, np.abs(y / depth / slope), depth)
+def seen_by(camera: Any, up: Array, points: Array) -> tuple[Array, Array]:
+    """Right, up and ahead of the camera; how far aside, 1 at the edge, and how deep points are."""
+    position, slope = np.array(camera.position), np.tan(0.5 * FIELD_OF_VIEW)
+    forward = np.array(camera.look_at) - position
+    forward /= np.linalg.norm(forward)
+    right = np.cross(forward, up)
+    right /= np.linalg.norm(right)
+    axes = np.array([right, np.cross(right, forward), forward])
+    x, y, depth = axes @ (points - position).T
+    return axes, np.array([np.abs(x / depth / slope) / 1.1, np.abs(y / depth / slope), depth])
 
 
 @settings(max_examples=10)
@@ -54,14 +46,13 @@ def test_the_camera_sees_every_point_and_no_more_than_it_must(seed: int, size: f
     with local_server() as server:
         set_stage(server, points, dark=False)
         camera = server.initial_camera
-        view = View.of(camera, np.array([0.0, 0.0, 1.0]), points)
-        back = np.array(camera.position) - np.array(camera.look_at)
+        _, (wide, high, depth) = seen_by(camera, np.array([0.0, 0.0, 1.0]), points)
         target, near, far = np.array(camera.look_at), camera.near, camera.far
+        back = np.array(camera.position) - target
     np.testing.assert_allclose(back / np.linalg.norm(back), DIRECTION / np.linalg.norm(DIRECTION))
     np.testing.assert_allclose(target, 0.5 * (points.min(axis=0) + points.max(axis=0)))
-    assert 0.7 < max(view.high.max(), view.wide.max()) < 1.0
-    assert 0.0 < near < view.depth.min()
-    assert view.depth.max() < far
+    assert 0.7 < max(high.max(), wide.max()) < 1.0
+    assert 0.0 < near < depth.min() <= depth.max() < far
 
 
 @settings(max_examples=10)
@@ -83,7 +74,7 @@ def test_in_orbit_the_camera_sees_every_point_and_the_earth_below(
         stage = set_stage(server, points, dark=False, horizon=Horizon.of(frames))
         camera, lamp = server.initial_camera, stage.lamp
         up, far = np.array(camera.up), camera.far
-        view = View.of(camera, up, points)
+        axes, (wide, high, depth) = seen_by(camera, up, points)
         np.testing.assert_allclose(np.array(camera.look_at), stage.middle)
         np.testing.assert_allclose(lamp.position, orbit.sun, atol=1e-12)
         bright = lamp.intensity
@@ -93,32 +84,29 @@ def test_in_orbit_the_camera_sees_every_point_and_the_earth_below(
         assert lamp.intensity == bright == LAMPS[0][1]
     local_up = orbit.position(now)[0] / orbit.radius
     np.testing.assert_allclose(up, local_up, atol=1e-12)
-    assert view.right @ orbit.velocity(now)[0] > 0.0  # it flies to the right
-    assert np.all(view.depth > 0.0)
-    assert max(view.high.max(), view.wide.max()) < 1.0
+    assert axes[0] @ orbit.velocity(now)[0] > 0.0  # it flies to the right
+    assert np.all(depth > 0.0)
+    assert max(high.max(), wide.max()) < 1.0
     # the limb, straight ahead, is in the lower half of the picture
-    ahead = np.cross(local_up, view.right)
+    ahead = np.cross(local_up, axes[0])
     dip = np.arccos(EARTH_RADIUS / orbit.radius)
     limb = np.cos(dip) * ahead - np.sin(dip) * local_up
-    _, high, depth = view.axes @ limb
-    assert -1.0 < high / depth / np.tan(0.5 * FIELD_OF_VIEW) < -0.2
+    _, above, away = axes @ limb
+    assert -1.0 < above / away / np.tan(0.5 * FIELD_OF_VIEW) < -0.2
     assert far > 2.0 * stage.earth_distance > 5000.0 * stage.size
 
 
-def test_the_base_does_not_hide_the_arm() -> None:
-    """Other robots are seen from the usual side."""
-    sides = {}
-    for name in ("paper", "canadarm", "canadarm2"):
-        scenario = resolve(FlightPlan(robot=name, controller="ctc"))
-        robot, waypoints = scenario.robots.plant, scenario.settings.mission.waypoints_deg
-        poses = np.radians(np.reshape(waypoints, (-1, robot.n)))
-        quaternions = np.tile([1.0, 0.0, 0.0, 0.0], (len(poses), 1))
-        sides[name] = clearest_side([(robot, quaternions, poses)])
-    np.testing.assert_array_equal(sides["paper"], SIDES[0])
-    np.testing.assert_array_equal(sides["canadarm2"], SIDES[0])
-    assert sides["canadarm"][2] < 0.0, "the arm is on the other side of the Orbiter's z axis"
+@pytest.mark.parametrize(("name", "side"), [("paper", 1.0), ("canadarm", -1.0), ("canadarm2", 1.0)])
+def test_the_base_does_not_hide_the_arm(name: str, side: float) -> None:
+    """It is on the other side of the Orbiter's z axis."""
+    scenario = resolve(FlightPlan(robot=name, controller="ctc"))
+    robot, waypoints = scenario.robots.plant, scenario.settings.mission.waypoints_deg
+    poses = np.radians(np.reshape(waypoints, (-1, robot.n)))
+    found = clearest_side([(robot, np.tile([1.0, 0.0, 0.0, 0.0], (len(poses), 1)), poses)])
+    assert np.array_equal(found, SIDES[0]) is (side > 0.0)
     with local_server() as server:
-        set_stage(server, random_points(1, 2.0), dark=True, side=sides["canadarm"])
+        set_stage(server, random_points(1, 2.0), dark=True, side=found)
         camera = server.initial_camera
         back = np.array(camera.position) - np.array(camera.look_at)
-    assert np.array_equal(np.sign(back), np.sign(DIRECTION * sides["canadarm"]))
+    assert np.array_equal(np.sign(back), np.sign(DIRECTION * found))
+    assert np.sign(found[2]) == side

@@ -7,10 +7,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from moving_logs import moving_log
 from numpy.typing import NDArray
 from robots import circular_orbit, meeting_target, target_of
-from scene_pages import Scene, page_of
+from scene_pages import Scene, moving_log, page_of
 from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
@@ -28,11 +27,6 @@ Array = NDArray[np.float64]
 TICK_S, TICKS = 0.1, 41
 
 
-def rotations(quaternions: Array) -> Array:
-    axes: Array = Rotation.from_quat(quaternions, scalar_first=True).as_matrix()
-    return axes
-
-
 def capture(relative_to: str, velocity: list[float], rate: list[float]) -> Capture:
     content = {
         "name": "box",
@@ -44,23 +38,17 @@ def capture(relative_to: str, velocity: list[float], rate: list[float]) -> Captu
     return Capture(0.0051, Target.from_dict({"target": content}))
 
 
+def rotations(quaternions: Array) -> Array:
+    axes: Array = Rotation.from_quat(quaternions, scalar_first=True).as_matrix()
+    return axes
+
+
 STILL = capture("tool", [0.0] * 3, [0.0] * 3)
 """Counts from tick 11: row 8 of a log from tick 3."""
 
 
-def test_what_stands_still_in_the_hand_is_in_it_a_tick_before(paper_robot: Robot) -> None:
-    log = moving_log(paper_robot, 12, first_tick=3)
-    body = before_capture(STILL, log, paper_robot)
-    assert body is not None
-    positions, axes = held_poses(Grasp.of(paper_robot, STILL.target), log, paper_robot)
-    shown, quaternions = body.poses(np.array([-log.timebase.period, 0.0]))
-    np.testing.assert_allclose(shown, positions[7:9], atol=1e-9)
-    np.testing.assert_allclose(rotations(quaternions)[1], axes[8], atol=1e-7)
-    turned = Rotation.from_matrix(axes[8] @ axes[7].T).as_rotvec() / log.timebase.period
-    np.testing.assert_allclose(body.angular_velocity, turned)
-
-
 def test_what_moves_in_the_tools_axes_and_in_inertial_ones(paper_robot: Robot) -> None:
+    """What stands still in the hand turns as the hand; where no row is known nothing is."""
     turned = Rotation.from_rotvec([0.3, -0.5, 0.8]).as_matrix()
     robot = replace(paper_robot, tools=(replace(paper_robot.tool, rotation=turned),))
     log = moving_log(robot, 12, first_tick=3)
@@ -70,22 +58,21 @@ def test_what_moves_in_the_tools_axes_and_in_inertial_ones(paper_robot: Robot) -
     assert still
     assert moved
     assert inertial
+    positions, axes = held_poses(Grasp.of(robot, STILL.target), log, robot)
+    shown, _ = still.poses(np.array([-log.timebase.period, 0.0]))
+    np.testing.assert_allclose(shown, positions[7:9], atol=1e-9)
+    hand = Rotation.from_matrix(axes[8] @ axes[7].T).as_rotvec() / log.timebase.period
+    np.testing.assert_allclose(still.angular_velocity, hand)
     np.testing.assert_array_equal(inertial.velocity, velocity)
     np.testing.assert_array_equal(inertial.angular_velocity, rate)
     tool = still.rotation @ turned
     np.testing.assert_allclose(moved.velocity - still.velocity, tool @ velocity, atol=1e-9)
     added = moved.angular_velocity - still.angular_velocity
     np.testing.assert_allclose(added, tool @ rate, atol=1e-9)
-
-
-def test_what_the_bag_does_not_know(paper_robot: Robot) -> None:
-    event = capture("inertial", [0.0] * 3, [0.0] * 3)
-    for ticks, first_tick in ((8, 3), (12, 11), (12, 30)):
-        log = moving_log(paper_robot, ticks, first_tick)
-        assert before_capture(event, log, paper_robot) is None
-    log = moving_log(paper_robot, 12, 3)
     log.joint_positions[7] = np.nan
-    assert before_capture(event, log, paper_robot) is None
+    unknown = [(8, 3), (12, 11), (12, 30)]
+    for part in (log, *(moving_log(robot, ticks, first) for ticks, first in unknown)):
+        assert before_capture(STILL, part, robot) is None
 
 
 def still_log(robot: Robot) -> FlightLog:
@@ -174,23 +161,23 @@ def test_a_target_on_an_orbit_falls_as_the_plant_has_it(
     monkeypatch.setattr(drawing, "_as_met", lambda event, log: met)
     scene = scene_of(log, paper_robot, monkeypatch, Capture(3.0, target))
 
-    def shown(time: float, name: str = "/one/free_target_0/box") -> Any:
-        return scene.poses(time + 1e-3)[name]
+    def box(time: float) -> Any:
+        return scene.poses(time + 1e-3)["/one/free_target_0/box"]
 
-    for time in (0.0, 1.0, 2.9):
+    def rate(start: Array, end: Array) -> Array:
+        return Rotation.from_matrix(end @ start.T).as_rotvec() / TICK_S
+
+    for time in (0.0, 1.0, 2.8):
         truth = meet(target, orbit, time)
-        np.testing.assert_allclose(shown(time).position, truth.position, atol=1e-6)
-        if time < 2.9:
-            turned = shown(time + 0.1).rotation @ shown(time).rotation.T
-            rate = Rotation.from_matrix(turned).as_rotvec() / 0.1
-            np.testing.assert_allclose(rate, truth.motion.angular_velocity, atol=0.02)
+        np.testing.assert_allclose(box(time).position, truth.position, atol=1e-6)
+        found = rate(box(time).rotation, box(time + TICK_S).rotation)
+        np.testing.assert_allclose(found, truth.motion.angular_velocity, atol=0.02)
     held = [name for name in scene.names() if name.endswith("/target_0")]
     assert bool(held) is is_reached
     if met:
-        turned = shown(3.0, held[0]).rotation @ shown(2.9).rotation.T
-        rate = Rotation.from_matrix(turned).as_rotvec() / 0.1
-        np.testing.assert_allclose(rate, met.target.motion.angular_velocity, atol=0.02)
+        found = rate(box(2.9).rotation, scene.poses(3.0 + 1e-3)[held[0]].rotation)
+        np.testing.assert_allclose(found, met.target.motion.angular_velocity, atol=0.02)
     else:
-        first, last = (shown(time, "/one/free_target_0").rotation for time in (0.0, 4.0))
         axes = rotations(fall(target, orbit, np.array([0.0, 4.0]))[1])
-        np.testing.assert_allclose(last @ first.T, axes[1] @ axes[0].T, atol=1e-6)
+        turned = box(4.0).rotation @ box(0.0).rotation.T
+        np.testing.assert_allclose(turned, axes[1] @ axes[0].T, atol=1e-6)
