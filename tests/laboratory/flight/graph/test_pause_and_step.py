@@ -170,15 +170,17 @@ def test_segments_and_trajectories_are_followed_and_what_cannot_be_flown_is_refu
     assert moved.returncode == 0, moved.stderr
     flight.sim("step", "--ticks", "1530")
     planner = Planner(free_domain)
+    planner.publish(names[:4], np.zeros(4))
+    refused = "refused a trajectory: the trajectory lacks joint 'joint5'"
+    planner.until(lambda: refused in planner.monitor.modes.get("mission_node", ""), refused)
     for target, seconds in ((1.0, 2**31 - 1), (1e308, 1), (np.nan, 1), (3.0, 0)):
         planner.publish(names, np.full(6, target), seconds, nanosec=1)
-    planner.publish(names[:4], np.zeros(4))
     planner.publish(names[::-1], np.radians(planned)[::-1])
     flight.sim("resume")
     code, output, errors = flight.end()
     planner.close()
     assert code == 0, errors
-    assert "mission_node: refused a trajectory: the trajectory lacks joint 'joint5'" in errors
+    assert f"mission_node: {refused}" in errors
     assert not any(json.loads(output)["lost"].values())
     log = read_flight(flight.bag)
     joints, base = log.reference_joints, log.reference_base
