@@ -97,13 +97,18 @@ def step(ground: Ground, ticks: int) -> str:
 def test_killed_nodes_are_replaced_in_flight(start: Start, ground: Ground, tmp_path: Path) -> None:
     """Lockstep holds the plant while no controller or no mission is there; the next one takes over.
 
-    Another plant is flown without ado, from tick 0 again, with the same controller and mission.
+    Before, another plant was flown with the same controller and mission: time begins anew.
     """
     monitor = ground.monitor
-    recorder = start("recorder", bag=tmp_path / "bag")
     mission = start("mission", lead_ticks=200)
-    waits = {"reference_timeout": 60.0, "wait_for": wait_for("controller")}
+    waits = {"reference_timeout": 60.0, "wait_for": wait_for("controller", ["recorder_node"])}
     controller = start("controller", **waits)
+    plant = start("plant", ticks=200)
+    output, _ = plant.communicate(timeout=60)
+    assert plant.returncode == 0, output
+    assert "flew 0.1000 s" in output
+    recorder = start("recorder", bag=tmp_path / "bag")
+    waits["wait_for"] = wait_for("controller")
     listeners = {"wait_for": wait_for("plant"), "silence_timeout": 0.0}
     plant = start("plant", ticks=1_000, paused=True, **listeners)
     ground.until(lambda: monitor.modes.get("plant_node") == PAUSED, "a paused plant")
@@ -125,10 +130,6 @@ def test_killed_nodes_are_replaced_in_flight(start: Start, ground: Ground, tmp_p
     assert ended(recorder) == 0
     assert open_bag(tmp_path / "bag").counts()["/command"] == 701
     assert [law.name for law in read_flight(tmp_path / "bag").laws] == ["tde_stc", "ctc"]
-    plant = start("plant", ticks=200)
-    output, _ = plant.communicate(timeout=60)
-    assert plant.returncode == 0, output
-    assert "flew 0.1000 s" in output
 
 
 def test_law_and_gains_are_described_and_what_cannot_be_is_refused_with_its_reason(
