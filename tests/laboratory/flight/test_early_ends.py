@@ -10,6 +10,7 @@ import sys
 import time
 from collections import Counter
 from collections.abc import Callable
+from itertools import count
 from pathlib import Path
 
 import numpy as np
@@ -25,7 +26,7 @@ from space_robot.flight.ending import COMPLETE, DIVERGED, FAILED, UNANSWERED, En
 from space_robot.flight.plan import Flight
 from space_robot.flight.simulate import fly_blocks, simulate
 from space_robot.processes import memory
-from space_robot_control.laws import ControlLaw, LawGains, Signals, per_axis
+from space_robot_control.laws import Signals
 from space_robot_control.laws.checked import LawError
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.bag.flight_log import FlightLog
@@ -39,26 +40,8 @@ from space_robot_msgs_py.errors import (
     UnusableStateError,
 )
 
-AXES, PERIOD = 9, 5e-4
-
-
-class NoGains(LawGains):
-    none: np.ndarray = per_axis("nothing")
-
-
-class Failing(ControlLaw):
-    """Gives no torque, and fails at a tick."""
-
-    name = "failing"
-    gains_type = NoGains
-
-    def __init__(self, at: int, how: Callable[[], float]) -> None:
-        super().__init__({"none": np.zeros(AXES)}, 0.0005)
-        self.at, self.how, self.tick = at, how, -1
-
-    def force(self, signals: Signals) -> np.ndarray:
-        self.tick += 1
-        return np.full(AXES, self.how() if self.tick == self.at else 0.0)
+PERIOD = 5e-4
+AT = 130
 
 
 def fails() -> float:
@@ -66,9 +49,13 @@ def fails() -> float:
 
 
 def failing(how: Callable[[], float]) -> Flight:
-    flight = planned(duration=2.0)
-    flight.controller.law = Failing(130, how)
-    return flight
+    """A flight whose law gives no torque, and fails at its tick 130."""
+    tick = count()
+
+    def law(signals: Signals) -> np.ndarray:
+        return how() + 0.0 * signals.error if next(tick) == AT else 0.0 * signals.error
+
+    return planned(controller=law, swaps=[], duration=2.0)
 
 
 def singular() -> Flight:
