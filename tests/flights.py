@@ -8,18 +8,20 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, redirect_stderr, redirect_stdout
+from contextlib import contextmanager, redirect_stderr, redirect_stdout, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import pytest
-from forked import SPACE_ROBOT, Forked
+from forked import END_S, SPACE_ROBOT, Forked
 
 from space_robot_msgs_py.ros.locks import nodes_in
 from space_robot_msgs_py.ros.process_environment import DEFAULTS
 
 if TYPE_CHECKING:
+    import psutil
+
     from space_robot.flight.plan import Flight
     from space_robot_msgs_py.bag.flight_log import FlightLog
 
@@ -115,6 +117,45 @@ def wait_for_nodes(domain: int, timeout_s: float = 60.0) -> None:
     while not nodes_in(domain):
         assert time.monotonic() < until
         time.sleep(0.02)
+
+
+class PausedFlight:
+    """A ``fly --paused`` in a process of its own, as soon as its nodes are active."""
+
+    def __init__(self, bag: Path, domain: int, *options: str) -> None:
+        self.bag, self._where = bag, ("--domain", str(domain))
+        self.process = forked_space_robot(
+            "fly", "--paused", "--bag", str(bag), *self._where, *options
+        )
+        self._errors: list[str] = []
+        assert self.process.stderr
+        while not self._errors or "configured and active: " not in self._errors[-1]:
+            self._errors.append(self.process.stderr.readline())
+            assert self._errors[-1], self._errors
+
+    def sim(self, *words: str, code: int = 0) -> str:
+        """``space-robot sim``; what it says, in one line."""
+        ran = space_robot_here("sim", *words, *self._where)
+        assert ran.returncode == code, ran.stderr
+        (line,) = (ran.stderr or ran.stdout).splitlines()
+        return line
+
+    def nodes(self) -> dict[str, psutil.Process]:
+        """The processes of its nodes by name."""
+        import psutil
+
+        nodes = {}
+        for process in psutil.Process(self.process.pid).children(recursive=True):
+            with suppress(psutil.Error, IndexError):  # it has just ended
+                name = process.cmdline()[0]
+                if name.endswith(("_node", "composed")):
+                    nodes[name.removesuffix("_node")] = process
+        return nodes
+
+    def end(self) -> tuple[int, str, str]:
+        """Wait for its end; exit code and output."""
+        output, errors = self.process.communicate(END_S)
+        return self.process.returncode, output, "".join(self._errors) + errors
 
 
 @dataclass

@@ -87,7 +87,7 @@ NOT_RUN = {
     r"python docs/campaign_statistics.py": "a minute: test_verdicts.py compares its table",
     r"python docs/view_picture.py": "a browser: tests/laboratory/view has one",
     r"space-robot (sim|fly --paused)\b": "two terminals: test_pause_and_step.py flies and steps",
-    r"space-robot fly --without\b": "two terminals: test_own_nodes.py flies",
+    r"space-robot fly --without\b": "two terminals: test_others_in_the_domain.py flies",
     r"ROS_DOMAIN_ID=7 python examples": "two terminals: test_examples.py runs it",
     r"space-robot goto\b": "two terminals: test_pause_and_step.py flies and moves",
     r"space-robot analyze flights/tde_stc_case1_": "printed at a flight's end",

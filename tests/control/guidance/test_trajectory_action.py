@@ -31,6 +31,7 @@ from ground import Ground  # noqa: E402
 from rclpy.action import ActionClient  # noqa: E402
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint  # noqa: E402
 
+pytestmark = pytest.mark.docs  # to build the package takes longer than to fly
 Array = np.ndarray[Any, np.dtype[np.float64]]
 TIMEOUT_S = 60.0
 NAMES = find_robot("paper").joint_names

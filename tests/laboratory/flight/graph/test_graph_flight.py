@@ -25,7 +25,6 @@ from space_robot.analysis import analyze
 from space_robot.flight.graph.launched import launched_parameters
 from space_robot_model.robot.find import find_robot
 from space_robot_msgs_py import topics
-from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.bag.reader import read_flight
 from space_robot_msgs_py.config.settings import leaves
 from space_robot_msgs_py.wire.definitions import jazzy
@@ -44,20 +43,12 @@ WORDS = (
 )
 AHEAD = {topics.REFERENCE_JOINTS.full_name, topics.REFERENCE_BASE.full_name}
 """The mission of a graph sends its reference beyond the flight's end."""
-OF_THE_CLOCK = ("latency", "unavailable")
 
 
 @pytest.fixture(scope="module")
 def graph(fly: Callable[..., Flown]) -> Flown:
     """A flight of four processes with sensors, swaps, and faults of drives and messages."""
     return fly(*WORDS)
-
-
-@pytest.fixture(scope="module")
-def here(tmp_path_factory: pytest.TempPathFactory) -> tuple[FlightLog, Path]:
-    bag = tmp_path_factory.mktemp("here") / "bag"
-    options = {"case": "3", "sensors": "fine", "seed": 5, "duration": 0.3}
-    return simulated(bag, **options, swaps=SWAPS, faults=FAULTS), bag
 
 
 def messages_by_topic(bag: Path) -> dict[str, list[bytes]]:
@@ -67,24 +58,21 @@ def messages_by_topic(bag: Path) -> dict[str, list[bytes]]:
     return found
 
 
-def test_the_graph_sends_what_one_process_sends(graph: Flown, here: tuple[FlightLog, Path]) -> None:
+def test_the_graph_sends_and_reports_what_one_process_does(graph: Flown, tmp_path: Path) -> None:
     """Byte by byte: states, the truth, commands, telemetry, laws, transforms and clock."""
-    theirs, own = messages_by_topic(graph.bag), messages_by_topic(here[1])
+    options = {"case": "3", "sensors": "fine", "seed": 5, "duration": 0.3}
+    log = simulated(tmp_path / "bag", **options, swaps=SWAPS, faults=FAULTS)
+    theirs, own = messages_by_topic(graph.bag), messages_by_topic(tmp_path / "bag")
     assert own.keys() == theirs.keys()
     for topic in own.keys() - AHEAD:
         assert own[topic] == theirs[topic], topic
-
-
-def test_its_report_is_that_of_the_flight_and_of_the_bag(
-    graph: Flown, here: tuple[FlightLog, Path]
-) -> None:
-    ours, theirs = json.loads(json.dumps(analyze(here[0]))), graph.bag_report
+    ours, reported = json.loads(json.dumps(analyze(log))), graph.bag_report
     result = space_robot_here("analyze", str(graph.bag), "--json")
-    assert json.loads(result.stdout) == theirs
-    for report in (ours, theirs):
-        for key in OF_THE_CLOCK:
+    assert json.loads(result.stdout) == reported
+    for report in (ours, reported):
+        for key in ("latency", "unavailable"):  # of the clock
             report.pop(key)
-    assert ours == theirs
+    assert ours == reported
 
 
 def test_the_report_tells_of_all_nodes_and_nothing_is_lost(graph: Flown) -> None:
@@ -126,55 +114,30 @@ def test_commands_answer_the_state_of_their_stamp_and_are_sent_after_it(graph: F
 
 
 def test_by_the_wall_clock_every_tick_is_flown(fly: Callable[..., Flown]) -> None:
-    flown = fly("--duration", "0.5", "--realtime")
+    """Here by nodes in one process, into a bag of several files."""
+    words = ("--composed", "--compression", "zstd", "--split-size", "66K")
+    flown = fly("--duration", "0.5", "--realtime", *words)
+    assert len(list(flown.bag.glob("*.mcap"))) > 1
     assert flown.report["ticks"] == 1000
     assert not any(flown.report["lost"].values())
     assert 0 <= flown.report["unanswered_ticks"] < 1000
-    assert flown.report["rms"]["mean_axis"]["attitude"] < 1e-3
 
 
-@pytest.fixture(scope="module")
-def files(tmp_path_factory: pytest.TempPathFactory) -> tuple[str, str]:
-    """The paper's robot with gears, and the wheels with rotors that are heavier by a tenth."""
-    folder = tmp_path_factory.mktemp("files")
-    robot, wheels = folder / "geared.yaml", folder / "heavier.yaml"
+def test_launched_nodes_get_files_of_their_own(tmp_path: Path) -> None:
+    """Here of the paper's robot with gears, and of wheels with rotors that are heavier."""
+    robot, wheels = tmp_path / "geared.yaml", tmp_path / "heavier.yaml"
     robot.write_text(yaml.safe_dump(driven_paper()), "utf-8")
     content = yaml.safe_load((CONFIG / "actuators" / "wheels.yaml").read_text("utf-8"))
     of_wheels = content["plant_node"]["ros__parameters"]["wheels"]
     of_wheels["rotor_inertia"] = [1.1 * value for value in of_wheels["rotor_inertia"]]
     wheels.write_text(yaml.safe_dump(content), "utf-8")
-    return str(robot), str(wheels)
-
-
-def test_the_plant_of_a_composed_graph_is_that_of_the_options(
-    fly: Callable[..., Flown], files: tuple[str, str]
-) -> None:
-    """With gears and wheels, which the controller knows otherwise, a latency, a bag in parts: as
-    `simulate` flies it, to the bit."""
-    robot, wheels = files
-    given = {"plant_robot": robot, "actuators": "wheels", "assumed_actuators": wheels}
-    given |= {"compression": "zstd", "split_size": "66K"}
-    words = [word for name, value in given.items() for word in (f"--{name}", value)]
-    words = [word.replace("_", "-") if word.startswith("--") else word for word in words]
-    flown = fly(*words, "--command-latency-ticks", "2", "--duration", "0.3", "--composed")
-    assert len(list(flown.bag.glob("*.mcap"))) > 1
-    log = read_flight(flown.bag)
-    expected = simulated(**given, command_latency_ticks=2, duration=0.3)
-    assert log.geared_names == expected.geared_names == ("joint2", "joint3", "joint5")
-    for name, column in expected.columns.items():
-        if name != "telemetry":  # a bag has that of some ticks
-            np.testing.assert_array_equal(getattr(log, name), column, name)
-    assert np.all(log.applied_torque[:3] == 0.0)
-
-
-def test_launched_nodes_get_files_of_their_own(tmp_path: Path, files: tuple[str, str]) -> None:
-    robot, wheels = files
-    flight = planned(plant_robot=robot, actuators="wheels", assumed_actuators=wheels, duration=0.2)
+    options = {"actuators": "wheels", "assumed_actuators": str(wheels), "duration": 0.2}
+    flight = planned(plant_robot=str(robot), **options)
     of_ros = {"mission": {"use_sim_time": True}}
     file = launched_parameters(flight, tmp_path / "bag", False, tmp_path, of_ros)
-    content = yaml.safe_load(file.read_text("utf-8"))
+    launched = yaml.safe_load(file.read_text("utf-8"))
     plant, controller, mission = (
-        content[f"/**/{node}_node"]["ros__parameters"]
+        launched[f"/**/{node}_node"]["ros__parameters"]
         for node in ("plant", "controller", "mission")
     )
     assert (plant["autostart"], mission["autostart"]) == (False, False)

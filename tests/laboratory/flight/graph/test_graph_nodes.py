@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import signal
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -16,11 +17,13 @@ from space_robot_model.robot import Robot
 from space_robot_model.robot.markers import RobotMarkers
 from space_robot_model.robot.poses import RobotPoses
 from space_robot_msgs_py import topics
+from space_robot_msgs_py.bag.folder import open_bag
 from space_robot_msgs_py.bag.reader import read_flight
 from space_robot_msgs_py.ros.process_environment import set_defaults
 from space_robot_msgs_py.samples import Timebase
 from space_robot_msgs_py.wire.clock import ClockCodec
 from space_robot_msgs_py.wire.markers import no_markers
+from space_robot_sim.plant.run_control import PAUSED
 
 set_defaults()
 rclpy = pytest.importorskip("rclpy")
@@ -28,6 +31,7 @@ rclpy = pytest.importorskip("rclpy")
 from rcl_interfaces.srv import DescribeParameters, SetParameters  # noqa: E402
 from rclpy.event_handler import SubscriptionEventCallbacks  # noqa: E402
 from rclpy.parameter import Parameter  # noqa: E402
+from std_srvs.srv import Trigger  # noqa: E402
 
 from space_robot_msgs_py.ros.endpoints import (  # noqa: E402
     PolledCallbackGroup,
@@ -82,43 +86,57 @@ def test_start_up_in_any_order(
         assert data.startswith(ours)
 
 
+def step(ground: Ground, ticks: int) -> str:
+    """Where a paused plant then stands."""
+    parameter = Parameter("step_ticks", value=ticks).to_parameter_msg()
+    request = SetParameters.Request(parameters=[parameter])
+    assert ground.call(SetParameters, "/plant_node/set_parameters", request).results[0].successful
+    return str(ground.call(Trigger, "/plant_node/step", Trigger.Request()).message)
+
+
 def test_killed_nodes_are_replaced_in_flight(start: Start, ground: Ground, tmp_path: Path) -> None:
     """Lockstep holds the plant while no controller or no mission is there; the next one takes over.
 
-    Another plant is flown without ado, from tick 0 again, with the same controller and mission.
+    Before, another plant was flown with the same controller and mission: time begins anew.
     """
     monitor = ground.monitor
-    recorder = start("recorder", bag=tmp_path / "bag")
-    mission = start("mission")
-    listeners = {"wait_for": "[recorder_node]", "silence_timeout": 0.0}
-    plant = start("plant", ticks=9_000, **listeners)
-    waits = {"reference_timeout": 60.0, "wait_for": wait_for("controller")}
+    mission = start("mission", lead_ticks=200)
+    waits = {"reference_timeout": 60.0, "wait_for": wait_for("controller", ["recorder_node"])}
     controller = start("controller", **waits)
-    ground.until(lambda: monitor.simulated_s > 0.2, "a flight")
+    plant = start("plant", ticks=200)
+    output, _ = plant.communicate(timeout=60)
+    assert plant.returncode == 0, output
+    assert "flew 0.1000 s" in output
+    recorder = start("recorder", bag=tmp_path / "bag")
+    waits["wait_for"] = wait_for("controller")
+    listeners = {"wait_for": wait_for("plant"), "silence_timeout": 0.0}
+    plant = start("plant", ticks=1_000, paused=True, **listeners)
+    ground.until(lambda: monitor.modes.get("plant_node") == PAUSED, "a paused plant")
+    assert step(ground, 100).startswith("stepped to tick 100")
     controller.kill()
     controller.wait()
     start("controller", controller="ctc", **waits)
-    stood_s = monitor.simulated_s
-    ground.until(lambda: monitor.simulated_s > stood_s + 0.5, "the next controller")
+    assert step(ground, 100).startswith("stepped to tick 200")
     mission.kill()
-    waiting = "waiting for the reference: no mission sends it"
-    ground.until(lambda: monitor.modes.get("controller_node") == waiting, "no mission")
-    mission = start("mission")
-    output, _ = plant.communicate(timeout=90)
-    assert plant.returncode == 0, output
+    mission.wait()
+    with ThreadPoolExecutor() as pool:
+        stepped = pool.submit(step, ground, 500)
+        waiting = "waiting for the reference: no mission sends it"
+        ground.until(lambda: monitor.modes.get("controller_node") == waiting, "no mission")
+        start("mission", lead_ticks=200)
+        assert stepped.result().startswith("stepped to tick 700")
+    assert ended(plant) == 0
     assert int(monitor.values["controller_node"]["references_held"]) == 0
     assert ended(recorder) == 0
-    assert read_flight(tmp_path / "bag").ticks == 9_000
-    for realtime in ("false", "true"):
-        plant = start("plant", ticks=200, realtime=realtime)
-        output, _ = plant.communicate(timeout=60)
-        assert plant.returncode == 0, output
-        assert "flew 0.1000 s" in output
+    assert open_bag(tmp_path / "bag").counts()["/command"] == 701
+    assert [law.name for law in read_flight(tmp_path / "bag").laws] == ["tde_stc", "ctc"]
 
 
-def test_law_and_gains_change_in_flight(start: Start, ground: Ground) -> None:
-    """By requests as those of `ros2 param`; what cannot be is refused with its reason."""
-    nodes = [start("mission"), start("controller"), start("plant")]
+def test_law_and_gains_are_described_and_what_cannot_be_is_refused_with_its_reason(
+    start: Start, ground: Ground
+) -> None:
+    """To requests as those of `ros2 param`."""
+    controller = start("controller")
 
     def change(name: str, value: object) -> tuple[bool, str]:
         request = SetParameters.Request()
@@ -148,7 +166,7 @@ def test_law_and_gains_change_in_flight(start: Start, ground: Ground) -> None:
         is_changed, reason = change(name, value)
         assert not is_changed
         assert said in reason
-    assert [ended(node) for node in reversed(nodes)] == [0, 0, 0]
+    assert ended(controller) == 0
 
 
 def test_a_late_listener_of_the_mission_is_told_what_is_needed(
@@ -184,37 +202,30 @@ def test_a_late_listener_of_the_mission_is_told_what_is_needed(
     assert not lost
 
 
-@pytest.mark.parametrize(
-    ("node", "parameters", "said"),
-    [
-        ("plant", {"case": 9}, "unknown case '9': choose one of 1, 2"),
-        ("plant", {"comand_latency_ticks": 1}, "unknown parameter 'comand_latency_ticks'"),
-        ("controller", {"tde_stc__k_1": "[1.0, 2.0]"}, "9 values (base x, y, z and the joints)"),
-        ("mission", {"waypoint_times": "[0.0]"}, "waypoints_deg has 18 values"),
-        ("recorder", {"bag": "/proc/no/bag"}, "no bag can be written there"),
-    ],
+BAD: tuple[tuple[str, dict[str, object], str], ...] = (
+    ("plant", {"comand_latency_ticks": 1}, "unknown parameter 'comand_latency_ticks'"),
+    ("controller", {"tde_stc__k_1": "[1.0, 2.0]"}, "9 values (base x, y, z and the joints)"),
+    ("mission", {"waypoint_times": "[0.0]"}, "waypoints_deg has 18 values"),
+    ("recorder", {"bag": "/proc/no/bag"}, "no bag can be written there"),
 )
-def test_node_refuses_bad_parameters(
-    start: Start, node: str, parameters: dict[str, object], said: str
+
+
+def test_bad_parameters_and_other_arguments_are_refused_and_help_is_a_few_lines(
+    start: Start,
 ) -> None:
-    process = start(node, **parameters)
-    output, _ = process.communicate(timeout=60)
-    assert process.returncode == 2
-    assert said in output
-    assert "recording to" not in output
-    assert "Traceback" not in output
-
-
-def test_help_is_a_few_lines_and_other_arguments_are_refused() -> None:
-    helped = {node: Forked(MODULES[node], ["--help"], ros_environment()) for node in MODULES}
-    refused = forked_space_robot("plant_node", "--case", "3", "--ros-args", "-p", "x:=1")
-    for node, process in helped.items():
-        output, _ = process.communicate(timeout=60)
-        assert process.returncode == 0, output
-        usage, *parameters = output.splitlines()
-        assert usage.startswith(f"usage: {node}_node [--ros-args")
-        assert "autostart, robot, period" in parameters[0]
-    _, errors = refused.communicate(timeout=60)
-    assert refused.returncode == 2
-    (line,) = errors.splitlines()
+    refused = {node: start(node, **parameters) for node, parameters, _ in BAD}
+    helped = Forked(MODULES["plant"], ["--help"], ros_environment())
+    typed = forked_space_robot("plant_node", "--case", "3", "--ros-args", "-p", "x:=1")
+    for node, _, said in BAD:
+        output, _ = refused[node].communicate(timeout=60)
+        assert refused[node].returncode == 2
+        assert said in output
+        assert "recording to" not in output
+        assert "Traceback" not in output
+    usage, *parameters = helped.communicate(timeout=60)[0].splitlines()
+    assert helped.returncode == 0
+    assert usage.startswith("usage: plant_node [--ros-args")
+    assert "autostart, robot, period" in parameters[0]
+    (line,) = typed.communicate(timeout=60)[1].splitlines()
+    assert typed.returncode == 2
     assert line.startswith("plant_node: error: unknown argument '--case'")

@@ -8,7 +8,6 @@ import shutil
 import signal
 import subprocess
 import sys
-import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -116,22 +115,6 @@ def test_bad_arguments_start_no_node(launch: Launch, word: str, said: str) -> No
     assert process.returncode == 1
     assert said in output
     assert "process started" not in output
-
-
-def test_a_signal_ends_it_with_a_whole_bag(launch: Launch, tmp_path: Path) -> None:
-    bag = tmp_path / "bag"
-    process = launch(f"bag:={bag}")
-    file, until = bag / "bag_0.mcap", time.monotonic() + 100.0
-    while not (file.exists() and file.stat().st_size > 500_000):
-        assert process.poll() is None
-        assert time.monotonic() < until
-        time.sleep(0.05)
-    process.send_signal(signal.SIGINT)
-    output, _ = process.communicate(timeout=60)
-    assert process.returncode == 1, output
-    log = read_flight(bag)
-    assert log.ticks > 100, output
-    assert not any(log.lost.values()), output
 
 
 def test_a_node_that_dies_ends_it_with_an_error(launch: Launch, tmp_path: Path) -> None:

@@ -1,21 +1,17 @@
-"""Flights where others are: free domains, one flight in each, namespaces, bags, refusals."""
+"""Flights where others are: free domains, namespaces, and nodes of the user's own."""
 
 from __future__ import annotations
 
 import json
-import shutil
 import socket
-import subprocess
-import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
-import yaml
 from flights import (
+    PausedFlight,
     forked_space_robot,
     planned,
     ros_environment,
@@ -23,7 +19,9 @@ from flights import (
     space_robot_here,
     wait_for_nodes,
 )
-from paths import CONFIG
+from forked import END_S, Forked
+from matrix.scenarios import difference
+from paths import ROOT
 
 from space_robot.analysis import analyze
 from space_robot.flight.bag_path import check_bag_path
@@ -42,77 +40,51 @@ pytest.importorskip("rclpy")
 
 FOREIGN = """
 import sys
+import time
 import rclpy
 from sensor_msgs.msg import JointState
 rclpy.init()
 node = rclpy.create_node("foreign")
 node.create_publisher(JointState, sys.argv[1], 10)
 print("ready", flush=True)
-sys.stdin.read()
+time.sleep(600)
 """
 
 
 @contextmanager
-def process(domain: int, *command: str) -> Iterator[subprocess.Popen[str]]:
-    """A process of others in a domain, until the context ends."""
-    with subprocess.Popen(
-        [sys.executable, *command],
-        stdin=subprocess.PIPE,
-        stdout=subprocess.PIPE,
-        text=True,
-        env={**ros_environment(), "ROS_DOMAIN_ID": str(domain)},
-    ) as it:
-        try:
-            yield it
-        finally:
-            it.kill()
-
-
-def refused(domain: int, bag: Path) -> str:
-    """Why a flight there is refused; nothing is left of it."""
-    result = space_robot_here(
-        "fly", "--duration", "0.2", "--domain", str(domain), "--bag", str(bag)
+def others(domain: int, *command: str) -> Iterator[Forked]:
+    """A process of others in a domain, until the context ends: a program, or a module's."""
+    environment = {**ros_environment(), "ROS_DOMAIN_ID": str(domain)}
+    it = (
+        Forked(command[0], command[1:], environment)
+        if command[0] in MODULES.values()
+        else Forked.of_command(command, environment)
     )
-    assert result.returncode == 2, result.stderr
-    assert "what was flown" not in result.stderr
-    assert not bag.exists()
-    return result.stderr
+    try:
+        yield it
+    finally:
+        it.kill()
+        it.communicate(END_S)
 
 
-def test_of_two_at_the_same_moment_one_flies(tmp_path: Path, free_domain: int) -> None:
-    bags = [tmp_path / "one", tmp_path / "two"]
-    flights = [
-        forked_space_robot(
-            "fly", "--duration", "0.2", "--domain", str(free_domain), "--bag", str(bag)
-        )
-        for bag in bags
-    ]
-    words = [flight.communicate(timeout=150)[1] for flight in flights]
-    codes = [flight.returncode for flight in flights]
-    assert sorted(codes) == [0, 2], words
-    flown = codes.index(0)
-    log = read_flight(bags[flown])
-    assert log.ticks == 400
-    assert not any(log.lost.values())
-    (line,) = words[1 - flown].splitlines()
-    pid = flights[flown].pid
-    assert f"ROS domain {free_domain} is taken by space-robot (pid {pid})" in line
-    assert not bags[1 - flown].exists()
-
-
-def test_beside_a_node_started_by_hand(tmp_path: Path, free_domain: int) -> None:
-    with process(free_domain, "-m", MODULES["mission"]) as node:
+def test_where_others_publish_or_nodes_are_no_flight_begins(
+    tmp_path: Path, free_domain: int
+) -> None:
+    foreign = tmp_path / "foreign.py"
+    foreign.write_text(FOREIGN)
+    words = ("--duration", "0.2", "--domain", str(free_domain), "--bag", str(tmp_path / "bag"))
+    with others(free_domain, str(foreign), "/command") as process:
+        assert process.stdout
+        assert process.stdout.readline() == "ready\n"
+        result = space_robot_here("fly", *words)
+        assert "/command is also published by /foreign" in result.stderr
+    with others(free_domain, MODULES["mission"]) as process:
         wait_for_nodes(free_domain)
-        (line,) = refused(free_domain, tmp_path / "bag").splitlines()
-        assert f"ROS domain {free_domain} is taken by mission_node (pid {node.pid})" in line
-
-
-def test_a_foreign_publisher_that_was_there_before(tmp_path: Path, free_domain: int) -> None:
-    with process(free_domain, "-c", FOREIGN, "/command") as foreign:
-        assert foreign.stdout
-        assert foreign.stdout.readline() == "ready\n"
-        words = refused(free_domain, tmp_path / "bag")
-    assert "/command is also published by /foreign" in words
+        taken = space_robot_here("fly", *words)
+    (line,) = taken.stderr.splitlines()
+    assert f"ROS domain {free_domain} is taken by mission_node (pid {process.pid})" in line
+    assert (result.returncode, taken.returncode) == (2, 2)
+    assert not (tmp_path / "bag").exists()
 
 
 def test_a_bag_that_another_flight_was_quicker_to_make_stays(
@@ -169,13 +141,12 @@ def test_a_taken_port_of_the_domain_is_somebody(
     assert is_quiet(alone)
 
 
-@pytest.mark.parametrize("port", [0, 12, 249])
 def test_a_domain_with_any_taken_port_is_not_free(
-    alone: int, port: int, monkeypatch: pytest.MonkeyPatch
+    alone: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A participant that outlives the first one of its flight has no port 10."""
     monkeypatch.setattr(domains, "DOMAINS", range(alone, alone + 1))
-    with taken(alone, port), pytest.raises(FlightError, match=f"between {alone} and"), ros_domain():
+    with taken(alone, 12), pytest.raises(FlightError, match=f"between {alone} and"), ros_domain():
         pass
     with ros_domain() as found:
         assert found == alone
@@ -197,33 +168,10 @@ def test_with_other_machines_nobody_knows(
 
 # Robots in namespaces
 
-PANEL = {
-    "name": "panel",
-    "parent": "base",
-    "mass": 8.0,
-    "inertia": [1.0, 0.5, 1.2, 0.0, 0.0, 0.0],
-    "com": [0.8, 0.0, 0.0],
-    "passive": {"stiffness": 30.0, "damping": 0.1},
-    "origin": {"xyz": [1.0, 0.0, 0.0]},
-}
-
-
-def with_a_panel(folder: Path) -> Path:
-    """The paper's robot, its mission and its gains, with a panel on a hinge without a motor."""
-    document = yaml.safe_load((CONFIG / "robots/paper.yaml").read_text("utf-8"))
-    document["robot"]["links"].append(PANEL)
-    shutil.copytree(CONFIG / "gains/paper", folder / "gains")
-    shutil.copyfile(CONFIG / "missions/paper.yaml", folder / "mission.yaml")
-    (folder / "robot.yaml").write_text(yaml.safe_dump(document))
-    return folder
-
 
 def test_two_robots_fly_at_once_and_each_as_simulated(tmp_path: Path, free_domain: int) -> None:
     """One of them composed; their bags hold the topics' full names, and are read and replayed."""
-    options: dict[str, dict[str, Any]] = {
-        "/sat1": {"controller": "ctc"},
-        "/fleet/sat2": {"robot": str(with_a_panel(tmp_path / "flexible"))},
-    }
+    options = {"/sat1": {"controller": "ctc"}, "/fleet/sat2": {"robot": "flexible_panels"}}
     bags = {namespace: tmp_path / namespace.replace("/", "_") for namespace in options}
     flights = {}
     for namespace, given in options.items():
@@ -231,7 +179,7 @@ def test_two_robots_fly_at_once_and_each_as_simulated(tmp_path: Path, free_domai
         where = ("--namespace", namespace, "--domain", str(free_domain))
         how = () if namespace == "/sat1" else ("--composed",)
         flights[namespace] = forked_space_robot(
-            *("fly", *where, *how, *words, "--duration", "0.2", "--json"),
+            *("fly", *where, *how, *words, "--duration", "0.1", "--json"),
             *("--bag", str(bags[namespace])),
         )
     told = {namespace: flight.communicate(timeout=300) for namespace, flight in flights.items()}
@@ -244,18 +192,16 @@ def test_two_robots_fly_at_once_and_each_as_simulated(tmp_path: Path, free_domai
         nodes = report["graph"]["nodes"]
         assert set(nodes) == {"recorder_node", "mission_node", "controller_node", "plant_node"}
         # on a busy machine a state that nobody answers is sent again
-        assert int(nodes["plant_node"][f"sent {namespace}/joint_states"]) >= 400
-        check_names(bags[namespace], namespace)
-        here, log = simulated(**options[namespace], duration=0.2), read_flight(bags[namespace])
-        for name, column in here.columns.items():
-            if name != "telemetry":  # a bag has that of some ticks
-                np.testing.assert_array_equal(getattr(log, name), column, name)
+        assert int(nodes["plant_node"][f"sent {namespace}/joint_states"]) >= 200
+        here, log = simulated(**options[namespace], duration=0.1), read_flight(bags[namespace])
+        check_names(bags[namespace], namespace, [*here.joint_names, *here.passive_names])
+        assert difference(log, here, {"telemetry"}) == ""
         assert log.laws == here.laws
     replayed = space_robot_here("replay", str(bags["/sat1"]), "--namespace", "sat1", "--json")
     assert replayed.returncode == 0, replayed.stderr  # each command equal to the last bit
 
 
-def check_names(bag: Path, namespace: str) -> None:
+def check_names(bag: Path, namespace: str, moving: Sequence[str]) -> None:
     """Of topics, of the node in its messages, of frames, and of joints, also without motors."""
     own = {topic.recorded.in_namespace(namespace): topic.recorded for topic in topics.RECORDED}
     assert open_bag(bag).topics() == {name: topic.type for name, topic in own.items()}
@@ -268,11 +214,10 @@ def check_names(bag: Path, namespace: str) -> None:
     prefix = namespace.lstrip("/")
     frames = [(t.header.frame_id, t.child_frame_id) for t in first[topics.TF].transforms]
     base = f"{prefix}/base_link"
-    assert frames[:2] == [("inertial", base), (base, f"{prefix}/link1")]
-    assert first[topics.TF_STATIC].transforms[0].child_frame_id == f"{prefix}/tool"
-    passive = ["panel"] if namespace == "/fleet/sat2" else []
-    names = [*(f"joint{i}" for i in range(1, 7)), *passive]
-    assert first[topics.JOINT_STATES].name == names
+    assert frames[0] == ("inertial", base)
+    assert all(f"{parent}/".startswith(f"{prefix}/") for parent, _ in frames[1:])
+    assert first[topics.TF_STATIC].transforms[0].child_frame_id.startswith(f"{prefix}/")
+    assert {*first[topics.JOINT_STATES].name} == {*moving}
 
 
 def test_one_namespace_has_one_robot(free_domain: int, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -291,3 +236,66 @@ def test_one_namespace_has_one_robot(free_domain: int, monkeypatch: pytest.Monke
     monkeypatch.delenv("ROS_DOMAIN_ID", raising=False)
     with ros_domain(namespace="/sat1") as first, ros_domain() as second:
         assert first != second
+
+
+# Nodes of the user's own
+
+OWN_CONTROLLER = str(ROOT / "examples/own_controller.py")
+
+
+def test_a_controller_and_a_mission_of_ones_own_fly(tmp_path: Path, free_domain: int) -> None:
+    """The metrics are those of the example's law to the printed digits."""
+    with others(free_domain, OWN_CONTROLLER) as own, others(free_domain, MODULES["mission"]):
+        options = ("--duration", "0.1", "--json")
+        result = space_robot_here(
+            *("fly", "--without", "controller", "--without", "mission", *options),
+            *("--domain", str(free_domain), "--bag", str(tmp_path / "bag")),
+        )
+        assert result.returncode == 0, result.stderr
+        printed, errors = own.communicate(timeout=60)
+    assert own.returncode == 0, errors
+    assert printed.startswith("200 states answered")
+    waits = "your controller (a node that publishes /command)"
+    for said in (waits, "your controller is /own_controller", "your mission is /mission_node"):
+        assert result.stderr.count(said) == 1
+    report = json.loads(result.stdout)
+    assert (report["controller"], report["ticks"]) == ("none", 200)
+    assert not any(report["lost"].values())
+    assert report["unanswered_ticks"] == 0
+    law = json.loads(space_robot_here("simulate", "--controller", "pd", *options).stdout)
+    for metric, values in law["rms"]["mean_axis"].items():
+        assert report["rms"]["mean_axis"][metric] == pytest.approx(values, rel=1e-5), metric
+    replayed = space_robot_here("replay", str(tmp_path / "bag"))
+    assert (replayed.returncode, "name the law" in replayed.stderr) == (2, True)
+
+
+def test_one_that_dies_in_flight_ends_it_as_a_killed_controller_does(
+    tmp_path: Path, free_domain: int
+) -> None:
+    """Here the controller of this project, started by hand."""
+    words = ("--without", "controller", "--set", "plant.silence_timeout=0.5", "--json")
+    with others(free_domain, MODULES["controller"]) as own:
+        wait_for_nodes(free_domain)
+        flight = PausedFlight(tmp_path / "bag", free_domain, *words)
+        flight.sim("step", "--ticks", "100")
+        flight.sim("resume")
+        own.kill()
+        code, output, errors = flight.end()
+    assert code == 1, errors
+    report = json.loads(output)
+    assert (report["controller"], report["outcome"]) == ("tde_stc", "failed")
+    assert "no command for 0.5 s (silence_timeout)" in report["reason"]
+    assert "the controller is silent" in errors
+    log = read_flight(flight.bag)
+    assert log.ticks > 100
+    assert not any(log.lost.values())
+
+
+def test_one_that_never_comes_ends_the_flight_in_time(tmp_path: Path, free_domain: int) -> None:
+    where = ("--domain", str(free_domain), "--join-timeout", "0.3")
+    for node, missing in (("controller", "good command"), ("mission", "reference")):
+        ended = space_robot_here("fly", "--without", node, *where, "--bag", str(tmp_path / node))
+        assert ended.returncode == 1
+        assert f"no {missing} for tick 0 within 0.3 s (join_timeout)" in ended.stderr
+        assert ("publishers of /command" in ended.stderr) == (node == "controller")
+    assert not (tmp_path / "controller").exists()
