@@ -66,8 +66,7 @@ def copied(bag: Path, copy: Path, keeps: Callable[[str, int], bool], **flight: A
     for name, data in open_bag(bag).messages(*topics.ALL):
         counts[name] += 1
         if keeps(name, counts[name]):
-            sender = b"participant 0001"
-            recorder.record(topics.BY_NAME[name], data, 1, sender, counts[name])
+            recorder.record(topics.BY_NAME[name], data, 1, counts[name])
     recorder.close()
     return Recording(copy)
 
