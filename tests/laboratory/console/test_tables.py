@@ -12,7 +12,8 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from hypothesis import given
+from flights import simulated
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from rich.table import Table as RichTable
 
@@ -34,8 +35,6 @@ from space_robot.console.tables import (
 )
 from space_robot.console.terminal import say, show, terminal
 from space_robot.console.terminal_tables import print_table
-from space_robot.flight.plan import Flight, FlightPlan, resolve
-from space_robot.flight.simulate import simulate
 from space_robot_control.laws import laws
 
 COLUMNS = Column("law", is_label=True), Column("error", "rad", ".2e"), Column("verdict")
@@ -120,9 +119,9 @@ def of_laws() -> Table:
     return Table.of("laws", columns, [[law, 0.997, "99.7 %", verdict, 1e-9, why] for law in LAWS])
 
 
-@pytest.mark.parametrize("width", [70, 80, 100])
-@pytest.mark.parametrize("table", [by_law(), of_laws()], ids=["by law", "of laws"])
-def test_no_number_and_no_word_of_a_label_is_broken(table: Table, width: int) -> None:
+@pytest.mark.parametrize("width", [70, 100])
+def test_no_number_and_no_word_of_a_label_is_broken(width: int) -> None:
+    table = of_laws()
     text = printed(table, width)
     words = text.split()
     for group in table.groups:
@@ -145,14 +144,6 @@ def test_a_table_that_is_too_wide_is_printed_in_parts_with_their_labels() -> Non
     assert printed(by_law(), 200).count("┏") == 1
 
 
-def test_a_cell_of_numbers_is_broken_only_if_the_table_is_too_wide() -> None:
-    columns = [Column("law", is_label=True), *(Column(f"n{k}") for k in range(4))]
-    table = Table.of("", columns, [["tde_stc", *(["0.97 < 1 holds"] * 4)]])
-    assert printed(table, 80).count("0.97 < 1 holds") == 4
-    assert printed(table, 70).count("0.97 < 1 holds") == 0
-    assert printed(table, 70).split().count("holds") == 4
-
-
 def test_a_path_is_folded_and_all_of_it_is_shown() -> None:
     path = "/".join(["a_folder"] * 20)
     table = Table.of("", [Column("file", is_label=True), Column("n")], [[path, "1.5"]])
@@ -164,6 +155,7 @@ def test_a_path_is_folded_and_all_of_it_is_shown() -> None:
 WORDS = st.text("abcdefgh_", min_size=1, max_size=LONGEST_WORD)
 
 
+@settings(max_examples=50)
 @given(
     st.lists(
         st.tuples(
@@ -183,11 +175,6 @@ def test_every_word_and_number_is_whole_on_any_width(
         assert f"{first:.17g}" in words
         assert f"{second}" in words
         assert all(word in words for word in label.split())
-
-
-@pytest.fixture(scope="module")
-def report() -> dict[str, Any]:
-    return analyze(simulate(Flight(resolve(FlightPlan(duration=0.05, case="2")))))
 
 
 def shown(width: int, *prints: Any) -> str:
@@ -214,6 +201,7 @@ def test_a_narrow_table_becomes_lines_that_name_each_number() -> None:
     ]
 
 
+@settings(max_examples=30)
 @given(st.text())
 def test_any_text_is_shown_as_it_is_and_never_as_control_letters(text: str) -> None:
     def table(console: Any) -> None:
@@ -230,7 +218,8 @@ def test_any_text_is_shown_as_it_is_and_never_as_control_letters(text: str) -> N
         assert f"<{text}>" in out
 
 
-def test_a_bag_that_does_not_say_what_flew_has_a_title_without_none(report: dict[str, Any]) -> None:
+def test_a_bag_that_does_not_say_what_flew_has_a_title_without_none() -> None:
+    report = analyze(simulated(duration=0.05, case="2"))
     unknown = dict.fromkeys(("controller", "case", "gains", "robot"))
     foreign = {**report, **unknown, "laws": []}
     text = shown(100, lambda console: print_table(rms_table(foreign), console))
@@ -266,10 +255,7 @@ def test_an_error_ends_the_watch() -> None:
     assert WATCHER not in {thread.name for thread in threading.enumerate()}
 
 
-WRITING = [errno.EPIPE, errno.ENOSPC, errno.EIO]
-
-
-@pytest.mark.parametrize("number", WRITING)
+@pytest.mark.parametrize("number", [errno.EPIPE, errno.ENOSPC, errno.EIO])
 def test_what_a_full_output_holds_goes_nowhere(
     number: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
