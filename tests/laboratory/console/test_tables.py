@@ -51,14 +51,12 @@ def table() -> Table:
     return Table("flights", COLUMNS, [Group(ROWS, "case 1", "light"), Group(ROWS[:1], "case 2")])
 
 
-def test_markdown_has_formatted_numbers_and_a_dash_where_there_is_none(table: Table) -> None:
+def test_markdown_has_formatted_numbers_and_csv_and_json_all_digits(table: Table) -> None:
+    """With a dash or nothing where there is none."""
     lines = as_markdown("all", [table]).splitlines()
     assert lines[:4] == ["# all", "", "## flights", ""]
     assert lines[4] == "| law | error, rad | verdict |"
     assert lines[6:8] == ["| tde_stc | 1.23e-04 | 1 < 2 holds |", "| <ctc> | - | fails |"]
-
-
-def test_csv_and_json_have_full_precision_and_every_row(table: Table) -> None:
     rows = list(csv.DictReader(io.StringIO(as_csv(table))))
     assert [row["error"] for row in rows] == ["0.000123456", "", "0.000123456"]
     records = as_records(table)
