@@ -151,6 +151,7 @@ def test_samples_of_long_missions_are_bounded(paper_robot: Robot) -> None:
         ({**LINE, "duration": 20}, "part 1 (tool)"),
         (TURN, "part 1 (base)"),
         ({**LINE, "duration": 20, "base": "free"}, ""),
+        ({"tool": {"xyz": [1.0, 0.3, 0.2], "frame": "base"}, "duration": 60}, ""),
         ({"joints_deg": [0, 80, 190, 20, 30, 10], "duration": 20}, ""),
     ],
 )
