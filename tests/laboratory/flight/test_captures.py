@@ -10,9 +10,6 @@ import numpy as np
 import pytest
 import yaml
 from flights import planned, simulated
-from numpy.typing import NDArray
-from oracles.momenta import momentum
-from oracles.orbit import centre_of_mass
 from paths import CONFIG
 from robots import held_place, meeting_target, target_of
 
@@ -27,9 +24,6 @@ from space_robot_msgs_py.bag.reader import read_flight
 from space_robot_msgs_py.errors import InputError
 from space_robot_sim.environment.orbit_settings import OrbitSettings
 from space_robot_sim.environment.target import Target
-from space_robot_sim.plant.surroundings import REPORT_TICKS
-
-Array = NDArray[np.float64]
 
 EVENTS = ["capture@0.1:tumbling_satellite", "release@0.2:0.05", "capture@0.2001:small_satellite"]
 PLAN: dict[str, Any] = {"actuators": "wheels", "duration": 0.3}
@@ -37,38 +31,6 @@ PLAN: dict[str, Any] = {"actuators": "wheels", "duration": 0.3}
 
 def flown(bag: Path | None = None, **options: Any) -> FlightLog:
     return simulate(planned(**{**PLAN, **options}), bag)
-
-
-def test_wheels_and_robot_together_get_what_the_torques_told_give() -> None:
-    """The angular momentum about the centre of mass grows by the integral of the four columns.
-
-    Those of air, light and field are held over a tick, that of gravity changes all the time.
-    """
-    orbit = {
-        "orbital_elements": {"height": 420e3, "inclination_deg": 51.6, "anomaly_deg": 30.0},
-        "atmosphere": {"density": 3e-12, "at_height": 420e3},
-        "sunlight": {"pressure": 4.56e-6},
-        "magnetism": {"strength": 2.98e-5, "residual_dipole": [1.0, -2.0, 3.0]},
-    }
-    ticks = 1201
-    flight = planned(**{**PLAN, "duration": 0.7}, orbit=orbit, sensors="fine")
-    log = simulate(flight)
-    robot, wheels = flight.plant.robot, flight.plant_settings.wheels
-
-    def about_com(tick: int) -> Array:
-        state = log.state(tick)
-        linear, angular = momentum(robot, state, wheels)
-        return np.asarray(angular - np.cross(centre_of_mass(robot, state), linear))
-
-    period = log.timebase.period
-    change = about_com(ticks - 1) - about_com(0)
-    gravity, *others = np.split(log.external_torques[:ticks], 4, axis=1)
-    impulses = [np.trapezoid(gravity[::REPORT_TICKS], dx=REPORT_TICKS * period, axis=0)]
-    impulses += [period * torque[: ticks - 1].sum(axis=0) for torque in others]
-    total = np.sum(impulses, axis=0)
-    for impulse in impulses:
-        assert np.linalg.norm(impulse) > 1e-3 * np.linalg.norm(total)
-    np.testing.assert_allclose(change, total, rtol=0, atol=1e-6 * np.linalg.norm(total))
 
 
 # Captures by the tool, wherever it is

@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 import pytest
 from flights import planned, simulated
-from numpy.typing import NDArray
 from oracles.momenta import momentum
 from robots import PASSIVE_ROBOT, geared_paper_arm
 from strategies import with_gears
@@ -30,8 +29,6 @@ from space_robot_model.robot.momentum import Motion, robot_momentum
 from space_robot_model.robot.tree import Encoder
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.bag.reader import read_flight
-
-Array = NDArray[np.float64]
 
 # Passive and prismatic joints
 
