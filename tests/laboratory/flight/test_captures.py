@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import shutil
 from pathlib import Path
 from typing import Any
@@ -10,15 +9,10 @@ from typing import Any
 import numpy as np
 import pytest
 import yaml
-from command import Run
-from flights import planned
-from numpy.typing import NDArray
-from oracles.momenta import momentum
-from oracles.orbit import centre_of_mass
+from flights import planned, simulated
 from paths import CONFIG
 from robots import held_place, meeting_target, target_of
 
-import space_robot as sr
 from space_robot.analysis import analyze
 from space_robot.analysis.described import captures_of
 from space_robot.analysis.figures.single_flight import control_results
@@ -28,12 +22,8 @@ from space_robot.flight.simulate import simulate
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.bag.reader import read_flight
 from space_robot_msgs_py.errors import InputError
-from space_robot_msgs_py.samples import ORBIT_FIELDS
 from space_robot_sim.environment.orbit_settings import OrbitSettings
 from space_robot_sim.environment.target import Target
-from space_robot_sim.plant.surroundings import REPORT_TICKS
-
-Array = NDArray[np.float64]
 
 EVENTS = ["capture@0.1:tumbling_satellite", "release@0.2:0.05", "capture@0.2001:small_satellite"]
 PLAN: dict[str, Any] = {"actuators": "wheels", "duration": 0.3}
@@ -41,52 +31,6 @@ PLAN: dict[str, Any] = {"actuators": "wheels", "duration": 0.3}
 
 def flown(bag: Path | None = None, **options: Any) -> FlightLog:
     return simulate(planned(**{**PLAN, **options}), bag)
-
-
-# In orbit
-
-
-def test_without_an_orbit_there_are_no_columns_of_one(tmp_path: Path) -> None:
-    log = flown(tmp_path / "bag", duration=0.01)
-    for name in ORBIT_FIELDS:
-        assert getattr(log, name).shape == (log.ticks, 0)
-        assert getattr(sr.load_bag(tmp_path / "bag"), name).shape == (log.ticks, 0)
-
-
-@pytest.mark.parametrize("sensors", ["ideal", "fine"])
-def test_wheels_and_robot_together_get_what_the_torques_told_give(sensors: str) -> None:
-    """The angular momentum about the centre of mass grows by the integral of the four columns.
-
-    Those of air, light and field are held over a tick, that of gravity changes all the time.
-    """
-    orbit = {
-        "orbital_elements": {"height": 420e3, "inclination_deg": 51.6, "anomaly_deg": 30.0},
-        "atmosphere": {"density": 3e-12, "at_height": 420e3},
-        "sunlight": {"pressure": 4.56e-6},
-        "magnetism": {"strength": 2.98e-5, "residual_dipole": [1.0, -2.0, 3.0]},
-    }
-    ticks = 1201
-    flight = planned(**{**PLAN, "duration": 0.7}, orbit=orbit, sensors=sensors)
-    log = simulate(flight)
-    robot, wheels = flight.plant.robot, flight.plant_settings.wheels
-
-    def about_com(tick: int) -> Array:
-        state = log.state(tick)
-        linear, angular = momentum(robot, state, wheels)
-        return np.asarray(angular - np.cross(centre_of_mass(robot, state), linear))
-
-    period = log.timebase.period
-    change = about_com(ticks - 1) - about_com(0)
-    gravity, *others = np.split(log.external_torques[:ticks], 4, axis=1)
-    impulses = [np.trapezoid(gravity[::REPORT_TICKS], dx=REPORT_TICKS * period, axis=0)]
-    impulses += [period * torque[: ticks - 1].sum(axis=0) for torque in others]
-    total = np.sum(impulses, axis=0)
-    for impulse in impulses:
-        assert np.linalg.norm(impulse) > 1e-3 * np.linalg.norm(total)
-    np.testing.assert_allclose(change, total, rtol=0, atol=1e-6 * np.linalg.norm(total))
-    travelled = np.linalg.norm(log.orbit_position[-1] - log.orbit_position[0])
-    speed = np.linalg.norm(log.orbit_velocity[0])
-    assert travelled == pytest.approx(speed * log.time[-1], rel=1e-6)
 
 
 # Captures by the tool, wherever it is
@@ -110,12 +54,8 @@ def test_the_analysis_counts_what_the_targets_bring(bag: tuple[Path, FlightLog])
         assert budget["drift"]["relative"] < 1e-11
         assert report["events"] == EVENTS
         assert f"events: {', '.join(EVENTS)}" in remarks(report)
-    upright = [
-        line
-        for line in control_results(bag[1], "").axes[0].get_lines()
-        if list(line.get_xdata()) in ([0.1, 0.1], [0.2, 0.2])
-    ]
-    assert len(upright) == 2
+    lines = control_results(bag[1], "").axes[0].get_lines()
+    assert sum(list(line.get_xdata()) in ([0.1, 0.1], [0.2, 0.2]) for line in lines) == 2
     del log.flight["events"]
     assert analyze(log)["momentum"]["drift"]["relative"] > 0.1
 
@@ -167,8 +107,6 @@ ORBIT = OrbitSettings.model_validate(
 """Nothing turns the robot from outside."""
 CAPTURE = 200
 """Tick."""
-MISS = 0.25
-"""m, of what is meant to be missed."""
 
 
 @pytest.fixture(scope="module")
@@ -195,19 +133,12 @@ def events_of(target: Target, distance: float = 0.0) -> list[str]:
     ]
 
 
-def assert_same_bits(found: FlightLog, expected: FlightLog) -> None:
-    for name, column in expected.columns.items():
-        assert found.columns[name].tobytes() == column.tobytes(), name
-
-
-def test_what_is_met_changes_the_flight_from_its_tick_on(
+def test_what_is_met_is_counted_by_the_analysis(
     without: FlightLog, target: Target, tmp_path: Path
 ) -> None:
-    """The analysis counts what the target brought: nothing else is left of the momentum."""
+    """Nothing else is left of the momentum."""
     log = flown(tmp_path / "bag", orbit=ORBIT, events=events_of(target))
-    assert_same_bits(log.rows(0, CAPTURE), without.rows(0, CAPTURE))
     assert np.abs(log.omega_base[CAPTURE] - without.omega_base[CAPTURE]).max() > 1e-3
-    np.testing.assert_array_equal(log.base_position[CAPTURE], without.base_position[CAPTURE])
     recorded = read_flight(tmp_path / "bag")
     for flight in (log, recorded):
         report = analyze(flight)
@@ -217,25 +148,21 @@ def test_what_is_met_changes_the_flight_from_its_tick_on(
         assert report["momentum"]["drift"]["relative"] < 1e-11
     faster = target.motion.model_copy(update={"velocity": [0.2, -0.1, 0.2]})
     recorded.flight["events"] = events_of(target.model_copy(update={"motion": faster}))
-    wrong = analyze(recorded)
-    assert wrong["missed_captures"] == {}
-    assert wrong["momentum"]["drift"]["relative"] > 1e-3
+    assert analyze(recorded)["momentum"]["drift"]["relative"] > 1e-3
 
 
 def test_what_is_missed_leaves_every_bit_and_is_reported(
     without: FlightLog, target: Target, tmp_path: Path
 ) -> None:
-    log = flown(tmp_path / "bag", orbit=ORBIT, events=events_of(target, MISS))
-    assert_same_bits(log, without)
-    recorded = read_flight(tmp_path / "bag")
-    assert not recorded.trusted
-    for flight in (log, recorded):
+    log = flown(tmp_path / "bag", orbit=ORBIT, events=events_of(target, 0.25))
+    for name, column in without.columns.items():
+        assert log.columns[name].tobytes() == column.tobytes(), name
+    for flight in (log, read_flight(tmp_path / "bag")):
         report = analyze(flight)
-        assert report["missed_captures"] == {"capture@0.1:drifter": pytest.approx(MISS, rel=1e-6)}
+        assert report["missed_captures"] == {"capture@0.1:drifter": pytest.approx(0.25, rel=1e-6)}
         assert (
             "capture@0.1:drifter did not happen: the target was 0.25 m from where the tool holds it"
         ) in remarks(report)
-        assert report["momentum"]["peak_n_m_s"]["outside"] == 0.0
     plain = analyze(without)
     assert plain["missed_captures"] is None
     same = ("rms", "maxima", "momentum", "pointing", "tool", "sizing")
@@ -245,45 +172,14 @@ def test_what_is_missed_leaves_every_bit_and_is_reported(
         for start, stop in zip((0, *cuts), (*cuts, log.ticks), strict=True):
             metric.add(log.rows(start, stop), np.empty(0))
         assert metric.result() == report["missed_captures"]
-    short = flown(orbit=ORBIT, events=events_of(target, MISS), duration=0.05)
+    short = flown(orbit=ORBIT, events=events_of(target, 0.25), duration=0.05)
     assert analyze(short)["missed_captures"] == {}
 
 
-def test_the_shipped_target_is_met_by_the_papers_mission(space_robot: Run) -> None:
+@pytest.mark.parametrize(("time", "missed"), [("15", False), ("12", True)])
+def test_the_shipped_target_is_met_by_the_papers_mission(time: str, missed: bool) -> None:
     """As the manual says; three seconds earlier the tool is elsewhere."""
-    for time, hits in (("15", True), ("12", False)):
-        event = f"capture@{time}:neighbouring_satellite"
-        words = ["--orbit", "iss", "--event", event, "--duration", f"{time}.1", "--json"]
-        ran = space_robot("simulate", *words)
-        assert ran.code == 0, ran.err
-        report = json.loads(ran.out)
-        assert report["events"] == [event]
-        assert list(report["missed_captures"]) == ([] if hits else [event])
-
-
-@pytest.mark.parametrize(
-    ("motion", "said"),
-    [
-        ("{relative_to: tool, reach: 0.1}", "reach are for relative_to orbit, got 'tool'"),
-        ("{relative_to: inertial, position: [1, 2, 3]}", "position are for relative_to orbit"),
-        (
-            "{position: [1, 2, 3], quaternion: [1, 0, 0, 0]}",
-            "target.motion: position, quaternion are for relative_to orbit, got 'tool'",
-        ),
-        ("{relative_to: orbit, reach: 0}", "target.motion.reach: "),
-        ("{relative_to: orbit, position: [1, 2]}", "target.motion.position: "),
-        ("{relative_to: orbit}", "target 'drifter': motion.relative_to orbit needs an orbit: "),
-    ],
-)
-def test_what_cannot_be_is_one_line(
-    space_robot: Run, tmp_path: Path, motion: str, said: str
-) -> None:
-    """From a file: its name is in the line, unless all of the file is well."""
-    file = tmp_path / "mine.yaml"
-    inertia = "mass: 1.0, inertia: [1, 1, 1, 0, 0, 0]"
-    file.write_text(f"target: {{name: drifter, {inertia}, motion: {motion}}}")
-    ran = space_robot("simulate", "--duration", "0.1", "--event", f"capture@0.05:{file}")
-    assert ran.code == 2
-    assert said in ran.err
-    assert ("mine.yaml" in ran.err) is ("needs an orbit" not in said)
-    assert len(ran.err.strip().splitlines()) == 1
+    event = f"capture@{time}:neighbouring_satellite"
+    report = analyze(simulated(orbit="iss", events=[event], duration=float(time) + 0.1))
+    assert report["events"] == [event]
+    assert list(report["missed_captures"]) == [event] * missed

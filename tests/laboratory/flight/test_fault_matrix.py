@@ -14,6 +14,7 @@ from collections import Counter
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cache
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -115,14 +116,14 @@ def seen(name: str) -> Seen:
         parameters={"plant": hold, "controller": hold},
     )
     modes: dict[str, list[tuple[int, str]]] = {"plant": [(0, "")], "controller": [(0, "")]}
-    loops: list[MessageLoop] = []
+    counts = {"plant": Counter[str](), "controller": Counter[str]()}
 
     class Watched(MessageLoop):
         def fly_tick(self) -> None:
             tick = flight.plant.tick
             super().fly_tick()
-            loops[:] = [self]
             supervisor = self._answering.supervisor
+            counts.update(plant=self._guard.refused, controller=supervisor.rejected)
             safe = f"{supervisor.mode.value}: {supervisor.reason}"
             for node, mode in (
                 ("controller", safe.removesuffix(": ")),
@@ -134,9 +135,6 @@ def seen(name: str) -> Seen:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("space_robot.flight.simulate.MessageLoop", Watched)
         log = simulate(flight)
-    counts = {"plant": Counter[str](), "controller": Counter[str]()}
-    for loop in loops:
-        counts = {"plant": loop._guard.refused, "controller": loop._answering.supervisor.rejected}
     schedule = Schedule(parse_faults(FLIGHTS[name], PLANT_KINDS), SEED, PERIOD, flight.plant.names)
     expected = {
         fault.kind.name: sum(
@@ -271,9 +269,11 @@ def test_the_flight_recovers(flight: str) -> None:
     assert end < 2e-3 or end < begin
 
 
-@pytest.fixture(scope="module")
-def graph(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
-    """The report of the silences on a graph; what its nodes tell is held back until they end."""
+@pytest.mark.ros
+def test_nodes_tell_of_their_modes_and_of_what_they_did_not_use(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """With the time of the tick, though here all is heard only when they end."""
     pytest.importorskip("rclpy")
     from space_robot.flight.graph.monitor import Event, Monitor
     from space_robot.flight.graph.processes import Graph
@@ -290,38 +290,22 @@ def graph(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
         stop(self, *args)
         stopped.append(self)
 
-    hold = (
-        "--set",
-        f"plant.hold_ticks={HOLD_TICKS}",
-        "--set",
-        f"controller.hold_ticks={HOLD_TICKS}",
-    )
-    faults = [word for text in FLIGHTS["long silences"] for word in ("--fault", text)]
-    bag = str(tmp_path_factory.mktemp("silences") / "bag")
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(Monitor, "poll", late_poll)
-        patch.setattr(Graph, "stop", noted_stop)
-        ended = space_robot_here(
-            *("fly", "--duration", "1", "--seed", str(SEED), *hold, *faults, "--bag", bag, "--json")
-        )
+    monkeypatch.setattr(Monitor, "poll", late_poll)
+    monkeypatch.setattr(Graph, "stop", noted_stop)
+    words = [word for text in FLIGHTS["long silences"] for word in ("--fault", text)]
+    for node in ("plant", "controller"):
+        words += ["--set", f"{node}.hold_ticks={HOLD_TICKS}"]
+    words += ["--duration", "1", "--seed", str(SEED), "--bag", str(tmp_path / "bag"), "--json"]
+    ended = space_robot_here("fly", *words)
     assert ended.returncode == 0, ended.stderr
-    return dict(json.loads(ended.stdout)["graph"])
-
-
-@pytest.mark.ros
-def test_nodes_tell_of_their_modes_with_the_time_of_the_tick(graph: dict[str, Any]) -> None:
-    """In the report, though it is heard only when they end."""
+    graph = json.loads(ended.stdout)["graph"]
+    here = seen("long silences")
     told = [(e["node"], e["what"], e["simulated_s"]) for e in graph["events"]]
-    for node, modes in seen("long silences").modes.items():
+    for node, modes in here.modes.items():
         assert len(modes) > 3
         for tick, mode in modes[2:]:
             if mode.startswith(("safe", "nominal")):
                 times = [s for name, what, s in told if (name, what) == (f"{node}_node", mode)]
                 assert np.abs(np.array(times) - tick * PERIOD).min() <= PERIOD, (mode, tick, told)
-
-
-@pytest.mark.ros
-def test_nodes_count_what_they_did_not_use(graph: dict[str, Any]) -> None:
-    counts, nodes = seen("long silences").counts, graph["nodes"]
-    rejected = counts["controller"]["quaternion not unit"]
-    assert int(nodes["controller_node"]["rejected: quaternion not unit"]) == rejected > 100
+    rejected = int(graph["nodes"]["controller_node"][f"rejected: {BAD_QUATERNION}"])
+    assert rejected == here.counts["controller"][BAD_QUATERNION] > 100

@@ -8,8 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from flights import planned
-from numpy.typing import NDArray
+from flights import planned, simulated
 from oracles.momenta import momentum
 from robots import PASSIVE_ROBOT, geared_paper_arm
 from strategies import with_gears
@@ -23,7 +22,6 @@ from space_robot.analysis.pointing import pointing_error
 from space_robot.analysis.report_lines import lines
 from space_robot.analysis.report_tables import rms_table
 from space_robot.flight.batch.sharing import batches
-from space_robot.flight.plan import Flight
 from space_robot.flight.simulate import simulate
 from space_robot_model.robot import Robot
 from space_robot_model.robot.gears import motor_momentum
@@ -32,23 +30,15 @@ from space_robot_model.robot.tree import Encoder
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.bag.reader import read_flight
 
-Array = NDArray[np.float64]
-
 # Passive and prismatic joints
-
-
-def passive_flight(law: str, **options: object) -> Flight:
-    """1.2 s: the arm has begun to move, and the panel to bend."""
-    given = {"robot": PASSIVE_ROBOT, "controller": law, "duration": 1.2, "friction": False}
-    return planned(**{**given, **options})
 
 
 @pytest.fixture(scope="module")
 def bent(tmp_path_factory: pytest.TempPathFactory) -> FlightLog:
     """With sensors and a filter, so that truth and measurement differ; its bag was read back."""
     bag = tmp_path_factory.mktemp("passive") / "bag"
-    flight = passive_flight("tde_stc", sensors="fine", navigation="filtered", friction=True)
-    log = simulate(flight, bag)
+    options = {"sensors": "fine", "navigation": "filtered", "duration": 1.2}
+    log = simulated(bag, robot=PASSIVE_ROBOT, controller="tde_stc", **options)
     recorded = read_flight(bag)
     assert recorded.passive_names == ("panel_root", "panel_tip", "slosh")
     assert recorded.prismatic == log.prismatic == (*[False, True], *[False] * 6, True)
@@ -57,25 +47,23 @@ def bent(tmp_path_factory: pytest.TempPathFactory) -> FlightLog:
     return log
 
 
-@pytest.mark.parametrize("law", ["tde_stc", "ctc", "pd", "adrc", "slotine_li"])
+@pytest.mark.parametrize("law", ["tde_stc", "pd"])
 def test_laws_hold_attitude_and_moves_the_joints_with_motors(law: str) -> None:
     """The springs are felt, not commanded; the model that the law has knows them locked."""
-    flight = passive_flight(law)
+    flight = planned(robot=PASSIVE_ROBOT, controller=law, duration=1.2, friction=False)
     flown = simulate(flight)
     assert flight.controller.block[0].signals.model.joint_count == 6
     assert flight.plant.memory.model.joint_count == 9
     report = analyze(flown)
     found = report["maxima"]
-    slack = 10.0 if law.startswith("pd") else 1.0  # which knows no springs and observes nothing
+    slack = 10.0 if law == "pd" else 1.0  # which knows no springs and observes nothing
     assert found["attitude"] < slack * 1e-6
     assert max(found["joints_revolute"], found["joints_prismatic"]) < slack * 1e-4
     assert (np.ptp(flown.joint_positions, axis=0) > 0.01).all()
     assert (np.ptp(flown.passive_positions, axis=0) > 1e-5).all()
-    estimates = {x.name: x.unit for x in lines([report]) if x.group == "estimate error"}
-    assert bool(estimates) == law.startswith("tde")
-    if estimates:
-        assert estimates["joints_prismatic RMS"] == "N"
-        assert estimates["joints_revolute max"] == "N m"
+    units = {x.name: x.unit for x in lines([report]) if x.group == "estimate error"}
+    if law == "tde_stc":
+        assert (units["joints_prismatic RMS"], units["joints_revolute max"]) == ("N", "N m")
     linear, _ = momentum(flight.plant.robot, flight.plant.truth)
     assert np.abs(linear).max() < 1e-10, "torques push nothing away"
 
@@ -103,7 +91,6 @@ def test_errors_and_forces_are_told_by_kind(bent: FlightLog) -> None:
     assert told["variation per s", "force_prismatic"].unit == "N/s"
     assert told["navigation error", "joints_prismatic"].unit == "m"
     assert told["ripple", "force_prismatic"].unit == "N"
-    assert told["ripple's peak", "force_prismatic"].texts[0].endswith((" N", "-"))
     names = {"boom_velocity_m_s", "panel_tip_position_rad", "slosh_velocity_m_s", "error_boom_m"}
     names |= {"applied_torque_boom_n", "applied_torque_wrist_n_m", "assumed_error_boom_m"}
     assert names <= set(column_names(bent))
@@ -134,8 +121,6 @@ def test_momentum_and_tool_are_those_of_the_whole_robot(bent: FlightLog) -> None
 
 
 # Gears
-
-MOTORS = ("motor_positions", "motor_velocities")
 
 
 @pytest.fixture(scope="module")
@@ -214,11 +199,6 @@ def test_arms_with_other_gears_fly_apart_and_with_other_numbers_together(
     rigid = [*gears[:5], None]
     robots = [paper_robot, robot, with_gears(robot, rigid), with_gears(robot, other_side)]
     robots += [*robots[:1], with_gears(robot, stiffer), *robots[2:]]
-    scenarios = [scenario(r, duration=0.05, seed=k) for k, r in enumerate(robots)]
-    flights = [one.check() for one in scenarios]
+    flights = [scenario(one).check() for one in robots]
     groups = [[number for number, _ in group] for group in batches(enumerate(flights))]
     assert sorted(groups) == [[0, 4], [1, 5], [2, 6], [3, 7]]
-    for flight, one in zip(sr.fly_many(scenarios), scenarios, strict=True):
-        for name in MOTORS:
-            alone = getattr(one.fly().log, name)
-            np.testing.assert_array_equal(getattr(flight.log, name), alone)

@@ -15,9 +15,6 @@ from space_robot_msgs_py.errors import InputError
 from space_robot_sim.faults.grammar import Fault, Kind, help_lines, parse_fault, parse_faults
 from space_robot_sim.plant.faults import PLANT_KINDS
 
-PAGE = DOCS / "reference/faults.md"
-
-
 TIMES = st.floats(0.0, 1e9)
 
 
@@ -56,12 +53,10 @@ def test_a_fault_is_its_text(fault: Fault) -> None:
     ("text", "fault", "axis", "value"),
     [
         ("drop_state@2.0:0.1", Fault(KINDS["drop_state"], 2.0, math.inf, "0.1"), "", 0.1),
-        ("noise_gyro@1-3:1e-4", Fault(KINDS["noise_gyro"], 1.0, 3.0, "1e-4"), "", 1e-4),
         ("noise_gyro@1e-3-2e-3:0", Fault(KINDS["noise_gyro"], 0.001, 0.002, "0"), "", 0.0),
         ("stuck_joint@5:3=20", Fault(KINDS["stuck_joint"], 5.0, math.inf, "3=20"), "3", 20.0),
         ("encoder_stuck@5:3", Fault(KINDS["encoder_stuck"], 5.0, math.inf, "3"), "3", math.nan),
         ("delay_state@0", Fault(KINDS["delay_state"], 0.0, math.inf, ""), "", 1.0),
-        ("kill_controller@2", Fault(KINDS["kill_controller"], 2.0, math.inf, ""), "", math.nan),
         ("stop_controller@2:1.5", Fault(KINDS["stop_controller"], 2.0, math.inf, "1.5"), "", 1.5),
         (" stop_mission@.5 ", Fault(KINDS["stop_mission"], 0.5, math.inf, ""), "", math.inf),
     ],
@@ -76,33 +71,27 @@ def test_given_texts(text: str, fault: Fault, axis: str, value: float) -> None:
     ("text", "why"),
     [
         ("drop_state", "KIND@T"),
-        ("drop_state@", "KIND@T"),
         ("drop_state@-1", "KIND@T"),
         ("drop_state@2s", "KIND@T"),
         ("drop_state@nan", "KIND@T"),
         ("drop_state@2:", "KIND@T"),
         ("drop_state@2-1", "END must be later than T, got 2 to 1"),
-        ("drop_state@2-2", "END must be later than T"),
         ("drop_state@1e999", "T must be from 0 to"),
-        ("drop_state@1-1e999", "END must be from 0 to"),
         ("drop@2", "unknown kind 'drop': did you mean drop_state"),
         ("drop_state@2:1.1", r"argument '1\.1': P, a number from 0 to 1 \(probability per tick\)"),
         ("drop_state@2:-0.1", "a number from 0 to 1"),
         ("drop_state@2:nan", "a number from 0 to 1"),
-        ("drop_state@2:often", "a number from 0 to 1"),
         ("drop_state@2:1=0.5", "a number from 0 to 1"),
         ("delay_state@2:1.5", r"TICKS, a whole number from 0 to 1e\+06 \(ticks\)"),
         ("noise_gyro@2", r"noise_gyro needs an argument: SIGMA, a number .* \(rad/s\)"),
         ("quantise_gyro@2:0", "STEP, a number from 1e-12"),
         ("stuck_joint@2:20", "JOINT=TORQUE, .* counted from 1"),
-        ("stuck_joint@2:0=20", "JOINT=TORQUE, .* counted from 1"),
         ("stuck_joint@2:3=x", "JOINT=TORQUE, .* counted from 1"),
         ("encoder_stuck@2", "encoder_stuck needs an argument: JOINT a name, counted from 1"),
         ("gyro_bias@2:1e-5", "BASE_AXIS=RATE, .* BASE_AXIS a name, or base"),
         ("tracker_blind@2:1", "tracker_blind takes no argument, got '1'"),
         ("kill_controller@2:1", "kill_controller takes no argument, got '1'"),
         ("kill_controller@2-3", "kill_controller has no end: kill_controller@T"),
-        ("stop_controller@2-3", "stop_controller has no end"),
     ],
 )
 def test_bad_texts_are_named_with_what_is_allowed(text: str, why: str) -> None:
@@ -111,15 +100,11 @@ def test_bad_texts_are_named_with_what_is_allowed(text: str, why: str) -> None:
     assert "\n" not in str(caught.value)
 
 
-def test_a_kind_of_another_place_is_refused() -> None:
+def test_a_kind_of_another_place_is_refused_and_an_empty_text_is_none() -> None:
     with pytest.raises(InputError, match=r"unknown kind 'kill_mission'"):
         parse_fault("kill_mission@2", PLANT_KINDS)
     with pytest.raises(InputError, match=r"'drop_state'.*choose one of kill_controller"):
         parse_fault("drop_state@2", PROCESS_KINDS)
-
-
-def test_empty_texts_are_no_faults() -> None:
-    assert parse_faults([""], KINDS) == []
     assert [str(f) for f in parse_faults(["", "nan_state@1", " "], KINDS)] == ["nan_state@1"]
 
 
@@ -131,34 +116,17 @@ def test_help_has_every_kind_and_its_form() -> None:
     assert {line.split("@")[0] for line in help_lines(KINDS)} == set(KINDS)
 
 
-def rows(page: str) -> list[list[str]]:
-    """The cells of the tables' rows that begin with a kind."""
-    lines = [line for line in page.splitlines() if line.startswith("| `")]
-    return [[cell.strip() for cell in line.strip("|").split("|")] for line in lines]
-
-
-def test_the_page_has_every_kind_as_it_is() -> None:
-    """Form, unit, default, description; and every example is one of its kind."""
-    table = rows(PAGE.read_text("utf-8"))
-    assert [re.split(r"[`@]", row[0])[1] for row in table] == list(KINDS)
-    for (form, unit, default, description, example), kind in zip(
-        table, KINDS.values(), strict=True
-    ):
-        assert form == f"`{kind.form}`"
-        assert unit == (kind.argument.unit if kind.argument else "")
-        if kind.default is None:
-            assert default == ""
-        else:
-            assert default == ("for ever" if math.isinf(kind.default) else f"{kind.default:g}")
-        assert description == kind.description
-        assert parse_fault(example.strip("`"), KINDS).kind == kind
+def test_every_example_of_the_page_is_one_of_its_kind() -> None:
+    page = (DOCS / "reference/faults.md").read_text("utf-8")
+    examples = re.findall(r"^\| `(\w+)@.* `([^`]+)` \|$", page, re.MULTILINE)
+    assert [kind for kind, _ in examples] == list(KINDS)
+    for kind, example in examples:
+        assert parse_fault(example, KINDS).kind is KINDS[kind]
 
 
 def test_every_default_argument_is_one_that_is_allowed() -> None:
-    with_default = [kind for kind in KINDS.values() if kind.argument and kind.default is not None]
-    assert len(with_default) > 5
-    for kind in with_default:
-        assert kind.argument is not None
-        assert kind.default is not None
+    for kind in KINDS.values():
+        if kind.argument is None or kind.default is None:
+            continue
         assert kind.default == math.inf or kind.argument.low <= kind.default <= kind.argument.high
         assert kind.argument.symbol != "P" or kind.default == 1.0, kind.name

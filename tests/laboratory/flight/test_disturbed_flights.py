@@ -1,0 +1,256 @@
+"""Flights with sensors that are not ideal, and with a disturbance of the user's own."""
+
+from __future__ import annotations
+
+import csv
+import json
+import math
+import pickle
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import yaml
+from attitude_sensors import attitude_error
+from command import Run
+from flights import planned, simulated
+from numpy.typing import NDArray
+
+import space_robot as sr
+from space_robot.flight.closed_loop import close_loop
+from space_robot.flight.flown_log import empty_log
+from space_robot.scenario.comparison import recorded_scenario
+from space_robot_control.laws import laws
+from space_robot_msgs_py.errors import InputError
+from space_robot_msgs_py.samples import Command
+
+Array = NDArray[np.float64]
+
+# Sensors
+
+LOOK_TICKS = 100
+
+
+def flown(**plan: Any) -> tuple[Array, Array]:
+    """True errors of attitude and joints now and then, (K, 9); commands (ticks, 9)."""
+    flight = planned(**plan)
+    log, errors = empty_log(flight), []
+    for start in range(0, log.ticks - LOOK_TICKS, LOOK_TICKS):
+        stop, truth = start + LOOK_TICKS, flight.plant.truth
+        close_loop(flight.plant, flight.controller, log, start, stop)
+        attitude = attitude_error(truth.quaternion, log.reference_base[stop, :4])
+        joints = log.reference_joints[stop, 0] - truth.joint_positions
+        errors.append(np.r_[0.5 * attitude, joints])  # as eps
+    return np.array(errors), log.commanded_torque[:-LOOK_TICKS]
+
+
+def test_the_truth_under_the_same_torque_does_not_know_of_sensors() -> None:
+    plants = [planned(sensors=sensors).plant for sensors in ("ideal", "coarse")]
+    rng = np.random.default_rng(1)
+    for tick in range(100):
+        command = Command(tick, rng.normal(size=9))
+        for plant in plants:
+            plant.step(command)
+        np.testing.assert_array_equal(plants[0].truth.numbers, plants[1].truth.numbers)
+
+
+def test_a_flight_s_seed_counts() -> None:
+    """At every tick behind the first, whose state is measured before anything is commanded."""
+    options = {"sensors": "fine", "faults": ["noise_gyro@0.01:1e-6"], "duration": 0.05}
+    one, other = (simulated(**options, seed=seed) for seed in (3, 4))
+    assert (one.commanded_torque[1:] != other.commanded_torque[1:]).any(axis=1).all()
+    assert (one.quaternion != one.as_measured().quaternion).any()
+
+
+@pytest.mark.parametrize("law", laws())
+def test_every_law_flies_with_fine_sensors(law: str) -> None:
+    """The true errors stay below those of the star tracker itself, 4e-5 rad about its boresight."""
+    plan = {"controller": law, "sensors": "fine", "navigation": "filtered", "duration": 1.5}
+    if law.startswith(("ctc", "tde")):  # CTC, with 100 rad/s the loudest: 14 to 21 N m
+        limits = (4e-5, 5e-5, 30.0 if law == "ctc" else 15.0)
+    else:  # gains for these sensors; ADRC, which observes angles, is the loudest: 16 N m
+        limits, plan["gains"] = (2e-4, 2e-3, 25.0), "robust"
+    errors, torque = flown(**plan)
+    found = (
+        np.abs(errors[5:, :3]).max(),
+        np.abs(errors[5:, 3:]).max(),
+        np.abs(torque[2000:]).max(),
+    )
+    assert np.less(found, limits).all(), found
+
+
+@pytest.mark.parametrize(("sensors", "most"), [("tactical", 1e-4), ("coarse", 5e-3)])
+def test_the_default_law_flies_with_any_sensors(sensors: str, most: float) -> None:
+    errors, _ = flown(sensors=sensors, navigation="filtered", duration=0.5)
+    assert np.abs(errors).max() < most
+
+
+def test_the_filter_takes_noise_out_of_the_torque() -> None:
+    torques = [
+        flown(navigation=mode, sensors="fine", duration=0.7)[1][1000:, :3]
+        for mode in ("direct", "filtered")
+    ]
+    direct, filtered = (np.sqrt(np.mean(np.diff(torque, axis=0) ** 2)) for torque in torques)
+    assert filtered < 0.1 * direct
+
+
+def test_a_delay_that_is_known_costs_nothing_and_one_that_is_not_does() -> None:
+    """On a base that begins 0.3 rad off and turns back."""
+    errors = []
+    for given in ({}, {"navigation_filter.tracker_delay": 0.0}):
+        parameters = {"plant": {"initial_quaternion": [0.99, 0.14, 0.0, 0.0]}, "controller": given}
+        flight = planned(sensors="fine", navigation="filtered", duration=1.5, parameters=parameters)
+        log = empty_log(flight)
+        close_loop(flight.plant, flight.controller, log, 0, 2000)
+        truth = flight.plant.truth.copy()
+        assert np.abs(truth.omega_base).max() > 0.005
+        close_loop(flight.plant, flight.controller, log, 2000, 2001)
+        estimate = flight.controller.block[0].navigation.estimate
+        errors.append(np.abs(attitude_error(estimate.quaternion, truth.quaternion)).max())
+    assert errors[0] < 5e-5
+    assert errors[1] > 10.0 * errors[0]
+
+
+def test_a_flight_tells_its_sensors_and_what_its_filter_assumes() -> None:
+    """The filter is for the flight's sensors unless told otherwise."""
+
+    def described(**plan: Any) -> dict[str, Any]:
+        return planned(duration=0.1, **plan).description
+
+    assert "navigation_filter" not in described()
+    for sensors, controller, across in (
+        ("tactical", {}, 4e-5),
+        ("tactical", {"navigation_sensors": "coarse"}, 1e-4),
+        ("tactical", {"navigation_filter.tracker_across": 1e-3}, 1e-3),
+    ):
+        parameters = {"controller": controller}
+        told = described(sensors=sensors, navigation="filtered", parameters=parameters)
+        assert told["sensors"] == told["parameters"]["plant"]["sensors"] == sensors
+        assert told["navigation_filter"]["tracker_across"] == across
+    with pytest.raises(InputError, match="unknown sensor 'good': choose one of coarse, fine"):
+        described(parameters={"controller": {"navigation_sensors": "good"}}, navigation="filtered")
+
+
+# A disturbance
+
+DURATION = 0.1
+SAID = "base_force_y, base_torque_z, joint2 from 0 to 0.1 s"
+
+
+def wind(t: float) -> dict[str, float]:
+    return {
+        "base_force_y": 3.0 * math.sin(20.0 * t),
+        "base_torque_z": 0.4 * math.cos(9.0 * t),
+        "joint2": 0.3 * t,
+    }
+
+
+COLUMNS = sr.sampled(wind, DURATION)
+
+
+@pytest.fixture
+def file(tmp_path: Path) -> Path:
+    """The columns as a table."""
+    path = tmp_path / "wind.csv"
+    with path.open("w", newline="") as table:
+        csv.writer(table).writerows([[*COLUMNS], *zip(*COLUMNS.values(), strict=True)])
+    return path
+
+
+def test_file_function_and_numbers_are_one_disturbance(
+    file: Path, tmp_path: Path, space_robot: Run
+) -> None:
+    """Also in a bag, without the file that it was read from; and the command tells it."""
+    given = [file, wind, {k: np.array(v) for k, v in COLUMNS.items()}]
+    expected = sr.Scenario(disturbance=COLUMNS, duration=DURATION).resolved()
+    for disturbance in given:
+        scenario = sr.Scenario(disturbance=disturbance, duration=DURATION)
+        assert scenario.resolved() == expected
+    sent = pickle.loads(pickle.dumps(sr.Scenario(disturbance=wind, duration=DURATION).check()))
+    assert sent.scenario.tree == expected
+    options = ("--disturbance", file, "--duration", DURATION)
+    assert SAID in space_robot("simulate", *options, "--bag", tmp_path / "bag").out
+    assert json.loads(space_robot("simulate", *options, "--json").out)["disturbance"] == SAID
+    file.unlink()
+    assert recorded_scenario(tmp_path / "bag")["disturbance"] == COLUMNS
+    log = sr.load_bag(tmp_path / "bag")
+    assert log.flight["disturbance"] == SAID
+    undisturbed = sr.Scenario(duration=DURATION)
+    assert "disturbance" not in undisturbed.resolved()
+    assert np.abs(undisturbed.fly().log.applied_torque - log.applied_torque).max() > 0.1
+
+
+def test_a_case_may_name_a_table_beside_it(file: Path, tmp_path: Path) -> None:
+    case = {"/**/plant_node": {"ros__parameters": {"disturbance": {"table": file.name}}}}
+    (tmp_path / "windy.yaml").write_text(yaml.safe_dump(case))
+    scenario = sr.Scenario(case=tmp_path / "windy.yaml", duration=DURATION)
+    assert scenario.resolved()["disturbance"] == COLUMNS
+    other = {"time": [0.0, 1.0], "joint1": [1.0, 1.0]}
+    assert scenario.replace(disturbance=other).resolved()["disturbance"] == other
+
+
+def test_campaigns_vary_its_scale(tmp_path: Path) -> None:
+    """The rows of a function are those of its numbers."""
+    tables = []
+    for number, disturbance in enumerate((wind, COLUMNS)):
+        study = {
+            "laws": ["ctc"],
+            "scenario": {"disturbance": disturbance, "duration": DURATION},
+            "vary": {"plant.disturbance.table_scale": {"uniform": [0.5, 2.0]}},
+            "runs": 3,
+        }
+        flown = sr.Campaign.of(study).run(out=tmp_path / str(number), workers=0)
+        assert list(flown.table["outcome"]) == ["complete"] * 3
+        tables.append(flown.table)
+    assert tables[0].equals(tables[1])
+    assert len(set(tables[0].iloc[:, -1])) == 3
+
+
+def in_plant(name: str, value: Any) -> dict[str, Any]:
+    return {"parameters": {"plant": {name: value}}}
+
+
+WRONG = {"time": [0, 1], "joint9": [1, 1]}
+TEXT = json.dumps(WRONG)
+GOOD = {"disturbance": {"time": [0, 1], "joint1": [1, 1]}}
+NO_JOINT9 = "unknown column 'joint9': choose one of "
+OF_FILE = f".*wind.csv: {NO_JOINT9}"
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        ({"disturbance": 3.0}, ".*a CSV or Parquet file, columns .* was expected, got 3.0"),
+        ({"disturbance": "wind"}, "disturbance 'wind': a .csv or .parquet file was expected"),
+        ({"disturbance": "no_such.csv"}, ".*no_such.csv: no such file"),
+        ({"disturbance": lambda t: None}, ".*the function returned None at 0 s; a mapping of num"),
+        ({"disturbance": lambda t: [t]}, ".*returned 1 numbers at 0 s; a mapping or 6 were expect"),
+        ({"disturbance": lambda t: {"joint1": math.nan}}, ".*returned nan for joint1 at 0 s"),
+        ({"disturbance": WRONG}, f"disturbance: {NO_JOINT9}"),
+        ({"disturbance": TEXT}, f"disturbance: {NO_JOINT9}"),
+        (in_plant("disturbance.table", TEXT), f"disturbance: {NO_JOINT9}"),
+        ({"disturbance": "wind.csv", **in_plant("disturbance.table", TEXT)}, "disturbance: unkn"),
+        ({"disturbance": "wind.csv"}, OF_FILE),
+        ({**GOOD, **in_plant("disturbance.table", "wind.csv")}, OF_FILE),
+        ({**GOOD, **in_plant("disturbance", {"table": "wind.csv"})}, OF_FILE),
+    ],
+)
+def test_what_is_wrong_is_said_in_a_line(
+    options: dict[str, Any], said: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A wrong column is named with its file or the option."""
+    monkeypatch.chdir(tmp_path)
+    Path("wind.csv").write_text("time,joint9\n0,1\n1,1\n")
+    with pytest.raises(InputError, match=f"^{said}") as refused:
+        sr.Scenario(duration=0.1, **options).check()
+    assert "\n" not in str(refused.value)
+
+
+def test_a_function_is_sampled() -> None:
+    columns = sr.sampled(lambda t: np.arange(6.0) * t, 0.02, period=0.01)
+    assert columns["time"] == [0.0, 0.01, 0.02]
+    assert columns["base_torque_z"] == [0.0, 0.05, 0.1]
+    for words in ({"duration": 0.0}, {"duration": 1.0, "period": -1.0}):
+        with pytest.raises(InputError, match="a number above 0 was expected"):
+            sr.sampled(wind, **words)
