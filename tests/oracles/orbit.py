@@ -32,11 +32,6 @@ EARTH_RATE = 7.292115e-5
 DIGITS = 50
 
 
-def mean_motion(semi_major_axis: float) -> float:
-    """Return ``sqrt(mu / a^3)``, rad/s."""
-    return float(np.sqrt(MU / semi_major_axis**3))
-
-
 class BodyMotion(NamedTuple):
     """One body, relative to the orbit's point, on inertial axes."""
 
@@ -106,11 +101,6 @@ def times(a: Exact, b: Exact) -> Decimal:
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
-def across(a: Exact, b: Exact) -> Exact:
-    """Return ``a x b``."""
-    return (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
-
-
 def exact_gravity(r: Exact, has_j2: bool) -> Exact:
     """Return the acceleration by the textbook's formula (Vallado, equation 8-30)."""
     square = times(r, r)
@@ -127,92 +117,11 @@ def exact_gravity(r: Exact, has_j2: bool) -> Exact:
     )
 
 
-def earth_potential(r: Exact, has_j2: bool) -> Decimal:
-    """Return ``-mu / r (1 - J2 (R_E / r)^2 P_2(z / r))``, m2/s2."""
-    square = times(r, r)
-    distance = square.sqrt()
-    potential = -Decimal(MU) / distance
-    if has_j2:
-        legendre = (3 * r[2] * r[2] / square - 1) / 2
-        potential *= 1 - Decimal(J2) * Decimal(EARTH_RADIUS) ** 2 / square * legendre
-    return potential
-
-
-class EarthTotals(NamedTuple):
-    """What a robot has about the Earth's centre, less what its mass would have at the point."""
-
-    energy: float
-    """J."""
-    angular: Array
-    """(3,) N m s."""
-    whole_energy: Decimal
-    """Nothing subtracted, J."""
-    whole_angular: Exact
-    """Nothing subtracted, N m s."""
-
-
-def earth_totals(robot: Robot, state: RobotState, has_j2: bool) -> EarthTotals:
-    """Return energy and angular momentum of all bodies about the Earth's centre.
-
-    Those of the whole are some 1e10 J and 1e12 N m s, so that the rounding of a position of 7e6 m
-    hides what the bodies exchange. What a particle of the same mass has at the orbit's point is
-    conserved by itself, and is subtracted; computed with many digits.
-    """
-    with localcontext() as context:
-        context.prec = DIGITS
-        point, motion = exact(state.orbit_position), exact(state.orbit_velocity)
-        energy, angular = Decimal(0), exact(np.zeros(3))
-        mass = Decimal(0)
-        for body in body_motions(robot, state):
-            mass += (m := Decimal(body.mass))
-            place = plus(point, exact(body.position))
-            velocity = plus(motion, exact(body.velocity))
-            energy += m * (times(velocity, velocity) / 2 + earth_potential(place, has_j2))
-            energy += Decimal(body.energy) + _extent(place, body)
-            orbital = across(place, velocity)
-            angular = plus(angular, (m * orbital[0], m * orbital[1], m * orbital[2]))
-            angular = plus(angular, exact(body.spin))
-        of_point = mass * (times(motion, motion) / 2 + earth_potential(point, has_j2))
-        about = across(point, motion)
-        less = [float(a - mass * b) for a, b in zip(angular, about, strict=True)]
-        return EarthTotals(float(energy - of_point), np.array(less), energy, angular)
-
-
-def _extent(place: Exact, body: BodyMotion) -> Decimal:
-    """Return the potential of a body's extent, ``mu / (2 r^3) (3 u . I u - tr I)``, J."""
-    r = np.array([float(value) for value in place])
-    distance = float(np.linalg.norm(r))
-    u = r / distance
-    moments = 3.0 * u @ body.inertia @ u - np.trace(body.inertia)
-    return Decimal(float(MU / (2.0 * distance**3) * moments))
-
-
 def centre_of_mass(robot: Robot, state: RobotState) -> Array:
     """Return the common centre of mass (3,) from the orbit's point, m, inertial axes."""
     bodies = body_motions(robot, state)
     moment = np.sum([body.mass * body.position for body in bodies], axis=0)
     return np.asarray(moment / sum(body.mass for body in bodies))
-
-
-def angular_momentum(robot: Robot, state: RobotState) -> Array:
-    """Return the angular momentum (3,) about the common centre of mass, N m s, inertial axes."""
-    bodies = body_motions(robot, state)
-    mass, com = sum(body.mass for body in bodies), centre_of_mass(robot, state)
-    velocity = np.sum([body.mass * body.velocity for body in bodies], axis=0) / mass
-    total = np.zeros(3)
-    for body in bodies:
-        total += body.spin
-        total += body.mass * np.cross(body.position - com, body.velocity - velocity)
-    return total
-
-
-def whole_inertia(robot: Robot, state: RobotState) -> Array:
-    """Return the inertia (3, 3) of all bodies about the common centre of mass, kg m2."""
-    com, total = centre_of_mass(robot, state), np.zeros((3, 3))
-    for body in body_motions(robot, state):
-        d = body.position - com
-        total += body.inertia + body.mass * (d @ d * np.eye(3) - np.outer(d, d))
-    return total
 
 
 def whole_momenta(bodies: list[BodyMotion]) -> tuple[Array, Array]:
@@ -231,6 +140,34 @@ def fall(position: Array, has_j2: bool) -> Array:
         factor = -1.5 * J2 * MU * EARTH_RADIUS**2 / r**5
         pull = pull + factor * position * (np.array([1.0, 1.0, 3.0]) - height)
     return np.asarray(pull)
+
+
+def exact_difference(r: ArrayLike, d: ArrayLike, has_j2: bool) -> Array:
+    """Return ``g(r + d) - g(r)``, rounded at the end."""
+    with localcontext() as context:
+        context.prec = DIGITS
+        at = exact(r)
+        end, begin = exact_gravity(plus(at, exact(d)), has_j2), exact_gravity(at, has_j2)
+        return np.array([float(a - b) for a, b in zip(end, begin, strict=True)])
+
+
+def weight_torque(robot: Robot, state: RobotState, has_j2: bool) -> Array:
+    """Return the torque (3,) of gravity about the common centre of mass, N m, inertial axes.
+
+    Each body is drawn at its centre of mass, and turned and drawn by its inertia I's part of the
+    potential, ``mu / (2 r^3) (3 u . I u - tr I)``.
+    """
+    com, total = centre_of_mass(robot, state), np.zeros(3)
+    for body in body_motions(robot, state):
+        r = state.orbit_position + body.position
+        distance = float(np.linalg.norm(r))
+        u = r / distance
+        turned, rate = body.inertia @ u, 3.0 * MU / distance**3
+        lift = turned + (0.5 * np.trace(body.inertia) - 2.5 * u @ turned) * u
+        force = body.mass * exact_difference(state.orbit_position, body.position, has_j2)
+        force -= rate / distance * lift
+        total += np.cross(body.position - com, force) + rate * np.cross(u, turned)
+    return total
 
 
 def free_path(position: ArrayLike, velocity: ArrayLike, times: ArrayLike, has_j2: bool) -> Array:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from decimal import localcontext
 from typing import Any
 
 import numpy as np
@@ -11,16 +10,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import ArrayLike, NDArray
 from oracles.orbit import (
-    DIGITS,
     EARTH_RADIUS,
     EARTH_RATE,
     MU,
     body_motions,
     body_places,
     centre_of_mass,
-    exact,
-    exact_gravity,
-    plus,
+    exact_difference,
     whole_momenta,
 )
 from robots import MOTORS, NO_FRICTION, coast, orbiting_plant, rigid_robot, set_motion, set_orbit
@@ -152,15 +148,6 @@ FEW = settings(max_examples=200)
 def vector(direction: tuple[float, ...], length: float) -> Array:
     """Return a vector (3,) of that length."""
     return np.asarray(length * np.array(direction) / np.linalg.norm(direction))
-
-
-def exact_difference(r: Array, d: Array, has_j2: bool) -> Array:
-    """Return ``g(r + d) - g(r)``, rounded at the end."""
-    with localcontext() as context:
-        context.prec = DIGITS
-        at = exact(r)
-        end, begin = exact_gravity(plus(at, exact(d)), has_j2), exact_gravity(at, has_j2)
-        return np.array([float(a - b) for a, b in zip(end, begin, strict=True)])
 
 
 def difference(r: Array, d: Array, has_j2: bool) -> Array:
