@@ -119,8 +119,3 @@ def second_moments(robot: Robot, factor: ArrayLike = 1.0) -> Array:
     factors = np.broadcast_to(factor, robot.n + 1).astype(np.float64)
     second_moments_into(robot.model, coordinates, np.ascontiguousarray(factors), out)
     return out
-
-
-def missing(robot: Robot) -> list[int]:
-    """Columns of vectors that are zero."""
-    return [4 + 2 * j for j in range(robot.n) if robot.is_prismatic[j]]

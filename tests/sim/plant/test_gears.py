@@ -14,7 +14,7 @@ import pytest
 from numpy.typing import NDArray
 from oracles import rotation_of
 from oracles.rotors import RotorEquations, random_motor_rotors
-from robots import HEAVY, PERIOD, GearedFlight, oscillator
+from robots import PERIOD, GearedFlight, oscillator
 from strategies import (
     State,
     random_bodies,
@@ -77,28 +77,6 @@ def test_a_flight_is_the_one_that_scipy_integrates(slides: list[bool]) -> None:
         np.testing.assert_allclose(flight.x, x, rtol=1e-9, atol=0.0)
     assert np.abs(flight.x - start).min() > 1e-3
     assert np.abs(flight.motor_positions - flight.positions).max() > 1e-3
-
-
-@pytest.mark.parametrize(("base", "damping"), [(HEAVY, 0.0), (BASE, 0.4)])
-def test_a_link_swings_on_a_motor_that_friction_holds(base: float, damping: float) -> None:
-    """With ``sqrt(K / I)``, and ``sqrt(K (1 / I + 1 / I_base))`` where the base is free.
-
-    The motor stands to the last bit, and its friction takes nothing from the swing.
-    """
-    robot = oscillator(GEAR._replace(damping=damping), LINK, base)
-    flight, stretched = GearedFlight(robot, SUBSTEPS, coulomb=20.0, viscous=3.0), 0.1
-    flight.positions[0], flight.motor_positions[0] = 0.3 - stretched, 0.3
-    lighter = 1.0 / LINK + 1.0 / base
-    decay = 0.5 * damping * lighter
-    pulsation = np.sqrt(STIFFNESS * lighter - decay**2)
-    for _ in range(20):
-        truth = flight.rest(50)
-        assert truth.motor_velocities[0] == 0.0
-        assert truth.motor_positions[0] == 0.3
-        t = flight.plant.tick * PERIOD
-        swing = np.cos(pulsation * t) + decay / pulsation * np.sin(pulsation * t)
-        expected = 0.3 - stretched * np.exp(-decay * t) * swing
-        assert truth.joint_positions[0] == pytest.approx(expected, rel=0.0, abs=1e-10)
 
 
 @pytest.mark.parametrize("sense", [-1.0, 1.0])

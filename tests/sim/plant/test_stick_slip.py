@@ -13,7 +13,6 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from oracles import pinocchio_bias_force, pinocchio_mass_matrix, rotation_of
 from oracles.momenta import kinetic_energy, momentum
-from oracles.rotors import RotorEquations
 from scipy.integrate import quad
 from strategies import State, random_quaternion, random_robot
 
@@ -109,28 +108,6 @@ def test_joints_stand_or_break_away_as_coulombs_law_has_it(n: int, seed: int) ->
     np.testing.assert_allclose(friction, expected, rtol=0.0, atol=1e-9)
     accelerations = stages.slope[0, 13 + n : 13 + 2 * n]
     assert not accelerations[locked].any()
-
-
-def test_a_joint_comes_to_rest_when_and_where_it_should() -> None:
-    """Thrown, it stops: against SciPy's events on Pinocchio's dynamics, to rounding."""
-    rng = np.random.default_rng(5)
-    plant = plant_of(random_robot(rng, 1), COULOMB)
-    place(plant, rng, np.array([0.003]))
-    plant.memory.x[8:14] *= 0.01
-    start, brake = plant.memory.x[:15].copy(), np.array([0.0] * 6 + [-COULOMB])
-
-    def at_rest(_: float, x: Array) -> float:
-        return float(x[14])
-
-    at_rest.terminal = True  # type: ignore[attr-defined]
-    exact = RotorEquations(plant.robot).fly(start, 0.0, 1.0, lambda t, x: brake, events=at_rest)
-    stops_at = float(exact.t[-1])
-    assert stops_at / PERIOD > 2.0
-    assert abs(stops_at / PERIOD - round(stops_at / PERIOD)) > 0.01, "within a tick"
-    for tick in range(int(stops_at / PERIOD) + 2):
-        plant.step(Command(tick, np.zeros(4)))
-    assert plant.state.joint_velocities[0] == 0.0
-    np.testing.assert_allclose(plant.state.joint_positions, exact.y[7:8, -1], rtol=0.0, atol=1e-13)
 
 
 SPIN, STEP = 0.5, 0.01
