@@ -6,7 +6,7 @@ They are written out here once more, so that the project's can be compared with 
 from __future__ import annotations
 
 from decimal import Decimal, localcontext
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import pinocchio as pin
@@ -19,7 +19,7 @@ from space_robot_model.robot import Robot
 from space_robot_msgs_py.samples import RobotState
 
 Array = NDArray[np.float64]
-Exact = tuple[Decimal, Decimal, Decimal]
+Exact = NDArray[np.object_]
 """A vector of many digits."""
 
 MU = 3.986004418e14
@@ -87,34 +87,21 @@ def body_places(robot: Robot, state: RobotState) -> list[tuple[Array, Array]]:
 
 def exact(vector: ArrayLike) -> Exact:
     """Return the same numbers as decimal ones."""
-    x, y, z = (Decimal(float(value)) for value in np.asarray(vector))
-    return x, y, z
+    return np.array([Decimal(float(value)) for value in np.asarray(vector)])
 
 
-def plus(a: Exact, b: Exact) -> Exact:
-    """Return ``a + b``."""
-    return a[0] + b[0], a[1] + b[1], a[2] + b[2]
+def fall(r: Any, has_j2: bool) -> Any:
+    """Return the acceleration by the textbook's formula (Vallado, equation 8-30), m/s2.
 
-
-def times(a: Exact, b: Exact) -> Decimal:
-    """Return ``a . b``."""
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-
-
-def exact_gravity(r: Exact, has_j2: bool) -> Exact:
-    """Return the acceleration by the textbook's formula (Vallado, equation 8-30)."""
-    square = times(r, r)
-    distance = square.sqrt()
-    fall = -Decimal(MU) / (square * distance)
-    if not has_j2:
-        return fall * r[0], fall * r[1], fall * r[2]
-    share = Decimal("1.5") * Decimal(J2) * Decimal(EARTH_RADIUS) ** 2 / square
-    height = 5 * r[2] * r[2] / square
-    return (
-        fall * r[0] * (1 + share * (1 - height)),
-        fall * r[1] * (1 + share * (1 - height)),
-        fall * r[2] * (1 + share * (3 - height)),
-    )
+    As exactly as the numbers are.
+    """
+    kind, square = type(r[0]), r @ r
+    distance = square.sqrt() if kind is Decimal else np.sqrt(square)
+    pull = -kind(MU) / (square * distance) * r
+    if has_j2:
+        share = kind(1.5) * kind(J2) * kind(EARTH_RADIUS) ** 2 / square
+        pull *= 1 + share * (np.array([1, 1, 3]) - 5 * r[2] * r[2] / square)
+    return pull
 
 
 def centre_of_mass(robot: Robot, state: RobotState) -> Array:
@@ -131,24 +118,11 @@ def whole_momenta(bodies: list[BodyMotion]) -> tuple[Array, Array]:
     return np.sum(linear, axis=0), np.sum(angular, axis=0)
 
 
-def fall(position: Array, has_j2: bool) -> Array:
-    """Return the acceleration of free fall (3,), m/s2."""
-    r = float(np.linalg.norm(position))
-    pull = -MU / r**3 * position
-    if has_j2:
-        height = 5.0 * position[2] ** 2 / r**2
-        factor = -1.5 * J2 * MU * EARTH_RADIUS**2 / r**5
-        pull = pull + factor * position * (np.array([1.0, 1.0, 3.0]) - height)
-    return np.asarray(pull)
-
-
 def exact_difference(r: ArrayLike, d: ArrayLike, has_j2: bool) -> Array:
     """Return ``g(r + d) - g(r)``, rounded at the end."""
     with localcontext() as context:
         context.prec = DIGITS
-        at = exact(r)
-        end, begin = exact_gravity(plus(at, exact(d)), has_j2), exact_gravity(at, has_j2)
-        return np.array([float(a - b) for a, b in zip(end, begin, strict=True)])
+        return (fall(exact(r) + exact(d), has_j2) - fall(exact(r), has_j2)).astype(float)
 
 
 def weight_torque(robot: Robot, state: RobotState, has_j2: bool) -> Array:
