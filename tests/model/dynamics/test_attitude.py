@@ -15,8 +15,6 @@ from space_robot_model.dynamics.attitude import (
     attitude_jacobian,
     attitude_jacobian_inverse,
     quaternion_rate,
-    rotate,
-    rotate_back,
     rotation_matrix,
 )
 from space_robot_model.dynamics.rho_space import RhoSpaceModel, rho_space_into
@@ -83,16 +81,6 @@ def test_inverse_jacobian_inverts(rng: np.random.Generator) -> None:
     np.testing.assert_allclose(inverse @ j0_of(q), np.eye(3), atol=tolerance)
     np.testing.assert_allclose(j0_of(q) @ inverse, np.eye(3), atol=tolerance)
     np.testing.assert_allclose(inverse, np.linalg.inv(j0_of(q)), rtol=1e-9, atol=tolerance)
-
-
-@given(RNGS)
-def test_rotate_and_rotate_back_are_products_with_the_matrix_and_its_transpose(
-    rng: np.random.Generator,
-) -> None:
-    matrix, vector = rng.normal(size=(3, 3)), rng.normal(size=3)
-    np.testing.assert_allclose(written(rotate, (3,), matrix, vector), matrix @ vector, atol=1e-14)
-    back = written(rotate_back, (3,), matrix, vector)
-    np.testing.assert_allclose(back, matrix.T @ vector, atol=1e-14)
 
 
 @given(RNGS)

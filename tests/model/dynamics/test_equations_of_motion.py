@@ -12,7 +12,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 from oracles import (
-    assert_close,
     attitude_jacobian_base,
     attitude_jacobian_inertial,
     pinocchio_acceleration,
@@ -154,22 +153,13 @@ def test_inverse_dynamics_is_pinocchios_without_momentum(case: Case) -> None:
 
 @FEW
 @given(cases() | branched_cases())
-def test_inertia_bias_and_acceleration_are_pinocchios(case: Case) -> None:
-    """Wherever the base is and however fast it drifts; Q and -Q are one attitude."""
-    robot, s, rng = case
-    position, force = 100.0 * rng.normal(size=3), 50.0 * rng.normal(size=robot.n + 6)
-    inertia = mass_matrix(robot, s.quaternion, s.theta)
-    motion = s.theta, s.w0, s.rate
-    bias = bias_force(robot, s.quaternion, *motion)
-    assert_close(inertia, pinocchio_mass_matrix(robot, s, position), 1e-10)
-    assert_close(bias, pinocchio_bias_force(robot, s, position), 1e-10)
-    assert_close(
-        forward_dynamics(robot, s.quaternion, *motion, force),
-        pinocchio_forward_dynamics(robot, s, force),
-        1e-10,
-    )
+def test_inertia_is_symmetric_and_no_bias_is_at_rest(case: Case) -> None:
+    """Q and -Q are one attitude; all else is Pinocchio's in test_tree."""
+    robot, s, _ = case
+    inertia, motion = mass_matrix(robot, s.quaternion, s.theta), (s.theta, s.w0, s.rate)
     np.testing.assert_array_equal(inertia, inertia.T)
     np.testing.assert_array_equal(mass_matrix(robot, -s.quaternion, s.theta), inertia)
+    bias = bias_force(robot, s.quaternion, *motion)
     np.testing.assert_array_equal(bias_force(robot, -s.quaternion, *motion), bias)
     still = bias_force(robot, s.quaternion, s.theta, np.zeros(3), 0.0 * s.rate)
     np.testing.assert_array_equal(still, np.zeros(robot.n + 6))

@@ -98,17 +98,6 @@ def test_no_joint_has_the_name_of_something_else() -> None:
     assert not any(map(other_meaning, ["elbow_rate", "joint_1", "base_yaw", "wheel", "time_1"]))
 
 
-@given(seed=SEEDS, kinds=SOME_TREES)
-def test_the_bodies_of_a_robot_make_the_same_robot(seed: int, kinds: list[str]) -> None:
-    robot = Robot.of_tree("tree", tree_of(seed, kinds))
-    again = Robot.of_tree("tree", robot.bodies())
-    assert again.all_joint_names == robot.all_joint_names
-    for name in ("mass", "inertia", "com", "parent", "rotation", "offset", "is_prismatic"):
-        np.testing.assert_array_equal(getattr(again, name), getattr(robot, name))
-    assert (again.limits, again.springs) == (robot.limits, robot.springs)
-    assert [tool.name for tool in again.tools] == [tool.name for tool in robot.tools]
-
-
 HULL = Body("hull", 5.0, np.eye(3), np.zeros(3))
 ARM = Body("arm", 1.0, np.eye(3), np.zeros(3), "hull", Joint("j"))
 BAD: dict[str, tuple[Callable[[], list[Body]], str]] = {

@@ -335,16 +335,3 @@ def test_points_more_than_a_second_apart_carry_into_the_seconds() -> None:
     ]
     assert [t.sec * 10**9 + t.nanosec for t in after] == [600_000_000 * k for k in range(4)]
     assert [t.sec for t in after] == [0, 0, 1, 1]
-
-
-def test_after_a_chunk_of_another_period_the_own_times_are_written() -> None:
-    chunk, other = random_chunk(2, 3), ReferenceCodec(joint_names(2), Timebase(1_000_000))
-    codec = ReferenceCodec(joint_names(2), TIMEBASE)
-    good = codec.encode(chunk)
-    for decode, data in zip(
-        (codec.decode_joints, codec.decode_base), other.encode(chunk), strict=True
-    ):
-        with pytest.raises(MessageError, match="point 1 is not 1 ticks after") as error:
-            decode(data)
-        assert error.value.reason
-    assert codec.encode(chunk) == good
