@@ -12,18 +12,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from oracles import rotation_of
 from oracles.rotors import RotorEquations, random_motor_rotors
 from robots import PERIOD, GearedFlight, oscillator
-from strategies import (
-    State,
-    random_bodies,
-    random_gears,
-    random_quaternion,
-    random_robot,
-    rotor_room,
-    with_gears,
-)
+from strategies import State, random_bodies, random_gears, random_robot, rotor_room, with_gears
 
 from space_robot_model.robot import Robot
 from space_robot_model.robot.tree import Body, Gear, JointFriction
@@ -40,43 +31,6 @@ MOTOR = RATIO**2 * ROTOR
 """B = N^2 J, kg m2 or kg."""
 GEAR = Gear(ROTOR, RATIO, STIFFNESS)
 KINDS = ("revolute", "passive revolute", "prismatic", "revolute", "revolute", "passive prismatic")
-
-
-@pytest.mark.parametrize("slides", [[False, False], [False, True], [True, False]])
-def test_a_flight_is_the_one_that_scipy_integrates(slides: list[bool]) -> None:
-    """Two joints, thrown, in two holds of torque on base and motors: 0.3 s, each number to 1e-9."""
-    rng = np.random.default_rng(7 + slides.index(True) if any(slides) else 3)
-    robot = replace(random_robot(rng, 2), is_prismatic=np.array(slides))
-    gears = [
-        Gear(
-            float(rng.uniform(0.05, 0.1)) * min(rotor_room(robot, joint), 1.0),
-            *rng.uniform((4.0, 500.0, 0.0), (8.0, 1500.0, 0.5)).tolist(),
-        )
-        for joint in range(2)
-    ]
-    robot = with_gears(robot, gears)
-    n, viscous, ticks = robot.n, 0.3, 300
-    equations = RotorEquations(robot, random_motor_rotors(rng, robot))
-    attitude = random_quaternion(rng).tolist()
-    flight = GearedFlight(robot, 4, viscous=viscous, initial_quaternion=attitude)
-    flight.positions[:] = rng.uniform(-1.0, 1.0, n)
-    flight.motor_positions[:] = flight.positions + rng.uniform(-0.05, 0.05, n)
-    flight.base_velocities[:] = rng.normal(size=6)
-    flight.velocities[:], flight.motor_velocities[:] = 2.0 * rng.normal(size=(2, n))
-    x, start = flight.x.copy(), flight.x.copy()
-    for torque in (10.0 * rng.normal(size=3 + n), 10.0 * rng.normal(size=3 + n)):
-
-        def force(_: float, y: Array, torque: Array = torque) -> Array:
-            motors = torque[3:] - viscous * equations.parts(y)[2]
-            of_base = rotation_of(y[3:7]).apply(torque[:3])
-            return np.concatenate([np.zeros(3), of_base, np.zeros(n), motors])
-
-        x = equations.fly(x, 0.0, ticks * PERIOD, force).y[:, -1]
-        x[3:7] /= np.linalg.norm(x[3:7])
-        flight.fly(torque, ticks)
-        np.testing.assert_allclose(flight.x, x, rtol=1e-9, atol=0.0)
-    assert np.abs(flight.x - start).min() > 1e-3
-    assert np.abs(flight.motor_positions - flight.positions).max() > 1e-3
 
 
 @pytest.mark.parametrize("sense", [-1.0, 1.0])

@@ -12,13 +12,14 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from oracles import assert_close, rotation_of
 from oracles.momenta import kinetic_energy, momentum, state_of
-from oracles.rotors import RotorEquations, random_rotors, settings_of
+from oracles.rotors import RotorEquations, random_motor_rotors, random_rotors, settings_of
 from paths import DATA
 from pydantic import ValidationError
 from robots import ANGLES_DEG, LOCKED, NO_FRICTION, PERIOD, rigid_robot
-from strategies import random_bodies, random_quaternion, random_robot
+from strategies import random_bodies, random_gears, random_quaternion, random_robot, with_gears
 
 from space_robot_model.robot import Robot
+from space_robot_model.robot.gears import geared_joints
 from space_robot_msgs_py.compiled.records import assign
 from space_robot_msgs_py.errors import DivergedError, InputError
 from space_robot_msgs_py.samples import Command, RobotState
@@ -167,22 +168,24 @@ TORQUE = np.array([60.0, -40.0, 50.0, 4.0, 9.0, -6.0])
 
 
 def numbers(plant: Plant) -> Array:
-    """``[r0, quaternion, theta, v0, w0, thetadot]``, in the robot's order."""
-    state = state_of(plant.robot, plant.truth)
-    return np.concatenate(
-        [plant.truth.base_position, state.quaternion, state.theta, state.velocity]
-    )
+    """A state as `RotorEquations` has it."""
+    truth, count = plant.truth, len(geared_joints(plant.robot))
+    state = state_of(plant.robot, truth)
+    of_motors = truth.motor_velocities[:count], truth.motor_positions[:count]
+    of_robot = state.quaternion, state.theta, state.velocity
+    return np.concatenate([truth.base_position, *of_robot, *of_motors])
 
 
 @pytest.mark.parametrize("seed", [0, 1, 2])
 def test_a_flight_is_the_one_that_scipy_integrates(seed: int) -> None:
-    """0.2 s in two holds of torque: motors, springs with damping, friction of the robot's own.
+    """0.2 s in two holds of torque: springs with damping, friction of the robot's own, gears.
 
-    Base and motors are disturbed by sines; force and torque on the base, on its own axes, and a
+    Base and joints are disturbed by sines; force and torque on the base, on its own axes, and a
     joint by lines of a table.
     """
-    rng = np.random.default_rng(seed)
-    robot, viscous = Robot.of_tree("tree", random_bodies(rng, KINDS)), 0.2
+    rng, viscous = np.random.default_rng(seed), 0.2
+    robot = random_gears(rng, Robot.of_tree("tree", random_bodies(rng, KINDS)))
+    robot = with_gears(robot, [gear and gear._replace(ratio=10.0) for gear in robot.gears])
     n, hold, end = robot.n, 200 * PERIOD, 0.2
     wrench = rng.normal(size=(2, 6)) * [80.0, 80.0, 80.0, 30.0, 30.0, 30.0]
     push = np.array([3.0, -2.0])
@@ -202,10 +205,15 @@ def test_a_flight_is_the_one_that_scipy_integrates(seed: int) -> None:
         robot,
         friction=friction,
         disturbance=disturbance,
+        substeps=4,
         initial_joints_deg=[0.0, 0.3, 0.6],
         initial_quaternion=[0.3, -0.8, 0.4, 0.2],
     )
-    equations, own = RotorEquations(robot), np.array(robot.friction)[:, 1]
+    equations, own = (
+        RotorEquations(robot, random_motor_rotors(rng, robot)),
+        np.array(robot.friction)[:, 1],
+    )
+    geared = equations.joints
     usual = np.where(np.arange(robot.joint_count) < n, viscous, 0.0)
     damping = np.where(np.isnan(own), usual, own)
     for k, spring in enumerate(robot.springs):
@@ -214,21 +222,26 @@ def test_a_flight_is_the_one_that_scipy_integrates(seed: int) -> None:
     for begin, torque in ((0.0, TORQUE), (hold, -0.5 * TORQUE[::-1])):
 
         def force(t: float, x: Array, torque: Array = torque) -> Array:
-            theta, rates, _, _ = equations.parts(x)
+            theta, rates, motor_rates, _ = equations.parts(x)
             acting, pushed = ((1.0 - t / end) * w[0] + t / end * w[1] for w in (wrench, push))
             of_base = rotation_of(x[3:7] / np.linalg.norm(x[3:7]))
-            joints = np.zeros(robot.joint_count)
-            joints[:n] = torque[3:] - 3.0 * np.sin(6.0 * np.pi * t)
+            joints = -damping * rates
+            joints[:n] += torque[3:]
+            joints[geared] = 0.0
+            joints[:n] -= 3.0 * np.sin(6.0 * np.pi * t)
             joints[1] += pushed
             for k, spring in enumerate(robot.springs):
-                joints[n + k] = -spring.stiffness * (theta[n + k] - spring.rest)
+                joints[n + k] -= spring.stiffness * (theta[n + k] - spring.rest)
             turning = of_base.apply(torque[:3] + acting[3:]) - 30.0 * np.sin(3.0 * np.pi * t)
-            return np.concatenate([of_base.apply(acting[:3]), turning, joints - damping * rates])
+            motors = torque[3:][geared] - damping[geared] * motor_rates
+            return np.concatenate([of_base.apply(acting[:3]), turning, joints, motors])
 
         expected = equations.fly(expected, begin, begin + hold, force).y[:, -1]
         fly(plant, np.tile(torque, (200, 1)))
         assert_close(numbers(plant), expected, 1e-9)
-    assert np.abs(plant.truth.passive_velocities[:3]).max() > 0.05, "springs must swing"
+    assert np.abs(plant.truth.passive_velocities[:3]).max() > 0.01, "springs must swing"
+    deflections = expected[-len(geared) :] - plant.truth.joint_positions[geared]
+    assert np.abs(deflections).max() > 1e-4, "those of gears, too"
 
 
 def test_wheels_go_through_rest_and_come_to_rest_as_the_formulas_say() -> None:
