@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 from oracles import assert_close, rotation_of
 from oracles.momenta import kinetic_energy, momentum, state_of
 from oracles.rotors import RotorEquations, random_motor_rotors, random_rotors, settings_of
-from paths import DATA
 from pydantic import ValidationError
 from robots import ANGLES_DEG, LOCKED, NO_FRICTION, PERIOD, rigid_robot
 from strategies import random_bodies, random_gears, random_quaternion, random_robot, with_gears
@@ -167,6 +166,12 @@ KINDS = (
 TORQUE = np.array([60.0, -40.0, 50.0, 4.0, 9.0, -6.0])
 
 
+def tree(rng: np.random.Generator) -> Robot:
+    """Turning, sliding and passive joints, some with gears."""
+    robot = random_gears(rng, Robot.of_tree("tree", random_bodies(rng, KINDS)))
+    return with_gears(robot, [gear and gear._replace(ratio=10.0) for gear in robot.gears])
+
+
 def numbers(plant: Plant) -> Array:
     """A state as `RotorEquations` has it."""
     truth, count = plant.truth, len(geared_joints(plant.robot))
@@ -184,8 +189,7 @@ def test_a_flight_is_the_one_that_scipy_integrates(seed: int) -> None:
     joint by lines of a table.
     """
     rng, viscous = np.random.default_rng(seed), 0.2
-    robot = random_gears(rng, Robot.of_tree("tree", random_bodies(rng, KINDS)))
-    robot = with_gears(robot, [gear and gear._replace(ratio=10.0) for gear in robot.gears])
+    robot = tree(rng)
     n, hold, end = robot.n, 200 * PERIOD, 0.2
     wrench = rng.normal(size=(2, 6)) * [80.0, 80.0, 80.0, 30.0, 30.0, 30.0]
     push = np.array([3.0, -2.0])
@@ -274,48 +278,40 @@ def test_wheels_go_through_rest_and_come_to_rest_as_the_formulas_say() -> None:
     assert plant.truth.wheel_velocities[1] == plant.truth.wheel_velocities[3] == 0.0
 
 
-def test_wheels_of_a_robot_with_passive_joints_get_what_is_asked_of_them() -> None:
-    """Each one's own momentum grows by its motor's torque alone, whatever else moves.
+def test_a_capture_gives_no_wheel_and_no_rotor_a_momentum_of_its_own() -> None:
+    """``J (N thetadot_m + z . w_p)`` is as in the flight without it, though all else is struck.
 
-    Also over a capture, which gives it none: ``J (Omega + a . w0)`` stays as the base is struck.
+    Each wheel's own momentum, ``J (Omega + a . w0)``, grows by its motor's torque alone.
     """
-    robot, rng = Robot.from_yaml(DATA / "passive_robot" / "robot.yaml"), np.random.default_rng(5)
+    rng, capture = np.random.default_rng(1), 100
+    robot = tree(rng)
+    equations = RotorEquations(robot, random_motor_rotors(rng, robot))
     rotors = [rotor._replace(spin=0.05) for rotor in random_rotors(rng, robot, 4)]
-    wheels = settings_of(rotors, initial_speed=[20.0, -30.0, 40.0, 10.0])
-    axes, spins = np.array([rotor.axis for rotor in rotors]), np.array([r.spin for r in rotors])
-    target = Target.from_dict(
-        {
-            "target": {
-                "mass": 20.0,
-                "inertia": [2.0, 3.0, 4.0, 0.0, 0.0, 0.0],
-                "motion": {"velocity": [0.3, -0.2, 0.1], "angular_velocity": [0.2, 0.4, -0.3]},
-            }
-        }
-    )
-    settings = PlantSettings(
-        initial_joints_deg=[10.0, 0.3, 20.0, 0.0, 30.0, 0.0],
-        friction=NO_FRICTION,
-        wheels=wheels,
-        base_actuation="hardware",
-        initial_quaternion=[0.5, -0.5, 0.1, 0.7],
-        events=[f"capture@{100 * PERIOD}:{target.inline}"],
-    )
-    plant = Plant(robot, settings, PERIOD)
-
-    def own() -> Array:
-        truth = plant.truth
-        return spins * (truth.wheel_velocities[:4] + axes @ truth.omega_base)
-
-    torque = np.concatenate([np.zeros(3), 5.0 * rng.normal(size=6), 0.3 * rng.normal(size=4)])
-    before, energy = own(), kinetic_energy(robot, plant.truth, wheels)
-    assert energy == pytest.approx(0.5 * spins @ np.square(wheels.initial_speed))
-    turned = 0.0
-    for tick in range(200):
-        omega = plant.truth.omega_base.copy()
-        plant.step(Command(tick, torque))
-        if plant.tick == 100:
-            turned = float(np.abs(plant.truth.omega_base - omega).max())
-        expected = before + torque[9:] * plant.tick * PERIOD
-        np.testing.assert_allclose(own(), expected, rtol=0.0, atol=1e-11)
-    assert turned > 1e-3, "the base must be struck"
-    assert np.abs(plant.truth.passive_positions[:2]).max() > 1e-4
+    axes, inertia = np.array([rotor.axis for rotor in rotors]), 0.05
+    motion = {"velocity": [0.3, -0.2, 0.1], "angular_velocity": [0.2, 0.4, -0.3]}
+    content = {"mass": 20.0, "inertia": [2.0, 3.0, 4.0, 0.0, 0.0, 0.0], "motion": motion}
+    target = Target.from_dict({"target": content})
+    torque = np.concatenate([np.zeros(3), 20.0 * rng.normal(size=3), 0.3 * rng.normal(size=4)])
+    speeds, spins = [], []
+    for events in ([], [f"capture@{capture * PERIOD}:{target.inline}"]):
+        plant = plant_of(
+            robot,
+            wheels=settings_of(rotors, initial_speed=[20.0, -30.0, 40.0, 10.0]),
+            base_actuation="hardware",
+            substeps=2,
+            events=events,
+        )
+        own = []
+        for _ in range(2 * capture):
+            truth = plant.truth
+            own.append(inertia * (truth.wheel_velocities[:4] + axes @ truth.omega_base))
+            fly(plant, torque[np.newaxis])
+            if plant.tick == capture:
+                state, found = state_of(robot, plant.truth), equations.velocity(numbers(plant))
+                mass, _ = equations.matrices(state.quaternion, state.theta, np.zeros(found.size))
+                speeds.append(found)
+                spins.append((mass @ found)[6 + robot.joint_count :])
+        grown = np.outer(np.arange(2 * capture) * PERIOD, torque[6:])
+        np.testing.assert_allclose(own - own[0], grown, rtol=0.0, atol=1e-11)
+    assert np.abs(speeds[1] - speeds[0])[[*range(6), -1]].max() > 1e-3
+    np.testing.assert_allclose(spins[1], spins[0], rtol=0.0, atol=1e-12 * np.abs(spins[0]).max())
