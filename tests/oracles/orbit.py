@@ -13,7 +13,7 @@ import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 from scipy.integrate import solve_ivp
 
-from oracles import pinocchio_model, pinocchio_state, rotation_of, visited
+from oracles import pinocchio_model, pinocchio_state, visited
 from oracles.momenta import state_of
 from space_robot_model.robot import Robot
 from space_robot_msgs_py.samples import RobotState
@@ -153,38 +153,3 @@ def free_path(position: ArrayLike, velocity: ArrayLike, times: ArrayLike, has_j2
     start, at = np.concatenate([position, velocity]), np.atleast_1d(times)
     path = solve_ivp(rates, (0.0, at[-1]), start, "DOP853", at, rtol=1e-13, atol=1e-9)
     return np.asarray(path.y.T)
-
-
-def tumbled(
-    inertia: Array, quaternion: ArrayLike, omega: ArrayLike, path: ArrayLike, time: float
-) -> tuple[Array, Array]:
-    """Return quaternion (4,) and angular velocity (3,), body axes, after some time.
-
-    Euler's equations with the gravity gradient along a Keplerian path.
-
-    Args:
-        inertia: (3, 3) kg m2.
-        quaternion: (4,) ``[w, x, y, z]`` at time 0.
-        omega: (3,) rad/s at time 0, body axes.
-        path: (6,) position and velocity at time 0 about the Earth.
-        time: s.
-    """
-
-    def rates(_: float, x: Array) -> Array:
-        q, w, r = x[:4] / np.linalg.norm(x[:4]), x[4:7], x[7:10]
-        distance = float(np.linalg.norm(r))
-        up = rotation_of(q).inv().apply(r / distance)
-        torque = 3.0 * MU / distance**3 * np.cross(up, inertia @ up)
-        return np.concatenate(
-            [
-                0.5 * np.array([-q[1:] @ w, *(q[0] * w + np.cross(q[1:], w))]),
-                np.linalg.solve(inertia, torque - np.cross(w, inertia @ w)),
-                x[10:13],
-                fall(r, has_j2=False),
-            ]
-        )
-
-    start = np.concatenate([quaternion / np.linalg.norm(quaternion), omega, path])
-    motion = solve_ivp(rates, (0.0, time), start, method="DOP853", rtol=1e-12, atol=1e-13)
-    end = motion.y[:, -1]
-    return end[:4] / np.linalg.norm(end[:4]), end[4:7]

@@ -17,7 +17,15 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from oracles import TreeOracle, assert_same_dynamics
 from paths import DATA
-from strategies import SEEDS, random_inertia, random_origin, random_rotation, random_urdf, words
+from strategies import (
+    MOMENTS,
+    SEEDS,
+    random_inertia,
+    random_origin,
+    random_rotation,
+    random_urdf,
+    words,
+)
 
 from space_robot.cli.main import _run
 from space_robot_model.robot import Robot
@@ -216,16 +224,10 @@ def nearest(inertia: Array) -> Array:
 
 
 def with_inertia(mass: float, tensor: Array) -> str:
-    i = tensor
-    return (
-        (
-            f'<inertial><origin xyz="0.1 0.2 0.3"/><mass value="{mass!r}"/><inertia '
-            f'ixx="{i[0, 0]!r}" iyy="{i[1, 1]!r}" izz="{i[2, 2]!r}" ixy="{i[0, 1]!r}" '
-            f'ixz="{i[0, 2]!r}" iyz="{i[1, 2]!r}"/></inertial>'
-        )
-        .replace("np.float64(", "")
-        .replace(")", "")
-    )
+    values = tensor[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]].tolist()
+    moments = " ".join(f'{name}="{value!r}"' for name, value in zip(MOMENTS, values, strict=True))
+    place = '<origin xyz="0.1 0.2 0.3"/>'
+    return f'<inertial>{place}<mass value="{mass!r}"/><inertia {moments}/></inertial>'
 
 
 LIMIT = '<limit lower="-1" upper="1" velocity="1" effort="1"/>'

@@ -15,7 +15,6 @@ from oracles.orbit import (
     BodyMotion,
     body_motions,
     free_path,
-    tumbled,
     weight_torque,
     whole_momenta,
 )
@@ -286,6 +285,12 @@ def test_the_plant_flies_the_same_body_to_the_same_place(has_j2: bool) -> None:
     assert np.linalg.norm(spun - turn.apply(omega)) > 1e-3
     np.testing.assert_allclose(meeting.motion.angular_velocity, spun, rtol=0.0, atol=1e-8)
     assert meeting.reach == 0.7
+    times = np.array([0.0, 0.5, 30.0, 31.0, ticks * period])
+    positions, quaternions = fall(target, orbit, times)
+    met = [meet(target, orbit, time).position for time in times.tolist()]
+    np.testing.assert_allclose(positions, met, rtol=0.0, atol=1e-6)
+    turned = rotation_of(state.quaternion).inv() * rotation_of(quaternions[-1])
+    assert turned.magnitude() < 1e-6
     (point,) = free_path(*state_of(orbit.orbital_elements), ticks * period, has_j2)
     found = np.concatenate([state.orbit_position, state.orbit_velocity])
     np.testing.assert_allclose(found, point, rtol=1e-11)
@@ -304,17 +309,3 @@ def test_what_cannot_be_followed_is_refused_in_one_line(
     with pytest.raises(InputError, match=rf"target 'drifter': {said}") as caught:
         meet(target_of(**motion), orbit, 1000.0)
     assert "\n" not in str(caught.value)
-
-
-def test_the_path_is_that_of_what_is_met() -> None:
-    """At each time, on the way of one integration; its attitude is SciPy's."""
-    orbit, times = circular_orbit(HEIGHT, j2=True), np.array([0.0, 0.5, 30.0, 31.0, 400.0])
-    motion = {"velocity": [0.1, -0.2, 0.05], "angular_velocity": [0.02, -0.03, 0.01]}
-    target = target_of(position=[10.0, -20.0, 5.0], **motion)
-    positions, quaternions = fall(target, orbit, times)
-    point, start = np.concatenate(state_of(orbit.orbital_elements)), target.motion
-    spin = start.quaternion, start.angular_velocity, point
-    for time, position, quaternion in zip(times.tolist(), positions, quaternions, strict=True):
-        np.testing.assert_allclose(position, meet(target, orbit, time).position, atol=1e-6)
-        due, _ = tumbled(tensor_of(target), *spin, time)
-        assert (rotation_of(due).inv() * rotation_of(quaternion)).magnitude() < 1e-4
