@@ -183,13 +183,6 @@ def set_motion(
     update_true_state(plant.block, plant.tick, plant.period)
 
 
-def set_orbit(plant: Plant, position: ArrayLike, velocity: ArrayLike) -> None:
-    """Put the orbit's point of a plant without wheels and gears elsewhere."""
-    at = 13 + 2 * plant.robot.joint_count
-    plant.memory.x[at : at + 3], plant.memory.x[at + 3 : at + 6] = position, velocity
-    update_true_state(plant.block, plant.tick, plant.period)
-
-
 BODY: dict[str, Any] = {
     "name": "drifter",
     "mass": 80.0,

@@ -102,14 +102,6 @@ def test_triangle_inequality_admits_a_flat_plate(content: dict[str, Any]) -> Non
     assert Robot.from_dict(content).n == 3
 
 
-def test_error_names_a_missing_file_and_an_unreadable_one(tmp_path: Path) -> None:
-    assert "no such file" in error_of(tmp_path / "none.yaml")
-    assert "not a file" in error_of(tmp_path)
-    binary = tmp_path / "binary.yaml"
-    binary.write_bytes(b"\xff\xfe\xfa")
-    assert "cannot be read" in error_of(binary)
-
-
 SOME_KINDS = ("revolute", "prismatic", "fixed", "passive revolute", "passive prismatic", "revolute")
 
 

@@ -22,8 +22,8 @@ from robots import oscillator
 from scipy.spatial.transform import Rotation
 from strategies import (
     BASE,
-    KINDS,
     SEEDS,
+    TREES,
     random_bodies,
     random_gears,
     random_quaternion,
@@ -43,29 +43,22 @@ from space_robot_msgs_py.topics import BASE_AXES
 from space_robot_sim.environment.disturbance_table import BASE as BASE_LOADS
 from space_robot_sim.environment.disturbance_table import TIME
 
-SOME_TREES = st.lists(st.sampled_from(KINDS), max_size=11)
-
-
-def tree_of(seed: int, kinds: list[str]) -> list[Body]:
-    """A random tree with one actuated joint at least."""
-    return random_bodies(np.random.default_rng(seed), ["revolute", *kinds])
-
 
 @settings(max_examples=60)
-@given(seed=SEEDS, kinds=SOME_TREES)
+@given(seed=SEEDS, kinds=TREES)
 def test_dynamics_are_pinocchios(seed: int, kinds: list[str]) -> None:
     """Branches, prismatic, fixed and passive joints about any axis, told in any order."""
-    bodies = tree_of(seed, kinds)
+    bodies = random_bodies(np.random.default_rng(seed), kinds)
     robot = Robot.of_tree("tree", bodies)
     oracle = TreeOracle(pinocchio_tree(bodies), BASE, robot.all_joint_names, seed)
     assert_same_dynamics(robot, oracle, seed)
 
 
 @settings(max_examples=30)
-@given(seed=SEEDS, kinds=SOME_TREES)
+@given(seed=SEEDS, kinds=TREES)
 def test_nominal_robot_is_locked_at_rest(seed: int, kinds: list[str]) -> None:
     """Pinocchio's tree with fixed joints where the springs are at rest, in the base's own frame."""
-    bodies = tree_of(seed, kinds)
+    bodies = random_bodies(np.random.default_rng(seed), kinds)
     robot = Robot.of_tree("tree", bodies)
     own = pinocchio_tree(bodies)
     locked = pinocchio_tree([_locked(body) for body in bodies])

@@ -122,18 +122,6 @@ def test_a_command_comes_back_whole(
     assert back.torque.tobytes() == torque.tobytes()
 
 
-@pytest.mark.parametrize(("wheels", "thrusters", "torquers"), [(4, 0, 3), (0, 0, 0), (2, 3, 1)])
-def test_actuators_are_told_apart_by_their_number(
-    wheels: int, thrusters: int, torquers: int
-) -> None:
-    whole = names_of(1, wheels, thrusters, 1, 1, torquers)
-    taken = RobotNames.of(
-        whole.joints, whole.actuators, wheels, whole.passive, whole.geared, torquers
-    )
-    assert taken == whole
-    assert taken.commanded == ("base_x", "base_y", "base_z", *whole.joints, *whole.actuators)
-
-
 def test_the_controller_waits_for_what_it_needs() -> None:
     """Not for thrusters and motors; the magnetometer is the last."""
     codec = StateCodec(names_of(3, 1, 1, 1, 2, 3), TIMEBASE)

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 from benches import PERIOD, N
+from benches import WHEEL_AXES as PYRAMID
 from benches import ActuatorBench as Bench
 from hypothesis import given
 from hypothesis import strategies as st
@@ -16,7 +17,6 @@ from strategies import SEEDS
 from space_robot_msgs_py.samples import MOST_TORQUERS
 
 Array = NDArray[np.float64]
-PYRAMID = [1.0, 1.0, 1.0, -1.0, 1.0, 1.0, -1.0, -1.0, 1.0, 1.0, -1.0, 1.0]
 WHEELS: dict[str, Any] = {
     "axes": PYRAMID,
     "rotor_inertia": [0.1],
@@ -29,14 +29,10 @@ def wheels(*faults: str, more: Any = None, **wheels: Any) -> Bench:
     return Bench(*faults, base_actuation="hardware", wheels={**WHEELS, **wheels}, **(more or {}))
 
 
-def axes_of(found: Bench) -> Array:
-    wheels: Array = found.settings.wheels.unit_axes
-    return wheels
-
-
 @given(SEEDS)
 def test_the_base_gets_what_the_wheels_lose(seed: int) -> None:
     found, rng = wheels(), np.random.default_rng(seed)
+    axes = found.settings.wheels.unit_axes
     for _ in range(20):
         found.truth.wheel_velocities[:4] = rng.uniform(-90, 90, 4)
         asked = rng.normal(size=4)
@@ -46,7 +42,7 @@ def test_the_base_gets_what_the_wheels_lose(seed: int) -> None:
         upper = np.minimum(0.4, np.maximum(0.0, 8.0 - momentum) / PERIOD)
         lower = -np.minimum(0.4, np.maximum(0.0, 8.0 + momentum) / PERIOD)
         np.testing.assert_array_equal(given_torques, np.clip(asked, lower, upper))
-        np.testing.assert_allclose(torque[:3], -given_torques @ axes_of(found), atol=1e-15)
+        np.testing.assert_allclose(torque[:3], -given_torques @ axes, atol=1e-15)
         np.testing.assert_array_equal(reported, torque)
         np.testing.assert_array_equal(found.record.base_wrench, np.zeros(6))
         np.testing.assert_array_equal(found.measured.wheel_torques, found.truth.wheel_torques)
