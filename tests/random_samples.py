@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 import pytest
 
 from space_robot_msgs_py import topics
-from space_robot_msgs_py.samples import STATE_FIELDS, RobotNames, RobotState, Timebase
-from space_robot_msgs_py.wire.codecs import StateCodec
+from space_robot_msgs_py.samples import STATE_FIELDS, RobotState, Timebase
 
 TIMEBASE = Timebase(500_000)
 JOINTS, BASE = topics.JOINT_STATES, topics.BASE_STATE
@@ -20,10 +18,6 @@ BASE_AXES = ["base_x", "base_y", "base_z"]
 def joint_names(n: int) -> list[str]:
     """Of different lengths, so that everything behind them is aligned differently."""
     return [f"j{'x' * (i * n % 5)}{i}" for i in range(n)]
-
-
-def state_codec(names: Sequence[str], timebase: Timebase = TIMEBASE) -> StateCodec:
-    return StateCodec(RobotNames.of(names), timebase)
 
 
 def random_sample(n: int, seed: int, tick: int = 4001) -> RobotState:

@@ -107,32 +107,16 @@ class GearedFlight:
     """A plant of a robot with gears, without Coulomb friction unless it is set."""
 
     def __init__(
-        self,
-        robot: Robot,
-        substeps: int = 1,
-        coulomb: float = 0.0,
-        viscous: float = 0.0,
-        **settings: Any,
+        self, robot: Robot, substeps: int = 1, coulomb: float = 0.0, **settings: Any
     ) -> None:
-        self.robot, self.joints = robot, geared_joints(robot)
-        self.plant = Plant(
-            robot,
-            PlantSettings(
-                **{"initial_joints_deg": [0.0] * robot.n, **settings},
-                friction=FrictionSettings(coulomb=coulomb, viscous=viscous),
-                substeps=substeps,
-            ),
-            PERIOD,
-        )
-        n, count = robot.joint_count, len(self.joints)
-        x = self.plant.memory.x
-        self.x = x[: 13 + 2 * n + 2 * count]
-        """The plant's own numbers ``[r0, quaternion, theta, v0, w0, thetadot, thetadot_m,
-        theta_m]``, see `Stages`; joints in the order of the model."""
-        self.positions, self.velocities = x[7 : 7 + n], x[13 + n : 13 + 2 * n]
-        self.base_velocities = x[7 + n : 13 + n]
-        self.motor_velocities = x[13 + 2 * n : 13 + 2 * n + count]
+        friction = FrictionSettings(coulomb=coulomb, viscous=0.0)
+        given = {"initial_joints_deg": [0.0] * robot.n, "friction": friction, **settings}
+        self.robot = robot
+        self.plant = Plant(robot, PlantSettings(**given, substeps=substeps), PERIOD)
+        n, count, x = robot.joint_count, len(geared_joints(robot)), self.plant.memory.x
+        self.positions = x[7 : 7 + n]
         self.motor_positions = x[13 + 2 * n + count : 13 + 2 * n + 2 * count]
+        """Of the plant's own numbers, see `Stages`; joints in the order of the model."""
 
     def fly(self, torque: Sequence[float] | Array, ticks: int = 1) -> RobotState:
         """Hold a torque (n+3,) on base and joints over some ticks; return the true state."""
@@ -157,8 +141,6 @@ MOTORS = 6
 """As many as the paper's robot has, whose compiled kernels serve."""
 ANGLES_DEG = [0.0, 120.0, 220.0, 0.0, -10.0, 0.0]
 BALL_MASS, BALL_INERTIA = 1e-3, 1e-6
-KEPLER = {"gradient": True, "j2": False}
-"""Settings of a gravity that knows no oblateness."""
 
 
 def rigid_robot(mass: float, principal: Sequence[float], **base: Any) -> Robot:
@@ -181,7 +163,7 @@ def rigid_robot(mass: float, principal: Sequence[float], **base: Any) -> Robot:
 
 def orbiting_plant(robot: Robot, period: float, **settings: Any) -> Plant:
     """Return a plant in a circular orbit at 400 km, or what the settings say; nobody turns it."""
-    orbit = {"orbital_elements": {"height": 400e3}, "gravity": KEPLER}
+    orbit = {"orbital_elements": {"height": 400e3}, "gravity": {"gradient": True, "j2": False}}
     joints = {"initial_joints_deg": [0.0] * robot.n, "friction": LOCKED}
     usual = {"base_actuation": "none", **joints, **orbit}
     return Plant(robot, PlantSettings.model_validate({**usual, **settings}), period)
@@ -198,13 +180,6 @@ def set_motion(
     n, x = plant.robot.joint_count, plant.memory.x
     x[:3], x[7 + n : 10 + n], x[10 + n : 13 + n] = position, velocity, omega
     x[13 + n : 13 + 2 * n] = joint_rates
-    update_true_state(plant.block, plant.tick, plant.period)
-
-
-def set_orbit(plant: Plant, position: ArrayLike, velocity: ArrayLike) -> None:
-    """Put the orbit's point of a plant without wheels and gears elsewhere."""
-    at = 13 + 2 * plant.robot.joint_count
-    plant.memory.x[at : at + 3], plant.memory.x[at + 3 : at + 6] = position, velocity
     update_true_state(plant.block, plant.tick, plant.period)
 
 

@@ -53,9 +53,3 @@ def kinetic_energy(robot: Robot, state: RobotState, wheels: WheelSettings = NO_W
     speeds = state.wheel_velocities[: wheels.count]
     of_base = wheels.unit_axes @ state.omega_base
     return float(of_robot + wheels.spin_momenta(speeds) @ (of_base + 0.5 * speeds))
-
-
-def spring_energy(robot: Robot, state: RobotState) -> float:
-    """Return the energy that the springs of the passive joints hold, J."""
-    stretched = state.passive_positions[: len(robot.springs)] - [s.rest for s in robot.springs]
-    return float(0.5 * np.array([s.stiffness for s in robot.springs]) @ stretched**2)

@@ -6,20 +6,20 @@ They are written out here once more, so that the project's can be compared with 
 from __future__ import annotations
 
 from decimal import Decimal, localcontext
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 from scipy.integrate import solve_ivp
 
-from oracles import pinocchio_model, pinocchio_state, rotation_of, visited
+from oracles import pinocchio_model, pinocchio_state, visited
 from oracles.momenta import state_of
 from space_robot_model.robot import Robot
 from space_robot_msgs_py.samples import RobotState
 
 Array = NDArray[np.float64]
-Exact = tuple[Decimal, Decimal, Decimal]
+Exact = NDArray[np.object_]
 """A vector of many digits."""
 
 MU = 3.986004418e14
@@ -30,11 +30,6 @@ J2 = 1.08262668e-3
 EARTH_RATE = 7.292115e-5
 """rad/s."""
 DIGITS = 50
-
-
-def mean_motion(semi_major_axis: float) -> float:
-    """Return ``sqrt(mu / a^3)``, rad/s."""
-    return float(np.sqrt(MU / semi_major_axis**3))
 
 
 class BodyMotion(NamedTuple):
@@ -92,99 +87,21 @@ def body_places(robot: Robot, state: RobotState) -> list[tuple[Array, Array]]:
 
 def exact(vector: ArrayLike) -> Exact:
     """Return the same numbers as decimal ones."""
-    x, y, z = (Decimal(float(value)) for value in np.asarray(vector))
-    return x, y, z
+    return np.array([Decimal(float(value)) for value in np.asarray(vector)])
 
 
-def plus(a: Exact, b: Exact) -> Exact:
-    """Return ``a + b``."""
-    return a[0] + b[0], a[1] + b[1], a[2] + b[2]
+def fall(r: Any, has_j2: bool) -> Any:
+    """Return the acceleration by the textbook's formula (Vallado, equation 8-30), m/s2.
 
-
-def times(a: Exact, b: Exact) -> Decimal:
-    """Return ``a . b``."""
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-
-
-def across(a: Exact, b: Exact) -> Exact:
-    """Return ``a x b``."""
-    return (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
-
-
-def exact_gravity(r: Exact, has_j2: bool) -> Exact:
-    """Return the acceleration by the textbook's formula (Vallado, equation 8-30)."""
-    square = times(r, r)
-    distance = square.sqrt()
-    fall = -Decimal(MU) / (square * distance)
-    if not has_j2:
-        return fall * r[0], fall * r[1], fall * r[2]
-    share = Decimal("1.5") * Decimal(J2) * Decimal(EARTH_RADIUS) ** 2 / square
-    height = 5 * r[2] * r[2] / square
-    return (
-        fall * r[0] * (1 + share * (1 - height)),
-        fall * r[1] * (1 + share * (1 - height)),
-        fall * r[2] * (1 + share * (3 - height)),
-    )
-
-
-def earth_potential(r: Exact, has_j2: bool) -> Decimal:
-    """Return ``-mu / r (1 - J2 (R_E / r)^2 P_2(z / r))``, m2/s2."""
-    square = times(r, r)
-    distance = square.sqrt()
-    potential = -Decimal(MU) / distance
-    if has_j2:
-        legendre = (3 * r[2] * r[2] / square - 1) / 2
-        potential *= 1 - Decimal(J2) * Decimal(EARTH_RADIUS) ** 2 / square * legendre
-    return potential
-
-
-class EarthTotals(NamedTuple):
-    """What a robot has about the Earth's centre, less what its mass would have at the point."""
-
-    energy: float
-    """J."""
-    angular: Array
-    """(3,) N m s."""
-    whole_energy: Decimal
-    """Nothing subtracted, J."""
-    whole_angular: Exact
-    """Nothing subtracted, N m s."""
-
-
-def earth_totals(robot: Robot, state: RobotState, has_j2: bool) -> EarthTotals:
-    """Return energy and angular momentum of all bodies about the Earth's centre.
-
-    Those of the whole are some 1e10 J and 1e12 N m s, so that the rounding of a position of 7e6 m
-    hides what the bodies exchange. What a particle of the same mass has at the orbit's point is
-    conserved by itself, and is subtracted; computed with many digits.
+    As exactly as the numbers are.
     """
-    with localcontext() as context:
-        context.prec = DIGITS
-        point, motion = exact(state.orbit_position), exact(state.orbit_velocity)
-        energy, angular = Decimal(0), exact(np.zeros(3))
-        mass = Decimal(0)
-        for body in body_motions(robot, state):
-            mass += (m := Decimal(body.mass))
-            place = plus(point, exact(body.position))
-            velocity = plus(motion, exact(body.velocity))
-            energy += m * (times(velocity, velocity) / 2 + earth_potential(place, has_j2))
-            energy += Decimal(body.energy) + _extent(place, body)
-            orbital = across(place, velocity)
-            angular = plus(angular, (m * orbital[0], m * orbital[1], m * orbital[2]))
-            angular = plus(angular, exact(body.spin))
-        of_point = mass * (times(motion, motion) / 2 + earth_potential(point, has_j2))
-        about = across(point, motion)
-        less = [float(a - mass * b) for a, b in zip(angular, about, strict=True)]
-        return EarthTotals(float(energy - of_point), np.array(less), energy, angular)
-
-
-def _extent(place: Exact, body: BodyMotion) -> Decimal:
-    """Return the potential of a body's extent, ``mu / (2 r^3) (3 u . I u - tr I)``, J."""
-    r = np.array([float(value) for value in place])
-    distance = float(np.linalg.norm(r))
-    u = r / distance
-    moments = 3.0 * u @ body.inertia @ u - np.trace(body.inertia)
-    return Decimal(float(MU / (2.0 * distance**3) * moments))
+    kind, square = type(r[0]), r @ r
+    distance = square.sqrt() if kind is Decimal else np.sqrt(square)
+    pull = -kind(MU) / (square * distance) * r
+    if has_j2:
+        share = kind(1.5) * kind(J2) * kind(EARTH_RADIUS) ** 2 / square
+        pull *= 1 + share * (np.array([1, 1, 3]) - 5 * r[2] * r[2] / square)
+    return pull
 
 
 def centre_of_mass(robot: Robot, state: RobotState) -> Array:
@@ -194,27 +111,6 @@ def centre_of_mass(robot: Robot, state: RobotState) -> Array:
     return np.asarray(moment / sum(body.mass for body in bodies))
 
 
-def angular_momentum(robot: Robot, state: RobotState) -> Array:
-    """Return the angular momentum (3,) about the common centre of mass, N m s, inertial axes."""
-    bodies = body_motions(robot, state)
-    mass, com = sum(body.mass for body in bodies), centre_of_mass(robot, state)
-    velocity = np.sum([body.mass * body.velocity for body in bodies], axis=0) / mass
-    total = np.zeros(3)
-    for body in bodies:
-        total += body.spin
-        total += body.mass * np.cross(body.position - com, body.velocity - velocity)
-    return total
-
-
-def whole_inertia(robot: Robot, state: RobotState) -> Array:
-    """Return the inertia (3, 3) of all bodies about the common centre of mass, kg m2."""
-    com, total = centre_of_mass(robot, state), np.zeros((3, 3))
-    for body in body_motions(robot, state):
-        d = body.position - com
-        total += body.inertia + body.mass * (d @ d * np.eye(3) - np.outer(d, d))
-    return total
-
-
 def whole_momenta(bodies: list[BodyMotion]) -> tuple[Array, Array]:
     """Return linear and angular momentum about the inertial frame's origin."""
     linear = [body.mass * body.velocity for body in bodies]
@@ -222,15 +118,30 @@ def whole_momenta(bodies: list[BodyMotion]) -> tuple[Array, Array]:
     return np.sum(linear, axis=0), np.sum(angular, axis=0)
 
 
-def fall(position: Array, has_j2: bool) -> Array:
-    """Return the acceleration of free fall (3,), m/s2."""
-    r = float(np.linalg.norm(position))
-    pull = -MU / r**3 * position
-    if has_j2:
-        height = 5.0 * position[2] ** 2 / r**2
-        factor = -1.5 * J2 * MU * EARTH_RADIUS**2 / r**5
-        pull = pull + factor * position * (np.array([1.0, 1.0, 3.0]) - height)
-    return np.asarray(pull)
+def exact_difference(r: ArrayLike, d: ArrayLike, has_j2: bool) -> Array:
+    """Return ``g(r + d) - g(r)``, rounded at the end."""
+    with localcontext() as context:
+        context.prec = DIGITS
+        return (fall(exact(r) + exact(d), has_j2) - fall(exact(r), has_j2)).astype(float)
+
+
+def weight_torque(robot: Robot, state: RobotState, has_j2: bool) -> Array:
+    """Return the torque (3,) of gravity about the common centre of mass, N m, inertial axes.
+
+    Each body is drawn at its centre of mass, and turned and drawn by its inertia I's part of the
+    potential, ``mu / (2 r^3) (3 u . I u - tr I)``.
+    """
+    com, total = centre_of_mass(robot, state), np.zeros(3)
+    for body in body_motions(robot, state):
+        r = state.orbit_position + body.position
+        distance = float(np.linalg.norm(r))
+        u = r / distance
+        turned, rate = body.inertia @ u, 3.0 * MU / distance**3
+        lift = turned + (0.5 * np.trace(body.inertia) - 2.5 * u @ turned) * u
+        force = body.mass * exact_difference(state.orbit_position, body.position, has_j2)
+        force -= rate / distance * lift
+        total += np.cross(body.position - com, force) + rate * np.cross(u, turned)
+    return total
 
 
 def free_path(position: ArrayLike, velocity: ArrayLike, times: ArrayLike, has_j2: bool) -> Array:
@@ -242,38 +153,3 @@ def free_path(position: ArrayLike, velocity: ArrayLike, times: ArrayLike, has_j2
     start, at = np.concatenate([position, velocity]), np.atleast_1d(times)
     path = solve_ivp(rates, (0.0, at[-1]), start, "DOP853", at, rtol=1e-13, atol=1e-9)
     return np.asarray(path.y.T)
-
-
-def tumbled(
-    inertia: Array, quaternion: ArrayLike, omega: ArrayLike, path: ArrayLike, time: float
-) -> tuple[Array, Array]:
-    """Return quaternion (4,) and angular velocity (3,), body axes, after some time.
-
-    Euler's equations with the gravity gradient along a Keplerian path.
-
-    Args:
-        inertia: (3, 3) kg m2.
-        quaternion: (4,) ``[w, x, y, z]`` at time 0.
-        omega: (3,) rad/s at time 0, body axes.
-        path: (6,) position and velocity at time 0 about the Earth.
-        time: s.
-    """
-
-    def rates(_: float, x: Array) -> Array:
-        q, w, r = x[:4] / np.linalg.norm(x[:4]), x[4:7], x[7:10]
-        distance = float(np.linalg.norm(r))
-        up = rotation_of(q).inv().apply(r / distance)
-        torque = 3.0 * MU / distance**3 * np.cross(up, inertia @ up)
-        return np.concatenate(
-            [
-                0.5 * np.array([-q[1:] @ w, *(q[0] * w + np.cross(q[1:], w))]),
-                np.linalg.solve(inertia, torque - np.cross(w, inertia @ w)),
-                x[10:13],
-                fall(r, has_j2=False),
-            ]
-        )
-
-    start = np.concatenate([quaternion / np.linalg.norm(quaternion), omega, path])
-    motion = solve_ivp(rates, (0.0, time), start, method="DOP853", rtol=1e-12, atol=1e-13)
-    end = motion.y[:, -1]
-    return end[:4] / np.linalg.norm(end[:4]), end[4:7]

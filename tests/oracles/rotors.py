@@ -93,27 +93,6 @@ def mount(model: Any, rotors: Sequence[Rotor]) -> None:
     model.wheel_inertia[:count] = [rotor.spin for rotor in rotors]
 
 
-def base_alone(robot: Robot, rotors: Sequence[Rotor]) -> pin.Inertia:
-    """The base without its rotors, about its centre of mass with them."""
-    base = pin.Inertia(robot.mass[0], np.zeros(3), robot.inertia[0]).toDynamicParameters()
-    for rotor in rotors:
-        base = base - rotor.inertia.toDynamicParameters()
-    return pin.Inertia.FromDynamicParameters(base)
-
-
-def pinocchio_with_wheels(robot: Robot, rotors: Sequence[Rotor]) -> pin.Model:
-    """`pinocchio_model` with a hinge for each rotor on the base, behind the joints."""
-    model = pinocchio_model(robot)
-    base = 1
-    model.inertias[base] = base_alone(robot, rotors)
-    for k, rotor in enumerate(rotors):
-        hinge = pin.JointModelRevoluteUnaligned(rotor.axis)
-        joint = model.addJoint(base, hinge, pin.SE3(np.eye(3), rotor.position), f"wheel_{k + 1}")
-        body = pin.Inertia(rotor.mass, np.zeros(3), rotor.tensor)
-        model.appendBodyToJoint(joint, body, pin.SE3.Identity())
-    return model
-
-
 def gear_of(robot: Robot, joint: int) -> Gear:
     """Return the gear of a joint that has one."""
     gear = robot.gears[joint]
@@ -140,20 +119,28 @@ def random_motor_rotors(rng: np.random.Generator, robot: Robot) -> list[Rotor]:
     return rotors
 
 
-def pinocchio_with_rotors(robot: Robot, rotors: Sequence[Rotor]) -> pin.Model:
-    """`pinocchio_model` with a revolute joint for each rotor, behind the joints."""
-    model = pinocchio_model(robot)
-    numbers = {0: 1} | {joint + 1: 2 + k for k, joint in enumerate(robot.order)}
-    for joint, rotor in zip(geared_joints(robot), rotors, strict=True):
-        carrier = numbers[int(robot.parent[joint])]
+def _put_on(model: pin.Model, carriers: Sequence[int], rotors: Sequence[Rotor]) -> pin.Model:
+    """Give each rotor a revolute joint of its own on a joint that has carried it, locked."""
+    for k, (carrier, rotor) in enumerate(zip(carriers, rotors, strict=True)):
         alone = model.inertias[carrier].toDynamicParameters() - rotor.inertia.toDynamicParameters()
         model.inertias[carrier] = pin.Inertia.FromDynamicParameters(alone)
         axis = pin.JointModelRevoluteUnaligned(rotor.axis)
-        place = pin.SE3(np.eye(3), rotor.position)
-        added = model.addJoint(carrier, axis, place, f"motor of {robot.joint_names[joint]}")
+        added = model.addJoint(carrier, axis, pin.SE3(np.eye(3), rotor.position), f"rotor {k + 1}")
         body = pin.Inertia(rotor.mass, np.zeros(3), rotor.tensor)
         model.appendBodyToJoint(added, body, pin.SE3.Identity())
     return model
+
+
+def pinocchio_with_wheels(robot: Robot, rotors: Sequence[Rotor]) -> pin.Model:
+    """`pinocchio_model` with the rotors on the base, behind the joints."""
+    return _put_on(pinocchio_model(robot), [1] * len(rotors), rotors)
+
+
+def pinocchio_with_rotors(robot: Robot, rotors: Sequence[Rotor]) -> pin.Model:
+    """`pinocchio_model` with the rotors of its gears, behind the joints."""
+    numbers = {0: 1} | {joint + 1: 2 + k for k, joint in enumerate(robot.order)}
+    carriers = [numbers[int(robot.parent[joint])] for joint in geared_joints(robot)]
+    return _put_on(pinocchio_model(robot), carriers, rotors)
 
 
 def turns(robot: Robot) -> Array:

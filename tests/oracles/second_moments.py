@@ -18,38 +18,24 @@ from space_robot_model.robot import Robot
 Array = NDArray[np.float64]
 
 
-class Frames(NamedTuple):
-    """Axes (n+1, 3, 3) and origins (n+1, 3) of the bodies, axes of the joints (n, 3)."""
-
-    axes: Array
-    origins: Array
-    joints: Array
-
-
-def frames(robot: Robot, quaternion: Array, theta: Array) -> Frames:
-    """Forward kinematics in inertial axes, the base's frame as origin."""
-    axes, origins, joints = [rotation_of(quaternion).as_matrix()], [np.zeros(3)], []
+def frames(robot: Robot, quaternion: Array, theta: Array) -> tuple[Array, Array]:
+    """Axes (n+1, 3, 3) of the bodies, and of the joints (n, 3), as inertial ones."""
+    axes, joints = [rotation_of(quaternion).as_matrix()], []
     for j in range(robot.n):
-        parent, turned = robot.parent[j], np.eye(3)
-        zero = axes[parent] @ robot.rotation[j]
-        origin = origins[parent] + zero @ robot.offset[j]
-        if robot.is_prismatic[j]:
-            origin = origin + zero[:, 2] * theta[j]
-        else:
-            turned = rotation_of([np.cos(theta[j] / 2), 0, 0, np.sin(theta[j] / 2)]).as_matrix()
-        axes.append(zero @ turned)
-        origins.append(origin)
+        zero = axes[robot.parent[j]] @ robot.rotation[j]
+        half = 0.0 if robot.is_prismatic[j] else 0.5 * theta[j]
+        axes.append(zero @ rotation_of([np.cos(half), 0.0, 0.0, np.sin(half)]).as_matrix())
         joints.append(zero[:, 2])
-    return Frames(np.array(axes), np.array(origins), np.array(joints))
+    return np.array(axes), np.array(joints)
 
 
 def vectors(robot: Robot, quaternion: Array, theta: Array) -> Array:
     """The vectors u_k as columns (3, 2n+3); zero where a prismatic joint has none."""
-    at = frames(robot, quaternion, theta)
-    columns = list(at.axes[0].T)
+    axes, joints = frames(robot, quaternion, theta)
+    columns = list(axes[0].T)
     for j in range(robot.n):
-        along = [at.joints[j] * theta[j], np.zeros(3)]
-        columns += along if robot.is_prismatic[j] else list(at.axes[j + 1].T[:2])
+        along = [joints[j] * theta[j], np.zeros(3)]
+        columns += along if robot.is_prismatic[j] else list(axes[j + 1].T[:2])
     return np.array(columns).T
 
 
@@ -86,7 +72,8 @@ def jacobians(
 
     Its base part is epsdot, or w0 in inertial axes without ``in_rho``.
     """
-    m, at, u = robot.n + 3, frames(robot, quaternion, theta), vectors(robot, quaternion, theta)
+    m, u = robot.n + 3, vectors(robot, quaternion, theta)
+    _, axes = frames(robot, quaternion, theta)
     turn = np.zeros((robot.n + 1, 3, m))  # angular Jacobian of each body, and its rate
     turn_rate, turn[0, :, :3] = np.zeros_like(turn), np.eye(3)
     if in_rho:
@@ -97,7 +84,7 @@ def jacobians(
     bodies, slides = [0, 0, 0], np.zeros((2 * robot.n + 3, 3, m))
     slide_rates = np.zeros_like(slides)
     for j in range(robot.n):
-        parent, z = robot.parent[j], at.joints[j]
+        parent, z = robot.parent[j], axes[j]
         z_rate = np.cross(turn[parent] @ rate, z)
         turn[j + 1], turn_rate[j + 1] = turn[parent], turn_rate[parent]
         one, its_rate = (slides, slide_rates) if robot.is_prismatic[j] else (turn, turn_rate)
@@ -119,8 +106,3 @@ def second_moments(robot: Robot, factor: ArrayLike = 1.0) -> Array:
     factors = np.broadcast_to(factor, robot.n + 1).astype(np.float64)
     second_moments_into(robot.model, coordinates, np.ascontiguousarray(factors), out)
     return out
-
-
-def missing(robot: Robot) -> list[int]:
-    """Columns of vectors that are zero."""
-    return [4 + 2 * j for j in range(robot.n) if robot.is_prismatic[j]]

@@ -122,18 +122,6 @@ def test_a_command_comes_back_whole(
     assert back.torque.tobytes() == torque.tobytes()
 
 
-@pytest.mark.parametrize(("wheels", "thrusters", "torquers"), [(4, 0, 3), (0, 0, 0), (2, 3, 1)])
-def test_actuators_are_told_apart_by_their_number(
-    wheels: int, thrusters: int, torquers: int
-) -> None:
-    whole = names_of(1, wheels, thrusters, 1, 1, torquers)
-    taken = RobotNames.of(
-        whole.joints, whole.actuators, wheels, whole.passive, whole.geared, torquers
-    )
-    assert taken == whole
-    assert taken.commanded == ("base_x", "base_y", "base_z", *whole.joints, *whole.actuators)
-
-
 def test_the_controller_waits_for_what_it_needs() -> None:
     """Not for thrusters and motors; the magnetometer is the last."""
     codec = StateCodec(names_of(3, 1, 1, 1, 2, 3), TIMEBASE)
@@ -335,16 +323,3 @@ def test_points_more_than_a_second_apart_carry_into_the_seconds() -> None:
     ]
     assert [t.sec * 10**9 + t.nanosec for t in after] == [600_000_000 * k for k in range(4)]
     assert [t.sec for t in after] == [0, 0, 1, 1]
-
-
-def test_after_a_chunk_of_another_period_the_own_times_are_written() -> None:
-    chunk, other = random_chunk(2, 3), ReferenceCodec(joint_names(2), Timebase(1_000_000))
-    codec = ReferenceCodec(joint_names(2), TIMEBASE)
-    good = codec.encode(chunk)
-    for decode, data in zip(
-        (codec.decode_joints, codec.decode_base), other.encode(chunk), strict=True
-    ):
-        with pytest.raises(MessageError, match="point 1 is not 1 ticks after") as error:
-            decode(data)
-        assert error.value.reason
-    assert codec.encode(chunk) == good

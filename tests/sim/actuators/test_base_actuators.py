@@ -7,22 +7,16 @@ from typing import Any
 import numpy as np
 import pytest
 from benches import PERIOD, N
+from benches import WHEEL_AXES as PYRAMID
 from benches import ActuatorBench as Bench
 from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
-from oracles import rotation_of
-from oracles.momenta import momentum
-from paths import CONFIG
-from robots import orbiting_plant, set_motion
 from strategies import SEEDS
 
-from space_robot_model.hardware.wheels import WheelSettings
-from space_robot_model.robot import Robot
-from space_robot_msgs_py.samples import MOST_TORQUERS, Command
+from space_robot_msgs_py.samples import MOST_TORQUERS
 
 Array = NDArray[np.float64]
-PYRAMID = [1.0, 1.0, 1.0, -1.0, 1.0, 1.0, -1.0, -1.0, 1.0, 1.0, -1.0, 1.0]
 WHEELS: dict[str, Any] = {
     "axes": PYRAMID,
     "rotor_inertia": [0.1],
@@ -35,14 +29,10 @@ def wheels(*faults: str, more: Any = None, **wheels: Any) -> Bench:
     return Bench(*faults, base_actuation="hardware", wheels={**WHEELS, **wheels}, **(more or {}))
 
 
-def axes_of(found: Bench) -> Array:
-    wheels: Array = found.settings.wheels.unit_axes
-    return wheels
-
-
 @given(SEEDS)
 def test_the_base_gets_what_the_wheels_lose(seed: int) -> None:
     found, rng = wheels(), np.random.default_rng(seed)
+    axes = found.settings.wheels.unit_axes
     for _ in range(20):
         found.truth.wheel_velocities[:4] = rng.uniform(-90, 90, 4)
         asked = rng.normal(size=4)
@@ -52,7 +42,7 @@ def test_the_base_gets_what_the_wheels_lose(seed: int) -> None:
         upper = np.minimum(0.4, np.maximum(0.0, 8.0 - momentum) / PERIOD)
         lower = -np.minimum(0.4, np.maximum(0.0, 8.0 + momentum) / PERIOD)
         np.testing.assert_array_equal(given_torques, np.clip(asked, lower, upper))
-        np.testing.assert_allclose(torque[:3], -given_torques @ axes_of(found), atol=1e-15)
+        np.testing.assert_allclose(torque[:3], -given_torques @ axes, atol=1e-15)
         np.testing.assert_array_equal(reported, torque)
         np.testing.assert_array_equal(found.record.base_wrench, np.zeros(6))
         np.testing.assert_array_equal(found.measured.wheel_torques, found.truth.wheel_torques)
@@ -236,10 +226,7 @@ def test_propellant_is_the_impulse_over_the_exhausts_speed(period: float) -> Non
     assert found.record.thrusters.pulses[:2].tolist() == [1.0, 1.0]
 
 
-PAPER = Robot.from_yaml(CONFIG / "robots/paper.yaml")
 FOUR_WHEELS = {"axes": PYRAMID, "rotor_inertia": [0.03], "initial_speed": [50.0, -20.0, 30.0, 90.0]}
-FIELD_ONLY = {"gravity": {"gradient": False}, "magnetism": {"strength": 3e-5}}
-"""T at the magnetic equator."""
 
 
 def torquers(axes: Array, most: Array, **more: Any) -> Bench:
@@ -286,45 +273,3 @@ def test_a_dipole_is_bounded_and_that_of_no_number_is_zero(
     actuators.ask(0.0, 0.0, 0.0, 0.0, asked, 7.5)
     expected = np.cross([given_dipole, 7.0, 0.0], field)
     np.testing.assert_allclose(actuators.truth.applied_torque[:3], expected, rtol=1e-15)
-
-
-def test_the_plants_momentum_grows_by_the_integral_of_m_cross_b() -> None:
-    """On inertial axes, of robot and wheels; and no force comes of it.
-
-    Each dipole is held on the base's axes over its tick, with the field of the tick's begin; the
-    torque turns with the base, whose attitude in the middle of the tick is close enough.
-    """
-    rng, plant = (
-        np.random.default_rng(2),
-        orbiting_plant(
-            PAPER,
-            0.01,
-            orbital_elements={"height": 420e3, "inclination_deg": 51.6, "anomaly_deg": 20.0},
-            base_actuation="hardware",
-            wheels=FOUR_WHEELS,
-            magnetic_torquers={"axes": np.eye(3).ravel().tolist(), "max_dipole": [300.0]},
-            initial_joints_deg=[0.0, 120.0, 220.0, 0.0, -10.0, 0.0],
-            initial_quaternion=[0.3, -0.8, 0.4, 0.2],
-            **FIELD_ONLY,
-        ),
-    )
-    set_motion(plant, position=[0.2, -0.1, 0.3], omega=[0.03, -0.02, 0.04])
-    wheels = WheelSettings.model_validate(FOUR_WHEELS)
-    impulse, start = np.zeros(3), momentum(PAPER, plant.truth, wheels)
-    for tick in range(300):
-        dipoles = 300.0 * rng.uniform(-1.0, 1.0, 3)
-        motors = 0.05 * rng.normal(size=4)
-        held = np.cross(dipoles, plant.truth.magnetic_field)
-        before = rotation_of(plant.truth.quaternion).apply(held)
-        plant.step(Command(tick, np.concatenate([np.zeros(N + 3), motors, dipoles])))
-        after = rotation_of(plant.truth.quaternion).apply(held)
-        impulse += 0.5 * plant.period * (before + after)
-        expected = held - motors @ wheels.unit_axes
-        np.testing.assert_allclose(plant.truth.applied_torque[:3], expected, rtol=0, atol=1e-14)
-        np.testing.assert_array_equal(plant.state.applied_torque, plant.truth.applied_torque)
-    end = momentum(PAPER, plant.truth, wheels)
-    size = np.linalg.norm(impulse)
-    assert size > 1e-3
-    # the trapezoidal rule's error: (omega period)^2 / 12, 2.4e-8 of each tick's impulse
-    np.testing.assert_allclose(end[1] - start[1], impulse, rtol=0.0, atol=3e-8 * size)
-    assert np.linalg.norm(end[0] - start[0]) < 1e-12

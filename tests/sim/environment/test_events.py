@@ -15,7 +15,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 from oracles import pinocchio_model, pinocchio_state, rotation_of, to_base_axes
-from oracles.orbit import BodyMotion, whole_momenta
 from paths import CONFIG, DATA
 from robots import tensor_of
 from strategies import (
@@ -174,36 +173,42 @@ def cases(draw: st.DrawFn) -> Case:
     return Case(robot, state, target, axes, rotors, *moving)
 
 
-def momentum(model: pin.Model, case: Case, velocity: Array) -> Array:
-    """Linear, then angular about the place of the base's CoM, of robot and wheels."""
+def momenta(case: Case, qdot: Array, is_held: bool) -> Array:
+    """Of base (also by its wheels) and joints, of the robot alone or with the target in its hand.
+
+    Those of the base are all the linear momentum and all the angular one about its CoM.
+    """
+    size, model = 6 + case.robot.joint_count, case.model.copy()
+    if is_held:
+        body = pin.Inertia(case.target.mass, np.zeros(3), tensor_of(case.target))
+        model.appendBodyToJoint(case.joint, body, case.local)
+    upper = np.triu(pin.crba(model, model.createData(), pinocchio_state(case.state)[0]))
+    to_base = to_base_axes(case.state.quaternion, size)
+    found: Array = to_base.T @ (upper + np.triu(upper, 1).T) @ to_base @ qdot[:size]
+    spin = case.wheel_axes.T @ (case.rotors * qdot[size:])
+    found[3:6] += rotation_of(case.state.quaternion).apply(spin)
+    return found
+
+
+def jacobian(case: Case) -> Array:
+    """Pinocchio's, of the target's place in the hand, on axes that stand."""
+    model, (q, _) = case.model.copy(), pinocchio_state(case.state)
+    number = model.addFrame(pin.Frame("t", case.joint, 0, case.local, pin.FrameType.OP_FRAME))
+    found = pin.computeFrameJacobian(model, model.createData(), q, number, pin.LOCAL_WORLD_ALIGNED)
     size = 6 + case.robot.joint_count
-    state = case.state._replace(v0=velocity[:3], w0=velocity[3:6], rate=velocity[6:size])
-    data = model.createData()
-    found = pin.computeCentroidalMomentum(model, data, *pinocchio_state(state))
-    spin = case.wheel_axes.T @ (case.rotors * velocity[size:])
-    angular = found.angular + np.cross(data.com[0], found.linear)
-    angular = angular + rotation_of(state.quaternion).apply(spin)
-    return np.concatenate([found.linear, angular])
+    return np.asarray(found @ to_base_axes(case.state.quaternion, size))
 
 
-def target_momentum(case: Case, motion: Array) -> Array:
-    """Of a target where the hand has it, with a velocity and an angular velocity (6,)."""
-    frame = case.hand * case.local
-    own = BodyMotion.of(
-        case.target.mass,
-        *(frame.translation, frame.rotation, tensor_of(case.target), motion[:3], motion[3:]),
-    )
-    return np.concatenate(whole_momenta([own]))
+def brought(case: Case, motion: Array) -> Array:
+    """What a target in its place with a velocity and an angular velocity (6,) has, as `momenta`."""
+    axes = (case.hand * case.local).rotation
+    spin = axes @ tensor_of(case.target) @ axes.T @ motion[3:]
+    momentum: Array = jacobian(case).T @ np.concatenate([case.target.mass * motion[:3], spin])
+    return momentum
 
 
-def with_target(case: Case) -> pin.Model:
-    """Pinocchio's robot with the target as a body of its own on the joint of the tool."""
-    model, body = (
-        case.model.copy(),
-        pin.Inertia(case.target.mass, np.zeros(3), tensor_of(case.target)),
-    )
-    model.appendBodyToJoint(case.joint, body, case.local)
-    return model
+def assert_sum(found: Array, *parts: Array) -> None:
+    np.testing.assert_allclose(found, sum(parts), rtol=0.0, atol=1e-11 * np.abs(parts).max())
 
 
 @settings(max_examples=30)
@@ -216,43 +221,16 @@ def test_a_capture_keeps_both_momenta_and_no_motor_gives_an_impulse(case: Case) 
         axes, twist = case.hand.rotation @ tool.rotation, case.twist
         w = axes @ w + twist.angular
         v = axes @ v + twist.linear + np.cross(twist.angular, frame.translation)
-    own = target_momentum(case, np.concatenate([v, w]))
-    before = momentum(case.model, case, case.velocity)
     after = case.impact.capture(given, case.velocity)
-    scale = max(np.abs(before).max(), np.abs(own).max())
-    found = momentum(with_target(case), case, after)
-    np.testing.assert_allclose(found, before + own, rtol=0.0, atol=1e-12 * scale)
-    # wheels
-    size, q = 6 + case.robot.joint_count, case.state.quaternion
-    turning = case.wheel_axes @ rotation_of(q).as_matrix().T
+    before = momenta(case, case.velocity, is_held=False)
+    held = momenta(case, after, is_held=True)
+    assert_sum(held, before, brought(case, np.concatenate([v, w])))
+    size = 6 + case.robot.joint_count
+    turning = case.wheel_axes @ rotation_of(case.state.quaternion).as_matrix().T
     rates = [turning @ qdot[3:6] + qdot[size:] for qdot in (case.velocity, after)]
     np.testing.assert_allclose(rates[1], rates[0], rtol=1e-12, atol=1e-11)
-    # joints: with Pinocchio's Jacobian of the target's frame, on axes that stand
-    model, whole = case.model.copy(), with_target(case)
-    number = model.addFrame(pin.Frame("t", case.joint, 0, case.local, pin.FrameType.OP_FRAME))
-    configuration, _ = pinocchio_state(case.state)
-    jacobian = pin.computeFrameJacobian(
-        model, model.createData(), configuration, number, pin.LOCAL_WORLD_ALIGNED
-    ) @ to_base_axes(q, size)
-    np.testing.assert_allclose(case.impact.jacobian[:, :size], jacobian, rtol=0.0, atol=1e-11)
-    at_place = own.copy()
-    at_place[3:] -= np.cross(frame.translation, own[:3])
-    bare, held = (
-        generalised_momentum(m, case, qdot)
-        for m, qdot in ((case.model, case.velocity), (whole, after))
-    )
-    expected = bare + jacobian.T @ at_place
-    atol = 1e-11 * max(np.abs(held).max(), np.abs(expected).max())
-    np.testing.assert_allclose(held[6:], expected[6:], rtol=0.0, atol=atol)
-
-
-def generalised_momentum(model: pin.Model, case: Case, qdot: Array) -> Array:
-    size = 6 + case.robot.joint_count
-    configuration, _ = pinocchio_state(case.state)
-    upper = np.triu(pin.crba(model, model.createData(), configuration))
-    to_base = to_base_axes(case.state.quaternion, size)
-    momenta: Array = to_base.T @ (upper + np.triu(upper, 1).T) @ to_base @ qdot[:size]
-    return momenta
+    found = case.impact.jacobian[:, :size]
+    np.testing.assert_allclose(found, jacobian(case), rtol=0.0, atol=1e-11)
 
 
 @settings(max_examples=30)
@@ -261,14 +239,11 @@ def test_a_release_leaves_the_momenta_and_gives_the_spring_s_speed(
     case: Case, speed: float
 ) -> None:
     """The target goes at ``speed`` along the tool's z, and turns as the hand does."""
-    whole = momentum(with_target(case), case, case.velocity)
     after = case.impact.release(speed, case.velocity)
     moving = case.impact.jacobian @ after
     moving[:3] += speed * (case.hand.rotation @ case.robot.tools[0].rotation)[:, 2]
-    left = target_momentum(case, moving)
-    scale = max(np.abs(whole).max(), np.abs(left).max())
-    found = momentum(case.model, case, after) + left
-    np.testing.assert_allclose(found, whole, rtol=0.0, atol=1e-12 * scale)
+    whole = momenta(case, case.velocity, is_held=True)
+    assert_sum(whole, momenta(case, after, is_held=False), brought(case, moving))
     back, size = case.impact.before_release(speed, after), np.abs(case.velocity).max()
     np.testing.assert_allclose(back, case.velocity, atol=1e-12 * (size + speed))
     motion = case.target.motion

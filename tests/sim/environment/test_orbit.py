@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from decimal import localcontext
 from typing import Any
 
 import numpy as np
@@ -11,39 +10,33 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import ArrayLike, NDArray
 from oracles.orbit import (
-    DIGITS,
     EARTH_RADIUS,
     EARTH_RATE,
     MU,
     body_motions,
     body_places,
     centre_of_mass,
-    exact,
-    exact_gravity,
-    plus,
+    exact_difference,
     whole_momenta,
 )
-from robots import MOTORS, NO_FRICTION, coast, orbiting_plant, rigid_robot, set_motion, set_orbit
+from robots import MOTORS, NO_FRICTION, coast, orbiting_plant, rigid_robot, set_motion
 from scipy.spatial.transform import Rotation
 from strategies import random_quaternion, random_robot_file
 
+from space_robot_model.dynamics.algebra import vector as at_0
 from space_robot_model.dynamics.model import Data
 from space_robot_model.robot import Robot
+from space_robot_msgs_py.compiled.kernels import kernel
 from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.samples import RobotState
 from space_robot_sim.environment.gravity_gradient import add_gravity_gradient
-from space_robot_sim.environment.orbit import Orbit, magnetic_field
+from space_robot_sim.environment.orbit import Orbit, light, magnetic_field
 from space_robot_sim.environment.orbit_file import orbit_layers
 from space_robot_sim.environment.orbit_settings import OrbitSettings
 from space_robot_sim.plant.plant import Plant
 
 Array = NDArray[np.float64]
-ROBOT = rigid_robot(
-    20.0,
-    [1.0, 1.0, 1.0],
-    plates=[{"area": 2.0, "normal": [0.0, 0.0, side]} for side in (1.0, -1.0)],
-)
-"""With a disk that the Sun shines on wherever it is, but in the disk's plane."""
+POINT = rigid_robot(2.0, [1.0, 1.0, 1.0])
 FIELD = {"strength": 2.98e-5, "tilt_deg": 9.41, "pole_deg": -72.68}
 
 
@@ -95,7 +88,7 @@ def test_the_robot_measures_the_field_on_its_axes_and_its_dipole_feels_it() -> N
         "initial_quaternion": [0.3, -0.8, 0.4, 0.2],
         "magnetism": {**FIELD, "residual_dipole": moment},
     }
-    plant = orbiting_plant(ROBOT, 0.5, **settings)
+    plant = orbiting_plant(POINT, 0.5, **settings)
     set_motion(plant, omega=[0.01, -0.02, 0.015])
     state = coast(plant, 200)
     turn = Rotation.from_quat(np.roll(state.quaternion, -1))
@@ -106,28 +99,27 @@ def test_the_robot_measures_the_field_on_its_axes_and_its_dipole_feels_it() -> N
     )
 
 
-def sunlit(semi_major_axis: float, angle: float, **sunlight: float) -> bool:
-    """Return whether the Sun shines at an angle from noon in an equatorial orbit, rad."""
-    light = {"pressure": 4.56e-6, **sunlight}
-    elements = {"height": semi_major_axis - EARTH_RADIUS}
-    plant = orbiting_plant(
-        ROBOT, 1.0, orbital_elements=elements, sunlight=light, initial_quaternion=[0.8, 0.3, 0.5, 0]
-    )
-    noon = np.radians(sunlight.get("noon_deg", 0.0))
-    place = [np.cos(noon + angle), np.sin(noon + angle), 0.0]
-    set_orbit(plant, semi_major_axis * np.array(place), [0.0, 0.0, 0.0])
-    return bool(np.any(plant.memory.environment.surfaces.sunlight[3:]))
+@kernel
+def light_at(orbit: Orbit, position: Array) -> float:
+    return light(orbit, at_0(position, 0))
 
 
 @pytest.mark.parametrize("beta", [0.0, 30.0, -50.0])
 def test_the_shadow_begins_where_the_earths_cylinder_is(beta: float) -> None:
     """``cos u = -sqrt(1 - (R_E / r)^2) / cos(beta)`` from noon, as a triangle shows."""
     a = EARTH_RADIUS + 700e3
+    sunlight = {"pressure": 4.56e-6, "beta_angle_deg": beta, "noon_deg": 25.0}
+    orbit, noon = orbit_of(sunlight=sunlight), np.radians(25.0)
+
+    def is_lit(angle: float) -> bool:
+        u = noon + angle
+        return light_at(orbit, a * np.array([np.cos(u), np.sin(u), 0.0])) == 1.0
+
     entry = np.arccos(-np.sqrt(1.0 - (EARTH_RADIUS / a) ** 2) / np.cos(np.radians(beta)))
     for side in (1.0, -1.0):
         for angle, expected in ((entry - 1e-9, True), (entry + 1e-9, False), (np.pi, False)):
-            assert sunlit(a, side * angle, beta_angle_deg=beta, noon_deg=25.0) is expected
-    assert sunlit(a, 0.0, beta_angle_deg=beta)
+            assert is_lit(side * angle) is expected
+    assert is_lit(0.0)
 
 
 def test_no_file_is_read_without_an_orbit() -> None:
@@ -142,7 +134,6 @@ def test_settings_without_an_orbit_are_refused_by_their_key() -> None:
         OrbitSettings.model_validate({"magnetism": {"strength": 3e-5}}).check_orbit("here")
 
 
-POINT = rigid_robot(2.0, [1.0, 1.0, 1.0])
 DIRECTION = st.tuples(*[st.floats(-1.0, 1.0)] * 3).filter(lambda d: np.linalg.norm(d) > 0.1)
 HEIGHTS = st.floats(200e3, 4e7)
 DISTANCES = st.floats(-3.0, 5.0).map(lambda power: 10.0**power)
@@ -152,15 +143,6 @@ FEW = settings(max_examples=200)
 def vector(direction: tuple[float, ...], length: float) -> Array:
     """Return a vector (3,) of that length."""
     return np.asarray(length * np.array(direction) / np.linalg.norm(direction))
-
-
-def exact_difference(r: Array, d: Array, has_j2: bool) -> Array:
-    """Return ``g(r + d) - g(r)``, rounded at the end."""
-    with localcontext() as context:
-        context.prec = DIGITS
-        at = exact(r)
-        end, begin = exact_gravity(plus(at, exact(d)), has_j2), exact_gravity(at, has_j2)
-        return np.array([float(a - b) for a, b in zip(end, begin, strict=True)])
 
 
 def difference(r: Array, d: Array, has_j2: bool) -> Array:

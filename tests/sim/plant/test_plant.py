@@ -1,4 +1,4 @@
-"""The plant against an adaptive integrator, the conservation laws, and its own contract."""
+"""The plant: a tree and wheels against SciPy and formulas, momenta, and its own contract."""
 
 from __future__ import annotations
 
@@ -6,91 +6,41 @@ from typing import Any
 
 import numpy as np
 import pytest
+from benches import WHEEL_AXES
 from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 from oracles import assert_close, rotation_of
-from oracles.momenta import kinetic_energy, momentum
-from oracles.rotors import RotorEquations
+from oracles.momenta import kinetic_energy, momentum, state_of
+from oracles.rotors import RotorEquations, random_motor_rotors, random_rotors, settings_of
 from pydantic import ValidationError
-from strategies import random_quaternion, random_robot
+from robots import ANGLES_DEG, LOCKED, NO_FRICTION, PERIOD, rigid_robot
+from strategies import random_bodies, random_gears, random_quaternion, random_robot, with_gears
 
 from space_robot_model.robot import Robot
+from space_robot_model.robot.gears import geared_joints
 from space_robot_msgs_py.compiled.records import assign
 from space_robot_msgs_py.errors import DivergedError, InputError
 from space_robot_msgs_py.samples import Command, RobotState
 from space_robot_sim.environment.disturbance import DisturbanceSettings
+from space_robot_sim.environment.disturbance_table import DisturbanceTable
 from space_robot_sim.environment.friction import FrictionSettings
+from space_robot_sim.environment.target import Target
 from space_robot_sim.plant.plant import Plant, PlantSettings
 from space_robot_sim.plant.tick import fastest_rate
 
 Array = NDArray[np.float64]
-PERIOD = 5e-4
-SMOOTH = FrictionSettings(coulomb=0.0, viscous=0.0)
-START_DEG = [0.0, 120.0, 220.0, 0.0, -10.0, 0.0]
 
 
-def plant_of(robot: Robot, period: float = PERIOD, **settings: Any) -> Plant:
-    settings = {"initial_joints_deg": [30.0] * robot.n, "friction": SMOOTH, **settings}
-    return Plant(robot, PlantSettings(**settings), period)
+def plant_of(robot: Robot, **settings: Any) -> Plant:
+    settings = {"initial_joints_deg": [30.0] * robot.n, "friction": NO_FRICTION, **settings}
+    return Plant(robot, PlantSettings(**settings), PERIOD)
 
 
 def fly(plant: Plant, torques: Array) -> RobotState:
-    for tick, torque in enumerate(torques):
-        plant.step(Command(tick, torque))
+    for torque in torques:
+        plant.step(Command(plant.tick, torque))
     return plant.state
-
-
-def state_vector(state: RobotState) -> Array:
-    """``[r0, quaternion, theta, v0, w0, thetadot]``, velocities on inertial axes."""
-    omega = rotation_of(state.quaternion).apply(state.omega_base)
-    return np.concatenate(
-        [
-            state.base_position,
-            state.quaternion,
-            state.joint_positions,
-            state.base_velocity,
-            omega,
-            state.joint_velocities,
-        ]
-    )
-
-
-@pytest.mark.parametrize(("name", "gain"), [("paper_robot", 20.0), ("seven_joint_robot", 1.0)])
-def test_step_agrees_with_an_adaptive_integrator(
-    name: str, gain: float, request: pytest.FixtureRequest
-) -> None:
-    """0.2 s in four holds of torque, from a large attitude, disturbed (k = 3) and damped.
-
-    DOP853 on Pinocchio's dynamics, (61) as printed.
-    """
-    robot, rng = request.getfixturevalue(name), np.random.default_rng(2)
-    n, hold, viscous, k = robot.n, 100, 0.2, 3.0
-    amplitude = gain * np.array([50.0] * 3 + [10.0] * (n - 3) + [2.0] * 3)
-    plant = plant_of(
-        robot,
-        friction=FrictionSettings(coulomb=0.0, viscous=viscous),
-        disturbance=DisturbanceSettings(scale=k),
-        initial_joints_deg=rng.uniform(-180.0, 180.0, n).tolist(),
-        initial_quaternion=random_quaternion(rng).tolist(),
-    )
-    equations, expected = RotorEquations(robot), state_vector(plant.state)
-    for stretch in range(4):
-        torque = rng.normal(size=n + 3) * amplitude
-
-        def force(t: float, x: Array, torque: Array = torque) -> Array:
-            a, b, c = (np.sin(share * np.pi * t) for share in (0.5, 1.0, 1.5))
-            base, inner, outer = 0.010 * k * (b + c), 0.005 * k * (a + b), 0.002 * k * a
-            disturbed = np.array([*[inner] * 3, *[outer] * n][:n])
-            of_base = rotation_of(x[3:7]).apply(torque[:3]) - base
-            joints = torque[3:] - disturbed - viscous * x[13 + n :]
-            return np.concatenate([np.zeros(3), of_base, joints])
-
-        begin, end = stretch * hold * PERIOD, (stretch + 1) * hold * PERIOD
-        expected = equations.fly(expected, begin, end, force).y[:, -1]
-        fly(plant, np.tile(torque, (hold, 1)))
-        assert_close(state_vector(plant.state), expected, 1e-10)
-    assert np.abs(plant.state.joint_velocities).max() > 1.0, "the flight must be a lively one"
 
 
 @given(
@@ -121,11 +71,11 @@ def test_a_start_with_a_rate_turns_the_robot_about_its_centre_of_mass(
 
 def test_plant_starts_at_rest_where_it_is_told(paper_robot: Robot) -> None:
     """The quaternion is normalised, degrees become radians."""
-    quaternion = [2.0, 0.0, -2.0, 0.0]
-    plant = plant_of(paper_robot, initial_joints_deg=START_DEG, initial_quaternion=quaternion)
+    start = {"initial_joints_deg": ANGLES_DEG, "initial_quaternion": [2.0, 0.0, -2.0, 0.0]}
+    plant = plant_of(paper_robot, **start)
     state = plant.state
     assert (plant.tick, state.tick) == (0, 0)
-    np.testing.assert_allclose(np.degrees(state.joint_positions), START_DEG)
+    np.testing.assert_allclose(np.degrees(state.joint_positions), ANGLES_DEG)
     np.testing.assert_allclose(state.quaternion, [np.sqrt(0.5), 0.0, -np.sqrt(0.5), 0.0])
     assert kinetic_energy(paper_robot, state) == 0.0
 
@@ -207,3 +157,161 @@ def test_settings_that_make_no_sense_are_refused(
 ) -> None:
     with pytest.raises((InputError, ValidationError), match=said):
         plant_of(paper_robot, **settings)
+
+
+KINDS = (
+    *("revolute", "prismatic", "revolute", "fixed"),
+    *("passive revolute", "passive prismatic", "passive revolute", "fixed"),
+)
+TORQUE = np.array([60.0, -40.0, 50.0, 4.0, 9.0, -6.0])
+
+
+def tree(rng: np.random.Generator) -> Robot:
+    """Turning, sliding and passive joints, some with gears."""
+    robot = random_gears(rng, Robot.of_tree("tree", random_bodies(rng, KINDS)))
+    return with_gears(robot, [gear and gear._replace(ratio=10.0) for gear in robot.gears])
+
+
+def numbers(plant: Plant) -> Array:
+    """A state as `RotorEquations` has it."""
+    truth, count = plant.truth, len(geared_joints(plant.robot))
+    state = state_of(plant.robot, truth)
+    of_motors = truth.motor_velocities[:count], truth.motor_positions[:count]
+    of_robot = state.quaternion, state.theta, state.velocity
+    return np.concatenate([truth.base_position, *of_robot, *of_motors])
+
+
+@pytest.mark.parametrize("seed", [0, 1, 2])
+def test_a_flight_is_the_one_that_scipy_integrates(seed: int) -> None:
+    """0.2 s in two holds of torque: springs with damping, friction of the robot's own, gears.
+
+    Base and joints are disturbed by sines; force and torque on the base, on its own axes, and a
+    joint by lines of a table.
+    """
+    rng, viscous = np.random.default_rng(seed), 0.2
+    robot = tree(rng)
+    n, hold, end = robot.n, 200 * PERIOD, 0.2
+    wrench = rng.normal(size=(2, 6)) * [80.0, 80.0, 80.0, 30.0, 30.0, 30.0]
+    push = np.array([3.0, -2.0])
+    columns = [f"base_{kind}_{axis}" for kind in ("force", "torque") for axis in "xyz"]
+    table = {name: column.tolist() for name, column in zip(columns, wrench.T, strict=True)}
+    table |= {"time": [0.0, end], robot.joint_names[1]: push.tolist()}
+    disturbance = DisturbanceSettings(
+        scale=1.0,
+        base_amplitude=30.0,
+        inner_amplitude=3.0,
+        base_frequencies=[1.5, 0.0],
+        inner_frequencies=[3.0, 0.0],
+        table=DisturbanceTable.of(table, "here").text,
+    )
+    friction = FrictionSettings(coulomb=0.0, viscous=viscous)
+    plant = plant_of(
+        robot,
+        friction=friction,
+        disturbance=disturbance,
+        substeps=4,
+        initial_joints_deg=[0.0, 0.3, 0.6],
+        initial_quaternion=[0.3, -0.8, 0.4, 0.2],
+    )
+    equations, own = (
+        RotorEquations(robot, random_motor_rotors(rng, robot)),
+        np.array(robot.friction)[:, 1],
+    )
+    geared = equations.joints
+    usual = np.where(np.arange(robot.joint_count) < n, viscous, 0.0)
+    damping = np.where(np.isnan(own), usual, own)
+    for k, spring in enumerate(robot.springs):
+        damping[n + k] += spring.damping
+    expected = numbers(plant)
+    for begin, torque in ((0.0, TORQUE), (hold, -0.5 * TORQUE[::-1])):
+
+        def force(t: float, x: Array, torque: Array = torque) -> Array:
+            theta, rates, motor_rates, _ = equations.parts(x)
+            acting, pushed = ((1.0 - t / end) * w[0] + t / end * w[1] for w in (wrench, push))
+            of_base = rotation_of(x[3:7] / np.linalg.norm(x[3:7]))
+            joints = -damping * rates
+            joints[:n] += torque[3:]
+            joints[geared] = 0.0
+            joints[:n] -= 3.0 * np.sin(6.0 * np.pi * t)
+            joints[1] += pushed
+            for k, spring in enumerate(robot.springs):
+                joints[n + k] -= spring.stiffness * (theta[n + k] - spring.rest)
+            turning = of_base.apply(torque[:3] + acting[3:]) - 30.0 * np.sin(3.0 * np.pi * t)
+            motors = torque[3:][geared] - damping[geared] * motor_rates
+            return np.concatenate([of_base.apply(acting[:3]), turning, joints, motors])
+
+        expected = equations.fly(expected, begin, begin + hold, force).y[:, -1]
+        fly(plant, np.tile(torque, (200, 1)))
+        assert_close(numbers(plant), expected, 1e-9)
+    assert np.abs(plant.truth.passive_velocities[:3]).max() > 0.01, "springs must swing"
+    deflections = expected[-len(geared) :] - plant.truth.joint_positions[geared]
+    assert np.abs(deflections).max() > 1e-4, "those of gears, too"
+
+
+def test_wheels_go_through_rest_and_come_to_rest_as_the_formulas_say() -> None:
+    """One is driven through zero speed, one stops and sticks, one breaks away, one stays.
+
+    The base is too heavy to be turned by them.
+    """
+    spin, coulomb, ticks = 0.02, 0.02, 800
+    speeds, motors = np.array([1.0, -0.4, 0.0, 0.0]), np.array([-0.07, 0.01, 0.05, -0.015])
+    wheels = {"axes": WHEEL_AXES, "rotor_inertia": [spin], "coulomb": [coulomb]}
+    settings = {
+        "initial_joints_deg": [0.0] * 6,
+        "friction": LOCKED,
+        "base_actuation": "hardware",
+        "wheels": {**wheels, "initial_speed": speeds.tolist()},
+    }
+    plant = Plant(rigid_robot(1e9, [1e12] * 3), PlantSettings.model_validate(settings), PERIOD)
+    rates = (motors - coulomb * np.array([-1.0, -1.0, 1.0, 0.0])) / spin
+    rates[0] = (motors[0] - coulomb) / spin
+    through = (motors[0] + coulomb) / spin
+    stops = -speeds[:2] / rates[:2]
+    for tick in range(ticks):
+        plant.step(Command(tick, np.concatenate([np.zeros(9), motors])))
+        time = plant.tick * PERIOD
+        first = speeds[0] + rates[0] * time if time < stops[0] else through * (time - stops[0])
+        second = min(speeds[1] + rates[1] * time, 0.0)
+        expected = [first, second, rates[2] * time, 0.0]
+        np.testing.assert_allclose(plant.truth.wheel_velocities[:4], expected, atol=1e-10)
+    assert stops.max() < time
+    assert plant.truth.wheel_velocities[1] == plant.truth.wheel_velocities[3] == 0.0
+
+
+def test_a_capture_gives_no_wheel_and_no_rotor_a_momentum_of_its_own() -> None:
+    """``J (N thetadot_m + z . w_p)`` is as in the flight without it, though all else is struck.
+
+    Each wheel's own momentum, ``J (Omega + a . w0)``, grows by its motor's torque alone.
+    """
+    rng, capture = np.random.default_rng(1), 100
+    robot = tree(rng)
+    equations = RotorEquations(robot, random_motor_rotors(rng, robot))
+    rotors = [rotor._replace(spin=0.05) for rotor in random_rotors(rng, robot, 4)]
+    axes, inertia = np.array([rotor.axis for rotor in rotors]), 0.05
+    motion = {"velocity": [0.3, -0.2, 0.1], "angular_velocity": [0.2, 0.4, -0.3]}
+    content = {"mass": 20.0, "inertia": [2.0, 3.0, 4.0, 0.0, 0.0, 0.0], "motion": motion}
+    target = Target.from_dict({"target": content})
+    torque = np.concatenate([np.zeros(3), 20.0 * rng.normal(size=3), 0.3 * rng.normal(size=4)])
+    speeds, spins = [], []
+    for events in ([], [f"capture@{capture * PERIOD}:{target.inline}"]):
+        plant = plant_of(
+            robot,
+            wheels=settings_of(rotors, initial_speed=[20.0, -30.0, 40.0, 10.0]),
+            base_actuation="hardware",
+            substeps=2,
+            events=events,
+        )
+        own = []
+        for _ in range(2 * capture):
+            truth = plant.truth
+            own.append(inertia * (truth.wheel_velocities[:4] + axes @ truth.omega_base))
+            fly(plant, torque[np.newaxis])
+            if plant.tick == capture:
+                state, found = state_of(robot, plant.truth), equations.velocity(numbers(plant))
+                mass, _ = equations.matrices(state.quaternion, state.theta, np.zeros(found.size))
+                speeds.append(found)
+                spins.append((mass @ found)[6 + robot.joint_count :])
+        grown = np.outer(np.arange(2 * capture) * PERIOD, torque[6:])
+        np.testing.assert_allclose(own - own[0], grown, rtol=0.0, atol=1e-11)
+    assert np.abs(speeds[1] - speeds[0])[[*range(6), -1]].max() > 1e-3
+    np.testing.assert_allclose(spins[1], spins[0], rtol=0.0, atol=1e-12 * np.abs(spins[0]).max())

@@ -46,6 +46,7 @@ class Node:
     def __init__(self) -> None:
         self.settings = Record(period=0.0005, reset_with=[""])
         self.is_active, self.starts, self.told = False, 0, [False]
+        self.logged: list[str] = []
         self.start()
 
     def start(self) -> None:
@@ -58,7 +59,7 @@ class Node:
         self.is_active = False
 
     def log(self, text: str) -> None:
-        pass
+        self.logged.append(text)
 
     @property
     def control(self) -> RunControl:
@@ -160,8 +161,13 @@ def test_it_announces_what_it_does_and_tells_the_other_nodes_of_pauses() -> None
     for feature, scope in ((21, 1), (22, 2), (23, 4)):
         assert (caller.reset(scope) == OK) == (feature in features)
     assert caller.node.starts == 1
+    caller.run(3)
     caller.set(PAUSED)
     caller.reset(0)
+    assert caller.node.logged == [
+        "paused at tick 3 (0.0015 s)",
+        "reset, paused at tick 0 (0.0000 s)",
+    ]
     assert caller.node.starts == 2
     assert caller.node.told[-1]
     caller.set(PLAYING)

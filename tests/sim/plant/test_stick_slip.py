@@ -1,8 +1,9 @@
-"""Coulomb friction as a set: joints that stand, slide, come to rest and break away."""
+"""Coulomb friction as a set: joints that stand, slide, come to rest, break away; and gears."""
 
 from __future__ import annotations
 
 import itertools
+import re
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
@@ -13,21 +14,23 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from oracles import pinocchio_bias_force, pinocchio_mass_matrix, rotation_of
 from oracles.momenta import kinetic_energy, momentum
-from oracles.rotors import RotorEquations
+from robots import PERIOD, GearedFlight, oscillator
 from scipy.integrate import quad
-from strategies import State, random_quaternion, random_robot
+from strategies import State, random_quaternion, random_robot, rotor_room, with_gears
 
 from space_robot_model.dynamics.model import Data
 from space_robot_model.robot import Robot
+from space_robot_model.robot.tree import Gear
+from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.samples import Command
 from space_robot_sim.environment.disturbance import DisturbanceSettings
 from space_robot_sim.environment.friction import FrictionSettings
+from space_robot_sim.plant.gear_mounting import STABLE, check_rotors, check_springs
 from space_robot_sim.plant.integrator import Stages
 from space_robot_sim.plant.plant import Plant, PlantSettings
 from space_robot_sim.plant.stick_slip import MOST_CUTS, integrate, slip_or_stick
 
 Array = NDArray[np.float64]
-PERIOD = 5e-4
 COULOMB = 0.7
 """N m; large beside the torques below, so that much sticks."""
 
@@ -109,28 +112,6 @@ def test_joints_stand_or_break_away_as_coulombs_law_has_it(n: int, seed: int) ->
     np.testing.assert_allclose(friction, expected, rtol=0.0, atol=1e-9)
     accelerations = stages.slope[0, 13 + n : 13 + 2 * n]
     assert not accelerations[locked].any()
-
-
-def test_a_joint_comes_to_rest_when_and_where_it_should() -> None:
-    """Thrown, it stops: against SciPy's events on Pinocchio's dynamics, to rounding."""
-    rng = np.random.default_rng(5)
-    plant = plant_of(random_robot(rng, 1), COULOMB)
-    place(plant, rng, np.array([0.003]))
-    plant.memory.x[8:14] *= 0.01
-    start, brake = plant.memory.x[:15].copy(), np.array([0.0] * 6 + [-COULOMB])
-
-    def at_rest(_: float, x: Array) -> float:
-        return float(x[14])
-
-    at_rest.terminal = True  # type: ignore[attr-defined]
-    exact = RotorEquations(plant.robot).fly(start, 0.0, 1.0, lambda t, x: brake, events=at_rest)
-    stops_at = float(exact.t[-1])
-    assert stops_at / PERIOD > 2.0
-    assert abs(stops_at / PERIOD - round(stops_at / PERIOD)) > 0.01, "within a tick"
-    for tick in range(int(stops_at / PERIOD) + 2):
-        plant.step(Command(tick, np.zeros(4)))
-    assert plant.state.joint_velocities[0] == 0.0
-    np.testing.assert_allclose(plant.state.joint_positions, exact.y[7:8, -1], rtol=0.0, atol=1e-13)
 
 
 SPIN, STEP = 0.5, 0.01
@@ -248,3 +229,121 @@ def test_friction_never_adds_energy(n: int, seed: int, viscous: float) -> None:
         before = after
     for was, now in zip((linear, angular), momentum(plant.robot, plant.state), strict=True):
         np.testing.assert_allclose(now, was, rtol=0.0, atol=1e-11 * (1.0 + np.abs(was).max()))
+
+
+# Gears: friction of the motor, and what is too stiff or too heavy
+
+SUBSTEPS = 8
+ROTOR, RATIO, STIFFNESS, LINK, BASE = 2e-5, 100.0, 150.0, 0.5, 3.0
+"""kg m2; the base's with the rotor, locked."""
+MOTOR = RATIO**2 * ROTOR
+"""B = N^2 J, kg m2 or kg."""
+GEAR = Gear(ROTOR, RATIO, STIFFNESS)
+
+
+@pytest.mark.parametrize("sense", [-1.0, 1.0])
+def test_a_motor_breaks_away_where_torque_less_spring_exceeds_its_friction(sense: float) -> None:
+    coulomb, stretched = 5.0, 0.02
+    for excess in (-1e-9, 1e-9):
+        flight = GearedFlight(oscillator(GEAR, LINK), SUBSTEPS, coulomb)
+        flight.positions[0] = -sense * stretched  # the spring pulls the motor back
+        memory = flight.plant.memory
+        pulled = coulomb + STIFFNESS * stretched
+        memory.stages.actuation[6] = sense * pulled * (1.0 + excess)
+        slip_or_stick(memory.model, memory.environment, memory.x, 0.0, memory.stages)
+        acceleration = memory.stages.slope[0, 14 + 1]
+        assert np.sign(acceleration) == (sense if excess > 0.0 else 0.0)
+
+
+def test_a_stuck_joint_is_a_stuck_motor() -> None:
+    """The fault raises the motor's friction: it stops at once, and the link swings about it."""
+    flight = GearedFlight(oscillator(GEAR, LINK), SUBSTEPS, faults=["stuck_joint@0.05:joint=1000"])
+    torque = [0.0, 0.0, 0.0, 4.0]
+    stopped = flight.fly(torque, 102).motor_positions[0]
+    swings = []
+    for _ in range(400):
+        truth = flight.fly(torque)
+        assert truth.motor_positions[0] == stopped > 0.0
+        swings.append(truth.joint_positions[0] - stopped)
+    assert min(swings) < -1e-3
+    assert max(swings) > 1e-3
+
+
+def lighter() -> float:
+    """``S^T M^-1 S`` of the deflection S: the square of the pulsation by stiffness."""
+    own, stretch = RATIO * ROTOR, np.array([0.0, -1.0, 1.0])
+    mass = np.array([[BASE + LINK, LINK, own], [LINK, LINK, 0.0], [own, 0.0, MOTOR]])
+    return float(stretch @ np.linalg.solve(mass, stretch))
+
+
+def swinging(angle: float, substeps: int = 1) -> Gear:
+    """The gear whose spring turns by ``angle`` rad in an integrator's step."""
+    return Gear(ROTOR, RATIO, (angle * substeps / PERIOD) ** 2 / lighter())
+
+
+def damped(angle: float) -> Gear:
+    """A gear without spring to speak of, whose damper's rate is ``angle`` by step."""
+    return Gear(ROTOR, RATIO, 1e-3, angle / PERIOD / lighter())
+
+
+@pytest.mark.parametrize(("excess", "substeps"), [(1.5, 1), (4.1, 1), (1.2, 3)])
+def test_a_spring_above_the_limit_is_refused_with_the_substeps_that_do(
+    excess: float, substeps: int
+) -> None:
+    """They are as few as would, and it flies stably with them, or with the shorter period."""
+    robot = oscillator(swinging(STABLE * excess, substeps), LINK, BASE)
+    with pytest.raises(InputError) as refused:
+        GearedFlight(robot, substeps)
+    message, pulsation = str(refused.value), STABLE * excess * substeps / PERIOD
+    assert "\n" not in message
+    steps = f"steps of {PERIOD / substeps:.6g} s"
+    for part in ("drive.stiffness of 'joint'", steps, f"{pulsation:.4g} rad/s"):
+        assert part in message
+    advice = re.search(r"substeps: (\d+) or a period of (\S+) s would do", message)
+    assert advice
+    least, period = int(advice[1]), float(advice[2])
+    assert least == int(excess * substeps) + 1
+    check_springs(robot, np.zeros(1), period / substeps, substeps)
+    flight = GearedFlight(robot, least)
+    flight.motor_positions[0], deflections = 1e-3, []
+    for _ in range(100):
+        truth = flight.rest(40)
+        deflections.append(truth.motor_positions[0] - truth.joint_positions[0])
+    assert np.abs(deflections).max() <= 1e-3
+
+
+def test_a_damper_may_be_what_is_too_strong_and_the_stiffest_joint_is_named() -> None:
+    assert STABLE < 2.785, "a decay is stable up to there in a step of this method"
+    with pytest.raises(InputError, match=r"drive\.damping of 'joint'"):
+        GearedFlight(oscillator(damped(STABLE * 1.01), LINK, BASE))
+    GearedFlight(oscillator(damped(STABLE * 0.99), LINK, BASE))
+    robot = random_robot(np.random.default_rng(1), 3)
+    rooms = [0.01 * rotor_room(robot, joint) for joint in range(3)]
+    gears = [Gear(room, 10.0, k) for room, k in zip(rooms, (1e3, 1e8, 1e4), strict=True)]
+    with pytest.raises(InputError, match=r"drive\.stiffness of 'joint2'"):
+        GearedFlight(with_gears(robot, gears))
+    GearedFlight(with_gears(robot, [gears[0], None, gears[2]]))
+
+
+def carried(*shares: float, alpha_deg: float = 0.0) -> Robot:
+    """Joints that are all on the base, with rotors of shares of its inertia."""
+    base = {"mass": 10.0, "inertia": [2.0, 2.0, 2.0, 0.0, 0.0, 0.0]}
+    link = {"mass": 1.0, "inertia": [1.0] * 3 + [0.0] * 3, "com": [0.0] * 3, "parent": "base"}
+    links = [
+        {"name": f"joint{k + 1}", "alpha_deg": alpha_deg * k, **link} for k in range(len(shares))
+    ]
+    robot = Robot.from_dict({"robot": {"name": "carrier", "base": base, "links": links}})
+    return with_gears(robot, [Gear(2.0 * s, 1.0, 10.0) if s else None for s in shares])
+
+
+def test_rotors_must_have_less_inertia_than_their_carriers() -> None:
+    check_rotors(carried(0.999))
+    check_rotors(carried(0.5, 0.0, 0.499))
+    check_rotors(carried(0.95, 0.95, alpha_deg=90.0))  # across one another they do not add up
+    for shares, names in (((1.0,), "joint1"), ((0.6, 0.0, 0.5), "joint1, joint3")):
+        with pytest.raises(InputError) as refused:
+            GearedFlight(carried(*shares))
+        message, least = str(refused.value), 2.0 * (1.0 - sum(shares))
+        assert f"drive.rotor_inertia of {names}: the inertia of 'base'" in message
+        assert message.endswith(f"smallest principal moment is {least:g} kg m2")
+        assert "\n" not in message
