@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 from dataclasses import fields
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,11 +12,16 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from space_robot_msgs_py import topics
+from space_robot_msgs_py.bag.accounts import noted_accounts
 from space_robot_msgs_py.bag.message_accounting import (
     LONGEST_JUMP,
     MessageAccounting,
     SequenceCount,
 )
+from space_robot_msgs_py.bag.metadata import read_information
+from space_robot_msgs_py.bag.recorder import BagRecorder
+from space_robot_msgs_py.samples import Command, Timebase
+from space_robot_msgs_py.wire.codecs import CommandCodec
 
 steps = st.sampled_from([1, 1, 1, 1, 2, 5, 0, -1, -3, 19_999, 20_001, 10**12])
 batches = st.lists(st.lists(steps, max_size=12), max_size=6)
@@ -158,3 +164,33 @@ def test_what_was_sent_in_a_pause_is_passed_over() -> None:
     assert (counted.passed_over, counted.holes, counted.tail) == (7, 0, 0)
     counted.note_sent(10)
     assert counted.tail == 1
+
+
+@pytest.mark.parametrize(
+    ("sent", "lost"),
+    [
+        ([(1, 0), (2, 1), (3, 500), (5, 502)], 1),  # unanswered ticks are none
+        ([(3, 0), (4, 1), (6, 3), (7, 2), (8, 2)], 0),  # sent again: 1 and 2 were tick 0, too
+    ],
+)
+def test_the_recorder_believes_the_numbers_of_the_messages(
+    tmp_path: Path, sent: list[tuple[int, int]], lost: int
+) -> None:
+    topic, timebase = topics.COMMAND, Timebase(500_000)
+    recorder = BagRecorder(tmp_path / "bag", {}, timebase)
+    for sequence, tick in sent:
+        data = CommandCodec(("j",), timebase).encode(Command(tick, np.ones(1)))
+        recorder.record(topic, data, 1, sequence)
+    assert recorder.lost[topic.full_name] == lost
+    recorder.note_sent(topic.full_name, sent[-1][0] + 2)
+    assert recorder.is_behind
+    recorder.close()
+    accounts = noted_accounts(read_information(tmp_path / "bag").noted)
+    assert accounts[topic.full_name].missing == lost + 2
+
+
+@pytest.mark.parametrize(
+    "text", ["[", "[]", '{"/a": null}', '{"/a": {"received": -1, "missing": 0}}', "NaN"]
+)
+def test_accounts_of_anything_else_are_none(text: str) -> None:
+    assert noted_accounts({"space_robot.accounting": text}) == noted_accounts({}) == {}

@@ -1,12 +1,9 @@
-"""Messages laid out as rosbags writes them; what is counted and believed of those received."""
+"""Messages laid out as rosbags writes them; stamps that are believed."""
 
 from __future__ import annotations
 
 import contextlib
-import random
-from collections.abc import Mapping
 from itertools import pairwise
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -18,21 +15,16 @@ from rosbags.interfaces import Nodetype
 from rosbags.typesys import Stores, get_typestore
 
 from space_robot_msgs_py import topics
-from space_robot_msgs_py.bag.accounts import foreign, noted_accounts
 from space_robot_msgs_py.bag.message_accounting import message_tick
-from space_robot_msgs_py.bag.metadata import read_information
-from space_robot_msgs_py.bag.recorder import BagRecorder
 from space_robot_msgs_py.errors import MessageError
-from space_robot_msgs_py.samples import Command, Timebase
+from space_robot_msgs_py.samples import Timebase
 from space_robot_msgs_py.wire.carrier import unwrap, wrap
 from space_robot_msgs_py.wire.cdr import MessageLayout, Slot, header_stamp_ns
 from space_robot_msgs_py.wire.codec import Codec
-from space_robot_msgs_py.wire.codecs import CommandCodec
 from space_robot_msgs_py.wire.compiled_codec import CompiledCodec
 from space_robot_msgs_py.wire.joint_states import JointStates
 from space_robot_msgs_py.wire.poses import POSE
 from space_robot_msgs_py.wire.robot_description import robot_description
-from space_robot_msgs_py.wire.sources import PARTICIPANT_BYTES, Claimed, Sources
 from space_robot_msgs_py.wire.stamp_guard import AGREEING, StampGuard
 from space_robot_msgs_py.wire.tf import Frame, TransformsCodec
 
@@ -180,81 +172,7 @@ def test_a_description_is_read_back(text: str) -> None:
     assert bytes(STORE.serialize_cdr(message, "std_msgs/msg/String")) == data
 
 
-# What is counted and believed of received messages: lost ones, and strange stamps
-
-TOPIC = topics.COMMAND.full_name
-OURS, FOREIGN = b"1" * 16, b"2" * 16
-
-
-class Graph:
-    """What discovery and claims say: one publisher is ours."""
-
-    def claimed(self, topic: str) -> Claimed:
-        return Claimed((OURS,), True)
-
-    def names(self, topic: str) -> Mapping[bytes, str]:
-        return {}
-
-
-@given(
-    st.integers(0, 40), st.integers(0, 40), st.sets(st.integers(1, 40)), st.randoms(), st.booleans()
-)
-def test_lost_is_what_was_sent_and_did_not_come(
-    ours: int, foreign: int, dropped: set[int], order: random.Random, is_told: bool
-) -> None:
-    """Against two lists, however the publishers' messages are interleaved."""
-    sources, left = Sources(TOPIC, Graph()), {OURS: ours, FOREIGN: foreign}
-    sent: dict[bytes, list[int]] = {OURS: [], FOREIGN: []}
-    came: list[int] = []
-    while any(left.values()):
-        publisher = order.choice([p for p, count in left.items() if count])
-        left[publisher] -= 1
-        sent[publisher].append(len(sent[publisher]) + 1)
-        if sent[publisher][-1] not in dropped:
-            is_ours = sources.take(publisher, sent[publisher][-1])
-            assert is_ours == (publisher == OURS)
-            came += [sent[publisher][-1]] * is_ours
-    if is_told:
-        sources.note_sent(OURS[:PARTICIPANT_BYTES], len(sent[OURS]))
-    known = sent[OURS] if is_told else sent[OURS][: max(came, default=0)]
-    assert sources.holes + sources.tail == len(set(known) - set(came))
-    assert sources.foreign == len(set(sent[FOREIGN]) - dropped)
-    assert sources.is_behind == (is_told and len(sent[OURS]) > max(came, default=0))
-
-
-def command(tick: int) -> bytes:
-    return CommandCodec(("j",), TIMEBASE).encode(Command(tick, np.ones(1)))
-
-
-@pytest.mark.parametrize(
-    ("sent", "lost"),
-    [
-        ([(1, 0), (2, 1), (3, 500), (5, 502)], 1),  # unanswered ticks are none
-        ([(3, 0), (4, 1), (6, 3), (7, 2), (8, 2)], 0),  # sent again: 1 and 2 were tick 0, too
-    ],
-)
-def test_lost_is_told_by_the_numbers_of_the_messages(
-    tmp_path: Path, sent: list[tuple[int, int]], lost: int
-) -> None:
-    recorder = BagRecorder(tmp_path / "bag", {}, TIMEBASE, publishers=Graph())
-    for sequence, tick in sent:
-        for junk in (command(tick), b"junk"):
-            assert not recorder.record(topics.COMMAND, junk, 1, FOREIGN, 2 * sequence)
-        assert recorder.record(topics.COMMAND, command(tick), 1, OURS, sequence)
-    assert recorder.lost[TOPIC] == lost
-    recorder.note_sent(TOPIC, OURS, sent[-1][0] + 2)
-    assert recorder.is_behind
-    assert recorder.lost[TOPIC] == lost + 2
-    recorder.close()
-    accounts = noted_accounts(read_information(tmp_path / "bag").noted)
-    assert (accounts[TOPIC].missing, accounts[TOPIC].foreign) == (lost + 2, 2 * len(sent))
-    for text in ("[", "[]", '{"/a": null}', '{"/a": {"received": -1, "missing": 0}}', "NaN"):
-        assert noted_accounts({"space_robot.accounting": text}) == {}
-    assert noted_accounts({}) == {}
-    told = '{"/command": {"received": 3, "missing": 0, "foreign": 2, "foreign_publishers": ["/a"]}}'
-    said = "2 messages on /command were left out: they are from /a"
-    assert foreign(noted_accounts({"space_robot.accounting": told})) == [said]
-
+# Strange stamps
 
 JUMP = 8
 
