@@ -35,7 +35,6 @@ from space_robot_msgs_py.errors import InputError
 
 pytest.importorskip("pyarrow")
 
-
 CONTENT: dict[str, Any] = {
     "scenario": {"case": "3", "duration": 0.01},
     "laws": ["tde_stc", "ctc"],
@@ -45,7 +44,6 @@ CONTENT: dict[str, Any] = {
         "late": {"metric": "attitude_rms", "from_s": 0.005, "below": 1.0, "in": 0.9},
     },
 }
-
 
 CAMPAIGN = Campaign.of(CONTENT)
 
@@ -177,7 +175,6 @@ def _flown_anywhere(tmp_path: Path) -> Path:
 
 BOTH = ["tde_stc", "ctc=tuned"]
 
-
 SCHEMA = Schema(
     grid={},
     vary={"mass": "float64", "word": "str"},
@@ -186,7 +183,6 @@ SCHEMA = Schema(
     bands=["s"],
     bins=3,
 )
-
 
 FLOATS = st.floats(allow_nan=False, allow_infinity=False)
 

@@ -27,8 +27,6 @@ from space_robot.campaign.study import Study
 from space_robot_msgs_py.errors import InputError
 
 REQUIRE = {"pointing": {"metric": "attitude_max", "from_s": 2, "below": 4e-5, "in": 0.9}}
-
-
 UNIFORM = {"uniform": [0.8, 1.2], "relative": True}
 
 

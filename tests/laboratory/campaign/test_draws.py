@@ -28,19 +28,10 @@ from space_robot_msgs_py.errors import InputError
 from space_robot_sim.plant.plant import Plant
 
 GOLDEN_BITS = [1788990827981690842, 15618775813144590017]
-
-
 GOLDEN_UNIFORM = "0x1.1c18746dcd574p-3"
-
-
 GOLDEN_NORMAL = "0x1.e65d1e31310b2p-1"
-
-
 GOLDEN_SEED = 832400951
-
-
 GOLDEN_PERMUTATION = [1, 4, 5, 0, 2, 3, 6, 7]
-
 
 KNOWN: list[tuple[dict[str, Any], Any]] = [
     ({"normal": 3.0, "sigma": 0.5}, stats.norm(3.0, 0.5)),
@@ -92,7 +83,6 @@ VARY: dict[str, Any] = {
     "faults": {"torque_scale@0:all": {"uniform": [0.98, 1.02]}},
     "mission.start_deg": {"uniform": [-2, 2], "offset": True},
 }
-
 
 OTHER = {"plant.friction.coulomb": {"uniform": [0.0, 0.05]}}
 
@@ -298,8 +288,6 @@ def test_principal_axes_are_numpys(six: list[float], turn: list[float]) -> None:
 
 
 DRIVEN = Robot.from_dict(driven_paper())
-
-
 DRAG = slice(3, 6)
 """Of the external torques."""
 

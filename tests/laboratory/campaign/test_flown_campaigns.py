@@ -32,9 +32,7 @@ from space_robot_msgs_py.errors import InputError
 
 pytest.importorskip("pyarrow")
 
-
 RUNS = 20
-
 
 CONTENT: dict[str, Any] = {
     "scenario": {"case": "3", "sensors": "fine", "duration": 0.2},
@@ -207,7 +205,6 @@ GEARS: dict[str, Any] = {
     "robot.joints[joint3].drive.rotor_inertia": {"uniform": [0.9, 1.1], "relative": True},
 }
 
-
 WORLD: dict[str, Any] = {
     "scenario.orbit": {"grid": ["iss", "sso_700"]},
     "plant.orbital_elements.height": {"log_uniform": [300e3, 1000e3]},
@@ -215,7 +212,6 @@ WORLD: dict[str, Any] = {
     "robot.plates.area": {"normal": 1.0, "sigma": 0.2, "relative": True},
     "robot.plates[*].diffuse": {"uniform": [0.1, 0.3]},
 }
-
 
 DRIVEN_RUNS = 10
 
@@ -257,11 +253,7 @@ def test_orbits_gears_and_plates(here: Path) -> None:
 
 
 BOTH, SENSORS = ("tde_stc", "ctc"), ("fine", "coarse", "ideal")
-
-
 DRAWS = 3 * CHECKED_EVERY
-
-
 BOUNDS = {"p": 1.0, "q": 2.0}
 
 

@@ -19,7 +19,6 @@ from space_robot_msgs_py.errors import InputError
 
 pytest.importorskip("pyarrow")
 
-
 FILE = """
 import numpy as np
 
@@ -65,7 +64,6 @@ def elsewhere(log):
     os.chdir("/")
     return 1.0
 """
-
 
 CONTENT: dict[str, Any] = {
     "scenario": {"case": "3", "sensors": "fine", "duration": 0.2},

@@ -62,7 +62,6 @@ def test_tables_leave_out_the_gain_set_that_all_laws_have() -> None:
 LINK = """<link name="{0}"><inertial><origin xyz="{1} 0 0"/><mass value="{2}"/>
 <inertia ixx="0.1" iyy="0.2" izz="{3}" ixy="0" ixz="0" iyz="0"/></inertial></link>"""
 
-
 JOINT = """<joint name="{0}" type="{3}"><parent link="{1}"/><child link="{2}"/>
 <axis xyz="0 0 1"/><limit lower="-1" upper="1" effort="9" velocity="1"/></joint>"""
 

@@ -49,32 +49,17 @@ def test_no_runs_know_nothing() -> None:
 
 
 _spec = importlib.util.spec_from_file_location("exact", DOCS / "campaign_statistics.py")
-
-
 assert _spec is not None
-
-
 assert _spec.loader is not None
-
-
 exact = importlib.util.module_from_spec(_spec)
 
 
 _spec.loader.exec_module(exact)
 
-
 KINDS = [FixedSample, Sequential]
-
-
 shares = st.floats(0.5, 0.999)
-
-
 confidences = st.floats(0.55, 0.99)
-
-
 counts = st.integers(1, 400).flatmap(lambda n: st.tuples(st.integers(0, n), st.just(n)))
-
-
 kinds = st.sampled_from(KINDS)
 
 

@@ -29,7 +29,6 @@ from space_robot.cli.main import cli
 
 pytest.importorskip("pyarrow")
 
-
 FILE = """
 scenario: {duration: 0.1}
 laws: [tde_stc]

@@ -180,12 +180,8 @@ def test_auto_says_why_it_takes_the_nominal_inertia(tmp_path: Path) -> None:
 
 
 JOINTS = [f"joint{number}" for number in range(1, 7)]
-
-
 WAYPOINT_TIMES = [0.0, 2.0, 4.0]
 """s."""
-
-
 OBSERVERS = {"adrc", "dob", "indi"}
 """Laws with an estimate other than TDE."""
 

@@ -33,8 +33,6 @@ from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.errors import DivergedError, InputError, SpaceRobotError
 
 FILE = str(CONFIG / "robots/ets_vii.yaml")
-
-
 ARM = DATA / "arm.urdf"
 
 

@@ -25,10 +25,7 @@ from space_robot_sim.plant.plant import PlantSettings
 
 TABLE = DATA / "refusals/commands.yaml"
 URDF = (DATA / "docs.urdf").read_text("utf-8")
-
-
 PAPER = (CONFIG / "robots/paper.yaml").read_text("utf-8")
-
 
 MADE = {
     "my.urdf": URDF,
@@ -60,7 +57,6 @@ GROUPS = {
     name: Group(**{"files": {}, **content})
     for name, content in yaml.safe_load(TABLE.read_text("utf-8")).items()
 }
-
 
 ROWS = [(name, k) for name, group in GROUPS.items() for k in range(len(group.rows))]
 

@@ -134,7 +134,6 @@ robot:
     - {name: rigid, mass: 3.0, inertia: [0.1, 0.1, 0.1, 0, 0, 0], com: [0, 0, 0]}
 """
 
-
 PLATES = """
   plates:
     - {area: 2.5, normal: [1, 0, 0]}

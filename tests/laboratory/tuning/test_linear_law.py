@@ -18,20 +18,10 @@ from space_robot_control.laws import ControlLaw, LawGains, Signals, find_law, pe
 from space_robot_control.laws.checked import LawError
 
 Array = NDArray[np.float64]
-
-
 PERIOD = 5e-4
-
-
 JOINTS = np.radians([0.0, 120.0, 220.0, 0.0, -10.0, 0.0])
-
-
 UPRIGHT = np.array([1.0, 0.0, 0.0, 0.0])
-
-
 ONES = np.ones(9)
-
-
 DIAGONAL = np.array(H_BAR)
 
 

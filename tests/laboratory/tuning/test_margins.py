@@ -24,11 +24,7 @@ from space_robot_control.laws import ControlLaw, find_law
 from space_robot_msgs_py.errors import DivergedError
 
 Array = np.ndarray
-
-
 PERIOD = 5e-4
-
-
 SLOW = {"k_p": 1e-4, "k_d": 2e-2}
 """Poles at 0.01 rad/s: u does not move the limits of the estimate."""
 

@@ -25,8 +25,6 @@ from space_robot.tuning.task import TuningOptions, TuningTask, axis_inertia
 from space_robot_msgs_py.errors import InputError
 
 Array = np.ndarray
-
-
 PERIOD = 5e-4
 
 
