@@ -41,28 +41,6 @@ def heavy_is_nan(log):
 
 def nan(log):
     return float("nan")
-
-
-def never(log):
-    while True:
-        pass
-
-
-def deadly(log):
-    import os
-
-    os._exit(0)
-
-
-def interrupted(log):
-    raise KeyboardInterrupt
-
-
-def elsewhere(log):
-    import os
-
-    os.chdir("/")
-    return 1.0
 """
 
 CONTENT: dict[str, Any] = {
