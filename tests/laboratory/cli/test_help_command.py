@@ -19,7 +19,7 @@ from paths import CONFIG, DOCS, ROOT
 from space_robot.cli.completion import PROGRAM, VARIABLE
 from space_robot.cli.main import cli
 from space_robot.cli.sections import SECTIONS, section_of
-from space_robot.help.topics import ORDER, as_plain_text, read_topic, title
+from space_robot.help.topics import ORDER, read_topic, title
 from space_robot_control.laws import laws
 
 MOST_LINES, MOST_COLUMNS = 25, 100
@@ -67,21 +67,12 @@ def test_a_command_for_a_topic_shows_its_help(space_robot: Run) -> None:
     assert space_robot("help", "gains").out.startswith(title(read_topic("gains")))
 
 
-def test_fenced_blocks_are_indented() -> None:
-    text = "# A?\n\n```yaml\n# a.yaml\n\na: 1\n```\n\nEnd\n"
-    assert as_plain_text(text) == "A?\n\n    # a.yaml\n\n    a: 1\n\nEnd"
-
-
 def test_every_command_is_listed_once_below_its_heading() -> None:
     printed = CliRunner().invoke(cli, ["--help"]).output
     of_headings = dict(re.findall(r"^(\S[^\n]*):\n((?:  [^\n]*\n)+)", printed, re.MULTILINE))
     for name, command in cli.commands.items():
         headings = [h for h in SECTIONS if re.search(rf"^  {name} ", of_headings.get(h, ""), re.M)]
         assert headings == ([] if command.hidden else [section_of(command)]), name
-
-
-def test_no_sentence_is_cut() -> None:
-    assert "..." not in CliRunner().invoke(cli, ["--help"]).output.partition("Options:")[2]
 
 
 def completed(*words: str) -> list[CompletionItem]:
@@ -171,18 +162,6 @@ def test_bash_completes(space_robot: Run, tmp_path: Path) -> None:
         check=False,
     )
     assert done.stdout == "4-1 4-2\n", done.stderr
-
-
-def test_a_completion_imports_nothing_slow() -> None:
-    slow = {"numpy", "numba", "pydantic", "yaml", "scipy"}
-    code = (
-        "import sys; from click.shell_completion import ShellComplete as S\n"
-        "from space_robot.cli.main import cli\n"
-        f"S(cli, {{}}, {PROGRAM!r}, {VARIABLE!r}).get_completions(['simulate', '--robot'], '')\n"
-        f"print(sorted({slow!r} & set(sys.modules)))"
-    )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
-    assert done.stdout == "[]\n", done.stderr
 
 
 EXAMPLES = ROOT / "examples"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import Any
 
@@ -46,22 +47,33 @@ def said_by(*arguments: str) -> str:
     return str(result.exception)
 
 
-def test_parameters_of_a_scenario_and_those_given(
-    planned: list[FlightPlan], tmp_path: Path
-) -> None:
-    """Both count, and those given here come over the scenario's."""
+def test_what_is_given_comes_over_the_scenario(planned: list[FlightPlan], tmp_path: Path) -> None:
+    """Options and parameters; the others of both count."""
     path = tmp_path / "scenario.yaml"
     path.write_text(
-        "case: 2\nduration: 3\nswaps: ['1:ctc']\nfriction: false\n"
+        "case: 2\nduration: 3\nswaps: ['1:ctc']\nfriction: false\nsensors: fine\n"
         "parameters: {plant: {friction: {coulomb: 0.5}, hold_ticks: 30}}\n"
     )
-    said_by("--scenario", str(path), "--set", "plant.hold_ticks=40", "--case", "3")
+    given = [
+        "--set",
+        "plant.hold_ticks=40",
+        "--case",
+        "3",
+        "--duration",
+        "1",
+        "--swap",
+        "2:tde_smc",
+        "--friction",
+    ]
+    said_by("--scenario", str(path), *given)
     said_by("--scenario", str(path))
     first, second = planned
     assert (first.case, second.case) == ("3", "2")
     assert first.parameters == {"plant": {"friction.coulomb": 0.5, "hold_ticks": 40}}
     assert second.parameters == {"plant": {"friction.coulomb": 0.5, "hold_ticks": 30}}
+    assert (first.duration, first.swaps, first.friction) == (1.0, ["2:tde_smc"], True)
     assert (second.duration, second.swaps, second.friction) == (3.0, ["1:ctc"], False)
+    assert first.sensors == second.sensors == "fine"
 
 
 def test_a_folder_of_gains_needs_no_slash(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -103,21 +115,20 @@ def test_any_parameters_fly_or_are_refused_in_one_line(pairs: list[tuple[str, st
         assert len(str(error).splitlines()) == 1  # noqa: PT017
 
 
-@pytest.mark.parametrize("text", ["nan", "inf", "-inf", "1e999", "x"])
-def test_what_is_no_finite_number_is_refused(text: str) -> None:
-    for kind in (FiniteRange(), FiniteRange(0.0, 0.5, min_open=True)):
-        with pytest.raises(click.BadParameter):
-            kind.convert(text, None, None)
-    if text != "x":
-        with pytest.raises(click.BadParameter) as caught:
-            FiniteRange().convert(text, None, None)
-        assert str(caught.value) == f"{text} is not a finite number."
-
-
-@pytest.mark.parametrize("text", ["0", "0.51", "-1"])
-def test_what_is_beyond_a_bound_is_refused(text: str) -> None:
-    with pytest.raises(click.BadParameter, match="is not in the range"):
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        *((text, f"{text} is not a finite number.") for text in ("nan", "inf", "-inf", "1e999")),
+        *((text, "is not in the range") for text in ("0", "0.51", "-1")),
+        ("x", "is not a valid float"),
+    ],
+)
+def test_a_number_out_of_its_range_is_refused(text: str, said: str) -> None:
+    with pytest.raises(click.BadParameter, match=re.escape(said)):
         FiniteRange(0.0, 0.5, min_open=True).convert(text, None, None)
+    if "finite" in said:
+        with pytest.raises(click.BadParameter):
+            FiniteRange().convert(text, None, None)
 
 
 def test_bounds_are_in_the_range_unless_they_are_open() -> None:

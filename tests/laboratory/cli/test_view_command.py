@@ -27,7 +27,7 @@ from space_robot_msgs_py.bag.reader import read_flight
 from space_robot_msgs_py.config.extras import install_command
 
 LARGEST = 3e6
-"""Bytes of a page of a flight of 3 s."""
+"""Bytes of a page of a flight of a second."""
 
 
 @pytest.fixture
@@ -38,16 +38,16 @@ def view(space_robot: Run, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> R
 
 @pytest.fixture(scope="module")
 def bags(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
-    """A whole flight of 3 s, and a short one."""
+    """A flight of a second, and a short one."""
     folder = tmp_path_factory.mktemp("bags")
-    simulate(Flight(resolve(FlightPlan(duration=3.0))), folder / "whole")
+    simulate(Flight(resolve(FlightPlan(duration=1.0))), folder / "whole")
     simulate(Flight(resolve(FlightPlan(controller="ctc", duration=0.3))), folder / "short")
     return folder / "whole", folder / "short"
 
 
 @pytest.fixture(scope="module")
 def whole(bags: tuple[Path, Path], tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The page of the flight of 3 s."""
+    """The page of the flight of a second."""
     out = tmp_path_factory.mktemp("page") / "whole.html"
     with pytest.raises(SystemExit) as ended:
         main(["view", str(bags[0]), "--no-open", "--out", str(out)])
@@ -75,7 +75,7 @@ class References(HTMLParser):
 def test_a_page_is_small_and_needs_no_other_file(whole: Path) -> None:
     page = whole.read_text("utf-8")
     assert whole.stat().st_size < LARGEST
-    assert Scene(page).duration == pytest.approx(3.0 - 5e-4)
+    assert Scene(page).duration == pytest.approx(1.0 - 5e-4)
     assert [ref for ref in References(page).found if not ref.startswith(("data:", "#"))] == []
     own = re.sub(r'srcdoc="[^"]*"', "", page)
     assert not re.search(
