@@ -54,18 +54,8 @@ def test_what_is_given_comes_over_the_scenario(planned: list[FlightPlan], tmp_pa
         "case: 2\nduration: 3\nswaps: ['1:ctc']\nfriction: false\nsensors: fine\n"
         "parameters: {plant: {friction: {coulomb: 0.5}, hold_ticks: 30}}\n"
     )
-    given = [
-        "--set",
-        "plant.hold_ticks=40",
-        "--case",
-        "3",
-        "--duration",
-        "1",
-        "--swap",
-        "2:tde_smc",
-        "--friction",
-    ]
-    said_by("--scenario", str(path), *given)
+    given = ["--set", "plant.hold_ticks=40", "--case", "3", "--duration", "1", "--friction"]
+    said_by("--scenario", str(path), *given, "--swap", "2:tde_smc")
     said_by("--scenario", str(path))
     first, second = planned
     assert (first.case, second.case) == ("3", "2")
