@@ -1,8 +1,10 @@
-"""What the runs of a campaign fly: distributions, designs, robots, gears and orbits."""
+"""A study and what its runs fly: distributions, designs, robots, gears and orbits."""
 
 from __future__ import annotations
 
+import math
 import pickle
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -10,6 +12,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
+from paths import CONFIG
 from robots import DRIVE, PLATES, driven_paper
 from scipy import stats
 from scipy.stats import qmc, truncnorm
@@ -20,8 +23,8 @@ from space_robot.campaign.draws.changes import rotation, spread
 from space_robot.campaign.draws.designs import shifted
 from space_robot.campaign.draws.distributions import read_distribution
 from space_robot.campaign.draws.keys import bits, noise_seed, permutation, uniform
-from space_robot.campaign.study import Study
-from space_robot_model.elementary.symmetric import principal_axes
+from space_robot.campaign.flown.preparation import Preparation
+from space_robot.campaign.study import Requirement, Study, read_study, short_names
 from space_robot_model.robot import Robot
 from space_robot_model.robot.find import find_robot
 from space_robot_msgs_py.errors import InputError
@@ -261,16 +264,8 @@ def test_every_robot_that_is_drawn_can_be(seed: int, name: str) -> None:
 
 
 @settings(max_examples=50)
-@given(
-    st.lists(st.floats(-1.0, 1.0), min_size=6, max_size=6),
-    st.lists(st.floats(-1.0, 1.0), min_size=3, max_size=3),
-)
-def test_principal_axes_are_numpys(six: list[float], turn: list[float]) -> None:
-    xx, yy, zz, xy, xz, yz = six
-    tensor = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-    moments, axes = principal_axes(tensor)
-    assert moments == pytest.approx(np.linalg.eigvalsh(tensor), abs=1e-14)
-    assert axes @ np.diag(moments) @ axes.T == pytest.approx(tensor, abs=1e-14)
+@given(st.lists(st.floats(-1.0, 1.0), min_size=3, max_size=3))
+def test_an_inertia_is_turned_as_a_whole(turn: list[float]) -> None:
     r = rotation(turn)
     assert r @ r.T == pytest.approx(np.eye(3), abs=1e-15)
     turned = spread(np.diag([2.0, 3.0, 4.0]), [1.0, 1.0, 1.0], turn)
@@ -330,3 +325,27 @@ def test_plates_vary_together_or_one_by_one() -> None:
         assert plates[2].specular == 0.6 + values["robot.plates[3].specular"]
         drag = plant.truth.external_torques[3:6]
         assert drag == pytest.approx(nominal * area * coefficient / 2.2, rel=1e-12)
+
+
+def test_a_requirement_holds_strictly() -> None:
+    below = Requirement.model_validate({"metric": "a", "below": 1.0, "in": 0.9})
+    above = Requirement.model_validate({"metric": "a", "above": 1.0, "in": 0.9})
+    assert [below.is_met(value) for value in (0.9, 1.0, float("nan"))] == [True, False, False]
+    assert [above.is_met(value) for value in (1.1, 1.0, float("nan"))] == [True, False, False]
+    assert below.confidence == 0.9
+
+
+@pytest.mark.parametrize("file", sorted((CONFIG / "campaigns").iterdir()), ids=lambda f: f.stem)
+def test_a_shipped_campaign_can_be_flown(file: Path) -> None:
+    """Also at every point of its grid."""
+    shipped = read_study(file.stem)
+    assert Preparation.of(shipped, 0, None).manifest.runs == shipped.runs
+    draws = Draws(shipped, 0, shipped.runs_asked())
+    for run in range(math.prod(draws.grid.values())):
+        draws.scenario(run, shipped.laws[0]).check()
+
+
+def test_tables_leave_out_the_gain_set_that_all_laws_have() -> None:
+    assert list(short_names(["ctc=robust", "tde_stc=robust"]).values()) == ["ctc", "tde_stc"]
+    assert list(short_names(["ctc", "tde_stc"]).values()) == ["ctc", "tde_stc"]
+    assert list(short_names(["ctc", "ctc=robust"]).values()) == ["ctc", "ctc=robust"]

@@ -121,25 +121,6 @@ def test_evidence_is_a_martingale_at_the_share_and_falls_above(
     assert log_evidence(0, 0, share) == pytest.approx(0.0, abs=1e-12)
 
 
-@pytest.mark.parametrize(("share", "confidence"), [(0.9, 0.9), (0.7, 0.8), (0.98, 0.95)])
-def test_no_way_of_looking_and_flying_on_makes_false_verdicts_more_frequent(
-    share: float, confidence: float
-) -> None:
-    """Exactly; order statistics, looked at that often, are false far more often than said."""
-    error = 1.0 - confidence
-    fixed, sequential = (exact.Rule(k(share, confidence), 120, 1000) for k in KINDS)
-    for rule in (fixed, sequential):
-        assert max(rule.looking(200, most=200)) <= error
-    often = sequential.looking(1)
-    assert max(often) <= error
-    assert min(often) > 0.3 * error  # nor is it much too careful
-    for every in (7, 50):
-        assert max(sequential.looking(every)) <= min(error, max(often))
-    assert max(sequential.flying_on(lambda k, _: int(sequential.met_from[k]))) <= error
-    assert max(fixed.looking(50)) > 1.3 * error
-    assert max(fixed.flying_on(lambda k, _: int(fixed.met_from[k]))) > 1.3 * error
-
-
 def test_the_page_on_campaigns_has_the_exact_probabilities() -> None:
     """The rows that take little time."""
     page = (DOCS / "explanation/campaign_statistics.md").read_text("utf-8")

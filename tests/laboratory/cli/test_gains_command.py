@@ -72,18 +72,19 @@ def test_laws_with_a_model_are_sound() -> None:
 
 def test_a_free_base_leaves_the_joints_to_be_judged() -> None:
     """Table IV: seven times the margin, so that it is sound; the base gets no torque of noise."""
-    result = run("check", "--actuators", "none")
+    free = ("--actuators", "none")
+    result = run("check", *free, "--controller", "tde_stc")
     assert result.exit_code == 0
     assert "H_f^-1 h_bar" in result.stdout
-    found = report("--actuators", "none")
+    found = report(*free)
     assert found["actuators"] == "none"
     stc = found["laws"]["tde_stc"]
     assert stc["torque_scale_margin"] == pytest.approx(0.0237, abs=5e-5)
     for law in found["laws"].values():
         assert law["noise_gain"][:3] == [0.0] * 3
     assert stc["noise_gain"][3:6] == pytest.approx([5.0 / 5e-4 + 5.0] * 3)
-    turned = ("--set", "mission.base_quaternion=[0.0, 1.0, 0.0, 0.0]")
-    again = report("--actuators", "none", *turned)["laws"]["ctc"]
+    turned = ("--controller", "ctc", "--set", "mission.base_quaternion=[0.0, 1.0, 0.0, 0.0]")
+    again = report(*free, *turned)["laws"]["ctc"]
     assert again["noise_gain"] == found["laws"]["ctc"]["noise_gain"]
 
 
@@ -153,12 +154,13 @@ def test_auto_says_why_it_takes_the_nominal_inertia_which_flies(tmp_path: Path) 
     assert "eigenvalues of H_S^-1 h_bar would be 0.06 to 2.24" in result.stderr
     for law in ("tde_smc", "tde_tsmc", "tde_stc"):
         assert "      h_bar: nominal\n" in (tmp_path / f"{law}.yaml").read_text()
-    given = ("--gains", str(tmp_path), "--case", "4-2", "--mass-uncertainty", "0.1")
-    found = report(*given)["laws"]
-    assert found["tde_stc"]["torque_scale_margin"] == pytest.approx(0.375, abs=5e-4)
-    assert found["indi"]["wrong_masses"]["smallest"] == pytest.approx(1.0 / 1.1)
-    assert found["indi"]["wrong_masses"]["largest"] == pytest.approx(1.0 / 0.9)
-    text = run("check", "--gains", str(tmp_path)).stdout
+    own = ("--gains", str(tmp_path))
+    heavy = report(*own, "--case", "4-2", "--controller", "tde_stc")["laws"]["tde_stc"]
+    assert heavy["torque_scale_margin"] == pytest.approx(0.375, abs=5e-4)
+    masses = report(*own, "--controller", "indi", "--mass-uncertainty", "0.1")["laws"]["indi"]
+    assert masses["wrong_masses"]["smallest"] == pytest.approx(1.0 / 1.1)
+    assert masses["wrong_masses"]["largest"] == pytest.approx(1.0 / 0.9)
+    text = run("check", *own).stdout
     assert "h_bar of indi, tde_smc, tde_stc, tde_tsmc is H_S of the nominal model" in text
     simulate(Flight(resolve(FlightPlan(gains=str(tmp_path), duration=0.05))))
 

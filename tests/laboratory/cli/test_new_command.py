@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import os
 import shlex
 import shutil
@@ -18,11 +19,26 @@ from click.testing import CliRunner, Result
 from paths import CONFIG, DATA, ROOT
 
 from space_robot.campaign.new_robot import robot_texts
-from space_robot.campaign.new_robot.make import mission_text, rest_to_rest
+from space_robot.campaign.new_robot.make import (
+    BEYOND,
+    DAMPING_RATIO,
+    DIVERGED,
+    FREQUENCY_HZ,
+    Outcome,
+    hinge_remark,
+    mission_text,
+    rest_to_rest,
+    tool_remark,
+    trial_remark,
+)
 from space_robot.cli.main import cli
+from space_robot.cli.new import new as new_command
 from space_robot.cli.new_files import LAW, METRIC, MISSION, SENSOR
 from space_robot.flight.plan import Flight, FlightPlan, resolve
 from space_robot.flight.simulate import simulate
+from space_robot.tuning.method import Tuned
+from space_robot.tuning.task import TuningOptions
+from space_robot.tuning.warning import estimate_remark
 from space_robot_control.guidance.mission import Mission
 from space_robot_control.laws import laws
 from space_robot_model.robot import Robot
@@ -263,3 +279,90 @@ def test_nothing_is_overwritten(tmp_path: Path) -> None:
         assert "test_mine.py: exists already; it is not overwritten" in str(result.exception)
         assert [path.name for path in tmp_path.iterdir()] == ["test_mine.py"]
     assert there.read_text("utf-8") == "mine"
+
+
+LINK = """<link name="{0}"><inertial><origin xyz="{1} 0 0"/><mass value="{2}"/>
+<inertia ixx="0.1" iyy="0.2" izz="{3}" ixy="0" ixz="0" iyz="0"/></inertial></link>"""
+
+JOINT = """<joint name="{0}" type="{3}"><parent link="{1}"/><child link="{2}"/>
+<axis xyz="0 0 1"/><limit lower="-1" upper="1" effort="9" velocity="1"/></joint>"""
+
+
+def satellite(tmp_path: Path, panel: str = "revolute") -> Robot:
+    """A base with an arm of two joints between two panels, each 3 kg at 0.5 m of its hinge."""
+    links = [("bus", 0, 100, 0.25), ("upper", 0.2, 5, 0.25), ("fore", 0.2, 5, 0.25)]
+    links += [("left", 0.5, 3, 0.25), ("right", 0.5, 3, 0.25)]
+    joints = [
+        ("left_hinge", "bus", "left", panel),
+        ("a", "bus", "upper", "revolute"),
+        ("b", "upper", "fore", "revolute"),
+        ("right_hinge", "bus", "right", panel),
+    ]
+    text = "".join(LINK.format(*x) for x in links) + "".join(JOINT.format(*x) for x in joints)
+    file = tmp_path / "satellite.urdf"
+    file.write_text(f'<robot name="satellite">{text}</robot>')
+    return Robot.from_urdf(file)
+
+
+def test_panels_on_hinges_are_proposed_as_passive_joints(tmp_path: Path) -> None:
+    """The command is one that `new` takes, and its springs swing as they are said to."""
+    robot = satellite(tmp_path)
+    remark = hinge_remark(robot, f"space-robot new {tmp_path}/satellite.urdf", Path("my sat"))
+    words = shlex.split(remark.split("`")[1])
+    assert words[:2] == ["space-robot", "new"]
+    parsed = new_command.commands["robot"].make_context("robot", words[2:]).params
+    assert (parsed["out"], parsed["force"]) == (Path("my sat"), True)
+    proposed = parsed["passive"]
+    assert list(proposed) == ["left_hinge", "right_hinge"]
+    _, passive = robot_texts(Path(parsed["robot"]), None, False, "", proposed)
+    assert (passive.joint_names, set(passive.passive_names)) == (("a", "b"), set(proposed))
+    inertia = 0.25 + 3.0 * 0.5**2  # about the hinge
+    for spring in proposed.values():
+        rate = math.sqrt(spring["stiffness"] / inertia)
+        assert rate / (2.0 * math.pi) == pytest.approx(FREQUENCY_HZ, rel=0.03)
+        ratio = spring["damping"] / (2.0 * inertia * rate)
+        assert ratio == pytest.approx(DAMPING_RATIO, rel=0.05)
+    assert hinge_remark(passive, "", tmp_path) == ""
+    assert remark.startswith("left_hinge, right_hinge: each carries one body")
+    one = {"left_hinge": proposed["left_hinge"]}
+    _, passive = robot_texts(Path(parsed["robot"]), None, False, "", one)
+    assert hinge_remark(passive, "", tmp_path).startswith("right_hinge: it carries one body")
+
+
+@pytest.mark.parametrize(("slower", "is_told"), [(1.01, False), (9.9, False), (10.1, True)])
+def test_weak_gains_are_told_with_their_reason(slower: float, is_told: bool) -> None:
+    tuned = Tuned(
+        TuningOptions(0.05, 0.2), 1.0, 0.0123, 5.0, 5.0 * slower, 0.06, 120.0, np.ones(9), {}
+    )
+    remark = estimate_remark(tuned)
+    assert bool(remark) == is_told
+    if is_told:
+        assert all(number in remark for number in ("0.06 to 120", "12.3 ms", "5 rad/s"))
+
+
+def test_laws_that_failed_in_the_comparison_are_named() -> None:
+    flights = {
+        law: Outcome({"attitude": 1.0}, "", 1.0, how)
+        for law, how in (("a", DIVERGED), ("b", ""), ("c", BEYOND), ("d", DIVERGED))
+    }
+    remark = trial_remark(flights)
+    assert remark.startswith("With friction, payload and disturbances of case 3, ")
+    assert remark.endswith(": a, d diverged; c went beyond the joints' limits of effort.")
+    assert trial_remark({"b": flights["b"]}) == ""
+
+
+def test_the_frame_that_missions_move_is_told_where_a_body_is_fixed_to_it(tmp_path: Path) -> None:
+    camera = LINK.format("camera", 0.1, 1, 0.25) + JOINT.format("mount", "fore", "camera", "fixed")
+    satellite(tmp_path)
+    file = tmp_path / "satellite.urdf"
+    for more, tools, told in (
+        (camera, "", True),
+        (camera, "tools: [camera]", False),
+        ("", "", False),
+    ):
+        text = file.read_text().replace(camera, "").replace("</robot>", f"{more}</robot>")
+        file.write_text(text)
+        (tmp_path / "robot.yaml").write_text(f"robot:\n  urdf: satellite.urdf\n  {tools}\n")
+        remark = tool_remark(Robot.from_yaml(tmp_path / "robot.yaml"), tmp_path)
+        assert remark.startswith("Missions move the frame of fore, to which camera is") == told
+        assert bool(remark) == told

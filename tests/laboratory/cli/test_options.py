@@ -8,9 +8,11 @@ from typing import Any
 
 import click
 import pytest
+import yaml
 from click.testing import CliRunner, Result
 from hypothesis import given
 from hypothesis import strategies as st
+from paths import CONFIG
 
 from space_robot.cli import main as cli
 from space_robot.cli.fly import fly
@@ -79,6 +81,17 @@ def test_a_folder_of_gains_needs_no_slash(tmp_path: Path, monkeypatch: pytest.Mo
     bare, slash = (Flight(resolve(FlightPlan(gains=gains))) for gains in ("g", "g/"))
     assert bare.scenario.gains_used == slash.scenario.gains_used
     assert bare.description == slash.description
+
+
+def test_a_plant_robot_of_the_same_numbers_is_no_other_robot(tmp_path: Path) -> None:
+    content = yaml.safe_load((CONFIG / "robots/paper.yaml").read_text("utf-8"))
+    for number, mass in enumerate((content["robot"]["base"]["mass"], 700.0)):
+        content["robot"]["base"]["mass"] = mass
+        file = tmp_path / f"{number}.yaml"
+        file.write_text(yaml.safe_dump(content))
+        flight = Flight(resolve(FlightPlan(plant_robot=str(file))))
+        assert ("controller_robot_file" in flight.description) == (number > 0)
+        assert ("plant_robot" in flight.scenario.tree) == (number > 0)
 
 
 _NAMES = (

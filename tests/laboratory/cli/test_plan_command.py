@@ -49,12 +49,16 @@ def report(*arguments: object) -> dict[str, Any]:
     return numbers
 
 
-def test_the_papers_mission_asks_for_what_is_known_of_it() -> None:
+def test_the_papers_mission_and_one_of_segments(mission: Path) -> None:
+    """What it asks for stands in docs/manual/missions.md, which has a test."""
     numbers = report()
-    assert numbers["base_torque"] == pytest.approx(2.4, abs=0.05)
-    assert numbers["momentum"] == pytest.approx(11.3, abs=0.05)
     assert [s["motion"] for s in numbers["segments"]] == ["joints", "joints"]
     assert {a["actuators"]: a["is_feasible"] for a in numbers["actuators"]}["wheels"]
+    numbers = report(mission)
+    assert numbers["segments"][0]["tool_travel_m"] == pytest.approx(0.5, rel=1e-3)
+    shown = run(mission).stdout
+    assert "37.00 s; largest base torque" in shown
+    assert "small_wheels" in shown
 
 
 def test_the_joints_nearest_to_their_limits() -> None:
@@ -76,16 +80,6 @@ def test_the_joints_nearest_to_their_limits() -> None:
     assert margins["position"]["share"] == pytest.approx(ranges.max(), rel=1e-9)
     assert 0.0 < margins["effort"]["share"] < 1.0
     assert "joints nearest to their limits: position " in run("--robot", "dual_arm").stdout
-
-
-def test_segments_of_a_document(mission: Path) -> None:
-    numbers = report(mission)
-    assert [s["motion"] for s in numbers["segments"]] == ["tool", "base", "hold"]
-    assert numbers["duration_s"] == 37.0
-    assert numbers["segments"][0]["tool_travel_m"] == pytest.approx(0.5, rel=1e-3)
-    shown = run(mission).stdout
-    assert "37.00 s; largest base torque" in shown
-    assert "small_wheels" in shown
 
 
 def test_sigma_is_of_translations_divided_by_the_tools_distance(mission: Path) -> None:
@@ -113,16 +107,6 @@ def test_a_stretched_mission_keeps_to_the_limit_and_flies(
     assert [s["motion"] for s in again["segments"]] == ["tool", "base", "hold"]
 
 
-def test_legs_between_waypoints_are_bent_and_stretched(tmp_path: Path) -> None:
-    numbers = report("--base-torque", 0.5, "--out", tmp_path / "slow.yaml")
-    assert 0.45 < numbers["base_torque"] <= 0.5
-    assert numbers["lightened"]["duration_s"] == 30.0
-    assert numbers["lightened"]["base_torque"] < 0.7 * numbers["before"]["base_torque"]
-    assert numbers["duration_s"] < 45.0
-    written = report(tmp_path / "slow.yaml")
-    assert written["segments"] == numbers["segments"]
-
-
 def test_redundant_joints_make_it_lighter_before_it_is_stretched(tmp_path: Path) -> None:
     start = {"joints_deg": [10, 30, 40, 50, 60, 70, 80]}
     segments = [{"tool": {"xyz": [0.2, 0, -0.1]}, "duration": 15}]
@@ -132,6 +116,7 @@ def test_redundant_joints_make_it_lighter_before_it_is_stretched(tmp_path: Path)
     assert numbers["before"]["base_torque"] > 0.1
     assert numbers["base_torque"] == numbers["lightened"]["base_torque"] < 0.05
     assert numbers["duration_s"] == 15.0
+    # legs between waypoints are bent and stretched: docs/manual/missions.md, which has a test
 
 
 WEAK = {

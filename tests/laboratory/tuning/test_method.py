@@ -146,21 +146,6 @@ def test_the_shape_is_near_the_best_diagonal(seed: int, m: int) -> None:
         assert ours <= m * ratio(other) * (1.0 + 1e-6)
 
 
-def test_demand_is_what_a_flight_commands() -> None:
-    """CTC's torque along case 1 at a high gain is that of inverse dynamics."""
-    from space_robot.flight.simulate import simulate
-
-    log = simulate(Flight(resolve(FlightPlan(controller="ctc"))))
-    assert log.commanded_torque is not None
-    asked = scene()[2]
-    flight = Flight(resolve(FlightPlan(controller="ctc")))
-    case_1 = demand(flight.robot, flight.mission_settings, [flight.plant_settings])
-    peak = np.abs(log.commanded_torque).max(axis=0)
-    peak[:3] *= 2.0  # J0 = E / 2
-    np.testing.assert_allclose(case_1.peak, peak, rtol=0.02, atol=2e-3)
-    assert np.all(asked.peak >= case_1.peak)
-
-
 def white(rate: float, angle: float = 0.0, ticks: int = 8000) -> Noise:
     """White noise of rates, rad/s (eps: 1/s), and of angles, rad, alike on all axes."""
     rng, shape = np.random.default_rng(1), (ticks, 9)
