@@ -299,8 +299,6 @@ def test_the_attitude_is_shown_in_degrees_where_it_was_measured_so() -> None:
     shown = medians(table, {law: law for law in table["law"]}, 1)
     names = [column.name for column in shown.columns][2:]
     assert names == ["attitude_deg_rms", "ripple_base_torque"]
-    known = table[table["law"] == "ctc"]["metric.attitude_deg_rms"].dropna()
-    assert float(shown.groups[0].rows[0][2]) == pytest.approx(known.median(), rel=0.05)
     quantities = chosen(table, {})
     assert [q.name for q in quantities] == [names[0], "joints_1_3_rms", names[1]]
     assert quantities[0].label == "attitude, RMS (deg)"

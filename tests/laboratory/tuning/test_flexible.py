@@ -147,8 +147,8 @@ def check_stability(
 
 def checked(flight: Flight) -> FlexibleCheck:
     corner = flight.controller_settings.acceleration_filter_hz
-    positions = np.radians([POSTURE_DEG])
-    return check_stability(flight.law, flight.plant.robot, positions, corner, flight.controls_base)
+    robot, positions = flight.plant.robot, np.radians([POSTURE_DEG])
+    return check_stability(flight.law, robot, positions, corner, flight.controls_base)
 
 
 def growth(signals: Array, skipped: int = 1) -> float:

@@ -207,12 +207,6 @@ def heard(sensors: str, navigation: Any = "direct", corner: float = 100.0) -> No
     )
 
 
-def test_ideal_sensors_have_none() -> None:
-    found = heard("ideal")
-    assert not found.rates.any()
-    assert found.lag == 0.0
-
-
 def test_white_noise_has_the_size_it_is_given() -> None:
     found = heard("white_l1")  # 1e-6 and 1e-5 rad/s; J0 = E / 2
     np.testing.assert_allclose(found.rates.std(axis=0), [5e-7] * 3 + [1e-5] * 6, rtol=0.05)
@@ -233,3 +227,5 @@ def test_lag_is_that_of_both_low_passes(corner: float) -> None:
     weight = 1.0 - math.exp(-2.0 * math.pi * corner * PERIOD)
     expected = 2.0 * PERIOD * (1.0 - weight) / weight
     assert heard("ideal", "filtered", corner).lag == pytest.approx(expected, rel=1e-6)
+    assert not heard("ideal").rates.any()
+    assert heard("ideal").lag == 0.0
