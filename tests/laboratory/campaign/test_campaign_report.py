@@ -1,34 +1,48 @@
-"""A report's tables, page and JSON on made-up campaigns: whole, unfinished, failed, with a grid."""
+"""A report's tables, page and JSON on made-up campaigns; what the campaign commands say."""
 
 from __future__ import annotations
 
 import json
+import os
 import re
-from functools import partial
+import shlex
+import signal
+import subprocess
+import sys
+import time
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from campaign_tables import made_table
-from command import Run
+from click.testing import CliRunner, Result
 from pandas import DataFrame
 from rich.console import Console
 
-from space_robot.campaign.flown import Campaign
+from space_robot.campaign.flown import FlownCampaign
 from space_robot.campaign.report import page as page_module
+from space_robot.campaign.report.bands import bands
 from space_robot.campaign.report.console import print_report
 from space_robot.campaign.report.findings import Findings
+from space_robot.campaign.report.league_tables import number
 from space_robot.campaign.report.page import render
+from space_robot.campaign.report.quantities import chosen, of_metric, of_requirement
 from space_robot.campaign.report.record import record
 from space_robot.campaign.report.subject import Subject
-from space_robot.campaign.report.verdict_tables import command, verdict_table
-from space_robot.campaign.study import Study
+from space_robot.campaign.report.verdict_tables import command, demanded, verdict_table
+from space_robot.campaign.store.manifest import read_manifest
+from space_robot.campaign.store.table import table_rows, write_table
+from space_robot.campaign.study import Requirement, Study
+from space_robot.campaign.verdicts.league import league
+from space_robot.cli.campaign import name_of
+from space_robot.cli.campaign_display import medians
+from space_robot.cli.main import cli
 from space_robot_msgs_py.errors import InputError
 
+pytest.importorskip("pyarrow")
+
 REQUIRE = {"pointing": {"metric": "attitude_max", "from_s": 2, "below": 4e-5, "in": 0.9}}
-
-
 UNIFORM = {"uniform": [0.8, 1.2], "relative": True}
 
 
@@ -55,21 +69,10 @@ def printed(findings: Findings, width: int = 100) -> str:
     return console.export_text()
 
 
-@pytest.fixture(scope="module")
-def page() -> str:
-    return render(found(made_table(60), ()))
-
-
-def test_the_page_has_every_section(page: str) -> None:
-    for section in (
-        "flown",
-        "requirements",
-        "laws",
-        "bands",
-        "distributions",
-        "sensitivity",
-        "worst",
-    ):
+def test_the_page_has_every_section() -> None:
+    page = render(found(made_table(60), ()))
+    parts = "flown requirements laws bands distributions sensitivity worst"
+    for section in parts.split():
         assert f'<h2 id="{section}">' in page
         assert f'href="#{section}"' in page
     assert page.count("<figure>") == 2 + 5 + 1  # bands, distributions, what drives it
@@ -83,8 +86,6 @@ def no_figures(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_every_command_flies_a_row_of_the_campaign() -> None:
-    import shlex
-
     findings = found(made_table(50))
     words = shlex.split(record(findings)["worst"][0]["command"])
     assert words[:4] == ["space-robot", "campaign", "rerun", "campaigns/a b"]
@@ -183,8 +184,6 @@ def test_saltelli_has_indices_and_verdicts_of_independent_points() -> None:
 
 
 def test_bands_count_failed_flights_as_worse() -> None:
-    from space_robot.campaign.report.bands import bands
-
     rows = made_table(20, laws=("ctc",), failing=0.0)
     low, middle, high, largest = bands(rows, "attitude")
     values = np.array(rows["band.attitude"].tolist())
@@ -197,33 +196,126 @@ def test_bands_count_failed_flights_as_worse() -> None:
     assert np.all(broken[0] >= low)
 
 
-@pytest.fixture
-def report(space_robot: Run) -> Run:
-    return partial(space_robot, "campaign", "report")
+FILE = """
+scenario: {duration: 0.1}
+laws: [tde_stc]
+vary: {"scenario.case": {choice: ["1", "3"]}}
+require: {p: {metric: attitude_max, below: 1.0, in: 0.5}}
+"""
+
+
+def campaign(verb: str, *words: object) -> Result:
+    return CliRunner().invoke(cli, ["campaign", verb, *map(str, words)])
 
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    file, out = (tmp_path_factory.mktemp("campaign") / name for name in ("my.yaml", "flown"))
-    file.write_text(
-        "scenario: {case: '1', duration: 0.05}\nlaws: [ctc, tde_stc]\n"
-        "vary: {robot.base.mass: {uniform: [0.8, 1.2], relative: true}}\n"
-        "require: {pointing: {metric: attitude_max, below: 1.0e-3, in: 0.9}}\n",
-        "utf-8",
-    )
-    Campaign.load(file).run(6, 3, out, workers=0)
-    return out
+def file(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("campaigns") / "my.yaml"
+    path.write_text(FILE)
+    return path
 
 
-def test_it_prints_and_writes(folder: Path, tmp_path: Path, report: Run) -> None:
+def test_the_default_folder_is_named_by_the_file_or_by_its_folder() -> None:
+    assert name_of(Path("first")) == name_of(Path("some/first.yaml")) == "first"
+    assert name_of(Path("mine/campaign.yaml")) == "mine"
+
+
+@pytest.fixture(scope="module")
+def flown(file: Path) -> Path:
+    folder = file.parent / "a"
+    result = campaign("run", file, "--runs", 4, "--out", folder, "--workers", 0)
+    assert result.exit_code == 0, result.output
+    assert "4 of 4" in result.stdout
+    assert "met" in result.stdout
+    assert f"campaign rerun {folder} " in result.stdout.replace("\n", " ")
+    return folder
+
+
+def test_the_same_line_again_flies_nothing_and_more_runs_go_on(file: Path, flown: Path) -> None:
+    result = campaign("run", file, "--runs", 4, "--out", flown, "--json")
+    assert "all 4 flights are there: nothing to fly" in result.stderr
+    report = json.loads(result.stdout)
+    assert report["outcomes"] == {"tde_stc": {"complete": 4}}
+    assert report["kept"] == 4
+    assert report["verdicts"][0]["requirement"] == "p"
+    result = campaign("run", file, "--runs", 6, "--out", flown, "--workers", 0)
+    assert "4 of 6 flights are there; going on" in result.stderr
+    assert len(FlownCampaign.open(flown).table) == 6
+
+
+def test_a_report_is_printed_and_written(flown: Path, tmp_path: Path) -> None:
     html, markdown = tmp_path / "a.html", tmp_path / "a.md"
-    code, out, err = report(
-        str(folder), "--html", str(html), "--markdown", str(markdown), "--metric", "attitude_rms"
-    )
-    assert code == 0, err
-    assert "pointing: attitude, largest below 0.001" in out
-    assert "undecided" in out
+    words = ("--html", html, "--markdown", markdown, "--metric", "attitude_rms")
+    result = campaign("report", flown, *words)
+    assert result.exit_code == 0, result.output
+    assert "p: attitude, largest below 1" in result.stdout
     assert html.read_text("utf-8").startswith("<!doctype html>")
     assert "| tde_stc |" in markdown.read_text("utf-8")
     assert (tmp_path / "a.png").is_file()
-    assert report(str(folder), "--html", str(html))[0] == 2
+    assert isinstance(campaign("report", flown, "--html", html).exception, InputError)
+
+
+def test_rerun_says_that_the_digest_is_the_same_or_fails(flown: Path, tmp_path: Path) -> None:
+    again = campaign("rerun", flown, 2, "--bag", tmp_path / "bag", "--json")
+    assert again.exit_code == 0, again.output
+    assert json.loads(again.stdout)["campaign"]["same"]
+    assert (tmp_path / "bag/metadata.yaml").is_file()
+    manifest = read_manifest(flown / "campaign.json")
+    rows = table_rows(flown / "table.parquet", manifest.table)
+    software = {**manifest.software, "numpy": "0.1"}
+    manifest = manifest.model_copy(update={"seed": manifest.seed + 1, "software": software})
+    other = tmp_path / "other"
+    other.mkdir()
+    manifest.write(other / "campaign.json")
+    write_table(other / "table.parquet", manifest.table, manifest.campaign, rows)
+    reruns = (campaign("rerun", other, run) for run in range(4))
+    differing = next(result for result in reruns if result.exit_code == 1)
+    assert "differs from the row's" in differing.stderr
+    assert "numpy 0.1, now" in differing.stderr
+
+
+def test_who_ends_it_is_told_how_to_go_on(file: Path, tmp_path: Path) -> None:
+    command = [sys.executable, "-m", "space_robot.cli.main", "campaign", "run", str(file)]
+    command += ["--runs", "5000", "--out", str(tmp_path / "a"), "--workers", "1"]
+    process = subprocess.Popen(
+        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True
+    )
+    journal = tmp_path / "a/journal.db-wal"
+    while process.poll() is None and not (journal.exists() and journal.stat().st_size > 100_000):
+        time.sleep(0.02)
+    os.killpg(process.pid, signal.SIGINT)  # as the terminal does
+    stdout, stderr = process.communicate(timeout=120)
+    assert process.returncode == 128 + signal.SIGINT
+    assert stderr.splitlines()[-1] == "space-robot: stopped by SIGINT"
+    assert "Traceback" not in stderr
+    assert not stdout
+    assert f"of 5000 flights are kept in {tmp_path / 'a'}: the same line goes on" in stderr
+    assert len(FlownCampaign.open(tmp_path / "a").table) > 3
+
+
+def test_the_attitude_is_shown_in_degrees_where_it_was_measured_so() -> None:
+    table = made_table(runs=60)
+    table["metric.attitude_deg_rms"] = np.degrees(2.0 * table["metric.attitude_rms"])
+    shown = medians(table, {law: law for law in table["law"]}, 1)
+    names = [column.name for column in shown.columns][2:]
+    assert names == ["attitude_deg_rms", "ripple_base_torque"]
+    quantities = chosen(table, {})
+    assert [q.name for q in quantities] == [names[0], "joints_1_3_rms", names[1]]
+    assert quantities[0].label == "attitude, RMS (deg)"
+    assert of_metric("tilt_deg_max").heading == "tilt deg, largest"  # of somebody's own
+    assert of_metric("half_cone_arcsec_jitter_rms").label == "half cone jitter, RMS (arcsec)"
+    demand = {"metric": "attitude_max", "below": 1e-3, "in": 0.9}  # of the vector part
+    text = demanded(of_requirement("p", Requirement.model_validate(demand)))
+    assert text.startswith("attitude, largest below 0.001 (an angle of 0.115 deg) in 90 %")
+
+
+@pytest.mark.parametrize("failing", [0.0, 0.2, 0.7])
+def test_medians_are_those_of_the_report_however_many_flights_failed(failing: float) -> None:
+    table = made_table(runs=60, failing=failing)
+    shown = medians(table, {law: law for law in table["law"]}, 1)
+    reported = {s.law: s for s in league(table, "metric.attitude_rms").standings}
+    (group,) = shown.groups
+    for law, complete, median, _ in group.rows:
+        assert complete == f"{60 - reported[law].failures} of 60"
+        assert median == number(reported[law].median.value)
+    assert (failing > 0.5) == any(row[2] == "failed" for row in group.rows)

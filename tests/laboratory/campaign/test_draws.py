@@ -1,8 +1,10 @@
-"""What the runs of a campaign fly: distributions, designs, robots, gears and orbits."""
+"""A study and what its runs fly: distributions, designs, robots, gears and orbits."""
 
 from __future__ import annotations
 
+import math
 import pickle
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -10,6 +12,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
+from paths import CONFIG
 from robots import DRIVE, PLATES, driven_paper
 from scipy import stats
 from scipy.stats import qmc, truncnorm
@@ -20,27 +23,12 @@ from space_robot.campaign.draws.changes import rotation, spread
 from space_robot.campaign.draws.designs import shifted
 from space_robot.campaign.draws.distributions import read_distribution
 from space_robot.campaign.draws.keys import bits, noise_seed, permutation, uniform
-from space_robot.campaign.study import Study
-from space_robot_model.elementary.symmetric import principal_axes
+from space_robot.campaign.flown.preparation import Preparation
+from space_robot.campaign.study import Requirement, Study, read_study, short_names
 from space_robot_model.robot import Robot
 from space_robot_model.robot.find import find_robot
 from space_robot_msgs_py.errors import InputError
 from space_robot_sim.plant.plant import Plant
-
-GOLDEN_BITS = [1788990827981690842, 15618775813144590017]
-
-
-GOLDEN_UNIFORM = "0x1.1c18746dcd574p-3"
-
-
-GOLDEN_NORMAL = "0x1.e65d1e31310b2p-1"
-
-
-GOLDEN_SEED = 832400951
-
-
-GOLDEN_PERMUTATION = [1, 4, 5, 0, 2, 3, 6, 7]
-
 
 KNOWN: list[tuple[dict[str, Any], Any]] = [
     ({"normal": 3.0, "sigma": 0.5}, stats.norm(3.0, 0.5)),
@@ -77,12 +65,13 @@ def test_keys_do_not_meet() -> None:
 
 def test_numbers_are_those_of_every_machine() -> None:
     """Golden: other numbers here are other campaigns for every seed that was ever used."""
-    assert [bits(7, "robot.links[joint1].mass", k) for k in range(2)] == GOLDEN_BITS
-    assert uniform(7, "x", 3).hex() == GOLDEN_UNIFORM
+    known = [1788990827981690842, 15618775813144590017]
+    assert [bits(7, "robot.links[joint1].mass", k) for k in range(2)] == known
+    assert uniform(7, "x", 3).hex() == "0x1.1c18746dcd574p-3"
     normal = read_distribution({"normal": 1.0, "sigma": 0.05, "low": 0.9}, "here")
-    assert float(normal.quantile(uniform(7, "x", 3))).hex() == GOLDEN_NORMAL
-    assert noise_seed(7, 3) == GOLDEN_SEED
-    assert permutation(7, "x", 8).tolist() == GOLDEN_PERMUTATION
+    assert float(normal.quantile(uniform(7, "x", 3))).hex() == "0x1.e65d1e31310b2p-1"
+    assert noise_seed(7, 3) == 832400951
+    assert permutation(7, "x", 8).tolist() == [1, 4, 5, 0, 2, 3, 6, 7]
 
 
 VARY: dict[str, Any] = {
@@ -92,7 +81,6 @@ VARY: dict[str, Any] = {
     "faults": {"torque_scale@0:all": {"uniform": [0.98, 1.02]}},
     "mission.start_deg": {"uniform": [-2, 2], "offset": True},
 }
-
 
 OTHER = {"plant.friction.coulomb": {"uniform": [0.0, 0.05]}}
 
@@ -263,10 +251,8 @@ def test_every_robot_that_is_drawn_can_be(seed: int, name: str) -> None:
         "robot.links[*].com[*]": {"normal": 0.0, "sigma": 0.1, "offset": True},
         "robot.base.com[*]": {"normal": 0.0, "sigma": 0.1, "offset": True},
     }
-    draws = DRAWS.setdefault(
-        name, Draws(study(vary, scenario={"robot": name, "duration": 0.1}), 0, 2**31, check=False)
-    )
-    robot = draws.scenario(seed, "ctc").plant_robot
+    asked = study(vary, scenario={"robot": name, "duration": 0.1})
+    robot = Draws(asked, 0, 2**31, check=False).scenario(seed, "ctc").plant_robot
     assert np.all(robot.mass > 0.0)
     moments = np.linalg.eigvalsh(robot.inertia)
     assert np.all(moments > 0.0)
@@ -277,20 +263,9 @@ def test_every_robot_that_is_drawn_can_be(seed: int, name: str) -> None:
         assert np.array_equal(getattr(again, field), getattr(robot, field)), field
 
 
-DRAWS: dict[str, Draws] = {}
-
-
 @settings(max_examples=50)
-@given(
-    st.lists(st.floats(-1.0, 1.0), min_size=6, max_size=6),
-    st.lists(st.floats(-1.0, 1.0), min_size=3, max_size=3),
-)
-def test_principal_axes_are_numpys(six: list[float], turn: list[float]) -> None:
-    xx, yy, zz, xy, xz, yz = six
-    tensor = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-    moments, axes = principal_axes(tensor)
-    assert moments == pytest.approx(np.linalg.eigvalsh(tensor), abs=1e-14)
-    assert axes @ np.diag(moments) @ axes.T == pytest.approx(tensor, abs=1e-14)
+@given(st.lists(st.floats(-1.0, 1.0), min_size=3, max_size=3))
+def test_an_inertia_is_turned_as_a_whole(turn: list[float]) -> None:
     r = rotation(turn)
     assert r @ r.T == pytest.approx(np.eye(3), abs=1e-15)
     turned = spread(np.diag([2.0, 3.0, 4.0]), [1.0, 1.0, 1.0], turn)
@@ -298,58 +273,49 @@ def test_principal_axes_are_numpys(six: list[float], turn: list[float]) -> None:
 
 
 DRIVEN = Robot.from_dict(driven_paper())
-
-
-DRAG = slice(3, 6)
 """Of the external torques."""
 
 
-def draws_of(vary: dict[str, Any], **scenario: Any) -> Draws:
-    content = {"scenario": {"duration": 0.02, **scenario}, "laws": ["ctc"], "vary": vary}
-    return Draws(Study.model_validate(content), 3, 8)
-
-
-def plants(draws: Draws, runs: int = 3) -> list[tuple[dict[str, Any], Plant]]:
+def plants(vary: dict[str, Any], runs: int = 3, **scenario: Any) -> list[tuple[Any, Plant]]:
     """The values of some runs, and the plants at tick 0."""
+    draws = Draws(study(vary, scenario={"duration": 0.02, "robot": DRIVEN, **scenario}), 3, 8)
     return [(draws.values(run), draws.flight(run, "ctc").plant) for run in range(runs)]
 
 
 def test_gears_vary_joint_by_joint() -> None:
     """``*`` is every joint with a gear."""
+    drive = "robot.joints[joint{}].drive.{}".format
     vary = {
         "robot.joints[*].drive.stiffness": {"uniform": [0.5, 2.0], "relative": True},
         "robot.joints[joint3].drive.damping": {"uniform": [-100.0, 100.0], "offset": True},
         "robot.joints[5].drive.gear_ratio": {"uniform": [90.0, 110.0]},
         "robot.joints[2].drive.rotor_inertia": {"normal": 1.0, "sigma": 0.05, "relative": True},
     }
-    draws = draws_of(vary, robot=DRIVEN)
-    stiff = [f"robot.joints[joint{k}].drive.stiffness" for k in (2, 3, 5)]
-    assert draws.names[:3] == stiff
-    for values, plant in plants(draws):
+    for values, plant in plants(vary):
+        assert len(values) == 6
         gears = dict(zip((2, 3, 5), filter(None, plant.robot.gears), strict=True))
-        for name, gear in zip(stiff, gears.values(), strict=True):
-            assert gear.stiffness == DRIVE["stiffness"] * values[name]
-        assert gears[3].damping == DRIVE["damping"] + values["robot.joints[joint3].drive.damping"]
-        assert gears[5].ratio == values["robot.joints[joint5].drive.gear_ratio"]
-        factor = values["robot.joints[joint2].drive.rotor_inertia"]
+        for joint, gear in gears.items():
+            assert gear.stiffness == DRIVE["stiffness"] * values[drive(joint, "stiffness")]
+        assert gears[3].damping == DRIVE["damping"] + values[drive(3, "damping")]
+        assert gears[5].ratio == values[drive(5, "gear_ratio")]
+        factor = values[drive(2, "rotor_inertia")]
         assert gears[2].rotor_inertia == DRIVE["rotor_inertia"] * factor
         row = int(plant.memory.model.row[1])
         assert plant.memory.model.rotor_inertia[row] == gears[2].rotor_inertia
-    assert draws.flight(0, "ctc").scenario.robots.controller.gears == DRIVEN.gears
 
 
 def test_plates_vary_together_or_one_by_one() -> None:
     """Drag is proportional to area and coefficient."""
-    scenario = {"robot": DRIVEN, "orbit": "iss"}
     vary = {
         "robot.plates.area": {"uniform": [0.5, 2.0], "relative": True},
         "robot.plates.drag_coefficient": {"uniform": [1.8, 2.6]},
         "robot.plates[3].specular": {"uniform": [-0.1, 0.1], "offset": True},
         "robot.plates[*].diffuse": {"uniform": [0.0, 0.2]},
     }
-    ((_, nominal),) = plants(draws_of({"plant.hold_ticks": 200}, **scenario), 1)
-    assert np.linalg.norm(nominal.truth.external_torques[DRAG]) > 1e-6
-    for values, plant in plants(draws_of(vary, **scenario)):
+    ((_, plant),) = plants({"plant.hold_ticks": 200}, 1, orbit="iss")
+    nominal = plant.truth.external_torques[3:6].copy()
+    assert np.linalg.norm(nominal) > 1e-6
+    for values, plant in plants(vary, orbit="iss"):
         area, coefficient = (values[f"robot.plates.{key}"] for key in ("area", "drag_coefficient"))
         plates = plant.robot.plates
         assert [p.area for p in plates] == [own["area"] * area for own in PLATES]
@@ -357,6 +323,29 @@ def test_plates_vary_together_or_one_by_one() -> None:
             values[f"robot.plates[{k + 1}].diffuse"] for k in range(3)
         ]
         assert plates[2].specular == 0.6 + values["robot.plates[3].specular"]
-        assert plant.truth.external_torques[DRAG] == pytest.approx(
-            nominal.truth.external_torques[DRAG] * area * coefficient / 2.2, rel=1e-12
-        )
+        drag = plant.truth.external_torques[3:6]
+        assert drag == pytest.approx(nominal * area * coefficient / 2.2, rel=1e-12)
+
+
+def test_a_requirement_holds_strictly() -> None:
+    below = Requirement.model_validate({"metric": "a", "below": 1.0, "in": 0.9})
+    above = Requirement.model_validate({"metric": "a", "above": 1.0, "in": 0.9})
+    assert [below.is_met(value) for value in (0.9, 1.0, float("nan"))] == [True, False, False]
+    assert [above.is_met(value) for value in (1.1, 1.0, float("nan"))] == [True, False, False]
+    assert below.confidence == 0.9
+
+
+@pytest.mark.parametrize("file", sorted((CONFIG / "campaigns").iterdir()), ids=lambda f: f.stem)
+def test_a_shipped_campaign_can_be_flown(file: Path) -> None:
+    """Also at every point of its grid."""
+    shipped = read_study(file.stem)
+    assert Preparation.of(shipped, 0, None).manifest.runs == shipped.runs
+    draws = Draws(shipped, 0, shipped.runs_asked())
+    for run in range(math.prod(draws.grid.values())):
+        draws.scenario(run, shipped.laws[0]).check()
+
+
+def test_tables_leave_out_the_gain_set_that_all_laws_have() -> None:
+    assert list(short_names(["ctc=robust", "tde_stc=robust"]).values()) == ["ctc", "tde_stc"]
+    assert list(short_names(["ctc", "tde_stc"]).values()) == ["ctc", "tde_stc"]
+    assert list(short_names(["ctc", "ctc=robust"]).values()) == ["ctc", "ctc=robust"]

@@ -17,7 +17,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from robots import driven_paper
 
-from space_robot import load_bag
+from space_robot import Scenario, load_bag
 from space_robot.campaign.flown import Campaign, FlownCampaign, campaign, flights, precision
 from space_robot.campaign.flown.flights import Progress
 from space_robot.campaign.flown.precision import CHECKED_EVERY, Precision
@@ -32,9 +32,7 @@ from space_robot_msgs_py.errors import InputError
 
 pytest.importorskip("pyarrow")
 
-
 RUNS = 20
-
 
 CONTENT: dict[str, Any] = {
     "scenario": {"case": "3", "sensors": "fine", "duration": 0.2},
@@ -76,7 +74,7 @@ def test_killed_again_and_again_it_has_the_same_table(
 
         Campaign(study()).run(RUNS, 7, folder, workers=workers, progress=told)
 
-    for kill in range(6):
+    for kill in range(3):
         ours, theirs = context.Pipe(duplex=False)
         process = context.Process(target=fly, args=(1 + kill % 2, theirs))
         process.start()
@@ -132,6 +130,18 @@ def test_any_row_flies_again_to_the_same_bits(undisturbed: FlownCampaign) -> Non
         undisturbed.rerun(20)
     with pytest.raises(InputError, match="unknown law 'tde': choose one of tde_stc, ctc=tuned"):
         undisturbed.rerun(0, "tde")
+
+
+def test_a_flight_by_hand_is_a_row_beside_the_tables(undisturbed: FlownCampaign) -> None:
+    """To be appended: the draws of its run, its own law's name, the same digest."""
+    flown = undisturbed.scenario(3, "tde_stc").fly()
+    row, ours = undisturbed.row_of(flown, 3, "by hand"), undisturbed.table.iloc[6]
+    assert list(row.columns) == list(undisturbed.table.columns)
+    assert (row["run"][0], row["law"][0], row["digest"][0]) == (3, "by hand", ours["digest"])
+    assert row["vary.scenario.sensors"][0] == ours["vary.scenario.sensors"]
+    other = Scenario(actuators="none", controller="ctc", duration=0.2).fly()
+    with pytest.raises(InputError, match="attitude_drift_max, which is no column of"):
+        undisturbed.row_of(other, 3, "by hand")
 
 
 def test_a_flight_whose_worker_died_is_a_row_and_is_tried_again(
@@ -201,52 +211,25 @@ def test_without_a_folder_it_lasts_as_long_as_the_object() -> None:
     assert not folder.exists()
 
 
-GEARS: dict[str, Any] = {
-    "robot.joints[*].drive.stiffness": {"log_uniform": [0.5, 2.0], "relative": True},
-    "robot.joints[*].drive.damping": {"uniform": [0.0, 2.0], "relative": True},
-    "robot.joints[joint3].drive.rotor_inertia": {"uniform": [0.9, 1.1], "relative": True},
-}
-
-
-WORLD: dict[str, Any] = {
-    "scenario.orbit": {"grid": ["iss", "sso_700"]},
-    "plant.orbital_elements.height": {"log_uniform": [300e3, 1000e3]},
-    "plant.sunlight.beta_angle_deg": {"uniform": [-75, 75]},
-    "robot.plates.area": {"normal": 1.0, "sigma": 0.2, "relative": True},
-    "robot.plates[*].diffuse": {"uniform": [0.1, 0.3]},
-}
-
-
-DRIVEN_RUNS = 10
-
-
-def fly_driven(folder: Path, vary: dict[str, Any], **scenario: Any) -> FlownCampaign:
+def test_orbits_gears_and_plates(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """In this process, eight flights at once where they can be."""
-    (folder / "paper.yaml").write_text(yaml.safe_dump(driven_paper()))
-    content = {
-        "scenario": {"robot": "paper.yaml", "case": "3", "duration": 0.1, **scenario},
-        "laws": ["tde_stc"],
-        "vary": vary,
-        "require": {"pointing": {"metric": "attitude_max", "below": 1e-3, "in": 0.9}},
-    }
-    (folder / "campaign.yaml").write_text(yaml.safe_dump(content))
-    return Campaign.load("campaign.yaml").run(DRIVEN_RUNS, 5, folder / "flown", workers=0)
-
-
-@pytest.fixture
-def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """An empty working folder."""
     monkeypatch.chdir(tmp_path)
-    return tmp_path
-
-
-def test_orbits_gears_and_plates(here: Path) -> None:
-    flown = fly_driven(here, WORLD | GEARS, orbit="iss")
+    Path("paper.yaml").write_text(yaml.safe_dump(driven_paper()))
+    scenario = {"robot": "paper.yaml", "case": "3", "duration": 0.05, "orbit": "iss"}
+    vary = {
+        "scenario.orbit": {"grid": ["iss", "sso_700"]},
+        "plant.orbital_elements.height": {"log_uniform": [300e3, 1000e3]},
+        "plant.sunlight.beta_angle_deg": {"uniform": [-75, 75]},
+        "robot.plates.area": {"normal": 1.0, "sigma": 0.2, "relative": True},
+        "robot.joints[*].drive.stiffness": {"log_uniform": [0.5, 2.0], "relative": True},
+    }
+    content = {"scenario": scenario, "laws": ["tde_stc"], "vary": vary}
+    Path("campaign.yaml").write_text(yaml.safe_dump(content))
+    flown = Campaign.load("campaign.yaml").run(10, 5, "flown", workers=0)
     table = flown.table
-    assert len(table) == DRIVEN_RUNS
-    assert set(table["outcome"]) == {"complete"}
+    assert table["outcome"].tolist() == ["complete"] * 10
     assert table["digest"].is_unique
-    assert table["vary.scenario.orbit"].tolist() == ["iss", "sso_700"] * (DRIVEN_RUNS // 2)
+    assert table["vary.scenario.orbit"].tolist() == ["iss", "sso_700"] * 5
     assert table["vary.robot.joints[joint5].drive.stiffness"].between(0.5, 2.0).all()
     for run in (3, 8):
         again = FlownCampaign.open(flown.folder, trust=True).rerun(run)
@@ -254,29 +237,6 @@ def test_orbits_gears_and_plates(here: Path) -> None:
         assert again.log.geared_names == ("joint2", "joint3", "joint5")
         radius = 6378137.0 + table["vary.plant.orbital_elements.height"][run]
         assert (again.log.orbit_position**2).sum(axis=1) ** 0.5 == pytest.approx(radius, rel=2e-3)
-
-
-BOTH, SENSORS = ("tde_stc", "ctc"), ("fine", "coarse", "ideal")
-
-
-DRAWS = 3 * CHECKED_EVERY
-
-
-BOUNDS = {"p": 1.0, "q": 2.0}
-
-
-def precise_study(half_width: float, points: int) -> Study:
-    return Study.model_validate(
-        {
-            "laws": BOTH,
-            "vary": {"scenario.sensors": {"grid": SENSORS[:points]}},
-            "require": {
-                name: {"metric": "attitude_max", "below": bound, "in": 0.9}
-                for name, bound in BOUNDS.items()
-            },
-            "until": {"half_width": half_width, "runs": points * DRAWS},
-        }
-    )
 
 
 @settings(max_examples=12, deadline=None)
@@ -293,25 +253,36 @@ def test_the_stop_is_the_first_look_at_which_all_are_narrow_at_each_point(
     points: int, half_width: float, seed: int, rates: list[float]
 ) -> None:
     """In whole draws: every point and every law has flown as often."""
-    runs, rng = points * DRAWS, np.random.default_rng(seed)
-    frequency = np.resize(rates, (points, 2))
-    met = rng.uniform(size=(DRAWS, points, 2)) < frequency
+    both, sensors, bounds = ("tde_stc", "ctc"), ("fine", "coarse", "ideal"), {"p": 1.0, "q": 2.0}
+    most = 3 * CHECKED_EVERY
+    content = {
+        "laws": both,
+        "vary": {"scenario.sensors": {"grid": sensors[:points]}},
+        "require": {
+            name: {"metric": "attitude_max", "below": bound, "in": 0.9}
+            for name, bound in bounds.items()
+        },
+        "until": {"half_width": half_width, "runs": points * most},
+    }
+    rng = np.random.default_rng(seed)
+    met = rng.uniform(size=(most, points, 2)) < np.resize(rates, (points, 2))
     values = np.where(met, 0.5, np.where(rng.uniform(size=met.shape) < 0.5, 1.5, 2.5))
     rows = [
-        Row(Task(draw * points + point, law), "complete", require=dict.fromkeys(BOUNDS, value))
-        for draw in range(DRAWS)
+        Row(Task(draw * points + point, law), "complete", require=dict.fromkeys(bounds, value))
+        for draw in range(most)
         for point in range(points)
-        for law, value in zip(BOTH, values[draw, point].tolist(), strict=True)
+        for law, value in zip(both, values[draw, point].tolist(), strict=True)
     ]
-    precision = Precision(precise_study(half_width, points), runs, {"scenario.sensors": points})
+    asked = Study.model_validate(content)
+    precision = Precision(asked, points * most, {"scenario.sensors": points})
     for index in rng.permutation(len(rows)).tolist():
         precision.add(rows[index])
-    expected = runs
-    for draws in range(CHECKED_EVERY, DRAWS + 1, CHECKED_EVERY):
-        failures = [(values[:draws] >= bound).sum(axis=0) for bound in BOUNDS.values()]
+    expected = points * most
+    for draws in range(CHECKED_EVERY, most + 1, CHECKED_EVERY):
+        failures = [(values[:draws] >= bound).sum(axis=0) for bound in bounds.values()]
         intervals = [Sequential(0.9, 0.9).interval(int(k), draws) for k in np.ravel(failures)]
         if max(interval.half_width for interval in intervals) <= half_width:
             expected = draws * points
             break
     assert precision.stop == expected
-    assert precision.is_reached == (expected < runs) or expected == runs
+    assert precision.is_reached == (expected < points * most) or expected == points * most

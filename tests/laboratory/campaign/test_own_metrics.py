@@ -19,7 +19,6 @@ from space_robot_msgs_py.errors import InputError
 
 pytest.importorskip("pyarrow")
 
-
 FILE = """
 import numpy as np
 
@@ -42,30 +41,7 @@ def heavy_is_nan(log):
 
 def nan(log):
     return float("nan")
-
-
-def never(log):
-    while True:
-        pass
-
-
-def deadly(log):
-    import os
-
-    os._exit(0)
-
-
-def interrupted(log):
-    raise KeyboardInterrupt
-
-
-def elsewhere(log):
-    import os
-
-    os.chdir("/")
-    return 1.0
 """
-
 
 CONTENT: dict[str, Any] = {
     "scenario": {"case": "3", "sensors": "fine", "duration": 0.2},

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import os
 import shlex
 import shutil
@@ -17,13 +18,27 @@ import yaml
 from click.testing import CliRunner, Result
 from paths import CONFIG, DATA, ROOT
 
-from space_robot.campaign.flown import Campaign
 from space_robot.campaign.new_robot import robot_texts
-from space_robot.campaign.new_robot.make import mission_text, rest_to_rest
+from space_robot.campaign.new_robot.make import (
+    BEYOND,
+    DAMPING_RATIO,
+    DIVERGED,
+    FREQUENCY_HZ,
+    Outcome,
+    hinge_remark,
+    mission_text,
+    rest_to_rest,
+    tool_remark,
+    trial_remark,
+)
 from space_robot.cli.main import cli
+from space_robot.cli.new import new as new_command
 from space_robot.cli.new_files import LAW, METRIC, MISSION, SENSOR
 from space_robot.flight.plan import Flight, FlightPlan, resolve
 from space_robot.flight.simulate import simulate
+from space_robot.tuning.method import Tuned
+from space_robot.tuning.task import TuningOptions
+from space_robot.tuning.warning import estimate_remark
 from space_robot_control.guidance.mission import Mission
 from space_robot_control.laws import laws
 from space_robot_model.robot import Robot
@@ -33,9 +48,8 @@ from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.errors import DivergedError, InputError, SpaceRobotError
 
 FILE = str(CONFIG / "robots/ets_vii.yaml")
-
-
 ARM = DATA / "arm.urdf"
+KINDS = {kind.name: kind for kind in (LAW, SENSOR, METRIC, MISSION)}
 
 
 @pytest.fixture(autouse=True)
@@ -43,16 +57,12 @@ def _here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
 
 
-def _shorter(file: str) -> str:
-    """The same campaign with flights of a twentieth of a second."""
-    content = yaml.safe_load(Path(file).read_text("utf-8"))
-    content["scenario"]["duration"] = 0.05
-    Path(file).write_text(yaml.safe_dump(content))
-    return file
+def run(*arguments: str) -> Result:
+    return CliRunner().invoke(cli, arguments)
 
 
 def new(*arguments: str) -> Result:
-    return CliRunner().invoke(cli, ["new", *arguments])
+    return run("new", *arguments)
 
 
 def test_a_file_becomes_a_folder_that_flies(tmp_path: Path) -> None:
@@ -61,23 +71,21 @@ def test_a_file_becomes_a_folder_that_flies(tmp_path: Path) -> None:
     assert "made mine/: `space-robot fly --robot mine/` flies it" in result.stderr
     report = json.loads(result.stdout)
     assert list(report["laws"]) == sorted(laws())
-    for law in report["laws"].values():
-        assert law["rms"]["attitude"] < 1e-6
+    assert max(law["rms"]["attitude"] for law in report["laws"].values()) < 1e-6
     assert [entry.name for entry in tmp_path.iterdir()] == ["mine"]
-    log = simulate(Flight(resolve(FlightPlan(robot="mine", controller="ctc", duration=0.01))))
-    assert log.flight["mission"] == "mine"
     assert (best := report["default_law"]) != "adrc"
     assert report["remarks"][0].startswith(f"{best} is flown unless another law is named")
-    plain = CliRunner().invoke(cli, ["simulate", "--robot", "mine", "--duration", "0.01", "--json"])
-    assert json.loads(plain.stdout)["controller"] == best
-    assert resolve(FlightPlan(robot="mine")).law.name == best
+    plain = json.loads(run("simulate", "--robot", "mine", "--duration", "0.01", "--json").stdout)
+    assert plain["controller"] == best
+    assert Flight(resolve(FlightPlan(robot="mine"))).description["mission"] == "mine"
     named = resolve(FlightPlan(robot="mine", controller="tde_stc"))
     assert named.law.name == "tde_stc"
-    study = Campaign.load("mine/campaign.yaml").study
-    assert study.scenario["robot"] == "mine/"
-    flown = CliRunner().invoke(
-        cli, ["campaign", "run", _shorter("mine/campaign.yaml"), "--runs", "2", "--workers", "0"]
-    )
+    file = tmp_path / "mine/campaign.yaml"
+    content = yaml.safe_load(file.read_text("utf-8"))
+    assert content["scenario"]["robot"] == "mine/"
+    content["scenario"]["duration"] = 0.05
+    file.write_text(yaml.safe_dump(content))
+    flown = run("campaign", "run", "mine/campaign.yaml", "--runs", "2", "--workers", "0")
     assert flown.exit_code == 0, flown.exception
     assert "pointing" in flown.stdout
     assert (tmp_path / "campaigns/mine/table.parquet").is_file()
@@ -122,7 +130,7 @@ def test_what_was_there_is_replaced_if_told_so_and_kept_if_anything_fails(
     mine.mkdir()
     (mine / "robot.yaml").write_text("old")
     monkeypatch.setattr("space_robot.campaign.new_robot.make.fly_blocks", fail)
-    CliRunner().invoke(cli, ["new", FILE, "--out", "mine", "--force"])
+    new(FILE, "--out", "mine", "--force")
     assert (mine / "robot.yaml").read_text() == "old"
     assert list(tmp_path.iterdir()) == [mine]
     (mine / "thesis.tex").touch()
@@ -220,28 +228,18 @@ def test_files_for_other_joints_name_the_command_that_mends_them(stale: str) -> 
     assert said[stale] in str(caught.value)
 
 
-KINDS = {kind.name: kind for kind in (LAW, SENSOR, METRIC, MISSION)}
-
-
-def run(*arguments: str) -> Result:
-    return CliRunner().invoke(cli, arguments)
-
-
-def pytest_of(folder: Path) -> subprocess.CompletedProcess[str]:
-    """Run the tests of a folder as their user would."""
-    return subprocess.run(
-        [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", str(folder)],
-        env={**os.environ, "PYTHONPATH": str(ROOT)},
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-
-
-@pytest.mark.parametrize("kind", KINDS)
-@pytest.mark.parametrize("out", ["", "my pieces/deep"])
+@pytest.mark.parametrize(
+    ("kind", "out"),
+    [
+        ("law", ""),
+        ("law", "my pieces/deep"),
+        ("sensor", "deep"),
+        ("metric", ""),
+        ("mission", "deep"),
+    ],
+)
 def test_the_printed_command_flies_the_file(kind: str, out: str, tmp_path: Path) -> None:
-    result = run("new", kind, "mine_2", *(["--out", out] if out else []))
+    result = new(kind, "mine_2", *(["--out", out] if out else []))
     assert result.exit_code == 0, result.exception
     files = sorted(path.name for path in (tmp_path / out).iterdir())
     assert files == sorted(name.replace("$name", "mine_2") for name in KINDS[kind].files.values())
@@ -256,20 +254,115 @@ def test_the_printed_command_flies_the_file(kind: str, out: str, tmp_path: Path)
         assert 0.0 < report["own_metrics"]["mine_2"] < 0.01
 
 
+@pytest.mark.docs
 def test_their_tests_pass(tmp_path: Path) -> None:
+    """As their user would run them."""
     for kind in KINDS:
-        assert run("new", kind, f"my_{kind}").exit_code == 0
-    result = pytest_of(tmp_path)
+        assert new(kind, f"my_{kind}").exit_code == 0
+    result = subprocess.run(
+        [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", str(tmp_path)],
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
     assert result.returncode == 0, result.stdout
     assert "8 passed" in result.stdout
 
 
-@pytest.mark.parametrize("kind", KINDS)
-def test_nothing_is_overwritten(kind: str, tmp_path: Path) -> None:
+def test_nothing_is_overwritten(tmp_path: Path) -> None:
     there = tmp_path / "test_mine.py"
     there.write_text("mine", "utf-8")
-    result = run("new", kind, "mine")
-    assert isinstance(result.exception, InputError)
-    assert "test_mine.py: exists already; it is not overwritten" in str(result.exception)
-    assert [path.name for path in tmp_path.iterdir()] == ["test_mine.py"]
+    for kind in KINDS:
+        result = new(kind, "mine")
+        assert isinstance(result.exception, InputError)
+        assert "test_mine.py: exists already; it is not overwritten" in str(result.exception)
+        assert [path.name for path in tmp_path.iterdir()] == ["test_mine.py"]
     assert there.read_text("utf-8") == "mine"
+
+
+LINK = """<link name="{0}"><inertial><origin xyz="{1} 0 0"/><mass value="{2}"/>
+<inertia ixx="0.1" iyy="0.2" izz="{3}" ixy="0" ixz="0" iyz="0"/></inertial></link>"""
+
+JOINT = """<joint name="{0}" type="{3}"><parent link="{1}"/><child link="{2}"/>
+<axis xyz="0 0 1"/><limit lower="-1" upper="1" effort="9" velocity="1"/></joint>"""
+
+
+def satellite(tmp_path: Path, panel: str = "revolute") -> Robot:
+    """A base with an arm of two joints between two panels, each 3 kg at 0.5 m of its hinge."""
+    links = [("bus", 0, 100, 0.25), ("upper", 0.2, 5, 0.25), ("fore", 0.2, 5, 0.25)]
+    links += [("left", 0.5, 3, 0.25), ("right", 0.5, 3, 0.25)]
+    joints = [
+        ("left_hinge", "bus", "left", panel),
+        ("a", "bus", "upper", "revolute"),
+        ("b", "upper", "fore", "revolute"),
+        ("right_hinge", "bus", "right", panel),
+    ]
+    text = "".join(LINK.format(*x) for x in links) + "".join(JOINT.format(*x) for x in joints)
+    file = tmp_path / "satellite.urdf"
+    file.write_text(f'<robot name="satellite">{text}</robot>')
+    return Robot.from_urdf(file)
+
+
+def test_panels_on_hinges_are_proposed_as_passive_joints(tmp_path: Path) -> None:
+    """The command is one that `new` takes, and its springs swing as they are said to."""
+    robot = satellite(tmp_path)
+    remark = hinge_remark(robot, f"space-robot new {tmp_path}/satellite.urdf", Path("my sat"))
+    words = shlex.split(remark.split("`")[1])
+    assert words[:2] == ["space-robot", "new"]
+    parsed = new_command.commands["robot"].make_context("robot", words[2:]).params
+    assert (parsed["out"], parsed["force"]) == (Path("my sat"), True)
+    proposed = parsed["passive"]
+    assert list(proposed) == ["left_hinge", "right_hinge"]
+    _, passive = robot_texts(Path(parsed["robot"]), None, False, "", proposed)
+    assert (passive.joint_names, set(passive.passive_names)) == (("a", "b"), set(proposed))
+    inertia = 0.25 + 3.0 * 0.5**2  # about the hinge
+    for spring in proposed.values():
+        rate = math.sqrt(spring["stiffness"] / inertia)
+        assert rate / (2.0 * math.pi) == pytest.approx(FREQUENCY_HZ, rel=0.03)
+        ratio = spring["damping"] / (2.0 * inertia * rate)
+        assert ratio == pytest.approx(DAMPING_RATIO, rel=0.05)
+    assert hinge_remark(passive, "", tmp_path) == ""
+    assert remark.startswith("left_hinge, right_hinge: each carries one body")
+    one = {"left_hinge": proposed["left_hinge"]}
+    _, passive = robot_texts(Path(parsed["robot"]), None, False, "", one)
+    assert hinge_remark(passive, "", tmp_path).startswith("right_hinge: it carries one body")
+
+
+@pytest.mark.parametrize(("slower", "is_told"), [(1.01, False), (9.9, False), (10.1, True)])
+def test_weak_gains_are_told_with_their_reason(slower: float, is_told: bool) -> None:
+    tuned = Tuned(
+        TuningOptions(0.05, 0.2), 1.0, 0.0123, 5.0, 5.0 * slower, 0.06, 120.0, np.ones(9), {}
+    )
+    remark = estimate_remark(tuned)
+    assert bool(remark) == is_told
+    if is_told:
+        assert all(number in remark for number in ("0.06 to 120", "12.3 ms", "5 rad/s"))
+
+
+def test_laws_that_failed_in_the_comparison_are_named() -> None:
+    flights = {
+        law: Outcome({"attitude": 1.0}, "", 1.0, how)
+        for law, how in (("a", DIVERGED), ("b", ""), ("c", BEYOND), ("d", DIVERGED))
+    }
+    remark = trial_remark(flights)
+    assert remark.startswith("With friction, payload and disturbances of case 3, ")
+    assert remark.endswith(": a, d diverged; c went beyond the joints' limits of effort.")
+    assert trial_remark({"b": flights["b"]}) == ""
+
+
+def test_the_frame_that_missions_move_is_told_where_a_body_is_fixed_to_it(tmp_path: Path) -> None:
+    camera = LINK.format("camera", 0.1, 1, 0.25) + JOINT.format("mount", "fore", "camera", "fixed")
+    satellite(tmp_path)
+    file = tmp_path / "satellite.urdf"
+    for more, tools, told in (
+        (camera, "", True),
+        (camera, "tools: [camera]", False),
+        ("", "", False),
+    ):
+        text = file.read_text().replace(camera, "").replace("</robot>", f"{more}</robot>")
+        file.write_text(text)
+        (tmp_path / "robot.yaml").write_text(f"robot:\n  urdf: satellite.urdf\n  {tools}\n")
+        remark = tool_remark(Robot.from_yaml(tmp_path / "robot.yaml"), tmp_path)
+        assert remark.startswith("Missions move the frame of fore, to which camera is") == told
+        assert bool(remark) == told

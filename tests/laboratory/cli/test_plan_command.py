@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -31,9 +32,9 @@ MISSION: dict[str, Any] = {
 }
 
 
-@pytest.fixture
-def mission(tmp_path: Path) -> Path:
-    file = tmp_path / "inspect.yaml"
+@pytest.fixture(scope="module")
+def mission(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    file = tmp_path_factory.mktemp("plan") / "inspect.yaml"
     file.write_text(yaml.safe_dump(MISSION))
     return file
 
@@ -42,17 +43,22 @@ def run(*arguments: object) -> Result:
     return CliRunner(env={"COLUMNS": "120"}).invoke(cli, ["plan", *map(str, arguments)])
 
 
+@cache
 def report(*arguments: object) -> dict[str, Any]:
     numbers: dict[str, Any] = json.loads(run(*arguments, "--json").stdout)
     return numbers
 
 
-def test_the_papers_mission_asks_for_what_is_known_of_it() -> None:
+def test_the_papers_mission_and_one_of_segments(mission: Path) -> None:
+    """What it asks for stands in docs/manual/missions.md, which has a test."""
     numbers = report()
-    assert numbers["base_torque"] == pytest.approx(2.4, abs=0.05)
-    assert numbers["momentum"] == pytest.approx(11.3, abs=0.05)
     assert [s["motion"] for s in numbers["segments"]] == ["joints", "joints"]
     assert {a["actuators"]: a["is_feasible"] for a in numbers["actuators"]}["wheels"]
+    numbers = report(mission)
+    assert numbers["segments"][0]["tool_travel_m"] == pytest.approx(0.5, rel=1e-3)
+    shown = run(mission).stdout
+    assert "37.00 s; largest base torque" in shown
+    assert "small_wheels" in shown
 
 
 def test_the_joints_nearest_to_their_limits() -> None:
@@ -76,16 +82,6 @@ def test_the_joints_nearest_to_their_limits() -> None:
     assert "joints nearest to their limits: position " in run("--robot", "dual_arm").stdout
 
 
-def test_segments_of_a_document(mission: Path) -> None:
-    numbers = report(mission)
-    assert [s["motion"] for s in numbers["segments"]] == ["tool", "base", "hold"]
-    assert numbers["duration_s"] == 37.0
-    assert numbers["segments"][0]["tool_travel_m"] == pytest.approx(0.5, rel=1e-3)
-    shown = run(mission).stdout
-    assert "37.00 s; largest base torque" in shown
-    assert "small_wheels" in shown
-
-
 def test_sigma_is_of_translations_divided_by_the_tools_distance(mission: Path) -> None:
     hold, robot = report(mission)["segments"][2], find_robot("paper")
     posture = np.radians(hold["goal_deg"]), np.array(hold["attitude"])
@@ -98,30 +94,17 @@ def test_sigma_is_of_translations_divided_by_the_tools_distance(mission: Path) -
     assert "translation are divided by the tool's distance from the base" in shown
 
 
-@pytest.mark.parametrize(
-    ("option", "key"), [("--base-torque", "base_torque"), ("--momentum", "momentum")]
-)
+@pytest.mark.parametrize("key", ["base_torque", "momentum"])
 def test_a_stretched_mission_keeps_to_the_limit_and_flies(
-    mission: Path, tmp_path: Path, option: str, key: str
+    mission: Path, tmp_path: Path, key: str
 ) -> None:
     out = tmp_path / "slow.yaml"
-    numbers = report(mission, option, 1.0, "--out", out)
-    assert numbers[key] <= 1.0 + 1e-9
-    assert numbers[key] > 0.9
+    numbers = report(mission, f"--{key.replace('_', '-')}", 1.0, "--out", out)
+    assert 0.9 < numbers[key] <= 1.0 + 1e-9
     assert numbers["before"] == report(mission)
     again = report(out)
     assert again[key] == numbers[key]
     assert [s["motion"] for s in again["segments"]] == ["tool", "base", "hold"]
-
-
-def test_legs_between_waypoints_are_bent_and_stretched(tmp_path: Path) -> None:
-    numbers = report("--base-torque", 0.5, "--out", tmp_path / "slow.yaml")
-    assert 0.45 < numbers["base_torque"] <= 0.5
-    assert numbers["lightened"]["duration_s"] == 30.0
-    assert numbers["lightened"]["base_torque"] < 0.7 * numbers["before"]["base_torque"]
-    assert numbers["duration_s"] < 45.0
-    written = report(tmp_path / "slow.yaml")
-    assert written["segments"] == numbers["segments"]
 
 
 def test_redundant_joints_make_it_lighter_before_it_is_stretched(tmp_path: Path) -> None:
@@ -133,6 +116,7 @@ def test_redundant_joints_make_it_lighter_before_it_is_stretched(tmp_path: Path)
     assert numbers["before"]["base_torque"] > 0.1
     assert numbers["base_torque"] == numbers["lightened"]["base_torque"] < 0.05
     assert numbers["duration_s"] == 15.0
+    # legs between waypoints are bent and stretched: docs/manual/missions.md, which has a test
 
 
 WEAK = {

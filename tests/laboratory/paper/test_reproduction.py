@@ -8,9 +8,8 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from click.testing import CliRunner
+from command import Run
 
-from space_robot.cli.main import cli
 from space_robot.paper.reproduction.claims import claims
 from space_robot.paper.reproduction.flights import (
     ROWS,
@@ -58,13 +57,12 @@ def test_verdicts_on_the_claims(time_delay_flights: list[Result]) -> None:
 def test_torques_of_the_time_delay_laws_in_every_cell(time_delay_flights: list[Result]) -> None:
     """Each of the fifteen cells by itself, TDE-STC within 1 % of Table V, friction-free."""
     for result in time_delay_flights:
-        if result.row.controller != "tde_stc" or result.variant.friction:
-            continue
-        assert result.rms is not None
-        for column in ("base_torque", "torque_1_3", "torque_4_6"):
-            measured = result.rms["mean_axis"][column]
-            expected = printed(result.row.controller, result.row.case, column)
-            assert measured == pytest.approx(expected, rel=0.01), (result.row, column)
+        if result.row.controller == "tde_stc" and not result.variant.friction:
+            assert result.rms is not None
+            for column in ("base_torque", "torque_1_3", "torque_4_6"):
+                expected = printed("tde_stc", result.row.case, column)
+                measured = result.rms["mean_axis"][column]
+                assert measured == pytest.approx(expected, rel=0.01), (result.row, column)
 
 
 def test_tde_smc_chatters_as_the_prototype_did(time_delay_flights: list[Result]) -> None:
@@ -79,7 +77,7 @@ def test_tde_smc_chatters_as_the_prototype_did(time_delay_flights: list[Result])
     assert variation["tde_stc"] == pytest.approx(0.33, rel=0.05)
 
 
-def test_rows_fly_with_sensors_that_are_not_ideal() -> None:
+def test_rows_fly_with_sensors_that_are_not_ideal(space_robot: Run) -> None:
     """And with the ideal ones if none are named."""
     planned = Planned(TableRow("tde_stc", "1"), Variant("printed", True), shown=False)
     ideal, noisy = (
@@ -94,9 +92,8 @@ def test_rows_fly_with_sensors_that_are_not_ideal() -> None:
     assert ideal.parameters["navigation"] == "direct"
     assert noisy.parameters["navigation"]["tracker_across"] == 1e-5
     assert ideal.rms != noisy.rms
-    result = CliRunner().invoke(cli, ["reproduce", "--sensors", "best"])
-    assert isinstance(result.exception, InputError)
-    assert str(result.exception).startswith("unknown sensor 'best': choose one of coarse, fine")
+    refused = space_robot("reproduce", "--sensors", "best").err
+    assert "error: unknown sensor 'best': choose one of coarse, fine" in refused
 
 
 def test_printed_computed_torque_gains_diverge_within_ticks() -> None:
@@ -125,12 +122,12 @@ def test_what_is_flown_in_brief() -> None:
 
 @pytest.fixture(scope="module")
 def twice(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path, dict[str, Any]]:
-    """Two reproductions of two rows, one after the other."""
+    """Two reproductions of two rows, one after the other, the second of them in brief."""
     folder = tmp_path_factory.mktemp("reproduction")
     rows = [TableRow("ctc", "1"), TableRow("tde_stc", "4-2")]
     first, second = folder / "first", folder / "below" / "second"
     record = reproduce(rows, first, duration=SHORT, jobs=2)
-    reproduce(rows, second, duration=SHORT, jobs=1)
+    reproduce(rows, second, duration=SHORT, jobs=1, brief=True)
     return first, second, record
 
 
@@ -143,14 +140,16 @@ def files(folder: Path) -> dict[str, bytes]:
 
 
 def test_two_runs_write_the_same_bytes(twice: tuple[Path, Path, dict[str, Any]]) -> None:
-    """Whatever the number of processes."""
-    first, second, _ = twice
-    written = files(first)
-    assert written == files(second)
-    assert {"report.html", "table_v.md", "table_v.csv", "table_v.json"} <= set(written)
+    """Whatever the number of processes, and what else they fly."""
+    first, second, record = twice
+    written, again = files(first), files(second)
+    assert {"report.html", "table_v.md", "table_v.csv", "table_v.json"} <= set(written) & set(again)
     for stem in ("case1_ctc", "case4-2_tde_stc", "figure5_desired_joints", "chatter", "junctions"):
-        assert f"figures/{stem}.svg" in written
         assert f"figures/{stem}.png" in written
+        assert again[f"figures/{stem}.svg"] == written[f"figures/{stem}.svg"], stem
+    cells = json.loads(again["table_v.json"])["cells"]
+    assert cells
+    assert [cell for cell in cells if cell not in record["cells"]] == []
     leftovers = [p.name for p in first.parent.iterdir() if p.name.startswith(".")]
     assert not leftovers
 
@@ -169,14 +168,17 @@ def test_csv_json_and_markdown_say_the_same(twice: tuple[Path, Path, dict[str, A
     assert f"{cell['measured']:.4f} / {cell['printed']:.4f} ({cell['ratio']:.3f})" in markdown
 
 
-def test_an_older_reproduction_is_replaced(twice: tuple[Path, Path, dict[str, Any]]) -> None:
+def test_an_older_reproduction_is_replaced(
+    twice: tuple[Path, Path, dict[str, Any]], space_robot: Run
+) -> None:
     _, folder, _ = twice
     (folder / "figures" / "old.svg").write_text("of an older run")
-    reproduce([TableRow("tde_stc", "1")], folder, duration=SHORT, brief=True)
-    assert not (folder / "figures" / "old.svg").exists()
-    assert not (folder / "figures" / "case1_ctc.svg").exists()
-    assert (folder / "figures" / "case1_tde_stc.svg").is_file()
-    assert not (folder / "figures" / "case1_tde_stc.png").exists()
+    only = ("--only", "tde_stc/1", "--duration", SHORT, "--brief", "--jobs", 1)
+    ran = space_robot("reproduce", "--out", folder, *only)
+    assert ran.code == 0, ran.err
+    drawn = {path.name for path in (folder / "figures").iterdir()}
+    assert "case1_tde_stc.svg" in drawn
+    assert not {"old.svg", "case1_ctc.svg", "case1_tde_stc.png"} & drawn
 
 
 def test_a_folder_of_something_else_is_left_alone(tmp_path: Path) -> None:

@@ -1,12 +1,16 @@
-"""The paper's proofs: (46) to (77), Lemma 1, reaching times and figures, by independent code."""
+"""The paper's proofs: (46) to (77), Lemma 1, reaching times, by independent code; the command."""
 
 from __future__ import annotations
 
-from types import SimpleNamespace
+import json
+from pathlib import Path
 from typing import Any
 
+import matplotlib.image
 import numpy as np
 import pytest
+import yaml
+from click.testing import CliRunner
 from closed_loop import GAINS, H_BAR
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -15,14 +19,17 @@ from oracles import rho_space_inertia
 from strategies import Case, cases
 
 from space_robot.analysis.generalised_motion import continuous_error, mean_acceleration
+from space_robot.cli.main import cli
 from space_robot.flight.plan import Flight, FlightPlan, resolve
 from space_robot.flight.simulate import simulate
-from space_robot.paper.stability import figures
+from space_robot.paper.stability import StabilityStudy, figures, report, study
+from space_robot.paper.stability.check import Check
 from space_robot.paper.stability.circle_criterion import (
     largest_tolerated_beta,
     peak_gain,
     transfer_function,
 )
+from space_robot.paper.stability.figures import draw
 from space_robot.paper.stability.lemma_1 import contraction
 from space_robot.paper.stability.lyapunov import (
     B,
@@ -38,6 +45,7 @@ from space_robot.paper.stability.reaching import arrival, lyapunov_state, off_mi
 from space_robot.paper.stability.time_delay_error import error_derivative, time_delay_error
 from space_robot.tuning.spectrum import contraction_matrix
 from space_robot_msgs_py.bag.flight_log import FlightLog
+from space_robot_msgs_py.errors import InputError
 
 PRINTED = sorted(set(zip(GAINS["tde_stc"]["k_1"], GAINS["tde_stc"]["k_2"], strict=True)))
 
@@ -124,45 +132,20 @@ def test_paper_m_needs_a_k_1_of_two(pair: tuple[float, float], beta: float, gamm
         assert residual(m, k_1, k_2, beta, gamma) > 0.0
 
 
-PAIR = (1.5, 3.0)
-
-
 @pytest.mark.parametrize("measured", [0.0, 0.4])
 def test_a_panel_of_nyquist_has_the_curve_and_the_circles_of_both_betas(measured: float) -> None:
-    panel = Figure().add_subplot()
-    figures._nyquist_panel(panel, PAIR, 0.8, measured)
+    pair, panel = (1.5, 3.0), Figure().add_subplot()
+    figures._nyquist_panel(panel, pair, 0.8, measured)
     lines = {str(line.get_label()): line.get_xydata() for line in panel.lines}
     for beta, word in ((0.8, "tolerated"), (measured, "measured")):
         circles = [xy for label, xy in lines.items() if label.endswith(word)]
         assert len(circles) == (beta > 0.0)
         for circle in circles:
             np.testing.assert_allclose(np.linalg.norm(circle, axis=1), 1.0 / beta, rtol=1e-12)
-            np.testing.assert_allclose(circle[0], circle[-1], atol=1e-12)
-            np.testing.assert_allclose(circle[90], (0.0, 1.0 / beta), atol=1e-12)
     (curve,) = (xy for label, xy in lines.items() if label.startswith("$G"))
-    half = np.geomspace(1e-3, 1e3, len(curve) // 2) * np.sqrt(PAIR[1] / 2.0)
-    expected = transfer_function(*PAIR, np.concatenate([-half[::-1], half]))
+    half = np.geomspace(1e-3, 1e3, len(curve) // 2) * np.sqrt(pair[1] / 2.0)
+    expected = transfer_function(*pair, np.concatenate([-half[::-1], half]))
     np.testing.assert_allclose(curve[:, 0] + 1j * curve[:, 1], expected, rtol=1e-12)
-    reach = 1.1 / 0.8
-    assert panel.get_xlim() == panel.get_ylim() == pytest.approx((-reach, reach))
-
-
-def test_axes_of_the_same_gains_share_a_panel_of_nyquist() -> None:
-    twisting: Any = SimpleNamespace(
-        gains=((2.0, 1.0), (0.0, 0.0), (3.0, 1.0), (2.0, 1.0)),
-        tolerated_beta=np.array([0.5, 0.0, 0.25, 0.5]),
-        beta=np.array([0.2, 9.0, 0.1, 0.125]),
-    )
-    figure = figures.nyquist(twisting, ("base x", "base y", "joint1", "joint2"))
-    titles = [panel.get_title(loc="left") for panel in figure.axes]
-    assert titles == [
-        "base x, joint2\n" r"$\beta$ tolerated 0.5, measured 0.125 or more",
-        "joint1\n" r"$\beta$ tolerated 0.25, measured 0.1 or more",
-    ]
-    for panel, beta in zip(figure.axes, (0.5, 0.25), strict=True):
-        assert panel.get_xlim()[1] == pytest.approx(1.1 / beta)
-    labels = [text.get_text() for text in figure.legends[0].get_texts()]
-    assert len(labels) == len(set(labels)) == 3
 
 
 PERIOD = 0.01
@@ -301,3 +284,87 @@ def test_derivative_of_a_known_error() -> None:
     assert found.beta_at_s[1] == 3000 * period
     np.testing.assert_allclose(found.beta_99_9_percentile, [0.25, 0.5])
     np.testing.assert_allclose(found.max_error, np.abs(error[1:]).max(axis=0))
+
+
+def run(*arguments: str) -> str:
+    """Standard output of the command."""
+    environment = {"COLUMNS": "80"}
+    result = CliRunner(env=environment).invoke(cli, ["stability", *arguments])
+    assert result.exit_code == 0, result.output
+    return result.stdout
+
+
+def studied(**options: Any) -> StabilityStudy:
+    plan = FlightPlan.model_validate({"duration": 0.1, **options})
+    return study(plan, 1e-3, lambda flight, which: simulate(flight))
+
+
+def test_tables_name_every_condition() -> None:
+    text = run("--duration", "0.2", "--no-friction")
+    for words in ("(69)", "(65)", "(46)", "(73)", "(48)", "(51)", "(56)", "holds", "fails"):
+        assert words in text
+    assert "sufficient" in text
+    assert "…" not in text
+
+
+def test_the_free_m_of_printed_gains() -> None:
+    """The rest of their numbers stands in docs/explanation/stability.md, which has a test."""
+    options = ("--duration", "0.2", "--gains", "printed", "--json")
+    twisting = json.loads(run(*options))["super_twisting"]
+    checks = [check["holds"] for check in twisting["circle_criterion"]]
+    assert checks == [False] * 9
+    assert twisting["tolerated_beta"] == twisting["k_2"]
+    free = twisting["lmi"]["assumed_beta_half_of_tolerated"]
+    for k_2, solved in zip(twisting["k_2"], free, strict=True):
+        assert solved["beta"] == pytest.approx(k_2 / 2)
+        assert solved["residual"] <= 0.0 < solved["gamma"]
+
+
+def test_other_laws_get_what_applies_to_them() -> None:
+    for law in ("tde_smc", "tde_tsmc"):
+        found = report(studied(controller=law))
+        assert found["super_twisting"] is None
+        assert len(found["time_delay_error"]["as_flown"]["beta"]) == 9
+    assert "do not apply" in run("--controller", "tde_smc", "--duration", "0.1")
+
+
+def test_seven_joints(tmp_path: Path) -> None:
+    found = studied(robot="seven_joint")
+    data = report(found)
+    assert len(data["axes"]) == len(data["super_twisting"]["k_1"]) == 10
+    names = [path.name for path in draw(found, tmp_path)]
+    assert names == ["nyquist.png", "nyquist.svg", "lyapunov.png", "lyapunov.svg"]
+    assert matplotlib.image.imread(tmp_path / names[0]).std() > 0.01
+
+
+def test_report_of_infinite_numbers_is_json(tmp_path: Path) -> None:
+    """K_1 = 0 has an infinite peak and no M: null, and the command still ends well."""
+    path = tmp_path / "tde_stc.yaml"
+    gains = {**GAINS["tde_stc"], "k_1": [0.0]}
+    path.write_text(yaml.safe_dump({"controller_node": {"ros__parameters": {"tde_stc": gains}}}))
+    found = studied(gains=str(path), duration=0.05)
+    data = json.loads(json.dumps(report(found), allow_nan=False))["super_twisting"]
+    assert data["circle_criterion"][0]["value"] is None
+    assert data["circle_criterion"][0]["holds"] is False
+    assert data["lmi"]["assumed_beta_half_of_tolerated"] == [None] * 9
+    assert data["reaching"]["reaching_time_s_below_bound"][0]["holds"] is None
+    assert len(draw(found, tmp_path / "figures")) == 4
+
+
+@pytest.mark.parametrize(
+    ("plan", "said"), [({"duration": 0.002}, "10 ticks"), ({"controller": "ctc_smc"}, "ctc_smc")]
+)
+def test_what_cannot_be_studied_is_refused_before_it_flies(plan: dict[str, Any], said: str) -> None:
+    def never(flight: Flight, which: str) -> Any:
+        if "controller" in plan:
+            raise AssertionError(which)
+        return simulate(flight)
+
+    with pytest.raises(InputError, match=said):
+        study(FlightPlan.model_validate(plan), 1e-3, never)
+
+
+def test_a_check_of_unknown_numbers_is_open() -> None:
+    assert Check(1.0, 2.0, applies=False).verdict == "not applicable"
+    assert (Check(1.0, 2.0).verdict, Check(2.0, 2.0).verdict) == ("holds", "fails")
+    assert Check(float("nan"), 2.0).verdict == Check(1.0, float("nan")).verdict == "open"

@@ -39,30 +39,14 @@ from space_robot_model.robot.tree import Encoder, Gear
 from space_robot_sim.plant.tick import update_true_state
 
 Array = NDArray[np.float64]
-
-
 PERIOD = 5e-4
-
-
 UPRIGHT = np.array([1.0, 0.0, 0.0, 0.0])
-
-
 TURNED = np.array([0.6, 0.48, -0.4, 0.4964])
-
-
 HALF_A_TURN = np.array([0.0, 0.8, 0.0, -0.6])
-
-
 POSTURE_DEG = [0.0, 120.0, 220.0, 0.0, -10.0, 0.0]
-
-
 H_BAR = [50.0] * 3 + [5.0] * 3 + [0.5] * 3
-
-
 NOTHING = 1e-12
 """A switching gain, N m, that does nothing beside oscillations of 1e-9 rad."""
-
-
 FEW = settings(max_examples=25, deadline=None)
 
 
@@ -163,8 +147,8 @@ def check_stability(
 
 def checked(flight: Flight) -> FlexibleCheck:
     corner = flight.controller_settings.acceleration_filter_hz
-    positions = np.radians([POSTURE_DEG])
-    return check_stability(flight.law, flight.plant.robot, positions, corner, flight.controls_base)
+    robot, positions = flight.plant.robot, np.radians([POSTURE_DEG])
+    return check_stability(flight.law, robot, positions, corner, flight.controls_base)
 
 
 def growth(signals: Array, skipped: int = 1) -> float:
@@ -184,10 +168,7 @@ def growth(signals: Array, skipped: int = 1) -> float:
 
 
 CTC = {"k_p": [400.0], "k_d": [40.0]}
-
-
 SMC = {"lambda": [1.0], "g": [NOTHING]}
-
 
 GROWING: dict[str, tuple[Encoder, str, dict[str, Any], dict[str, Any]]] = {
     "computed torque, links seen": ("link", "ctc", CTC, {"duration": 1.2}),

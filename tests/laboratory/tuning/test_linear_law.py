@@ -18,20 +18,10 @@ from space_robot_control.laws import ControlLaw, LawGains, Signals, find_law, pe
 from space_robot_control.laws.checked import LawError
 
 Array = NDArray[np.float64]
-
-
 PERIOD = 5e-4
-
-
 JOINTS = np.radians([0.0, 120.0, 220.0, 0.0, -10.0, 0.0])
-
-
 UPRIGHT = np.array([1.0, 0.0, 0.0, 0.0])
-
-
 ONES = np.ones(9)
-
-
 DIAGONAL = np.array(H_BAR)
 
 
@@ -92,35 +82,16 @@ def test_it_is_what_the_law_does_near_rest(name: str) -> None:
         state += sum(linear.state_by[key] @ values for key, values in inputs.items())
 
 
-def by_gains(own: ControlLaw, weight: float) -> Array:
-    """Torque by noise of a rate, by the names of the gains, in the coordinates of `posture`."""
-    gains = own.gain_values
-    damping = gains.get("k_d", gains.get("lambda"))
-    assert damping is not None
-    if "h_bar" in gains and gains["h_bar"].any():
-        return gains["h_bar"] * (weight / PERIOD + damping)
-    per_rate = np.diag(posture().inertia) * damping
-    if "h_bar" in gains or own.name == "indi":
-        per_rate = per_rate + np.diag(posture().inertia) * weight / PERIOD
-    return per_rate + (gains["g"] / gains["delta"] if "delta" in gains else 0.0)
-
-
 @pytest.mark.parametrize("weight", [1.0, 0.05])
-@pytest.mark.parametrize("name", [name for name in LAWS if name not in ("adrc", "dob")])
-def test_noise_gain_is_that_of_the_gains(name: str, weight: float) -> None:
-    own = LAWS[name]
-    per_rate = own.gain_values["k_d"] if name.startswith("pd") else by_gains(own, weight)
-    expected = per_rate.copy()
-    expected[:3] *= 0.25  # a torque is half its force, and rhodot half of omega
-    np.testing.assert_allclose(noise_gain(own, [posture()], weight), expected, rtol=1e-9)
-
-
-def test_noise_gain_of_observers_is_that_of_their_own_filters() -> None:
-    """`dob`: ``J (w / period + K_D)`` with its own weight; `adrc` sees positions alone."""
-    weight = 80.0 * PERIOD / (1.0 + 80.0 * PERIOD)
-    expected = DIAGONAL * (weight / PERIOD + 30.0)
+def test_noise_gain_is_that_of_the_gains(weight: float) -> None:
+    """``H (w / period + lambda)``; a torque is half its force, and rhodot half of omega."""
+    share = np.array([0.25] * 3 + [1.0] * 6)
+    expected = share * DIAGONAL * (weight / PERIOD + 7.0)
+    np.testing.assert_allclose(noise_gain(LAWS["tde_stc"], [posture()], weight), expected)
+    # `dob` has a weight of its own; `adrc` sees positions alone
+    own = 80.0 * PERIOD / (1.0 + 80.0 * PERIOD)
     by_rate = force_by_rate(LAWS["dob"], posture())
-    np.testing.assert_allclose(np.diag(by_rate), -expected, rtol=1e-9)
+    np.testing.assert_allclose(-np.diag(by_rate), DIAGONAL * (own / PERIOD + 30.0), rtol=1e-9)
     assert not force_by_rate(LAWS["adrc"], posture()).any()
 
 

@@ -1,4 +1,4 @@
-"""Loops and eigenvalues: margins against algebra, SciPy and flights."""
+"""Loops and eigenvalues: margins against algebra, SciPy and flights; remarks on small ones."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from closed_loop import H_BAR
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from space_robot.cli.options import remarks_on
 from space_robot.flight.plan import Flight, FlightPlan, resolve
 from space_robot.flight.simulate import simulate
 from space_robot.tuning.closed_loop import RigidLoop, loop_of, rigid_motion
@@ -19,16 +20,14 @@ from space_robot.tuning.inertia import SAMPLING, inertia_along
 from space_robot.tuning.linear_law import linear_laws
 from space_robot.tuning.mass_errors import check_masses, drawn_inertias
 from space_robot.tuning.postures import postures_along
-from space_robot.tuning.spectrum import Spectrum, eigenvalues, spectrum
+from space_robot.tuning.spectrum import eigenvalues, spectrum
+from space_robot.tuning.warning import margin_remarks
+from space_robot_control.controller.settings import ControllerNodeSettings
 from space_robot_control.laws import ControlLaw, find_law
 from space_robot_msgs_py.errors import DivergedError
 
 Array = np.ndarray
-
-
 PERIOD = 5e-4
-
-
 SLOW = {"k_p": 1e-4, "k_d": 2e-2}
 """Poles at 0.01 rad/s: u does not move the limits of the estimate."""
 
@@ -145,6 +144,9 @@ def test_eigenvalues_are_scipys(seed: int, m: int) -> None:
     expected = scipy.linalg.eigh(np.diag(h_bar), inertia, eigvals_only=True)
     np.testing.assert_allclose(eigenvalues(inertia[np.newaxis], h_bar)[0], expected, rtol=1e-8)
     found = spectrum(inertia[np.newaxis], h_bar)
+    assert found.contracts == (found.radius < 1.0)
+    margin = expected[0] if found.contracts else 2.0 - expected[-1]
+    assert found.margin == pytest.approx(margin, rel=1e-6, abs=1e-9)
     w = np.eye(m) - np.linalg.solve(inertia, np.diag(h_bar))
     assert found.radius == pytest.approx(np.max(np.abs(np.linalg.eigvals(w))), rel=1e-7)
     assert found.norm == pytest.approx(np.linalg.norm(w, 2))
@@ -177,36 +179,14 @@ def test_an_error_of_the_estimate_grows_as_the_formula_says(
     assert np.max(np.abs(np.linalg.eigvals(matrix))) == pytest.approx(radius, rel=1e-6)
 
 
-def test_limits_are_where_an_error_neither_grows_nor_fades() -> None:
-    found = Spectrum(smallest=0.03, largest=1.2, norm=1.5)
-    assert found.radius == pytest.approx(0.97)
-    assert found.contracts
-    assert found.is_sound
-    assert 1.0 + found.margin - found.smallest == pytest.approx(1.0)
-    assert 1.0 - found.largest_scale * found.largest == pytest.approx(-1.0)
-    too_large = Spectrum(smallest=0.03, largest=2.1, norm=2.0)
-    assert not too_large.contracts
-    assert too_large.margin == pytest.approx(-0.1)
-    assert Spectrum(0.03, 2.1, 2.0, weight=0.5).contracts
-
-
-def test_margin_of_table_iv() -> None:
-    """Its size, by spec an eigenvalue of 0.0031 to 0.0079, and what it means in flight."""
-    flight = Flight(resolve(FlightPlan()))
-    every = eigenvalues(inertia_along(flight.robot, flight.mission_settings), np.array(H_BAR))
-    assert every[:, 0].min() == pytest.approx(0.0031, abs=5e-5)
-    assert every[:, 0].max() == pytest.approx(0.0079, abs=5e-5)
-
-
 @pytest.mark.parametrize("controller", ["tde_smc", "tde_stc"])
 def test_a_torque_reported_too_large_by_more_than_the_margin_diverges(controller: str) -> None:
+    """Of Table IV: 0.31 to 0.79 %. One too small costs accuracy, no more."""
     with pytest.raises(DivergedError):
         fly(controller, "default", echo_scale=1.01)
     assert fly(controller, "default", echo_scale=1.005) < 1e-3
-
-
-def test_a_torque_reported_too_small_costs_accuracy_but_does_not_diverge() -> None:
-    assert 1e-4 < fly("tde_stc", "default", echo_scale=0.99) < 1e-2
+    if controller == "tde_stc":
+        assert 1e-4 < fly(controller, "default", echo_scale=0.99) < 1e-2
 
 
 @pytest.mark.parametrize("is_nominal", [False, True])
@@ -230,3 +210,98 @@ def test_the_sample_is_within_the_bound_and_scipys(share: float, is_nominal: boo
     if is_nominal:  # the margin is that of the masses alone
         assert check.smallest == pytest.approx(1.0 / (1.0 + share))
         assert check.largest == pytest.approx(1.0 / (1.0 - share))
+
+
+def remarks(plan: FlightPlan, corner: float = 0.0) -> list[str]:
+    flight = Flight(resolve(plan))
+    laws = [flight.law, *(law for _, law in flight.swaps)]
+    return margin_remarks(
+        laws,
+        flight.plant.robot,
+        flight.mission_settings,
+        corner,
+        flight.controls_base,
+        nominal=flight.robot,
+    )
+
+
+TOO_LARGE = FlightPlan(
+    parameters={"controller": {"tde_stc.h_bar": [50.0] * 3 + [5.0] * 3 + [1.0] * 3}}
+)
+
+
+def test_table_iv_is_remarked_upon_once_a_law() -> None:
+    (line,) = remarks(FlightPlan(swaps=["1:tde_stc"]))
+    assert line.startswith("warning: tde_stc: h_bar leaves 0.31% of margin in torque scale")
+    assert line.endswith("see space-robot gains check")
+    both = remarks(FlightPlan(swaps=["1:tde_smc", "2:ctc"]))
+    assert [text.split(":")[1] for text in both] == [" tde_stc", " tde_smc"]
+
+
+def test_nobody_is_warned_of_the_default_gains_unless_the_flight_tries_their_margin() -> None:
+    """Who has chosen nothing is not greeted with a warning; who has tried something is."""
+    h_bar = {"controller": {"tde_stc.h_bar": H_BAR}}
+    for plan, count in (
+        (FlightPlan(), 0),
+        (FlightPlan(case="3", sensors="fine"), 0),
+        (FlightPlan(gains="printed"), 1),
+        (FlightPlan(parameters=h_bar), 1),
+        (FlightPlan(gains={"h_bar": H_BAR}), 1),
+        (FlightPlan(faults=["torque_scale@2:base=0.99"]), 1),
+        (FlightPlan(actuators="wheels"), 1),
+    ):
+        assert len(remarks_on(Flight(resolve(plan)))) == count, plan
+    (line,) = remarks_on(Flight(resolve(TOO_LARGE)))
+    assert "diverge" in line
+
+
+def test_thrusters_are_told_which_gains_are_for_them() -> None:
+    for actuators, is_said in (("thrusters", True), ("wheels_and_thrusters", False)):
+        (line,) = remarks_on(Flight(resolve(FlightPlan(actuators=actuators))))
+        assert ("thrusters' pulses" in line) is is_said
+    assert remarks_on(Flight(resolve(FlightPlan(actuators="thrusters", gains="robust")))) == []
+
+
+def test_an_h_bar_that_is_too_large_is_said_to_diverge() -> None:
+    (line,) = remarks(TOO_LARGE)
+    assert "too large" in line
+    assert "diverge" in line
+    assert "margin" in remarks(TOO_LARGE, corner=100.0)[0]
+
+
+@pytest.mark.parametrize(
+    ("own", "given", "corner"),
+    [
+        ("direct", {}, 0.0),
+        ("direct", {"acceleration_filter_hz": 50.0}, 50.0),
+        ("filtered", {}, 150.0),  # rates 100, joints 150 Hz: what passes the faster one
+        ("filtered", {"acceleration_filter_hz": 50.0}, 50.0),
+        ("filtered", {"navigation_filter.rate_filter_hz": 0.0}, 0.0),
+    ],
+)
+def test_what_filters_the_pair_counts(own: str, given: dict[str, float], corner: float) -> None:
+    settings = ControllerNodeSettings.resolve({"navigation": own, **given})
+    assert pair_corner(settings) == corner
+
+
+@pytest.mark.parametrize(
+    ("inertia", "word"), [(2.0, "it will diverge"), (100.0, "margin in torque scale"), (400.0, "")]
+)
+def test_an_observer_of_too_little_inertia_is_remarked_upon(inertia: float, word: str) -> None:
+    """Of ADRC by its loop: its observer's pole is at ``min(lambda) omega_o / 3``."""
+    shape = [5.3, 2.8, 2.2, 0.067, 0.23, 0.19, 0.0053, 0.0056, 0.0012]
+    own = {"inertia": [inertia * value for value in shape], "omega_c": [0.2], "omega_o": [400.0]}
+    plan = FlightPlan(
+        controller="adrc", parameters={"controller": {f"adrc.{k}": v for k, v in own.items()}}
+    )
+    found = remarks(plan)
+    assert len(found) == bool(word)
+    assert all(word in line and line.startswith("warning: adrc: ") for line in found)
+
+
+def test_the_nominal_inertia_is_remarked_upon_where_a_payload_outweighs_it() -> None:
+    flights = (("paper", "4-2", 0), ("seven_joint", "1", 0), ("seven_joint", "4-2", 1))
+    for robot, case, count in flights:
+        found = remarks(FlightPlan(controller="indi", robot=robot, case=case))
+        assert len(found) == count
+        assert all("nominal inertia leaves 1.87% of margin" in line for line in found)
