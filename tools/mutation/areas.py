@@ -33,7 +33,7 @@ MORE: dict[str, tuple[str, ...]] = {
     "config": ("laboratory/cli/test_*option*.py", "laboratory/cli/test_*refus*.py"),
     "ros": (GRAPHS,),
     "actuators": ("sim/plant/*.py", "control/allocation/*.py"),
-    "dynamics": ("model/robot/*.py", "test_conservation.py", "sim/plant/test_*plant*.py"),
+    "dynamics": ("model/robot/*.py", "sim/plant/test_*plant*.py", "control/controller/*.py"),
     "hardware": ("sim/actuators/*.py", "sim/sensors/*.py"),
     "robot": ("model/dynamics/*.py",),
     "environment": ("sim/plant/*.py",),
@@ -48,7 +48,6 @@ MORE: dict[str, tuple[str, ...]] = {
     "cli": ("test_start_up.py",),
     "help": ("laboratory/cli/test_*help*.py",),
     "console": ("laboratory/cli/test_*output*.py",),
-    "paper": ("laboratory/cli/test_*stability*.py",),
     "tuning": ("laboratory/cli/test_*gains*.py",),
     "view": ("laboratory/cli/test_*view*.py",),
 }
