@@ -60,11 +60,6 @@ def test_tables_are_those_of_weighted_least_squares(count: int) -> None:
         np.testing.assert_array_equal(null[out], 0.0)
 
 
-def test_null_motion_of_a_pyramid_is_in_turn() -> None:
-    null = wheel_set(PYRAMID).null
-    np.testing.assert_allclose(null[:4], null[0] * np.array([1.0, -1.0, 1.0, -1.0]), atol=1e-12)
-
-
 # Least largest loads
 
 

@@ -88,9 +88,6 @@ def test_the_acceleration_that_a_law_demands_is_what_happens(
     np.testing.assert_allclose(result[first:], u[first:], rtol=0.0, atol=1e-11 * size)
 
 
-# References that do not go on where they were
-
-
 # Contract
 
 

@@ -2,19 +2,23 @@
 
 from __future__ import annotations
 
+import importlib.util
 import math
 from functools import cache
 from itertools import product
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+import yaml
 from exported_kernels import in_c, needs_compiler, same_bits, text_of
 from hypothesis import example, given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
+from paths import DATA
 
-from space_robot_control.flight_code.c99.language import BOOL, FLOAT, INT, ArrayOf
+from space_robot_control.flight_code.c99.language import BOOL, FLOAT, INT, ArrayOf, NotInSubsetError
 from space_robot_model.elementary.sine import sin_cos
 from space_robot_msgs_py.compiled.kernels import kernel
 from space_robot_msgs_py.compiled.lanes import uniform, where, whole
@@ -276,3 +280,44 @@ def test_what_was_asked_is_not_asked_again_and_an_integer_stays_one() -> None:
     assert "return 2.0 * a;" in text
     assert "3.0" not in text
     assert "int64_t a" in text
+
+
+# What has no translation
+
+
+ROWS: list[dict[str, Any]] = yaml.safe_load((DATA / "refusals/flight_code.yaml").read_text("utf-8"))
+HEAD = """
+import numpy as np
+
+from space_robot_msgs_py.compiled.kernels import kernel
+
+
+@kernel
+def written(values):
+    values[0] += 1.0
+    return values[0]
+
+
+@kernel
+def kernel_under_test(a, row):
+"""
+
+
+@pytest.mark.parametrize("row", ROWS, ids=lambda row: row["construct"])
+def test_a_construct_is_refused_with_file_line_and_what_to_write(
+    row: dict[str, Any], tmp_path: Path
+) -> None:
+    path = tmp_path / "refused.py"
+    path.write_text(HEAD + "".join(f"    {line}\n" for line in row["body"]))
+    spec = importlib.util.spec_from_file_location("refused", path)
+    assert spec
+    assert spec.loader
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    with pytest.raises(NotInSubsetError) as error:
+        text_of((module.kernel_under_test, FLOAT, ArrayOf((4,))))
+    line = HEAD.count("\n") + row.get("line", len(row["body"]))
+    assert str(error.value).startswith(f"{path}, line {line}: ")
+    for part in (row["construct"], " cannot be exported as C: ", row["instead"]):
+        assert part in str(error.value)
+    assert "\n" not in str(error.value)

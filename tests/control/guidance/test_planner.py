@@ -103,26 +103,6 @@ def test_joints_move_with_the_base_free_without_momentum() -> None:
     np.testing.assert_allclose(whole(free)[0][-1], whole(held)[0][-1], atol=1e-12)
 
 
-@pytest.mark.parametrize("base", [{}, {"base": "free"}], ids=["held", "free"])
-def test_a_closed_path_returns_the_joints_with_the_attitude_held_alone(base: Any) -> None:
-    sides = ([0.2, 0.0, 0.0], [0.0, 0.2, 0.0], [-0.2, 0.0, 0.0], [0.0, -0.2, 0.0])
-    pose = {"rpy_deg": [0.0, 0.0, 0.0]}
-    square = planned(
-        *({"tool": {"xyz": side, **pose}, "duration": 3, **base} for side in sides),
-        waypoints_deg=[10.0, 100.0, 200.0, 20.0, 30.0, 10.0],
-    )
-    joints, attitudes = whole(square)
-    if base:
-        assert np.abs(joints[-1, 0] - joints[0, 0]).max() > np.radians(0.1)
-        assert 2.0 * np.linalg.norm(attitudes[-1, 1:4]) > np.radians(0.1)
-        robot = find_robot("paper")
-        first, last = (tool_state(robot, attitudes[k, :4], joints[k, 0]) for k in (0, -1))
-        np.testing.assert_allclose(first.position, last.position, atol=1e-9)
-        np.testing.assert_allclose(first.rotation, last.rotation, atol=1e-9)
-    else:
-        np.testing.assert_allclose(joints[-1, 0], joints[0, 0], rtol=0.0, atol=1e-9)
-
-
 @pytest.mark.parametrize(("orientation", "share"), [({}, 0.05), ({"rpy_deg": [0, 0, 0]}, 0.6)])
 def test_a_tool_is_led_with_the_least_momentum(orientation: dict[str, Any], share: float) -> None:
     goal = {"xyz": [0.2, 0.0, -0.1], **orientation}

@@ -4,30 +4,18 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
-from typing import Any
 
 import numba
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 from law_equations import EQUATIONS, PERIOD, History, forces, random_gains
 from numpy.typing import NDArray
 from paths import ROOT
 
 from space_robot.flight.plan import Flight, FlightPlan, resolve
 from space_robot.flight.simulate import simulate
-from space_robot_control.laws import (
-    CompiledLaw,
-    ControlLaw,
-    LawGains,
-    LawMemory,
-    Signals,
-    find_law,
-    laws,
-)
+from space_robot_control.laws import CompiledLaw, ControlLaw, Signals, find_law, laws
 from space_robot_control.laws.base import CONSTANT_INERTIA, NO_ESTIMATE, NOMINAL_INERTIA
-from space_robot_control.laws.ctc_smc import saturation
 
 Array = NDArray[np.float64]
 
@@ -53,34 +41,6 @@ def test_force_is_the_equation(name: str, axes: int) -> None:
     expected = EQUATIONS[name](history, gains)
     actual = forces(law(gains, PERIOD), history)
     np.testing.assert_allclose(actual, expected, rtol=1e-11, atol=1e-12)
-
-
-def listed_backwards(record: type[Any], base: type[Any]) -> type[Any]:
-    """The same fields in the opposite order, all of them behind those of ``base``."""
-    own = [item for item in record.fields().items() if item[0] not in base.fields()]
-    backwards = type("Backwards", (base,), dict(reversed(own)))
-    assert list(backwards.fields()) == [*base.fields(), *(name for name, _ in reversed(own))]
-    return backwards
-
-
-@pytest.mark.parametrize("name", EQUATIONS)
-def test_the_order_of_listing_changes_nothing(name: str) -> None:
-    """Gains and memory go by name: swapped lines of a law's declarations command the same."""
-    law, history = find_law(name), History(9, seed=8)
-    assert issubclass(law, CompiledLaw)
-
-    class Backwards(law):  # type: ignore[misc, valid-type]
-        gains_type = listed_backwards(law.gains_type, LawGains)
-        memory_type = listed_backwards(law.memory_type, LawMemory)
-
-    gains = random_gains(law, 9, seed=9)
-    swapped = Backwards(dict(reversed(gains.items())), PERIOD)
-    as_listed = law(gains, PERIOD)
-    assert swapped.gains_block.tobytes() != as_listed.gains_block.tobytes()
-    np.testing.assert_array_equal(forces(swapped, history), forces(as_listed, history))
-    for signal in ("s", "u"):
-        now, then = getattr(swapped.memory, signal), getattr(as_listed.memory, signal)
-        np.testing.assert_array_equal(now, then)
 
 
 def test_a_gain_named_as_a_word_of_python_has_its_name_for_the_user() -> None:
@@ -113,19 +73,6 @@ def test_the_memory_is_a_laws_own_is_emptied_and_restored(name: str) -> None:
     before = block.tobytes()
     law.force(Signals.view(block))
     assert block.tobytes() == before
-
-
-def test_terminal_surface_starts_at_zero_whatever_the_error() -> None:
-    """(60) with s(0) = 0, also after a reset: the first force is that of u_PD alone."""
-    law, history = find_law("tde_tsmc"), History(9, 6)
-    gains = random_gains(law, 9, seed=5)
-    controller = law(gains, PERIOD)
-    for k in (0, 7):
-        controller.reset()
-        force = controller.force(history.at(k))
-        np.testing.assert_array_equal(controller.memory.s, np.zeros(9))
-        u_pd = history.rhodd_d[k] + gains["k_d"] * history.edot[k] + gains["k_p"] * history.e[k]
-        np.testing.assert_allclose(force, gains["h_bar"] * u_pd + history.n_hat[k], rtol=1e-13)
 
 
 def test_model_and_time_delay_estimate_go_to_the_laws_that_say_so() -> None:
@@ -165,16 +112,6 @@ def test_with_h_bar_zero_the_estimate_has_the_nominal_inertia(name: str) -> None
     np.testing.assert_allclose(forces(built, history), history.n_hat + switching, rtol=1e-14)
     built.gain_values = gains
     assert (built.estimate, built.needs_model) == (CONSTANT_INERTIA, False)
-
-
-@given(st.floats(-1e3, 1e3), st.floats(1e-6, 10.0))
-def test_saturation_is_odd_bounded_and_linear_inside_the_layer(s: float, delta: float) -> None:
-    """(58)."""
-    value = saturation(s, delta)
-    assert saturation(-s, delta) == -value
-    assert abs(value) <= 1.0
-    assert value * s >= 0.0
-    assert value == (np.sign(s) if abs(s) > delta else s / delta)
 
 
 def test_the_integral_in_the_manual_is_kept_and_begins_at_zero(tmp_path: Path) -> None:
