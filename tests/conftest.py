@@ -15,9 +15,13 @@ import pytest
 
 try:
     from hypothesis import HealthCheck, settings
+    from hypothesis.internal.conjecture import providers
 except ImportError:
     pass  # every module that needs it is skipped
 else:
+    # Else examples depend on which modules other tests have imported before.
+    NO_CONSTANTS = providers._local_constants
+    providers._get_local_constants = lambda: NO_CONSTANTS
     settings.register_profile(
         "ci", derandomize=True, deadline=None, suppress_health_check=[HealthCheck.too_slow]
     )

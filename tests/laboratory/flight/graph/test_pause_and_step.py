@@ -172,7 +172,7 @@ def test_segments_and_trajectories_are_followed_and_what_cannot_be_flown_is_refu
     planner = Planner(free_domain)
     planner.publish(names[:4], np.zeros(4))
     refused = "refused a trajectory: the trajectory lacks joint 'joint5'"
-    planner.until(lambda: refused in planner.monitor.modes.get("mission_node", ""), refused)
+    planner.until(lambda: planner.value("mission", "trajectories refused") == 1, refused)
     for target, seconds in ((1.0, 2**31 - 1), (1e308, 1), (np.nan, 1), (3.0, 0)):
         planner.publish(names, np.full(6, target), seconds, nanosec=1)
     planner.publish(names[::-1], np.radians(planned)[::-1])
