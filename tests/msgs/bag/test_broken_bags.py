@@ -17,7 +17,6 @@ from bags import (
     FLIGHT,
     TIMEBASE,
     Recorded,
-    assert_nothing_is_hidden,
     assert_rows_are_the_originals,
     chunks_of,
     entries_of,
@@ -47,7 +46,7 @@ def recorded(tmp_path_factory: pytest.TempPathFactory) -> Recorded:
 
 @pytest.fixture
 def bag(recorded: Recorded, tmp_path: Path) -> Path:
-    return recorded.copy(tmp_path / "bag")
+    return Path(shutil.copytree(recorded.folder, tmp_path / "bag"))
 
 
 def _flip(at: Callable[[Path], int]) -> Callable[[Path], None]:
@@ -375,4 +374,5 @@ def test_a_bag_broken_by_chance_is_read_truly_or_refused(
     (folder / METADATA).write_bytes(contents["yaml"])
     if log := read_or_refused(folder):
         assert_rows_are_the_originals(log, short.log)
-        assert_nothing_is_hidden(log, short.log)
+        is_whole = log.ticks == short.log.ticks and log.whole.all()
+        assert is_whole or log.damage or log.unfinished, "what is missing is told"

@@ -69,7 +69,7 @@ def make_node(domain: int) -> Iterator[Make]:
 
 
 def test_the_publisher_of_a_topic_is_alone(make_node: Make, domain: int) -> None:
-    """A killed one leaves its place at once: its lock does (test_locks.py)."""
+    """A killed one leaves its place at once: its lock does (test_processes.py)."""
     first, second = make_node("controller"), make_node("controller", namespace="/robot")
     claim = TopicClaim(first, ["/command"])
     said = f"/command of ROS domain {domain} is already published by controller"
