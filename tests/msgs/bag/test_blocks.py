@@ -86,6 +86,8 @@ def test_in_words_every_change_is_told_with_its_time() -> None:
         "tde_stc -> tde_tsmc at 1.2345 s (other k_1 at 2.0000 s) -> tde_stc at 2.5000 s "
         "(other k_2) and 1 more"
     )
+    begun_again = (LAWS[0], LAWS[0]._replace(tick=9))
+    assert in_words(as_data(begun_again, TIMEBASE)) == "tde_stc (begun again at 0.0045 s)"
     assert in_words([]) == ""
 
 
