@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -44,11 +43,6 @@ class Recorded:
     @property
     def file(self) -> Path:
         return mcap_file(self.folder)
-
-    def copy(self, folder: Path) -> Path:
-        """The same bag at another place."""
-        shutil.copytree(self.folder, folder)
-        return folder
 
 
 def assert_same_flight(log: FlightLog, original: FlightLog) -> None:
@@ -113,12 +107,6 @@ def assert_rows_are_the_originals(log: FlightLog, original: FlightLog) -> None:
             continue
         there = np.isfinite(column)
         np.testing.assert_array_equal(column[there], true[: log.ticks][there], name)
-
-
-def assert_nothing_is_hidden(log: FlightLog, original: FlightLog) -> None:
-    """Whatever is missing is told."""
-    if log.ticks < original.ticks or not log.whole.all():
-        assert log.damage or log.unfinished
 
 
 def entries_of(bag: Path) -> list[Entry]:

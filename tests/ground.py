@@ -23,6 +23,11 @@ from space_robot.flight.graph.monitor import Monitor  # noqa: E402
 TIMEOUT_S = 30.0
 
 
+def request(transition: str) -> Any:
+    number = getattr(Transition, f"TRANSITION_{transition.upper()}")
+    return ChangeState.Request(transition=Transition(id=number))
+
+
 class Ground:
     """A node of the test that calls services, and hears and sends what it likes."""
 
@@ -51,30 +56,23 @@ class Ground:
             self.node.destroy_client(client)
 
     def change(self, node: str, transition: str) -> bool:
-        number = getattr(Transition, f"TRANSITION_{transition.upper()}")
-        request = ChangeState.Request(transition=Transition(id=number))
-        return bool(self.call(ChangeState, f"/{node}_node/change_state", request).success)
+        service = f"/{node}_node/change_state"
+        return bool(self.call(ChangeState, service, request(transition)).success)
 
     def change_at_once(
         self, node: str, process: subprocess.Popen[str], *transitions: str
     ) -> list[bool]:
         """Ask for several transitions that a node finds together when it looks."""
         client = self.node.create_client(ChangeState, f"/{node}_node/change_state")
-        try:
-            assert client.wait_for_service(TIMEOUT_S), node
-            process.send_signal(signal.SIGSTOP)
-            futures = []
-            for transition in transitions:
-                number = getattr(Transition, f"TRANSITION_{transition.upper()}")
-                request = ChangeState.Request(transition=Transition(id=number))
-                futures.append(client.call_async(request))
-            time.sleep(0.1)
-            process.send_signal(signal.SIGCONT)
-            for future in futures:
-                self._executor.spin_until_future_complete(future, TIMEOUT_S)
-            return [future.done() and bool(future.result().success) for future in futures]
-        finally:
-            self.node.destroy_client(client)
+        assert client.wait_for_service(TIMEOUT_S), node
+        process.send_signal(signal.SIGSTOP)
+        futures = [client.call_async(request(transition)) for transition in transitions]
+        time.sleep(0.1)
+        process.send_signal(signal.SIGCONT)
+        for future in futures:
+            self._executor.spin_until_future_complete(future, TIMEOUT_S)
+        self.node.destroy_client(client)
+        return [future.done() and bool(future.result().success) for future in futures]
 
     def state(self, node: str) -> str:
         answer = self.call(GetState, f"/{node}_node/get_state", GetState.Request())

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import ast
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from functools import cache
+from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 
 from paths import ROOT
@@ -72,32 +73,13 @@ def folders(graph: Graph) -> dict[str, set[str]]:
     return found
 
 
-def cycles(graph: Graph) -> list[list[str]]:
-    """Groups of nodes that all lead to one another (Tarjan's strongly connected components)."""
-    index: dict[str, int] = {}
-    lowest: dict[str, int] = {}
-    path: list[str] = []
-    found: list[list[str]] = []
-
-    def visit(node: str) -> None:
-        index[node] = lowest[node] = len(index)
-        path.append(node)
-        for other in sorted(graph.get(node, ())):
-            if other not in index:
-                visit(other)
-                lowest[node] = min(lowest[node], lowest[other])
-            elif other in path:
-                lowest[node] = min(lowest[node], index[other])
-        if lowest[node] == index[node]:
-            place = path.index(node)
-            if len(group := path[place:]) > 1:
-                found.append(sorted(group))
-            del path[place:]
-
-    for node in sorted(graph):
-        if node not in index:
-            visit(node)
-    return found
+def circle(graph: Graph) -> list[str]:
+    """One of the circles in which nodes lead to one another, each before the one it leads to."""
+    try:
+        TopologicalSorter(graph).prepare()
+    except CycleError as error:
+        return list(reversed(error.args[1]))
+    return []
 
 
 def strings(file: Path) -> Iterator[tuple[int, str]]:
@@ -111,9 +93,3 @@ def strings(file: Path) -> Iterator[tuple[int, str]]:
     for node in ast.walk(tree):
         if isinstance(node, ast.Constant) and isinstance(text := node.value, str):
             yield from [] if id(node) in documented else [(node.lineno, text)]
-
-
-def edges(graph: Graph, names: Iterable[str]) -> str:
-    """The arrows among ``names``, a line each, for a failure's text."""
-    group = set(names)
-    return "\n".join(f"  {a} -> {b}" for a in sorted(group) for b in sorted(graph[a] & group))

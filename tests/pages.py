@@ -20,28 +20,10 @@ SHELL = {"", "bash", "console", "sh"}
 """Languages of fenced blocks that may hold commands."""
 BEGINNING = re.compile(r"(?:\$ )?((?:[A-Z_]+=\S* )*([\w./-]+).*)")
 """Of a line: the command without its prompt, and the command's first word."""
-COMMANDS = {
-    ".",
-    "cp",
-    "dask",
-    "export",
-    "for",
-    "git",
-    "make",
-    "mkdir",
-    "nft",
-    "pip",
-    "python",
-    "plotjuggler",
-    "python3",
-    "rerun",
-    "ros2",
-    "rviz2",
-    "sed",
-    "source",
-    "space-robot",
-    "sudo",
-}
+COMMANDS = (
+    ". cp dask export for git make mkdir nft pip python plotjuggler python3 rerun ros2 rviz2 sed "
+    "source space-robot sudo"
+)
 """First words of commands; all other indented lines are what one prints."""
 INLINE = re.compile(r"`(space-robot [^`]*\s(?:-|\S*[./@=])[^`]*)`")
 """A whole command within a sentence: one with an option or a file. Others are names."""
@@ -90,7 +72,7 @@ def items(page: Path) -> Iterator[Item]:
 def command(line: str, number: int, following: Iterator[tuple[int, str]]) -> Iterator[Item]:
     """The command that begins on a line, if one does: with the lines on which it goes on."""
     found = BEGINNING.fullmatch(line.strip())
-    if found is None or found[2] not in COMMANDS:
+    if found is None or found[2] not in COMMANDS.split():
         return
     text = found[1]
     while text.endswith("\\") or (found[2] == "for" and not text.endswith("done")):

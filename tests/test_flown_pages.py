@@ -13,7 +13,7 @@ from paths import DOCS
 
 sys.path.append(str(DOCS / "flown"))
 
-from flown_tables import Page, Sentence, Table, fly, is_same, pages
+from flown_tables import Page, Table, fly, is_same, pages
 
 from space_robot import Scenario
 
@@ -65,9 +65,3 @@ def test_a_flight_with_other_gains_noise_or_hardware_is_stale() -> None:
     assert not is_same(kept, {**options, "actuators": "wheels"})
     louder = {name: value * 1.01 for name, value in enumerate(kept["beginning"])}
     assert not is_same({**kept, "beginning": list(louder.values())}, options)
-
-
-def test_numbers_in_sentences_are_replaced_where_they_stand() -> None:
-    sentence = Sentence("the {} of {} turns by {}°, then", ())
-    with pytest.raises(ValueError, match="0 times in the page"):
-        sentence.put_into("nothing of the kind", {})

@@ -81,22 +81,16 @@ def test_the_version_is_that_of_the_changelog_everywhere() -> None:
     found = [entry.groups() for entry in entries if entry]
     version = found[0][0]
     assert dependencies("version") == {version}
-    assert f"\nversion: {version}\n" in (ROOT / "CITATION.cff").read_text("utf-8")
+    citation = (ROOT / "CITATION.cff").read_text("utf-8")
+    assert f"\nversion: {version}\n" in citation
     assert f"version = {{{version}}}," in (ROOT / "README.md").read_text("utf-8")
     named = [sys.executable, "setup.py", "--version"]
     said = subprocess.run(named, cwd=ROOT, capture_output=True, text=True, check=True).stdout
     assert said.splitlines()[-1] == version
     assert all(date != "unreleased" for _, date in found[1:])
+    dates = re.findall(r"^date-released: (\S+)$", citation, re.MULTILINE)
+    assert dates == [found[0][1]] * (found[0][1] != "unreleased")
     assert found == sorted(found, key=lambda e: [int(n) for n in e[0].split(".")], reverse=True)
-
-
-def test_a_released_version_has_its_date_in_the_citation() -> None:
-    changelog = (ROOT / "CHANGELOG.md").read_text("utf-8")
-    dated = re.search(r"^## \S+ \((\d{4}-\d\d-\d\d)\)$", changelog.split("\n\n")[1], re.MULTILINE)
-    released = re.search(
-        r"^date-released: (\S+)$", (ROOT / "CITATION.cff").read_text("utf-8"), re.MULTILINE
-    )
-    assert (released and released[1]) == (dated and dated[1])
 
 
 def test_setup_py_and_the_imports_name_the_same_packages() -> None:
@@ -112,7 +106,7 @@ def test_setup_py_and_the_imports_name_the_same_packages() -> None:
 
 
 def third_party_imports() -> set[str]:
-    """Packages that the three packages import anywhere, by their names on PyPI."""
+    """Packages that the five packages import anywhere, by their names on PyPI."""
     return imports_of(ROOT / file for file in modules().values())
 
 
@@ -144,10 +138,14 @@ def test_the_docs_name_every_extra_that_a_command_needs() -> None:
     assert named <= set(extras)
 
 
-def test_the_makefile_installs_extras_of_setup_py() -> None:
+def test_the_makefile_installs_extras_of_setup_py_and_tests_alone_are_a_recipe() -> None:
+    """A new release of a checker of types or style must not stop a new user's tests."""
     text = (ROOT / "Makefile").read_text("utf-8")
     named = {name for group in re.findall(r"'\.\[([\w,]+)\]'", text) for name in group.split(",")}
     assert {"ros", "test", "mutation"} <= named <= set(setup_keyword("extras_require"))
+    recipes = dict(re.findall(r"^(\w+):([^\n]*\n(?:\t.*\n)*)", text, re.MULTILINE))
+    assert "lint" not in recipes["test"]
+    assert all(step in recipes["check"] for step in ("lint", "test"))
 
 
 def test_every_requirement_has_its_known_version_for_each_python() -> None:
@@ -172,34 +170,6 @@ def test_every_requirement_has_its_known_version_for_each_python() -> None:
             assert wanted.specifier.contains(here[canonicalize_name(wanted.name)]), (python, text)
 
 
-def test_make_test_runs_the_tests_and_nothing_else() -> None:
-    """A new release of a checker of types or style must not stop a new user's tests."""
-    text = (ROOT / "Makefile").read_text("utf-8")
-    recipes = dict(re.findall(r"^(\w+):([^\n]*\n(?:\t.*\n)*)", text, re.MULTILINE))
-    assert "lint" not in recipes["test"]
-    assert all(step in recipes["check"] for step in ("lint", "test"))
-    steps = re.findall(r"^(?:exec )?make (.*)$", (ROOT / ".ci/run").read_text(), re.M)
-    assert steps == ["check", "test-docs"]
-
-
-def test_the_extra_that_makes_the_site_is_part_of_that_of_the_tests() -> None:
-    extras = setup_keyword("extras_require")
-    assert {*extras["docs"]} <= {*extras["test"]}
-
-
-def test_types_of_untyped_libraries_are_told_of_libraries_that_are_used() -> None:
-    """The list in pyproject.toml, of modules that mypy need not find."""
-    text = (ROOT / "pyproject.toml").read_text("utf-8")
-    (listed,) = re.findall(r"module = \[\n(.*?)\]\nignore_missing_imports", text, re.DOTALL)
-    untyped = {PYPI.get(name, name) for name in re.findall(r'"(\w+)\.\*"', listed)}
-    messages = {topic.type.split("/")[0] for topic in (*topics.ALL, topics.DIAGNOSTICS)}
-    assert untyped - messages <= third_party_imports() | dependencies("exec_depend") | {
-        "daqp",  # of an example
-        "mujoco",
-        "pin",
-    }
-
-
 def test_package_xml_has_what_setup_py_requires() -> None:
     """By its rosdep key, or in the comment on those that have none."""
     from_rosdep = {name for name in dependencies("exec_depend") if name.startswith("python3-")}
@@ -219,21 +189,10 @@ def test_package_xml_has_the_packages_of_all_messages() -> None:
     assert "ros-jazzy-rclpy" in wheels
 
 
-def test_package_xml_has_what_the_launch_files_import() -> None:
+def test_package_xml_has_what_launch_files_import_and_tests_need() -> None:
     assert imports_of((ROOT / "launch").glob("*.py")) <= dependencies("exec_depend")
-
-
-def test_tests_depend_on_what_setup_py_says() -> None:
     tested = packages(setup_keyword("extras_require")["test"])
     assert {name.removeprefix("python3-") for name in dependencies("test_depend")} <= tested
-
-
-def test_the_recipe_for_apt_takes_its_packages_from_setup_py() -> None:
-    """No list of packages in the page for ROS users that could grow stale."""
-    text = (ROOT / "docs/manual/ros.md").read_text("utf-8")
-    (installed,) = re.findall(r"pip install (.*?) &&", text)
-    assert installed == '"./src/space_robot[apt]"'
-    assert "apt" in setup_keyword("extras_require")
 
 
 def test_there_is_one_executable_for_each_command_and_node() -> None:

@@ -10,9 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 import yaml
-from shown import ROOT, block, check, differences, run
-
-from space_robot import load_bag
+from shown import NUMBER, ROOT, block, check, run, step
 
 
 @pytest.fixture(scope="module")
@@ -118,69 +116,34 @@ def test_the_page_on_stability_has_the_numbers_of_its_command() -> None:
     eigenvalues = [axis["value"] for axis in lmi["residual_of_paper_m_at_beta_0_gamma_0"]]
     gammas = [axis["gamma"] for axis in lmi["assumed_beta_half_of_tolerated"]]
     without_friction = [beta / k_2 for beta, k_2 in zip(unlike, twisting["k_2"], strict=True)]
-    shown = block(
-        "docs/explanation/stability.md", "| Lemma 1, spectral norm", "| reaching time below (56)"
-    )
-    assert not [
-        *differences(
-            shown,
-            [
-                f"| Lemma 1, spectral norm of $W$ below 1 | fails: "
-                f"{lemma['spectral_norm']['max']:.3f} |",
-                f"| the same with the spectral radius | holds: "
-                f"{lemma['spectral_radius']['max']:.3f} |",
-                r"| $K_2 > \beta$, also circle criterion (73) | fails on every axis, by factors of "
-                f"{min(excess):.0f} to {max(excess):.0f}; without friction by "
-                f"{min(without_friction):.0f} to {max(without_friction):.0f} |",
-                "| $K_1^2 > 4K_2$ | holds on every axis |",
-                f"| LMI (51) with the $M$ of (48) | fails: largest eigenvalue "
-                f"{min(eigenvalues):.2f} to "
-                rf"{max(eigenvalues):.2f}, with $\beta = \gamma = 0$ |",
-                r"| LMI (51) with $M$ free, $\beta$ measured | no $\gamma$ |",
-                rf"| the same, $\beta = K_2/2$ | $\gamma$ {min(gammas):.4f} (base) to "
-                rf"{max(gammas):.3f} |",
-                r"| reaching time below (56) for $\beta = K_2/2$ | not applicable: the flight "
-                r"exceeds that "
-                rf"$\beta$ on every axis. It arrives within {max(t for t, _ in base):.1f} s "
-                rf"(base) and "
-                f"{min(t for t, _ in joints):.2f} to {max(t for t, _ in joints):.2f} s "
-                f"(joints), the "
-                f"bounds would be {min(limit for _, limit in base):.0f} and "
-                f"{min(limit for _, limit in joints):.0f} to "
-                f"{max(limit for _, limit in joints):.0f} s |",
-            ],
-        )
+    expected: list[list[float]] = [
+        [lemma["spectral_norm"]["max"]],
+        [lemma["spectral_radius"]["max"]],
+        [min(excess), max(excess), min(without_friction), max(without_friction)],
+        [],
+        [min(eigenvalues), max(eigenvalues), 0.0],
+        [],
+        [min(gammas), max(gammas)],
+        [
+            max(t for t, _ in base),
+            *(pick(t for t, _ in joints) for pick in (min, max)),
+            min(limit for _, limit in base),
+            *(pick(limit for _, limit in joints) for pick in (min, max)),
+        ],
     ]
-    verdicts = [axis["holds"] for axis in twisting["4_k_2_below_k_1_squared"]]
-    assert all(verdicts)
+    first, last = "| Lemma 1, spectral norm", "| reaching time below (56)"
+    rows = block("docs/explanation/stability.md", first, last)
+    for row, computed in zip(rows, expected, strict=True):
+        shown = NUMBER.findall(row.split("|")[2])
+        assert [float(text) for text in shown] == [
+            pytest.approx(number, abs=1.51 * step(text))  # one in the last place
+            for text, number in zip(shown, computed, strict=True)
+        ]
+    assert lemma["spectral_norm"]["max"] > 1.0 > lemma["spectral_radius"]["max"]
+    assert all(axis["holds"] for axis in twisting["4_k_2_below_k_1_squared"])
     assert not any(axis["applies"] for axis in bounds)
     assert not any(axis["holds"] for axis in twisting["beta_below_k_2"])
     assert set(lmi["measured_beta"]) == {None}
-
-
-def test_the_first_difference_of_the_page_on_replay_is_that_of_the_two_gains(
-    tmp_path: Path,
-) -> None:
-    """Until tick 1 both flights are the same, so a replay sees what the second one flies."""
-    options = ("simulate", "--duration", "0.001", "--bag")
-    run(*options, str(tmp_path / "mine"))
-    gains = (ROOT / "config/gains/paper/printed/tde_stc.yaml").read_text("utf-8")
-    (tmp_path / "tde_stc.yaml").write_text(
-        re.sub(r"k_1: \[.*?\]", f"k_1: {[0.2] * 9}", gains, flags=re.DOTALL)
-    )
-    run(*options, str(tmp_path / "other"), "--gains", str(tmp_path / "tde_stc.yaml"))
-    recorded, replayed = (load_bag(tmp_path / name).commanded_torque for name in ("mine", "other"))
-    assert np.array_equal(recorded[0], replayed[0])
-    (first,) = np.flatnonzero(recorded[1] != replayed[1])[:1]
-    difference = replayed[1, first] - recorded[1, first]
-    (line,) = block("docs/manual/replay.md", "effort[joint4]", "effort[joint4]")
-    name, *shown = line.split()
-    assert name == f"effort[{load_bag(tmp_path / 'mine').joint_names[first - 3]}]"
-    assert [float(text) for text in shown] == [
-        pytest.approx(recorded[1, first], rel=1e-9),
-        pytest.approx(replayed[1, first], rel=1e-9),
-        pytest.approx(difference, abs=0.005e-6),
-    ]
 
 
 METRICS = ("attitude_rms", "joints_4_6_rms", "ripple_base_torque")
@@ -211,24 +174,6 @@ def test_the_page_on_real_spacecraft_has_what_its_commands_give(tmp_path: Path) 
         ]
         shown = [float(text) for text in row.group(1).split("|")]
         np.testing.assert_allclose(shown, medians, rtol=0.06)
-
-
-def test_the_page_on_real_spacecraft_has_the_tools_errors(tmp_path: Path) -> None:
-    """Two laws with ideal sensors, which have no seeds, by its commands."""
-    file, folder = tmp_path / "tool.yaml", tmp_path / "campaign"
-    content = yaml.safe_load((ROOT / "config/campaigns/tool_errors.yaml").read_text("utf-8"))
-    content["laws"] = ["ctc=tuned", "tde_stc"]
-    content["vary"]["scenario.sensors"] = {"grid": ["ideal"]}
-    file.write_text(yaml.safe_dump(content), "utf-8")
-    run("campaign", "run", str(file), "--runs", "1", "--out", str(folder), "--workers", "0")
-    report = json.loads(run("campaign", "report", str(folder), "--metric=tool_max", "--json"))
-    page = (ROOT / "docs/explanation/real_spacecraft.md").read_text("utf-8")
-    (row,) = re.findall(r"^\| ideal \|(.*)\|$", page.split("## The tool")[1], re.MULTILINE)
-    shown = dict(zip(("ctc=tuned", "tde_stc"), row.split("|")[::4], strict=True))
-    (league,) = report["leagues"]
-    for standing in league["standings"]:
-        median = standing["median"]["value"]
-        assert median == pytest.approx(float(shown[standing["law"]]), rel=0.02)
 
 
 def test_the_page_on_campaigns_has_what_its_commands_print(tmp_path: Path) -> None:

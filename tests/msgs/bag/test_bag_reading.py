@@ -23,9 +23,7 @@ from bags import (
     rosbags_bag,
     within,
 )
-from mcap.reader import make_reader
 from mcap.writer import CompressionType
-from mcap.writer import Writer as McapWriter
 from paths import DATA
 from rosbags.rosbag2 import CompressionFormat, CompressionMode, Reader, Writer
 
@@ -300,27 +298,18 @@ def test_a_flight_by_any_clock_begins_with_its_first_state(
 
 def test_latency_is_the_time_between_the_senders(recorded: Recorded, tmp_path: Path) -> None:
     assert recorded.log.latency_s is None
-    rng, sent = np.random.default_rng(1), {"/base/state": 0, "/command": 0}
-    delays = rng.integers(100_000, 900_000, 200)
-    with (tmp_path / "x.mcap").open("wb") as file, recorded.file.open("rb") as source:
-        writer = McapWriter(file)
-        writer.start("ros2")
-        channels: dict[str, int] = {}
-        for schema, channel, message in make_reader(source).iter_messages(log_time_order=False):
-            assert schema
-            topic, publish = channel.topic, message.log_time + 5_000_000_000
-            if topic not in channels:
-                number = writer.register_schema(schema.name, "ros2msg", schema.data)
-                channels[topic] = writer.register_channel(topic, "cdr", number)
-            if topic in sent:
-                tick, sent[topic] = sent[topic], sent[topic] + 1
-                if topic == "/command":
-                    publish += int(delays[tick])
-                    if tick == 7:
-                        continue
-            writer.add_message(channels[topic], message.log_time, message.data, publish)
-        writer.finish()
-    log = read_flight(tmp_path / "x.mcap")
+    delays = np.random.default_rng(1).integers(100_000, 900_000, 200)
+    recorder, answered = BagRecorder(tmp_path / "bag", FLIGHT, TIMEBASE), 0
+    for topic, data in messages_of(recorded.folder):
+        published = TIMEBASE.period_ns * answered + 5_000_000_000
+        if topic is topics.COMMAND:
+            published += int(delays[answered])
+            answered += 1
+            if answered == 8:
+                continue
+        recorder.record(topic, data, published)
+    recorder.close()
+    log = read_flight(tmp_path / "bag")
     assert log.latency_s is not None
     assert log.commanded_torque is not None
     expected = delays * 1e-9

@@ -17,7 +17,6 @@ from bags import (
     FLIGHT,
     TIMEBASE,
     Recorded,
-    assert_nothing_is_hidden,
     assert_rows_are_the_originals,
     chunks_of,
     entries_of,
@@ -47,36 +46,23 @@ def recorded(tmp_path_factory: pytest.TempPathFactory) -> Recorded:
 
 @pytest.fixture
 def bag(recorded: Recorded, tmp_path: Path) -> Path:
-    return recorded.copy(tmp_path / "bag")
+    return Path(shutil.copytree(recorded.folder, tmp_path / "bag"))
 
 
-def _flip(file: Path, *places: int) -> None:
-    content = bytearray(file.read_bytes())
-    for place in places:
-        content[place] ^= 0x10
-    file.write_bytes(content)
+def _flip(at: Callable[[Path], int]) -> Callable[[Path], None]:
+    """A bit of one byte of the bag's file."""
 
-
-def _flip_chunk(which: int) -> Callable[[Path], None]:
     def harm(bag: Path) -> None:
-        start, length = chunks_of(bag)[which]
-        _flip(mcap_file(bag), start + length // 2)
+        content = bytearray(mcap_file(bag).read_bytes())
+        content[at(bag)] ^= 0x10
+        mcap_file(bag).write_bytes(content)
 
     return harm
 
 
-def _rewrite(change: Callable[[bytes, int, int], bytes]) -> Callable[[Path], None]:
-    """Of the file's bytes and where its second and third chunk begin."""
-
-    def harm(bag: Path) -> None:
-        (one, _), (two, _) = chunks_of(bag)[1:3]
-        mcap_file(bag).write_bytes(change(mcap_file(bag).read_bytes(), one, two))
-
-    return harm
-
-
-def _metadata(content: bytes) -> Callable[[Path], object]:
-    return lambda bag: (bag / METADATA).write_bytes(content)
+def _last_chunk(bag: Path) -> int:
+    start, length = chunks_of(bag)[3]
+    return start + length // 2
 
 
 def _edit(change: Callable[[dict[str, Any]], object]) -> Callable[[Path], None]:
@@ -93,89 +79,64 @@ def _joints_count(information: dict[str, Any]) -> None:
         entry["message_count"] -= entry["topic_metadata"]["name"] == "/joint_states"
 
 
-def _many_topics(information: dict[str, Any]) -> None:
-    topic = {"type": "std_msgs/msg/String", "serialization_format": "cdr"}
-    information["topics_with_message_count"] += [
-        {"topic_metadata": {"name": f"/t{k}", **topic}, "message_count": 1} for k in range(1000)
-    ]
-
-
 def _second_file(information: dict[str, Any]) -> None:
     information["relative_file_paths"].append("bag_1.mcap")
     for entry in information["topics_with_message_count"]:
         entry["message_count"] *= 2
 
 
-NONE = range(0)
-DAMAGES: dict[str, tuple[Callable[[Path], object], range, list[str]]] = {
-    **{
-        f"chunk {k}": (
-            _flip_chunk(k),
-            range(100 * k, 100 * k + 100),
-            ["bag_0.mcap: unreadable at byte ", "messages cannot be read", "/joint_states 100"],
-        )
-        for k in (1, 3)
-    },
-    "gap": (_flip_chunk(1), range(100, 200), ["100 of 400 ticks lack", "t = 0.0500 to 0.0995 s"]),
-    "index": (
-        lambda bag: _flip(mcap_file(bag), mcap_file(bag).stat().st_size - 60),
-        NONE,
-        ["bag_0.mcap: its index cannot be read (CRC)"],
+DAMAGES: dict[str, tuple[Callable[[Path], object], list[str]]] = {
+    "last chunk": (
+        _flip(_last_chunk),
+        ["bag_0.mcap: unreadable at byte ", "messages cannot be read", "/joint_states 100"],
     ),
-    "footer": (_rewrite(lambda b, *_: b[:-40]), NONE, ["the bag was not finished"]),
-    "no text": (_metadata(b"\xff\xfe\x00"), NONE, [METADATA]),
-    "empty": (_metadata(b""), NONE, [METADATA]),
-    "no YAML": (_metadata(b"a: ["), NONE, [METADATA]),
-    "odd key": (_metadata(b"? [a]\n: b"), NONE, [METADATA]),
-    "deep": (_metadata(b"[" * 9000), NONE, [METADATA]),
+    "index": (_flip(lambda bag: -60), ["bag_0.mcap: its index cannot be read (CRC)"]),
+    "footer": (
+        lambda bag: mcap_file(bag).write_bytes(mcap_file(bag).read_bytes()[:-40]),
+        ["the bag was not finished"],
+    ),
+    "no text": (lambda bag: (bag / METADATA).write_bytes(b"\xff\xfe\x00"), [METADATA]),
+    "odd key": (lambda bag: (bag / METADATA).write_bytes(b"? [a]\n: b"), [METADATA]),
+    "deep": (lambda bag: (bag / METADATA).write_bytes(b"[" * 9000), [METADATA]),
     "count": (
         _edit(_joints_count),
-        NONE,
         ["metadata.yaml: 399 messages on /joint_states, but 400 in the bag"],
     ),
-    "topics": (_edit(_many_topics), NONE, ["so it is with 988 more topics"]),
     "duration": (
         _edit(lambda i: i.update(duration={"nanoseconds": 5_000_000_000})),
-        NONE,
         ["metadata.yaml: messages from 0 to 5 s, but 0 to 0.1995 s in the bag"],
     ),
     "version": (
         _edit(lambda i: i.update(version=99)),
-        NONE,
         ["metadata.yaml: version 99, known are 1 to 9: read as one of those"],
     ),
     "another file": (
         lambda bag: shutil.copy(mcap_file(bag), bag / "other.mcap"),
-        NONE,
         ["metadata.yaml does not name other.mcap: left out"],
     ),
     "renamed": (
         lambda bag: mcap_file(bag).rename(bag / "other.mcap"),
-        NONE,
         ["names bag_0.mcap, not there"],
     ),
-    "split": (_edit(_second_file), NONE, ["bag_1.mcap, not there", "/joint_states 400"]),
+    "split": (_edit(_second_file), ["bag_1.mcap, not there", "/joint_states 400"]),
 }
-"""How each bag is broken, the ticks that are gone, and what is told."""
+"""How each bag is broken, and what is told."""
 
 
 @pytest.mark.parametrize("kind", DAMAGES)
 def test_what_is_readable_is_read_and_the_rest_told(
     recorded: Recorded, bag: Path, kind: str
 ) -> None:
-    harm, gone, words = DAMAGES[kind]
+    harm, words = DAMAGES[kind]
     harm(bag)
     log = read_flight(bag)
-    whole = np.ones(400, np.bool_)
-    whole[gone.start : gone.stop] = False
-    np.testing.assert_array_equal(log.whole, whole[: log.ticks])
-    assert log.ticks == (300 if gone.stop == 400 else 400)
+    assert log.whole.all()
+    assert log.ticks == (300 if kind == "last chunk" else 400)
     assert_rows_are_the_originals(log, recorded.log)
     told = [*log.damage, log.unfinished]
     assert bool(log.unfinished) == (kind == "footer")
-    assert len(told) < 20
     assert all(any(word in text for text in told) for word in words), told
-    lost = len(gone) + 400 * (kind == "split")
+    lost = {"last chunk": 100, "split": 400}.get(kind, 0)
     for topic in (topics.JOINT_STATES, topics.BASE_STATE, topics.COMMAND):
         assert log.lost[topic.full_name] == lost
     assert log.flight == FLIGHT
@@ -184,14 +145,14 @@ def test_what_is_readable_is_read_and_the_rest_told(
 # Refused in one line
 
 
-def _error(path: Path, **options: Any) -> str:
+def _error(path: Path) -> str:
     with pytest.raises(InputError) as caught:
-        read_flight(path, **options)
+        read_flight(path)
     line = str(caught.value)
-    assert str(path) in line
     assert "\n" not in line
     assert len(line) < 500
-    return line.removeprefix(f"{path}: ")
+    assert str(path) in line
+    return line
 
 
 def _file(name: str, content: bytes = b"") -> Callable[[Path], Path]:
@@ -202,30 +163,16 @@ def _file(name: str, content: bytes = b"") -> Callable[[Path], Path]:
     return make
 
 
-def _database(folder: Path) -> Path:
-    with sqlite3.connect(folder / "y.db3") as database:
-        database.execute("CREATE TABLE notes(id INTEGER)")
-    return folder / "y.db3"
-
-
-def _own(*messages: tuple[topics.Topic, bytes]) -> Callable[[Path], Path]:
-    def make(folder: Path) -> Path:
-        recorder = BagRecorder(folder / "own", FLIGHT, TIMEBASE)
-        for message in messages:
-            recorder.record(*message)
-        recorder.close()
-        return folder / "own"
-
-    return make
-
-
-def _without_file(folder: Path) -> Path:
-    mcap_file(folder / "bag").unlink()
-    return folder / "bag"
+def _own(folder: Path) -> Path:
+    recorder = BagRecorder(folder / "own", FLIGHT, TIMEBASE)
+    recorder.record(topics.CLOCK, ClockCodec().encode(0))
+    recorder.close()
+    return folder / "own"
 
 
 def _folder_for_file(folder: Path) -> Path:
-    (_without_file(folder) / "bag_0.mcap").mkdir()
+    mcap_file(folder / "bag").unlink()
+    (folder / "bag/bag_0.mcap").mkdir()
     return folder / "bag"
 
 
@@ -242,12 +189,6 @@ def _write(path: Path, entries: list[tuple[str, str, str, bytes]]) -> Path:
     return path
 
 
-def _ten_thousand(folder: Path) -> Path:
-    names = [f"/topic_{k:05}" for k in range(10_000)]
-    data = b"\0\1\0\0\1\0\0\0\0"
-    return _write(folder / "x.mcap", [(n, "std_msgs/msg/String", "cdr", data) for n in names])
-
-
 @pytest.mark.parametrize(
     ("make", "told"),
     [
@@ -255,18 +196,9 @@ def _ten_thousand(folder: Path) -> Path:
         (lambda folder: folder, "not a bag folder"),
         (_file("notes.txt", b"no bag"), "neither .mcap nor .db3"),
         (_file("x.mcap"), "no messages on /joint_states"),
-        (_file("x.mcap", b"no bag at all"), "no messages on /joint_states"),
-        (_file("x.mcap", bytes(range(256)) * 12), "no messages on /joint_states"),
         (_file("x.db3", b"SQLite format 3\0" + bytes(4000)), "cannot be read"),
-        (_database, "cannot be read"),
-        (_without_file, "names bag_0.mcap, not there"),
         (_folder_for_file, "cannot be read (Is a directory)"),
-        (_own(), "no messages on /joint_states (no topic of it has any)"),
-        (
-            _own((topics.CLOCK, ClockCodec().encode(0))),
-            "no messages on /joint_states (it has /clock)",
-        ),
-        (_ten_thousand, "/topic_00010, /topic_00011, and 9,988 more)"),
+        (_own, "no messages on /joint_states (it has /clock)"),
     ],
 )
 def test_what_is_no_bag_is_told_in_a_line(
@@ -442,4 +374,5 @@ def test_a_bag_broken_by_chance_is_read_truly_or_refused(
     (folder / METADATA).write_bytes(contents["yaml"])
     if log := read_or_refused(folder):
         assert_rows_are_the_originals(log, short.log)
-        assert_nothing_is_hidden(log, short.log)
+        is_whole = log.ticks == short.log.ticks and log.whole.all()
+        assert is_whole or log.damage or log.unfinished, "what is missing is told"

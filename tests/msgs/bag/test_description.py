@@ -35,19 +35,12 @@ MODULE = "this"
 """Importing it prints, and it is in no one's way."""
 PLAN = FlightPlan(duration=0.02, swaps=["0.005:ctc"], case="3", actuators="wheels")
 DESCRIPTION = json.dumps(Flight(resolve(PLAN)).description)
-MARKUP = (r"$\frac$", "[/red]", "$", "_x", ":smile:", "<b>&amp;", "[bold]", "\\", "{}", "%s", "夏")
-NUMBERS = [0, -1, 1e300, 1e-300, 10**400, float("nan"), float("inf"), -0.0, 2**64]
-NAMES = [
-    "ctc",
-    "tde_stc",
-    "seven_joint",
-    "nan",
-    "0.01:ctc",
-    "default",
-    "/etc/passwd",
-    "../../x.yaml",
-]
-TEXTS = [*MARKUP, *NAMES, "", "..", "a" * 400, "\x1b[31m", "\ud800", "\x00", f"0.1:{MODULE}:X"]
+TEXTS = (
+    *(r"$\frac$", "[/red]", "$", ":smile:", "<b>&amp;", "[bold]", "\\", "{}", "%s", "夏"),
+    *("ctc", "seven_joint", "nan", "0.01:ctc", "/etc/passwd", "../../x.yaml", "", ".."),
+    *("a" * 400, "\x1b[31m", "\ud800", "\x00", f"0.1:{MODULE}:X"),
+)
+NUMBERS = (0, -1, 1e300, 1e-300, 10**400, float("nan"), float("inf"), -0.0, 2**64)
 scalars = st.one_of(
     st.none(),
     st.booleans(),
@@ -148,24 +141,11 @@ def test_what_is_no_json_is_told(bag: Path, text: str) -> None:
     "changes",
     [
         {"period": 0},
-        {"period": float("nan")},
-        {"period": "abc"},
         {"period": 1e300},
-        {"period": True},
-        {"parameters": None},
-        {"parameters": []},
         {"parameters": {"plant": 3}},
-        {"gains_used": None},
-        {"gains_used": {"h_bar": "x"}},
         {"gains_used": {"h_bar": [[1]]}},
-        {"robot_file": []},
-        {"swaps": "0.1:ctc"},
         {"swaps": [1]},
-        {"faults": None},
-        {"case": 3},
-        {"controller": ["tde_stc"]},
         {"command_latency_ticks": "2"},
-        {"realtime": "no"},
     ],
 )
 def test_each_wrong_key_is_named_in_a_line(bag: Path, changes: dict[str, Any]) -> None:

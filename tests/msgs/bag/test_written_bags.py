@@ -229,18 +229,6 @@ def test_no_place_for_the_next_file_keeps_those_before(messages: Messages, tmp_p
     assert 0 < recorder.kept_tick == read_flight(bag).ticks - 1
 
 
-def test_publish_time_is_the_senders(messages: Messages, tmp_path: Path) -> None:
-    recorder = BagRecorder(tmp_path / "bag", FLIGHT, TIMEBASE)
-    for number, (topic, data) in enumerate(messages[:50]):
-        recorder.record(topic, data, 10**18 + number if number % 2 else 0)
-    recorder.close()
-    with _files(tmp_path / "bag")[0].open("rb") as stream:
-        sent = [m for _, _, m in make_reader(stream).iter_messages(log_time_order=False)]
-    for number, message in enumerate(sent):
-        known = 10**18 + number
-        assert message.publish_time == (known if number % 2 else message.log_time)
-
-
 def test_recorder_counts_what_is_missing_and_drops_what_is_repeated(tmp_path: Path) -> None:
     recorder = BagRecorder(tmp_path / "bag", {}, TIMEBASE)
     codec, state = StateCodec(RobotNames.of(("j",)), TIMEBASE), RobotState.allocate(1)
