@@ -8,13 +8,11 @@ import resource
 import shutil
 import signal
 import time
-from collections import defaultdict
 from pathlib import Path
 from typing import Any
 
 import psutil
 import pytest
-from bags import messages_of
 from flights import PausedFlight, forked_space_robot, space_robot_here
 
 from space_robot.flight.graph import simulation_calls
@@ -124,29 +122,6 @@ def test_recorder_without_its_folder_says_so(tmp_path: Path, free_domain: int) -
     assert code != 0
     assert "removed or moved" in errors
     assert not flight.bag.exists()
-
-
-def test_diverging_flight_ends_with_its_tick_and_all_messages(tmp_path: Path) -> None:
-    """Those of the flight in one process, to the last byte."""
-    bags = {name: tmp_path / name for name in ("fly", "simulate")}
-    found: dict[str, dict[str, list[bytes]]] = {}
-    for command, bag in bags.items():
-        how = ("--composed",) if command == "fly" else ()
-        options = ("--gains", "printed", "--swap", "0.1:ctc", "--json", *how)
-        result = space_robot_here(command, *options, "--bag", str(bag))
-        assert result.returncode == 1
-        assert "diverged at tick 209 (t = 0.1045 s)" in result.stderr
-        assert "Traceback" not in result.stderr
-        report = json.loads(result.stdout)
-        assert report["diverged"]["tick"] == report["ticks"] == 209
-        assert (report["outcome"], report["ended_at_s"]) == ("diverged", 0.1045)
-        found[command] = defaultdict(list)
-        for topic, data in messages_of(bag):
-            found[command][topic.full_name].append(data)
-    for topic, messages in found["simulate"].items():
-        sent = found["fly"][topic]
-        # the mission sends ahead of need
-        assert messages == (sent[: len(messages)] if topic.startswith("/reference/") else sent)
 
 
 def test_nodes_of_a_killed_command_close_the_bag_and_the_next_flight_has_the_domain(
