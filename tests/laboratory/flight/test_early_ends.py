@@ -18,6 +18,7 @@ from flights import forked_space_robot, planned
 from matrix.scenarios import difference
 
 from space_robot.analysis import analyze
+from space_robot.flight import compilation
 from space_robot.flight.bag_path import check_bag_path, default_bag
 from space_robot.flight.ending import COMPLETE, DIVERGED, FAILED, UNANSWERED, Ending
 from space_robot.flight.plan import Flight
@@ -163,7 +164,18 @@ def test_a_bag_is_never_overwritten_and_looking_leaves_nothing(tmp_path: Path) -
         assert str(caught.value).isprintable()
 
 
+def test_the_output_of_a_command_that_compiles_stays_clean(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    with compilation.compiling("nothing"):
+        pass
+    captured = capsys.readouterr()
+    assert captured.out == ""
+    assert captured.err.startswith("compiling nothing (once an installation")
+
+
 # Long ones
+
 
 def test_the_longest_flight_flies_and_can_be_interrupted(tmp_path: Path) -> None:
     """It ended in a traceback before its first tick."""
