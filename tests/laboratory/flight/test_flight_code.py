@@ -110,28 +110,6 @@ def test_the_node_answers_in_c_and_compares(fly: Callable[..., Flown]) -> None:
     assert difference(read_flight(fly(*options).bag), expected, {"telemetry"}) == ""
 
 
-def test_a_compiler_that_fuses_products_and_sums_is_found_out(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Flags and a pragma forbid it; here they are taken out."""
-    cpu = Path("/proc/cpuinfo")
-    if not shutil.which("gcc") or not cpu.exists() or " fma" not in cpu.read_text():
-        pytest.skip("no gcc, or no processor with fused multiply-add")
-    compiler = tmp_path / "fusing"
-    compiler.write_text(
-        "#!/bin/sh\nfor word; do case $word in */src/*.c) "
-        'sed -i "/#pragma GCC/d" "${word%/*}/kernels.h";; esac; done\n'
-        'exec gcc "$@" -mfma -ffp-contract=fast\n'
-    )
-    compiler.chmod(0o755)
-    monkeypatch.setenv("CC", str(compiler))
-    bag = tmp_path / "bag"
-    ran = space_robot_here("simulate", "--shadow", "c", "--duration", "0.2", "--bag", str(bag))
-    assert ran.returncode == 1
-    assert re.search(r"at tick \d+ the command of \w+ is \S+ in Python and \S+ in C", ran.stderr)
-    assert read_flight(bag, trust=True).ticks < 400
-
-
 @pytest.fixture(scope="module")
 def flight_computer(tmp_path_factory: pytest.TempPathFactory) -> Iterator[int]:
     """The example's program for `HARD`, running; its port."""
