@@ -19,7 +19,6 @@ from matrix.scenarios import difference
 from paths import ROOT
 
 from space_robot.export.software import export
-from space_robot.flight.bench import check_for_bench
 from space_robot_control.flight_code.compiler import write_sources
 from space_robot_control.flight_code.library import FlightLibrary
 from space_robot_control.flight_code.remote import BEGIN, FlightComputer
@@ -98,8 +97,6 @@ def nothing(signals: Any) -> Any:
 def test_what_cannot_answer_is_refused(options: dict[str, Any], said: str) -> None:
     with pytest.raises((InputError, ValueError), match=said):
         flown(**options)
-    with pytest.raises(InputError, match="on the bench are no messages"):
-        check_for_bench(planned(shadow="c"))
 
 
 @needs_compiler

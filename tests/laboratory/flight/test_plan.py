@@ -20,7 +20,6 @@ from pydantic import BaseModel
 from robots import PASSIVE_ROBOT
 from rosbags.highlevel import AnyReader
 
-from space_robot.cli.numbers import FiniteRange
 from space_robot.flight.flown_log import empty_log
 from space_robot.flight.graph.orchestrator import flight_parameters
 from space_robot.flight.plan import Flight, FlightPlan, resolve
@@ -368,9 +367,3 @@ def test_the_latest_time_is_a_flight_and_a_later_one_is_refused(key: str, text: 
     assert is_refused({key: [text.format("1.1e9")]})
     assert is_refused({key: [text.format("1e308")]})
     assert key == "events" or not is_refused({key: [text.format("1e9")]})
-
-
-@pytest.mark.parametrize("given", ["nan", "inf", "-inf", "1e400"])
-def test_no_option_takes_a_number_that_is_not_finite(given: str) -> None:
-    with pytest.raises(Exception, match=r"not a finite number|is not in the range"):
-        FiniteRange(0.0).convert(given, None, None)

@@ -10,7 +10,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any
@@ -83,13 +83,6 @@ def server() -> Iterator[ForkServer]:
     server.close()
 
 
-def wait_for(condition: Callable[[], bool]) -> None:
-    until = time.monotonic() + TIMEOUT_S
-    while not condition():
-        assert time.monotonic() < until
-        time.sleep(0.005)
-
-
 def test_children_talk_to_the_process_that_asked_for_them_and_end_with_the_server(
     server: ForkServer,
 ) -> None:
@@ -132,7 +125,10 @@ def test_the_exit_code_is_the_childs_and_stays(server: ForkServer) -> None:
     other, to_other = server.fork()
     to_other.send(3)
     for child, code in ((pid, -signal.SIGTERM), (other, 3)):
-        wait_for(lambda child=child: server.exit_code(child) is not None)
+        until = time.monotonic() + TIMEOUT_S
+        while server.exit_code(child) is None:
+            assert time.monotonic() < until
+            time.sleep(0.005)
         assert [server.exit_code(child), server.exit_code(child), server.end(child)] == [code] * 3
         assert not psutil.pid_exists(child)
 
