@@ -1,4 +1,4 @@
-"""One resolved plan: what is set by any way, of any number, is flown, sent to nodes, told in bags."""
+"""One resolved plan: what is set is flown, sent to the nodes and told in bags, any number of it."""
 
 from __future__ import annotations
 
