@@ -14,9 +14,7 @@ from paths import CONFIG
 from robots import held_place, meeting_target, target_of
 
 from space_robot.analysis import analyze
-from space_robot.analysis.described import captures_of
 from space_robot.analysis.figures.single_flight import control_results
-from space_robot.analysis.missed_captures import MissedCaptures
 from space_robot.analysis.words import remarks
 from space_robot.flight.simulate import simulate
 from space_robot_msgs_py.bag.flight_log import FlightLog
@@ -167,11 +165,6 @@ def test_what_is_missed_leaves_every_bit_and_is_reported(
     assert plain["missed_captures"] is None
     same = ("rms", "maxima", "momentum", "pointing", "tool", "sizing")
     assert [report[key] for key in same] == [plain[key] for key in same]
-    for cuts in ((CAPTURE,), (CAPTURE + 1,), (1, 150, 300, 599)):  # whatever the blocks
-        metric = MissedCaptures(captures_of(log))
-        for start, stop in zip((0, *cuts), (*cuts, log.ticks), strict=True):
-            metric.add(log.rows(start, stop), np.empty(0))
-        assert metric.result() == report["missed_captures"]
     short = flown(orbit=ORBIT, events=events_of(target, 0.25), duration=0.05)
     assert analyze(short)["missed_captures"] == {}
 

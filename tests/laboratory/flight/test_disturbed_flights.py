@@ -190,23 +190,6 @@ def test_a_case_may_name_a_table_beside_it(file: Path, tmp_path: Path) -> None:
     assert scenario.replace(disturbance=other).resolved()["disturbance"] == other
 
 
-def test_campaigns_vary_its_scale(tmp_path: Path) -> None:
-    """The rows of a function are those of its numbers."""
-    tables = []
-    for number, disturbance in enumerate((wind, COLUMNS)):
-        study = {
-            "laws": ["ctc"],
-            "scenario": {"disturbance": disturbance, "duration": DURATION},
-            "vary": {"plant.disturbance.table_scale": {"uniform": [0.5, 2.0]}},
-            "runs": 3,
-        }
-        flown = sr.Campaign.of(study).run(out=tmp_path / str(number), workers=0)
-        assert list(flown.table["outcome"]) == ["complete"] * 3
-        tables.append(flown.table)
-    assert tables[0].equals(tables[1])
-    assert len(set(tables[0].iloc[:, -1])) == 3
-
-
 def in_plant(name: str, value: Any) -> dict[str, Any]:
     return {"parameters": {"plant": {name: value}}}
 

@@ -19,7 +19,6 @@ from matrix.scenarios import difference
 from paths import ROOT
 
 from space_robot.export.software import export
-from space_robot.flight.bench import check_for_bench
 from space_robot_control.flight_code.compiler import write_sources
 from space_robot_control.flight_code.library import FlightLibrary
 from space_robot_control.flight_code.remote import BEGIN, FlightComputer
@@ -98,8 +97,6 @@ def nothing(signals: Any) -> Any:
 def test_what_cannot_answer_is_refused(options: dict[str, Any], said: str) -> None:
     with pytest.raises((InputError, ValueError), match=said):
         flown(**options)
-    with pytest.raises(InputError, match="on the bench are no messages"):
-        check_for_bench(planned(shadow="c"))
 
 
 @needs_compiler
@@ -108,28 +105,6 @@ def test_the_node_answers_in_c_and_compares(fly: Callable[..., Flown]) -> None:
     options = ("--duration", "0.1", "--swap", "0.05:ctc", "--shadow", "c", "--composed")
     expected = flown(duration=0.1, swaps=["0.05:ctc"])
     assert difference(read_flight(fly(*options).bag), expected, {"telemetry"}) == ""
-
-
-def test_a_compiler_that_fuses_products_and_sums_is_found_out(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Flags and a pragma forbid it; here they are taken out."""
-    cpu = Path("/proc/cpuinfo")
-    if not shutil.which("gcc") or not cpu.exists() or " fma" not in cpu.read_text():
-        pytest.skip("no gcc, or no processor with fused multiply-add")
-    compiler = tmp_path / "fusing"
-    compiler.write_text(
-        "#!/bin/sh\nfor word; do case $word in */src/*.c) "
-        'sed -i "/#pragma GCC/d" "${word%/*}/kernels.h";; esac; done\n'
-        'exec gcc "$@" -mfma -ffp-contract=fast\n'
-    )
-    compiler.chmod(0o755)
-    monkeypatch.setenv("CC", str(compiler))
-    bag = tmp_path / "bag"
-    ran = space_robot_here("simulate", "--shadow", "c", "--duration", "0.2", "--bag", str(bag))
-    assert ran.returncode == 1
-    assert re.search(r"at tick \d+ the command of \w+ is \S+ in Python and \S+ in C", ran.stderr)
-    assert read_flight(bag, trust=True).ticks < 400
 
 
 @pytest.fixture(scope="module")

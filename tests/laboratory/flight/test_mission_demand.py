@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import json
 from typing import Any
 
 import numpy as np
 import pinocchio as pin
 import pytest
-from command import Run
 from flights import planned
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -26,7 +24,6 @@ from space_robot.flight.mission_demand import (
 )
 from space_robot.flight.plan import Flight, FlightPlan, resolve
 from space_robot.flight.simulate import simulate
-from space_robot.flight.start_step import sentence
 from space_robot_model.hardware.base_actuators import BaseActuatorSettings
 from space_robot_model.robot import Robot
 from space_robot_msgs_py.errors import InputError
@@ -242,23 +239,9 @@ def test_a_start_elsewhere_is_told_with_its_distance_and_torques(
     assert step["demand"] == commanded[:, axis].max() == commanded.max()
 
 
-def test_a_rate_that_the_law_has_to_brake_is_told() -> None:
-    """Not one with which the first segment begins."""
-    start = {"joints_deg": JOINTS, "base": {"rate_deg_s": [0, 3.0, 4.0]}}
-    braked, led = (
-        started(mission={"start": start, "segments": [segment]}).check().start_step
-        for segment in ({"hold": 5}, {"base": {"rpy_deg": [0, 0, 0]}, "duration": 60})
-    )
-    assert braked
-    assert braked["rate_deg_s"] == pytest.approx(5.0)
-    assert "the base's rate is 5 deg/s from where the mission begins" in sentence(braked)
-    assert led is None
-
-
 @pytest.mark.parametrize(
     "options",
     [
-        {},
         {"quaternion": [-2.0, 0.0, 0.0, 0.0]},
         {"quaternion": [0.9, 0.1, 0.0, 0.0], "actuators": "none"},
         {"joints": [*JOINTS[:5], 1e-5], "controller": "tde_stc"},
@@ -270,16 +253,3 @@ def test_where_there_is_no_step_nothing_is_said(options: Any) -> None:
     flight = started(**options).check()
     assert flight.start_step is None
     assert "start_step" not in flight.description
-
-
-def test_simulate_and_analyze_tell_the_same(space_robot: Run, tmp_path: Any) -> None:
-    joints = ",".join(map(str, [*JOINTS[:5], 5.0]))
-    flight = ("--controller", "ctc", "--duration", "0.2", "--bag", tmp_path / "bag")
-    flown = space_robot(
-        "simulate", *flight, "--set", f"plant.initial_joints_deg=[{joints}]", "--json"
-    )
-    told = json.loads(flown.out)["start_step"]
-    assert f"warning: {sentence(told)}" in flown.err.splitlines()
-    assert json.loads(space_robot("analyze", tmp_path / "bag", "--json").out)["start_step"] == told
-    shown = space_robot("analyze", tmp_path / "bag").out
-    assert " ".join(sentence(told).split()) in " ".join(shown.split())

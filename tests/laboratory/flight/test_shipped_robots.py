@@ -27,7 +27,7 @@ ATTITUDE = {("canadarm2", "adrc"): 2e-5}
 @pytest.mark.parametrize("law", sorted(laws()))
 @pytest.mark.parametrize("robot", robot_names())
 def test_every_law_flies_it(robot: str, law: str) -> None:
-    log = simulated(robot=robot, controller=law, duration=SECONDS)
+    log = simulated(robot=robot, controller=law, gains="tuned", duration=SECONDS)
     rms = analyze(log)["rms"]["mean_axis"]
     assert rms.pop("attitude") < ATTITUDE.get((robot, law), 1e-6)
     for name, value in rms.items():

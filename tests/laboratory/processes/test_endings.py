@@ -10,8 +10,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Iterator, Sequence
 from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any
@@ -20,13 +19,8 @@ import psutil
 import pytest
 
 from space_robot.processes.child_process import child_process
-from space_robot.processes.fork_server import ForkServer, Target, accept_signals
-from space_robot.processes.interruption import (
-    Interrupted,
-    handled_signals,
-    not_lost_in_callbacks,
-    raising_signals,
-)
+from space_robot.processes.fork_server import ForkServer, accept_signals
+from space_robot.processes.interruption import Interrupted, not_lost_in_callbacks, raising_signals
 from space_robot.processes.scratch_folder import NEW_S, PREFIX, ScratchFolder
 
 HELPER = [
@@ -82,91 +76,72 @@ def echo(connection: Connection, descriptors: Sequence[int], server: int) -> Non
     raise SystemExit(item)
 
 
-@contextmanager
-def served(target: Target = echo) -> Iterator[ForkServer]:
-    server = ForkServer.of_this_process(target)
-    try:
-        yield server
-    finally:
-        server.close()
+@pytest.fixture
+def server() -> Iterator[ForkServer]:
+    server = ForkServer.of_this_process(echo)
+    yield server
+    server.close()
 
 
-def wait_for(condition: Callable[[], bool]) -> None:
-    until = time.monotonic() + TIMEOUT_S
-    while not condition():
-        assert time.monotonic() < until
-        time.sleep(0.005)
+def test_children_talk_to_the_process_that_asked_for_them_and_end_with_the_server(
+    server: ForkServer,
+) -> None:
+    (one, to_one), (two, to_two) = server.fork(), server.fork()
+    for pid, connection in ((one, to_one), (two, to_two)):
+        connection.send("word")
+        item, own, parent, told = connection.recv()
+        assert (item, own) == ("word", pid)
+        assert parent == told != os.getpid()
+    assert one != two
+    assert server.exit_code(one) is None
+    server.close()
+    assert not any(psutil.pid_exists(pid) for pid in (one, two, parent))
+    with pytest.raises(OSError, match="Bad file descriptor"):
+        server.exit_code(one)
+    assert server.end(one) is None
 
 
-def test_a_child_talks_to_the_process_that_asked_for_it() -> None:
-    with served() as server:
-        (one, to_one), (two, to_two) = server.fork(), server.fork()
-        for pid, connection in ((one, to_one), (two, to_two)):
-            connection.send("word")
-            item, own, parent, told = connection.recv()
-            assert (item, own) == ("word", pid)
-            assert parent == told != os.getpid()
-        assert one != two
-        assert server.exit_code(one) is None
-
-
-def test_a_child_gets_open_files_too() -> None:
-    with served() as server:
-        reading, writing = os.pipe()  # after the server, which has what was open before it
-        _, connection = server.fork(writing, writing)
-        os.close(writing)
-        connection.send("twice ")
-        connection.recv()
-        assert os.read(reading, 100) == b"twice twice "
-        connection.send(0)
-        assert os.read(reading, 100) == b""  # nobody else holds it
+def test_a_child_gets_open_files_too(server: ForkServer) -> None:
+    reading, writing = os.pipe()  # after the server, which has what was open before it
+    _, connection = server.fork(writing, writing)
+    os.close(writing)
+    connection.send("twice ")
+    connection.recv()
+    assert os.read(reading, 100) == b"twice twice "
+    connection.send(0)
+    assert os.read(reading, 100) == b""  # nobody else holds it
     os.close(reading)
 
 
-@pytest.mark.parametrize("code", [0, 3])
-def test_the_exit_code_is_the_childs_and_stays(code: int) -> None:
-    with served() as server:
-        pid, connection = server.fork()
-        connection.send(code)
-        wait_for(lambda: server.exit_code(pid) is not None)
-        assert [server.exit_code(pid), server.exit_code(pid), server.end(pid)] == [code] * 3
-        assert not psutil.pid_exists(pid)
+def test_the_exit_code_is_the_childs_and_stays(server: ForkServer) -> None:
+    """Its signals come to it."""
+    pid, connection = server.fork()
+    connection.send("ready")
+    connection.recv()
+    os.kill(pid, signal.SIGINT)
+    connection.send("still there")
+    assert connection.recv()[0] == "still there"
+    os.kill(pid, signal.SIGTERM)
+    other, to_other = server.fork()
+    to_other.send(3)
+    for child, code in ((pid, -signal.SIGTERM), (other, 3)):
+        until = time.monotonic() + TIMEOUT_S
+        while server.exit_code(child) is None:
+            assert time.monotonic() < until
+            time.sleep(0.005)
+        assert [server.exit_code(child), server.exit_code(child), server.end(child)] == [code] * 3
+        assert not psutil.pid_exists(child)
 
 
-def test_signals_of_a_child() -> None:
-    with served() as server:
-        pid, connection = server.fork()
-        connection.send("ready")
-        connection.recv()
-        os.kill(pid, signal.SIGINT)
-        connection.send("still there")
-        assert connection.recv()[0] == "still there"
-        os.kill(pid, signal.SIGTERM)
-        wait_for(lambda: server.exit_code(pid) == -signal.SIGTERM)
-
-
-def test_closing_ends_server_and_children() -> None:
-    with served() as server:
-        pid, connection = server.fork()
-        connection.send("who")
-        *_, of_server = connection.recv()
-    assert not psutil.pid_exists(pid)
-    assert not psutil.pid_exists(of_server)
-    with pytest.raises(OSError, match="Bad file descriptor"):
-        server.exit_code(pid)
+def test_a_killed_server_is_an_error_not_a_hang(server: ForkServer) -> None:
+    pid, connection = server.fork()
+    connection.send("who")
+    *_, of_server = connection.recv()
+    os.kill(of_server, signal.SIGKILL)
+    with pytest.raises(ConnectionError):
+        server.fork()
     assert server.end(pid) is None
-
-
-def test_a_killed_server_is_an_error_not_a_hang() -> None:
-    with served() as server:
-        pid, connection = server.fork()
-        connection.send("who")
-        *_, of_server = connection.recv()
-        os.kill(of_server, signal.SIGKILL)
-        with pytest.raises(ConnectionError):
-            server.fork()
-        assert server.end(pid) is None
-        connection.send(0)  # its child lives on, until it is asked to end
+    connection.send(0)  # its child lives on, until it is asked to end
 
 
 @pytest.mark.parametrize(
@@ -178,11 +153,12 @@ def test_signals_are_raised_once_and_put_back(
     number: signal.Signals, code: int, default: signal.Handlers
 ) -> None:
     """Also where a shell ignores them for what it starts in the background."""
-    if number == signal.SIGHUP and default is signal.SIG_IGN:
-        return  # nohup
     original = signal.signal(number, default)
     try:
         with raising_signals():
+            if number == signal.SIGHUP and default is signal.SIG_IGN:  # nohup
+                assert signal.getsignal(number) is default
+                return
             with pytest.raises(Interrupted, match=f"stopped by {number.name}") as raised:
                 signal.raise_signal(number)
             signal.raise_signal(signal.SIGINT)  # again, from `timeout` or an impatient hand
@@ -206,15 +182,6 @@ def test_a_signal_in_a_callback_of_c_is_raised_after_it(error: RuntimeError | No
 
     with raising_signals(), pytest.raises(Interrupted, match="stopped by SIGTERM"):
         compile_kernels()
-
-
-def test_nohup_is_respected() -> None:
-    before = signal.signal(signal.SIGHUP, signal.SIG_IGN)
-    try:
-        with handled_signals(lambda number, frame: None):
-            assert signal.getsignal(signal.SIGHUP) is signal.SIG_IGN
-    finally:
-        signal.signal(signal.SIGHUP, before)
 
 
 @pytest.fixture(autouse=True)

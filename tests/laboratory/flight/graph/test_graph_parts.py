@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import asyncio
 import json
 import os
 import signal
@@ -11,8 +10,8 @@ import tempfile
 import threading
 import time
 from collections.abc import Callable, Iterator
+from itertools import count
 from pathlib import Path
-from types import SimpleNamespace
 from typing import IO, Any
 
 import psutil
@@ -20,7 +19,7 @@ import pytest
 
 from space_robot.flight.graph import orchestrator, processes
 from space_robot.flight.graph.following import degradation
-from space_robot.flight.graph.launched import LaunchedGraph, report_failure
+from space_robot.flight.graph.launched import LaunchedGraph
 from space_robot.flight.graph.node_names import NODE_NAMES
 from space_robot.flight.graph.node_server import ForkedProcess, Program, node_server
 from space_robot.flight.graph.processes import TAIL_LINES, NodeProcess
@@ -148,66 +147,48 @@ UNHEARD = 2
 """So many answers are dropped, as to a client that has not been discovered."""
 
 
-class Server:
-    """A node whose first answers do not arrive, whatever the service."""
-
-    def __init__(self, domain: int) -> None:
-        self._visitor = TemporaryNode("plant_node", domain)
-        self.node = self._visitor.node
-        self.answers = self.triggers = 0
-        services = (
-            (GetState, "get_state", lambda _, response: response),
-            (Trigger, "go", self._go),
-        )
-        for kind, name, callback in services:
-            service = self.node.create_service(kind, f"{self.node.get_name()}/{name}", callback)
-            service.send_response = self._dropping(service.send_response)
-        self._executor = SingleThreadedExecutor(context=self.node.context)
-        self._executor.add_node(self.node)
-        self._is_over = threading.Event()
-        self._thread = threading.Thread(target=self._spin)
-        self._thread.start()
-
-    def _spin(self) -> None:
-        while not self._is_over.is_set():
-            self._executor.spin_once(timeout_sec=0.02)
-
-    def _dropping(self, send: Any) -> Any:
-        def send_or_drop(response: Any, header: Any) -> None:
-            self.answers += 1
-            if self.answers > UNHEARD:
-                send(response, header)
-
-        return send_or_drop
-
-    def _go(self, request: Any, response: Any) -> Any:
-        self.triggers += 1
-        self._is_over.wait(4 * AGAIN_S)  # as a step of many ticks
-        response.success, response.message = True, "goes on"
-        return response
-
-    def close(self) -> None:
-        self._is_over.set()
-        self._thread.join()
-        for _ in range(5):  # what was asked again waits still
-            self._executor.spin_once(timeout_sec=0.02)
-        self._executor.shutdown()
-        self._visitor.leave()
-
-
 def test_an_answer_that_is_lost_to_a_new_caller_delays_the_call_and_no_more(
     domain: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(node_services, "ASK_AGAIN_S", AGAIN_S)
-    server, caller = Server(domain), TemporaryNode("caller", domain)
+    server, caller = TemporaryNode("plant_node", domain), TemporaryNode("caller", domain)
+    name, is_over = server.node.get_name(), threading.Event()
+    answers, triggers = count(1), []
+
+    def go(request: Any, response: Any) -> Any:
+        triggers.append(request)
+        is_over.wait(4 * AGAIN_S)  # as a step of many ticks
+        response.success, response.message = True, "goes on"
+        return response
+
+    for kind, called, callback in ((GetState, "get_state", lambda _, r: r), (Trigger, "go", go)):
+        service = server.node.create_service(kind, f"{name}/{called}", callback)
+
+        def send_or_drop(*answer: Any, send: Any = service.send_response) -> None:
+            if next(answers) > UNHEARD:
+                send(*answer)
+
+        service.send_response = send_or_drop
+    executor = SingleThreadedExecutor(context=server.node.context)
+    executor.add_node(server.node)
+
+    def spin() -> None:
+        while not is_over.is_set():
+            executor.spin_once(timeout_sec=0.02)
+
+    thread = threading.Thread(target=spin)
+    thread.start()
     try:
-        said = node_services.call_trigger(caller.node, f"{server.node.get_name()}/go", lambda: None)
+        said = node_services.call_trigger(caller.node, f"{name}/go", lambda: None)
     finally:
         caller.leave()
-        server.close()
+        is_over.set()
+        thread.join()
+        executor.shutdown()
+        server.leave()
     assert said == (True, "goes on")
-    assert server.triggers == 1, "what is not asked twice, as a step, is not done twice"
-    assert server.answers > UNHEARD + 1
+    assert len(triggers) == 1, "what is not asked twice, as a step, is not done twice"
+    assert next(answers) > UNHEARD + 2
 
 
 # How flights end, and what is told of it
@@ -237,20 +218,6 @@ def test_a_launched_flight_is_complete_when_the_plant_ends_first_and_all_end_wel
     assert complete.note_end(PLANT, 0, is_stopped=False) == ""
     assert [complete.note_end(n, 0, is_stopped=True) for n in NODE_NAMES[:3]] == [""] * 3
     assert complete.has_ended
-
-
-def test_a_failure_is_an_error_of_the_loop_and_ends_nothing() -> None:
-    """launch returns exit code 1 after an error in its event loop."""
-    errors: list[dict[str, Any]] = []
-
-    async def run() -> None:
-        loop = asyncio.get_running_loop()
-        loop.set_exception_handler(lambda _, context: errors.append(context))
-        report_failure(SimpleNamespace(asyncio_loop=loop), "flights/mine: no view")
-        await asyncio.sleep(0.0)
-
-    asyncio.run(run())
-    assert errors == [{"message": "error: flights/mine: no view"}]
 
 
 HELD = {"controller_node": {"tick": "5", "references_held": "300"}}

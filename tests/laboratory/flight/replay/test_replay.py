@@ -21,7 +21,7 @@ from hypothesis import strategies as st
 from rosbags.rosbag2 import StoragePlugin, Writer
 
 from space_robot.flight.replay.choice import ControllerChoice
-from space_robot.flight.replay.outcome import Replay, ReplayOptions
+from space_robot.flight.replay.outcome import ReplayOptions
 from space_robot.flight.replay.recording import COMPARED, Recording
 from space_robot.flight.replay.run import replay
 from space_robot_control.controller.gains import build_laws, split_gains
@@ -40,23 +40,10 @@ TICKS = 400
 
 
 @pytest.fixture(scope="module")
-def recorded(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., Path]:
-    """The bag of a short flight in process; each set of options flies once."""
-    flown: dict[str, Path] = {}
-
-    def fly(**options: object) -> Path:
-        key = repr(options)
-        if key not in flown:
-            flown[key] = tmp_path_factory.mktemp("recorded") / "bag"
-            simulated(flown[key], duration=TICKS * 0.0005, **options)
-        return flown[key]
-
-    return fly
-
-
-@pytest.fixture(scope="module")
-def bag(recorded: Callable[..., Path]) -> Path:
-    return recorded()
+def bag(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    bag = tmp_path_factory.mktemp("recorded") / "bag"
+    simulated(bag, duration=TICKS * 0.0005, controller="ctc")
+    return bag
 
 
 def copied(bag: Path, copy: Path, keeps: Callable[[str, int], bool], **flight: Any) -> Recording:
@@ -120,18 +107,24 @@ def test_topics_of_other_names_are_remapped(bag: Path, tmp_path: Path) -> None:
     np.testing.assert_array_equal(remapped.commands(axes).torque, here.commands(axes).torque)
 
 
-@settings(max_examples=8, deadline=None)
-@given(st.floats(0.02, 1.0))
-def test_what_is_cut_is_told_as_analyze_does_and_what_is_whole_is_sent(
-    bag: Path, part: float
-) -> None:
-    """The states that are sent are those of ticks that are whole, byte by byte as recorded."""
+def cut_bag(bag: Path, part: float) -> Path:
+    """A copy whose file ends after a part of its bytes."""
     cut = bag.with_name("cut")
     shutil.rmtree(cut, ignore_errors=True)
     shutil.copytree(bag, cut)
     (file,) = cut.glob("*.mcap")
     content = file.read_bytes()
     file.write_bytes(content[: int(part * len(content))])
+    return cut
+
+
+@settings(max_examples=8, deadline=None)
+@given(st.floats(0.02, 1.0))
+def test_what_is_cut_is_told_as_analyze_does_and_what_is_whole_is_sent(
+    bag: Path, part: float
+) -> None:
+    """The states that are sent are those of ticks that are whole, byte by byte as recorded."""
+    cut = cut_bag(bag, part)
     try:
         log = read_flight(cut)
     except InputError:
@@ -214,19 +207,8 @@ def test_what_cannot_be_is_named(
 # Played to a live node
 
 
-@pytest.fixture
-def play(domain: int) -> Callable[..., Replay]:
-    """Replay in a ROS domain of the test's own."""
-    pytest.importorskip("rclpy")
-
-    def run(bag: Path, **options: object) -> Replay:
-        return replay(ReplayOptions(bag, domain=domain, **options))  # type: ignore[arg-type]
-
-    return run
-
-
 def test_a_changed_gain_is_found_with_exit_code_1(bag: Path) -> None:
-    gain = "controller.tde_stc.k_1=[40.0]"
+    gain = "controller.ctc.k_p=[9e3]"
     result = space_robot_here("replay", str(bag), "--set", gain, "--json")
     assert result.returncode == 1
     first = json.loads(result.stdout)["first_difference"]
@@ -245,7 +227,7 @@ def test_another_law_answers_a_bag_of_ros2_bag_record_and_is_not_judged(
     plain = rosbags_bag(tmp_path / "bag", entries_of(bag), lambda writer: None)
     table, plot = tmp_path / "torques.csv", tmp_path / "torques.png"
     written = ("--csv", str(table), "--plot", str(plot))
-    result = space_robot_here("replay", str(plain), "--controller", "ctc", *written)
+    result = space_robot_here("replay", str(plain), "--controller", "tde_stc", *written)
     assert result.returncode == 0, result.stderr
     assert "open loop" in result.stdout
     rows = list(csv.DictReader(table.open()))
@@ -260,35 +242,27 @@ def test_another_law_answers_a_bag_of_ros2_bag_record_and_is_not_judged(
 
 
 def test_without_any_commands_a_flight_is_only_shown(
-    bag: Path, play: Callable[..., Replay], tmp_path: Path
+    bag: Path, domain: int, tmp_path: Path
 ) -> None:
     flight = json.loads(open_bag(bag).custom_data()["space_robot.flight"])
     copied(bag, tmp_path / "none", lambda name, number: name != "/command", **flight)
-    done = play(tmp_path / "none", rate=2.0)
+    done = replay(ReplayOptions(tmp_path / "none", rate=2.0, domain=domain))
     assert done.has_passed
     assert not done.is_judged
     assert done.report()["played"] == TICKS
 
 
-def test_a_part_is_compared_by_itself(
-    recorded: Callable[..., Path], play: Callable[..., Replay]
-) -> None:
+def test_a_part_is_compared_by_itself(bag: Path, domain: int) -> None:
     """A law without memory is equal again once it has taken over from the applied torque."""
-    part = play(recorded(controller="ctc"), start_s=0.05, end_s=0.15)
+    part = replay(ReplayOptions(bag, start_s=0.05, end_s=0.15, domain=domain))
     assert part.comparison.ticks.tolist() == list(range(100, 300))
     assert part.comparison.equal[41:].all()  # the transfer lasts 20 ms
     assert not part.comparison.equal[1]
 
 
-def test_an_unfinished_bag_is_compared_to_its_end_and_not_passed(
-    recorded: Callable[..., Path], tmp_path: Path
-) -> None:
-    bag = tmp_path / "bag"
-    shutil.copytree(recorded(controller="ctc"), bag)
-    file = bag / "bag_0.mcap"
-    content = file.read_bytes()
-    file.write_bytes(content[: int(0.8 * len(content))])
-    result, log = space_robot_here("replay", str(bag), "--json"), read_flight(bag)
+def test_an_unfinished_bag_is_compared_to_its_end_and_not_passed(bag: Path) -> None:
+    cut = cut_bag(bag, 0.8)
+    result, log = space_robot_here("replay", str(cut), "--json"), read_flight(cut)
     report = json.loads(result.stdout)
     (stretch,) = report["stretches"]
     assert (stretch["from_s"], stretch["equal"]) == (0.0, stretch["compared"])
@@ -298,10 +272,8 @@ def test_an_unfinished_bag_is_compared_to_its_end_and_not_passed(
     assert (report["passed"], report["whole"], result.returncode) == (False, False, 1)
 
 
-def test_a_bag_without_its_robot_is_refused_in_one_line(
-    recorded: Callable[..., Path], tmp_path: Path
-) -> None:
-    flown = recorded(robot="seven_joint")
-    bag = rosbags_bag(tmp_path / "bag", entries_of(flown), lambda writer: None)
+def test_a_bag_without_its_robot_is_refused_in_one_line(tmp_path: Path) -> None:
+    simulated(tmp_path / "flown", robot="seven_joint", duration=0.01)
+    bag = rosbags_bag(tmp_path / "bag", entries_of(tmp_path / "flown"), lambda writer: None)
     with pytest.raises(InputError, match="which robot was flown, with 7 joints: name it with"):
         replay(ReplayOptions(bag))

@@ -8,7 +8,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from space_robot.flight.replay.commands import CommandList, Form, ReplayedCommands
@@ -60,49 +60,29 @@ def foreign(data: bytes, **changes: object) -> bytes:
     return bytes(jazzy().serialize_cdr(read, TYPE))
 
 
-@given(tick=st.integers(0, 19), axis=st.integers(0, 4), bit=st.integers(0, 63))
-def test_one_bit_is_found_where_it_was_changed(tick: int, axis: int, bit: int) -> None:
-    """Whatever bit: of the mantissa's end, of the sign of zero, or one that makes it a NaN."""
-    sent, torque = messages(range(20)), torque_of(tick)
-    same = compare(sent, sent, 20)
+WORDS = st.integers(0, 2**64 - 1)
+
+
+@given(tick=st.integers(0, 19), axis=st.integers(0, 4), one=WORDS, other=WORDS)
+@example(1, 1, 0x0000000000000000, 0x8000000000000000)  # 0.0 and -0.0, equal as numbers
+@example(1, 1, 0x7FF8000000000000, 0x7FF8000000000001)  # NaN, which do not equal themselves
+def test_bits_are_compared_and_not_numbers(tick: int, axis: int, one: int, other: int) -> None:
+    def with_bits(bits: int) -> Messages:
+        torque = torque_of(tick)
+        torque.view(np.uint64)[axis] = bits
+        return {**messages(range(20)), tick: message(tick, torque)}
+
+    same = compare(with_bits(one), with_bits(one), 20)
     assert same.is_identical
     assert same.first_difference() is None
     assert same.units == ("N m", "N m", "N m", "N", "N m")
-    torque.view(np.uint64)[axis] ^= np.uint64(1 << bit)
-    compared = compare(sent, {**sent, tick: message(tick, torque)}, 20)
-    assert not compared.is_identical
-    assert np.count_nonzero(~compared.equal) == 1
-    assert difference(compared) == (tick, [f"effort[{AXES[axis]}]"])
-    report = compared.report(TIMEBASE.period)
-    assert report["first_difference"]["fields"][0]["recorded"] == torque_of(tick)[axis]
-    assert report["axes"][AXES[axis]]["recorded_rms"] > 0.0
-
-
-@pytest.mark.parametrize(
-    ("one", "other"),
-    [
-        (0x0000000000000000, 0x8000000000000000),  # 0.0 and -0.0, which are equal as numbers
-        (0x7FF8000000000000, 0x7FF8000000000001),  # NaN of another payload; neither equals itself
-    ],
-)
-@pytest.mark.parametrize("field", ["effort", "position"])
-def test_bits_are_compared_and_not_numbers(one: int, other: int, field: str) -> None:
-    """In the torques and in the fields that a command of others may have."""
-    sent = messages(range(3))
-
-    def with_bits(bits: int) -> Messages:
-        values = np.array([0, bits, 0, 0, 0], np.uint64).view(np.float64)
-        return {**sent, 1: foreign(sent[1], **{field: values})}
-
-    for bits in (one, other):
-        assert compare(with_bits(bits), with_bits(bits), 3).is_identical
-    compared = compare(with_bits(one), with_bits(other), 3)
-    assert compared.equal.tolist() == [True, False, True]
-    found = compared.first_difference()
-    assert found is not None
-    (only,) = found[1]
-    assert only.field.startswith(field)
-    assert str(only.recorded) != str(only.replayed)  # so that one sees it
+    compared = compare(with_bits(one), with_bits(other), 20)
+    assert compared.is_identical == (one == other)
+    if one != other:
+        assert np.flatnonzero(~compared.equal).tolist() == [tick]
+        assert difference(compared) == (tick, [f"effort[{AXES[axis]}]"])
+        (field,) = compared.report(TIMEBASE.period)["first_difference"]["fields"]
+        assert str(field["recorded"]) != str(field["replayed"])  # so that one sees it
 
 
 @given(recorded=st.sets(st.integers(0, 12)), replayed=st.sets(st.integers(0, 12)))
