@@ -91,7 +91,7 @@ def flown(tmp_path_factory: pytest.TempPathFactory) -> Flown:
     bag = tmp_path_factory.mktemp("changed") / "bag"
     with ros_domain() as domain:
         pass  # a free one, for the flight to take
-    plan = f"--duration 2 --swap {SWAP_S}:tde_smc --set plant.silence_timeout=0.2 --json".split()
+    plan = f"--duration 3 --swap {SWAP_S}:tde_smc --set plant.silence_timeout=0.2 --json".split()
     plan += ["--set", "plant.hold_ticks=100"]
     death = ["--restart-controller", "--fault", f"kill_controller@{KILL_S}"]
     place = ["--bag", str(bag), "--domain", str(domain)]
