@@ -28,19 +28,17 @@ def unwrapped(text: str) -> str:
     return " ".join(text.split())
 
 
-def test_the_listings_are_those_of_kernel_and_export(sources: dict[str, str]) -> None:
+def test_listings_and_lines_of_tables_are_those_of_kernel_and_export(
+    sources: dict[str, str],
+) -> None:
     text = (ROOT / PAGE).read_text("utf-8")
     (python,) = re.findall(r"```py\n(.*?)```", text, re.DOTALL)
     law: Any = tde_stc.time_delay_super_twisting
     assert python == inspect.getsource(law.py_func)
     (c,) = re.findall(r"```c\n(.*?)```", text, re.DOTALL)
     assert re.sub(MARK, r"\1", c) in re.sub(MARK, r"\1", sources["laws.c"])
-
-
-def test_every_line_of_the_tables_is_in_both(sources: dict[str, str]) -> None:
     python = unwrapped(inspect.getsource(tde_stc) + inspect.getsource(time_delay_estimation))
     c = unwrapped(sources["laws.c"] + sources["estimate.c"])
-    text = (ROOT / PAGE).read_text("utf-8")
     rows = re.findall(r"^\| \(\d+\) .* \| `(.*)` \| `(.*)` \|$", text, re.MULTILINE)
     assert len(rows) == 6
     for left, right in rows:

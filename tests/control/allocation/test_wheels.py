@@ -225,15 +225,10 @@ def test_it_takes_failure_ticks_of_silence_in_a_row() -> None:
     """A tick in which the wheel gives something begins the count anew."""
     bench = AllocationBench(failure_ticks=10, null_gain=0.0)
     bench.fly(DEMAND, 3)
-    for _ in range(5):
-        bench.failed = {2}
-        bench.fly(DEMAND, 9)
-        bench.failed = set()
-        bench.fly(DEMAND, 1)
-    assert sound(bench) == [0, 1, 2, 3]
-    bench.failed = {2}
-    bench.fly(DEMAND, 10)
-    assert sound(bench) == [0, 1, 2, 3]  # the tenth silence is heard at the next tick
+    for failed, ticks in (*[({2}, 9), (set(), 1)] * 5, ({2}, 10)):
+        bench.failed = failed
+        bench.fly(DEMAND, ticks)
+        assert sound(bench) == [0, 1, 2, 3]  # the tenth silence is heard at the next tick
     bench.fly(DEMAND, 1)
     assert sound(bench) == [0, 1, 3]
 

@@ -1,4 +1,4 @@
-"""N_hat of (35), (36): with a constant inertia, and with that of the nominal model."""
+"""N_hat of (35), (36) with the inertia of the nominal model, and the gains that choose it."""
 
 from __future__ import annotations
 
@@ -10,7 +10,6 @@ import pytest
 import yaml
 from closed_loop import PERIOD
 from hypothesis import assume, given, settings
-from hypothesis import strategies as st
 from law_equations import random_gains
 from numpy.typing import NDArray
 from oracles import (
@@ -26,54 +25,15 @@ from space_robot_control.controller.controller import Controller
 from space_robot_control.controller.gains import NOMINAL, check_gains, read_gains
 from space_robot_control.controller.law_set import LawSet
 from space_robot_control.controller.settings import ControllerNodeSettings
-from space_robot_control.controller.time_delay_estimation import (
-    TimeDelayPair,
-    nominal_estimate,
-    observe,
-    time_delay_estimate,
-)
 from space_robot_control.laws import ControlLaw, find_law, laws
-from space_robot_control.navigation.low_pass import low_pass_weight
 from space_robot_model.hardware.base_actuators import BaseActuatorSettings
-from space_robot_msgs_py.compiled.records import assign
 from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.samples import Reference, RobotState
 
 Array = NDArray[np.float64]
 
 
-class Estimator:
-    """The kernels on a pair of their own; ``desired`` is the desired acceleration of all axes."""
-
-    def __init__(self, axes: int, desired: float = 0.0, corner_hz: float = 0.0) -> None:
-        self.pair = TimeDelayPair.allocate(axes - 3)
-        assign(self.pair, smoothing=low_pass_weight(corner_hz, PERIOD))
-        self.desired = np.full(axes, desired)
-
-    def observe(self, tick: int, force: Array, rate: Array) -> None:
-        observe(self.pair, tick, force, rate, self.desired, PERIOD)
-
-    def estimate(self, h_bar: Array) -> Array:
-        n_hat = np.full_like(h_bar, np.nan)
-        time_delay_estimate(self.pair, h_bar, n_hat)
-        return n_hat
-
-
-def test_low_pass_reaches_63_per_cent_in_its_time_constant() -> None:
-    corner_hz, still = 20.0, np.zeros(2)
-    time_constant = round(1.0 / (2.0 * np.pi * corner_hz) / PERIOD)
-    estimator = Estimator(2, corner_hz=corner_hz)
-    estimator.observe(0, still, still)
-    for tick in range(1, time_constant + 1):
-        estimator.observe(tick, np.ones(2), still)
-    np.testing.assert_allclose(estimator.pair.applied_force, 1.0 - np.exp(-1.0), atol=0.01)
-
-
-# With the nominal inertia
-
-
 WITH_H_BAR = sorted(name for name, law in laws().items() if "h_bar" in law.gain_descriptions())
-ESTIMATING = [*WITH_H_BAR, "indi"]
 FREE = BaseActuatorSettings(base_actuation="none")
 
 
@@ -129,43 +89,29 @@ def flown_into(case: Case, law: ControlLaw, controls_base: bool) -> tuple[Contro
     return controller, applied, rhodd
 
 
-@pytest.mark.parametrize("name", ESTIMATING)
+@pytest.mark.parametrize(
+    ("name", "controls_base"), [("tde_stc", True), ("indi", True), ("indi", False)]
+)
 @settings(max_examples=15)
 @given(case=cases(joints=[1, 6]))
-def test_it_is_the_force_that_the_nominal_inertia_does_not_explain(name: str, case: Case) -> None:
-    """``F_S(t - d) - H_S rhodd(t - d)``, H_S by Pinocchio; and with a perfect model it is c_S."""
+def test_it_is_the_force_that_the_nominal_inertia_does_not_explain(
+    name: str, controls_base: bool, case: Case
+) -> None:
+    """``F_S(t - d) - H_S rhodd(t - d)``, H_S by Pinocchio; and with a perfect model it is c_S: of
+    the joints alone where nothing turns the base."""
     assume(abs(case.state.quaternion[0]) > 0.1)
-    controller, force, rhodd = flown_into(case, nominal_law(name, case.robot.n + 3), True)
+    law = nominal_law(name, case.robot.n + 3)
+    controller, force, rhodd = flown_into(case, law, controls_base)
     signals = controller.signals
     inertia = rho_space_inertia(case.robot, error_of(case), case.state.theta)
     size = np.abs(inertia).max() * (1.0 + np.abs(rhodd).max()) + np.abs(force).max()
-    np.testing.assert_allclose(signals.n_hat, force - inertia @ rhodd, rtol=0.0, atol=1e-11 * size)
     np.testing.assert_allclose(signals.n_hat, signals.nominal.bias, rtol=0.0, atol=1e-11 * size)
-
-
-@settings(max_examples=15)
-@given(case=cases(joints=[6]))
-def test_with_a_free_base_it_is_that_of_the_joints_alone(case: Case) -> None:
-    """Pinocchio's accelerations of the joints while nothing turns the base."""
-    controller, force, rhodd = flown_into(case, nominal_law("indi", 9), False)
-    signals = controller.signals
-    size = np.abs(signals.nominal.inertia).max() * (1.0 + np.abs(rhodd).max())
-    np.testing.assert_allclose(signals.n_hat, signals.nominal.bias, rtol=0.0, atol=1e-11 * size)
-    assert (signals.n_hat[:3] == 0.0).all()
-    assert (signals.paired_force[3:] == force[3:]).all()
-
-
-@given(st.integers(0, 2**32 - 1), st.sampled_from([4, 9, 10]))
-def test_for_a_diagonal_inertia_it_is_the_constant_estimate(seed: int, axes: int) -> None:
-    """To the last bit."""
-    rng = np.random.default_rng(seed)
-    pair = TimeDelayPair.allocate(axes - 3)
-    assign(pair, applied_force=rng.normal(size=axes), acceleration=rng.normal(size=axes))
-    h_bar = rng.uniform(0.1, 100.0, axes)
-    constant, nominal = np.full(axes, np.nan), np.full(axes, np.nan)
-    time_delay_estimate(pair, h_bar, constant)
-    nominal_estimate(pair, np.diag(h_bar), nominal)
-    np.testing.assert_array_equal(nominal, constant)
+    if controls_base:
+        unexplained = force - inertia @ rhodd
+        np.testing.assert_allclose(signals.n_hat, unexplained, rtol=0.0, atol=1e-11 * size)
+    else:
+        assert (signals.n_hat[:3] == 0.0).all()
+        assert (signals.paired_force[3:] == force[3:]).all()
 
 
 @pytest.mark.parametrize("name", WITH_H_BAR)

@@ -2,23 +2,37 @@
 
 from __future__ import annotations
 
+import ctypes
 import importlib.util
 import math
+from collections.abc import Callable
 from functools import cache
 from itertools import product
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 from typing import Any
 
+import jinja2
 import numpy as np
 import pytest
 import yaml
-from exported_kernels import in_c, needs_compiler, same_bits, text_of
+from exported_kernels import needs_compiler
 from hypothesis import example, given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 from paths import DATA
 
-from space_robot_control.flight_code.c99.language import BOOL, FLOAT, INT, ArrayOf, NotInSubsetError
+from space_robot_control.flight_code.c99.language import (
+    BOOL,
+    FLOAT,
+    INT,
+    ArrayOf,
+    NotInSubsetError,
+    Value,
+)
+from space_robot_control.flight_code.c99.program import KernelProgram
+from space_robot_control.flight_code.compiler import build_library
+from space_robot_control.flight_code.files import Files
+from space_robot_control.flight_code.folder import FLAGS, WARNINGS
 from space_robot_model.elementary.sine import sin_cos
 from space_robot_msgs_py.compiled.kernels import kernel
 from space_robot_msgs_py.compiled.lanes import uniform, where, whole
@@ -28,6 +42,59 @@ pytestmark = needs_compiler
 SPECIAL = [0.0, -0.0, 1.0, -1.0, math.nan, math.inf, -math.inf, 5e-324, 1.7e308]
 floats = st.one_of(st.sampled_from(SPECIAL), st.floats())
 integers = st.integers(-(2**52), 2**52)
+CTYPES = {FLOAT: ctypes.c_double, INT: ctypes.c_int64, BOOL: ctypes.c_bool}
+
+
+def text_of(*signatures: tuple[Any, ...]) -> str:
+    """The C of kernels, each with the types of its arguments, and of all that they call."""
+    program = KernelProgram({}, 3)
+    functions = []
+    for function, *kinds in signatures:
+        values = tuple(Value(kind, "given") for kind in kinds)
+        functions.append(program.functions[program.function(function.py_func, values)])
+    files = Files(program, functions, [], lambda _: "all")
+    environment = jinja2.Environment(
+        loader=jinja2.PackageLoader("space_robot_control.flight_code"), autoescape=False
+    )
+    header = environment.get_template("kernels.h.j2").render(
+        constants=files.constants(), tuples=files.tuples(), prototypes=files.prototypes()
+    )
+    header = header.replace(
+        '#include "space_robot_flight.h"', "#include <stdbool.h>\n#include <stdint.h>"
+    )
+    return files.final(header) + files.rooms()["all"]
+
+
+def in_c(*signatures: tuple[Any, ...]) -> dict[Any, Callable[..., Any]]:
+    """Kernels by themselves, compiled together by the system's compiler; arrays are float64."""
+    text = text_of(*signatures)
+    flags = (*FLAGS, *WARNINGS, "-Wno-unused-function")
+    compiled = ctypes.CDLL(str(build_library({PurePosixPath("kernel.c"): text}, flags)))
+    return {one: call_of(compiled, one, kinds) for one, *kinds in signatures}
+
+
+def call_of(compiled: ctypes.CDLL, original: Any, kinds: list[Any]) -> Callable[..., Any]:
+    function = getattr(compiled, f"sr_{original.py_func.__name__.lstrip('_')}")
+    result = original.py_func.__annotations__["return"]
+    function.restype = {"float": ctypes.c_double, "int": ctypes.c_int64, "None": None}[result]
+
+    def call(*arguments: Any) -> Any:
+        given = []
+        for kind, argument in zip(kinds, arguments, strict=True):
+            if isinstance(argument, np.ndarray):
+                given.append(ctypes.c_void_p(argument.ctypes.data))
+            else:
+                given.append(CTYPES[kind](argument))
+        return function(*given)
+
+    return call
+
+
+def same_bits(one: float, other: float) -> bool:
+    """Whether two floats have the same bits; any NaN is as good as another."""
+    if one != one:
+        return other != other
+    return np.float64(one).tobytes() == np.float64(other).tobytes()
 
 
 @kernel

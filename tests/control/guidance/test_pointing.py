@@ -118,9 +118,6 @@ def test_attitudes_are_those_of_two_directions(
     wanted = np.roll(expected.as_quat(), 1)
     wanted = wanted if wanted @ row[0, :4] > 0.0 else -wanted
     np.testing.assert_allclose(row[0, :4], wanted, rtol=0, atol=1e-14)
-    directions = [v / np.linalg.norm(v) for v in (first, second)]
-    aligned, _ = Rotation.align_vectors(directions, [a, b], weights=[np.inf, 1.0])
-    assert (rotations(row)[0] * turn.inv() * aligned.inv()).magnitude() < 1e-7
 
 
 @pytest.mark.parametrize("elements", [ISS, GTO])
@@ -160,7 +157,7 @@ def test_a_fixed_direction_needs_no_orbit_and_does_not_turn() -> None:
 
 
 def test_directions_that_meet_on_the_way_are_refused() -> None:
-    """Noon is a quarter of an orbit ahead of the node."""
+    """Noon is a quarter of an orbit ahead of the node. A Sun above the pole has another default."""
     elements = {"height": 420e3, "inclination_deg": 51.6}
     known = orbit(orbital_elements=elements, j2=False, beta_angle_deg=0.0, noon_deg=90.0)
     pointing = course(known, point="nadir", about="sun")
@@ -171,11 +168,7 @@ def test_directions_that_meet_on_the_way_are_refused() -> None:
     with pytest.raises(InputError, match=line):
         pointing.check(0.0, 2.0 * quarter)
     course(orbit(beta_angle_deg=1.5), point="nadir", about="sun").check(0.0, 5560.0)
-
-
-def test_the_default_second_direction_of_a_sun_above_the_pole_is_another_one() -> None:
-    elements = {"height": 420e3, "inclination_deg": 0.0}
-    known = orbit(orbital_elements=elements, beta_angle_deg=90.0)
+    known = orbit(orbital_elements=elements | {"inclination_deg": 0.0}, beta_angle_deg=90.0)
     course(known, point="sun").check(0.0, 5560.0)
     with pytest.raises(InputError, match=r"'normal' is .* degrees from the line of sun"):
         course(known, point="sun", about="normal").check(0.0, 5560.0)

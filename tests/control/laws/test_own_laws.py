@@ -94,11 +94,10 @@ def test_ctrl_c_is_the_users_and_no_mistake_of_the_law() -> None:
 
 
 def test_clear_errors_and_forces_pass_as_they_are() -> None:
-    law = Law({}, 0.001, 9)
+    law, force = Law({}, 0.001, 9), np.arange(9.0)
     law.what = lambda: raise_it(InputError("clear"))
     with pytest.raises(InputError, match=r"^clear$"):
         force_of(law, None, 7)  # type: ignore[arg-type]
-    force = np.arange(9.0)
     law.what = lambda: force
     assert force_of(law, None, 7) is force  # type: ignore[arg-type]
 
@@ -237,22 +236,31 @@ def described(**changes: Any) -> dict[str, Any]:
     return {**description, **changes}
 
 
+IMPORTS = "--trust imports a module:Class"
+READS = "read only with --trust"
+SECRET = dict.fromkeys(["gains", "robot"], "secret.yaml")
+
+
 @pytest.mark.parametrize(
-    "changes",
+    ("changes", "lacking", "said"),
     [
-        {"controller_node": {"controller": LAW}, "controller": "stranger"},
-        {"controller_node": {"swaps": [f"0.01:{LAW}"]}},
-        {"parameters": {}, "controller": LAW},
-        {"parameters": {"controller": {}}, "controller": LAW},
-        {"controller_node": {"controller": "this:X"}},
+        ({"controller_node": {"controller": LAW}, "controller": "stranger"}, "gains_used", IMPORTS),
+        ({"controller_node": {"swaps": [f"0.01:{LAW}"]}}, "gains_used", IMPORTS),
+        ({"parameters": {}, "controller": LAW}, "gains_used", IMPORTS),
+        ({"parameters": {"controller": {}}, "controller": LAW}, "gains_used", IMPORTS),
+        ({"controller_node": {"controller": "this:X"}}, "gains_used", IMPORTS),
+        ({"controller_node": SECRET}, "gains_used", READS),
+        ({"controller_node": SECRET}, "robot_file", READS),
+        ({"controller_node": {"actuators": "./secret.yaml"}}, "", READS),
     ],
 )
-def test_a_replay_imports_no_module_that_a_bag_names(
-    changes: dict[str, Any], tmp_path: Path, ran: Callable[[], bool], bag: Path
+def test_a_replay_imports_no_module_and_reads_no_file_that_a_bag_names(
+    changes: dict[str, Any], lacking: str, said: str, tmp_path: Path, ran: Callable[[], bool]
 ) -> None:
+    (tmp_path / "secret.yaml").write_text("password: 1234")
     flight = described(**changes)
-    flight.pop("gains_used")
-    with pytest.raises(NotTrustedError, match="--trust imports a module:Class"):
+    flight.pop(lacking, None)
+    with pytest.raises(NotTrustedError, match=said):
         ControllerChoice(flight, tmp_path)
     assert not ran()
     assert "this" not in sys.modules
@@ -262,10 +270,9 @@ def test_with_trust_it_does_and_the_users_own_word_needs_none(
     tmp_path: Path, ran: Callable[[], bool]
 ) -> None:
     flight = described(controller_node={"controller": LAW}, controller="stranger")
-    trusted, given = (tmp_path / name for name in ("trusted", "given"))
-    trusted.mkdir()
+    given = tmp_path / "given"
     given.mkdir()
-    assert ControllerChoice(flight, trusted, trust=True).law_name == "stranger"
+    assert ControllerChoice(flight, tmp_path, trust=True).law_name == "stranger"
     assert ran()
     assert ControllerChoice(flight, given, LAW).law_name == "stranger"
     by_set = ControllerChoice(flight, given, chosen={"controller": "tde_stc"})
@@ -306,21 +313,6 @@ def test_analyze_reads_no_file_that_a_bag_names(
     assert "password" not in why
     log.trusted = True
     assert "--trust" not in analyze(log)["unavailable"][figure]
-
-
-@pytest.mark.parametrize(
-    ("names", "lacking"),
-    [(["gains", "robot"], "gains_used"), (["gains", "robot"], "robot_file"), (["actuators"], "")],
-)
-def test_a_replay_reads_no_file_that_a_bag_names(
-    tmp_path: Path, names: list[str], lacking: str
-) -> None:
-    secret = tmp_path / "secret.yaml"
-    secret.write_text("password: 1234")
-    flight = described(controller_node=dict.fromkeys(names, str(secret)))
-    flight.pop(lacking, None)
-    with pytest.raises(NotTrustedError, match="read only with --trust"):
-        ControllerChoice(flight, tmp_path)
 
 
 def test_numbers_in_the_bag_are_taken_and_those_of_a_swap_must_be_there(tmp_path: Path) -> None:

@@ -164,8 +164,8 @@ def test_what_does_not_fit_is_refused(key: str, value: object, why: str) -> None
         Navigation.build(N, NAVIGATION.model_copy(update={key: value}), 1e-4)
 
 
-@pytest.mark.parametrize("angle", [5e-324, 1e-200, 1e3])
-@pytest.mark.parametrize("rate", [0.0, 5e-324, 1e3])
+@pytest.mark.parametrize("angle", [5e-324, 1e-200, LEAST, 1e3])
+@pytest.mark.parametrize("rate", [0.0, 5e-324, LEAST, 1e3])
 def test_noises_whose_squares_vanish_give_a_filter(angle: float, rate: float) -> None:
     """They count as the least that there is."""
     given = NAVIGATION.model_dump() | {"joint_angle_noise": angle, "joint_rate_noise": rate}
@@ -266,14 +266,10 @@ def test_what_is_assumed_of_sensors_is_what_they_do(period: float) -> None:
 
 
 def test_nothing_is_assumed_to_be_perfect() -> None:
-    """Ideal sensors make a filter that can be built."""
     found = assumed_numbers(SensorSettings(), PERIOD)
     assert found["tracker_across"] == found["tracker_about"] == LEAST_ANGLE
     assert found["gyro_angle_walk"] == found["joint_angle_noise"] == LEAST
     assert found["joint_rate_noise"] == LEAST
-    settings = NavigationFilterSettings(**found)
-    navigation = Navigation.build(6, settings, PERIOD)
-    assert np.isfinite(navigation.joints.angle_gain).all()
 
 
 @pytest.mark.parametrize(
