@@ -12,19 +12,21 @@ from hypothesis import strategies as st
 
 from space_robot.export.software import export
 from space_robot.flight.plan import Flight, FlightPlan, resolve
+from space_robot_control.controller.signal_kernels import USABLE
 from space_robot_control.controller.supervision import (
     NEW,
     NO_REFERENCE,
     NOMINAL_FROM_ETA,
     REFERENCE_HELD,
     SAFE_BELOW_ETA,
+    STATUSES,
 )
 from space_robot_control.controller.supervisor import Supervisor
 from space_robot_control.flight_code.folder import Exported
 from space_robot_control.flight_code.hostile import hostile_ticks, shake, spoil, spoiled_reference
 from space_robot_control.flight_code.library import CONDITION, FlightLibrary
 from space_robot_control.flight_code.supervisors import bits
-from space_robot_msgs_py.samples import RobotState
+from space_robot_msgs_py.samples import Reference, RobotState
 
 pytestmark = needs_compiler
 TICKS = 150
@@ -90,3 +92,31 @@ def test_spoiled_states_meet_half_a_turn_from_wherever_the_base_should_be(
     assert min(etas) < 1e-9
     assert any(0.0 < eta < SAFE_BELOW_ETA for eta in etas)
     assert any(SAFE_BELOW_ETA < eta < NOMINAL_FROM_ETA for eta in etas)
+
+
+def test_bad_references_are_held_and_told() -> None:
+    """The law goes on, and keeps nothing of them; before the first good one there is none to hold.
+
+    A quaternion that is not unit is one: what rounding makes of a unit one flies.
+    """
+    flight, code = flight_of("ctc"), FlightLibrary(exported("ctc"))
+    supervisor = Supervisor(flight.controller, flight.controller_settings.hold_ticks)
+    references, state = flight.mission.chunk(0, 12).references(), flight.plant.state.copy()
+    scales = [np.nan, 1.0, 1.0001, 0.0, 0.9, 1.001, 1e20, -1.0, np.inf, 1.0]
+    statuses = []
+    for tick, scale in enumerate(scales):
+        reference = references[tick : tick + 1].copy()
+        with np.errstate(invalid="ignore"):
+            reference["quaternion"] *= scale
+        if tick == 9:
+            Reference.parts(reference)[0].reshape(-1)[2] = np.nan
+        state.tick = tick
+        command = supervisor.answer(state, reference)
+        statuses.append(code.answer(state, reference))
+        assert supervisor.reason == TOLD.get(statuses[-1], "")
+        np.testing.assert_array_equal(bits(code.command), bits(command.torque))
+        assert np.isfinite(np.concatenate([code.command, *code.telemetry])).all()
+    held, good = REFERENCE_HELD, USABLE
+    assert statuses == [NO_REFERENCE, good, good, held, held, held, held, good, held, held]
+    rejected = dict(zip(range(STATUSES), code.condition[5:], strict=True))
+    assert (rejected[NO_REFERENCE], rejected[held], sum(rejected.values())) == (1, 6, 7)

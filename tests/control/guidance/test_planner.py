@@ -264,3 +264,23 @@ def test_bad_files_are_named_with_line_and_column(tmp_path: Path, content: str, 
     (tmp_path / "path.csv").write_text(content)
     with pytest.raises(InputError, match=rf"path.csv: {said}"):
         with_columns("{file: path.csv}", tmp_path)
+
+
+@pytest.mark.parametrize("base", [{}, {"base": "free"}], ids=["held", "free"])
+def test_a_closed_path_returns_the_joints_with_the_attitude_held_alone(base: Any) -> None:
+    sides = ([0.2, 0.0, 0.0], [0.0, 0.2, 0.0], [-0.2, 0.0, 0.0], [0.0, -0.2, 0.0])
+    pose = {"rpy_deg": [0.0, 0.0, 0.0]}
+    square = planned(
+        *({"tool": {"xyz": side, **pose}, "duration": 3, **base} for side in sides),
+        waypoints_deg=[10.0, 100.0, 200.0, 20.0, 30.0, 10.0],
+    )
+    joints, attitudes = whole(square)
+    if base:
+        assert np.abs(joints[-1, 0] - joints[0, 0]).max() > np.radians(0.1)
+        assert 2.0 * np.linalg.norm(attitudes[-1, 1:4]) > np.radians(0.1)
+        robot = find_robot("paper")
+        first, last = (tool_state(robot, attitudes[k, :4], joints[k, 0]) for k in (0, -1))
+        np.testing.assert_allclose(first.position, last.position, atol=1e-9)
+        np.testing.assert_allclose(first.rotation, last.rotation, atol=1e-9)
+    else:
+        np.testing.assert_allclose(joints[-1, 0], joints[0, 0], rtol=0.0, atol=1e-9)

@@ -8,6 +8,8 @@ from pathlib import Path
 import numba
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from law_equations import EQUATIONS, PERIOD, History, forces, random_gains
 from numpy.typing import NDArray
 from paths import ROOT
@@ -16,6 +18,7 @@ from space_robot.flight.plan import Flight, FlightPlan, resolve
 from space_robot.flight.simulate import simulate
 from space_robot_control.laws import CompiledLaw, ControlLaw, Signals, find_law, laws
 from space_robot_control.laws.base import CONSTANT_INERTIA, NO_ESTIMATE, NOMINAL_INERTIA
+from space_robot_control.laws.ctc_smc import saturation
 
 Array = NDArray[np.float64]
 
@@ -144,3 +147,26 @@ def test_numba_finds_one_type_for_all_laws_and_keeps_it() -> None:
     assert [id(kind) for kind in first] == [id(kind) for kind in again]
     parts = [numba.typeof(part) for part in codes[0]]
     assert list(first[0].types) == parts
+
+
+def test_terminal_surface_starts_at_zero_whatever_the_error() -> None:
+    """(60) with s(0) = 0, also after a reset: the first force is that of u_PD alone."""
+    law, history = find_law("tde_tsmc"), History(9, 6)
+    gains = random_gains(law, 9, seed=5)
+    controller = law(gains, PERIOD)
+    for k in (0, 7):
+        controller.reset()
+        force = controller.force(history.at(k))
+        np.testing.assert_array_equal(controller.memory.s, np.zeros(9))
+        u_pd = history.rhodd_d[k] + gains["k_d"] * history.edot[k] + gains["k_p"] * history.e[k]
+        np.testing.assert_allclose(force, gains["h_bar"] * u_pd + history.n_hat[k], rtol=1e-13)
+
+
+@given(st.floats(-1e3, 1e3), st.floats(1e-6, 10.0))
+def test_saturation_is_odd_bounded_and_linear_inside_the_layer(s: float, delta: float) -> None:
+    """(58)."""
+    value = saturation(s, delta)
+    assert saturation(-s, delta) == -value
+    assert abs(value) <= 1.0
+    assert value * s >= 0.0
+    assert value == (np.sign(s) if abs(s) > delta else s / delta)

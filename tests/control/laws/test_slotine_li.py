@@ -1,7 +1,8 @@
-"""The adaptive law against its equations in NumPy."""
+"""The adaptive law against its equations in NumPy, and its Lyapunov function on ideal plants."""
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -10,12 +11,22 @@ import scipy.linalg
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
-from oracles import rotation_of
+from oracles import attitude_jacobian_base, rotation_of
 from oracles.second_moments import Jacobians, jacobians, second_moments
+from scipy.integrate import solve_ivp
 from strategies import Case, branched_cases, cases, random_robot, random_state
 
 from space_robot_control.laws import Signals
 from space_robot_control.laws.slotine_li import SlotineLi
+from space_robot_model.dynamics.regressor import (
+    Regressor,
+    force_in_rho,
+    force_on_vectors_into,
+    motions_into,
+    take_rho,
+    vectors_into,
+)
+from space_robot_model.dynamics.rho_space import RhoSpaceModel, rho_space_into
 from space_robot_model.robot import Robot
 from space_robot_msgs_py.compiled.records import assign
 
@@ -58,6 +69,11 @@ class NumpyLaw:
             moved = self.metric @ vectors
             lack = np.maximum(-values, 0.0)
             self.estimate = self.estimate + side * (moved * lack) @ moved.T
+
+    def distance(self, one: Array, other: Array) -> float:
+        """In the norm of ``Gamma^-1``."""
+        difference = np.linalg.solve(self.metric, one - other)
+        return float(np.trace(difference @ difference))
 
 
 def random_gains(rng: np.random.Generator, axes: int, gamma: float) -> dict[str, Array]:
@@ -197,3 +213,101 @@ def test_the_estimate_starts_at_the_nominal_robot_and_outlives_changes_of_gains(
     law.gain_values = gains
     law.reset()
     np.testing.assert_array_equal(law.force(signals), first)
+
+
+def desired(t: float, axes: int) -> tuple[Array, Array, Array]:
+    """rho_d and its rates: each axis swings with a frequency of its own."""
+    frequency = 0.5 + 0.15 * np.arange(axes)
+    amplitude = np.where(np.arange(axes) < 3, 0.1, 0.6)
+    angle = frequency * t
+    return (
+        amplitude * np.sin(angle),
+        amplitude * frequency * np.cos(angle),
+        -amplitude * frequency**2 * np.sin(angle),
+    )
+
+
+class IdealPlant:
+    """The continuous law with its estimate, and a plant whose bodies are off; both by kernels."""
+
+    def __init__(self, off: float) -> None:
+        rng = np.random.default_rng(5)
+        self.robot = robot = random_robot(rng, 2)
+        factor = 1.0 + off * rng.choice([-1.0, 1.0], robot.n + 1)
+        mass, inertia = robot.mass * factor, robot.inertia * factor[:, None, None]
+        self.plant = replace(robot, mass=mass, inertia=inertia)
+        self.axes, self.size, self.slope = robot.n + 3, 2 * robot.n + 3, 3.0
+        at_rest = jacobians(robot, np.eye(4)[0], np.zeros(robot.n), np.zeros(self.axes))
+        effective = 1.0 / np.diag(np.linalg.inv(at_rest.inertia(second_moments(robot))))
+        same = np.ones(self.axes)
+        self.gains = {"k_d": 20.0 * effective, "gamma": 3.0 * same, "spread": 0.6 * same}
+        self.form = NumpyLaw(robot, self.gains)
+        self.work, self.out = Regressor.allocate(robot.n), RhoSpaceModel.allocate(robot.n)
+
+    def motion(self, t: float, x: Array) -> tuple[Array, Array, Array, Array, Array]:
+        """Quaternion, rate, s, v and vdot of a state."""
+        rho, rate = x[: self.axes], x[self.axes : 2 * self.axes]
+        rho_d, rate_d, acceleration_d = desired(t, self.axes)
+        s = rate_d - rate + self.slope * (rho_d - rho)
+        v_rate = acceleration_d + self.slope * (rate_d - rate)
+        quaternion = np.concatenate([[np.sqrt(1.0 - rho[:3] @ rho[:3])], rho[:3]])
+        return quaternion, rate, s, s + rate, v_rate
+
+    def frame(self, t: float) -> tuple[Array, Array]:
+        """Rate and acceleration of the desired frame, which never comes to rest."""
+        frequencies, phases = np.array([0.9, 1.3, 0.7]), np.array([0.0, 1.0, 2.0])
+        angle = frequencies * t + phases
+        return 0.4 * np.sin(angle), 0.4 * frequencies * np.cos(angle)
+
+    def estimate(self, x: Array) -> Array:
+        return x[2 * self.axes : -1].reshape(self.size, self.size)
+
+    def rates(self, t: float, x: Array) -> Array:
+        """Of rho, rhodot, the estimate, and what the damping has taken."""
+        quaternion, rate, s, v, v_rate = self.motion(t, x)
+        theta, work, force = x[3 : self.axes].copy(), self.work, np.zeros(self.axes)
+        vectors_into(self.robot.model, quaternion, theta, work)
+        take_rho(quaternion, *self.frame(t), rate, s, v, v_rate, work)
+        motions_into(self.robot.model, work)
+        forces = work.acceleration @ self.estimate(x)
+        force_on_vectors_into(self.robot.model, forces, work, force)
+        force_in_rho(work, force)
+        force += self.gains["k_d"] * s
+        omega, alpha = self.frame(t)
+        omega_base = np.linalg.solve(attitude_jacobian_base(quaternion), rate[:3])
+        omega_base += rotation_of(quaternion).inv().apply(omega)
+        moving = theta, omega_base, rate[3:].copy(), omega, alpha
+        rho_space_into(self.plant.model, quaternion, *moving, self.out)
+        acceleration = np.linalg.solve(self.out.inertia, force - self.out.bias)
+        product = self.form.metric @ work.sliding.T @ work.acceleration @ self.form.metric
+        change = 0.5 * (product + product.T).ravel()
+        return np.concatenate([rate, acceleration, change, [s @ (self.gains["k_d"] * s)]])
+
+    def function(self, t: float, x: Array) -> float:
+        """``s^T H s / 2 + |pi - pi*|^2 / 2``."""
+        quaternion, rate, s, *_ = self.motion(t, x)
+        true = second_moments(self.plant)
+        inertia = jacobians(self.robot, quaternion, x[3 : self.axes], rate).inertia(true)
+        return float(0.5 * s @ inertia @ s + 0.5 * self.form.distance(self.estimate(x), true))
+
+
+def test_lyapunov_function_falls_by_the_damping_alone() -> None:
+    """V never rises, falls by ``s^T K_D s`` and nothing else, and the errors die out.
+
+    The desired frame turns and accelerates, and the desired motion moves relative to it.
+    """
+    ideal = IdealPlant(0.5)
+    rho_d, rate_d, _ = desired(0.0, ideal.axes)
+    nominal = second_moments(ideal.robot)
+    start = np.concatenate([rho_d - 0.02, 0.8 * rate_d, nominal.ravel(), [0.0]])
+    times = np.linspace(0.0, 15.0, 76)
+    flown = solve_ivp(
+        ideal.rates, (0.0, times[-1]), start, "DOP853", times, rtol=1e-8, atol=1e-10
+    ).y.T
+    values = np.array([ideal.function(t, x) for t, x in zip(times, flown, strict=True)])
+    assert (np.diff(values) < 1e-8 * values[0]).all()
+    np.testing.assert_allclose(values[0] - values, flown[:, -1], rtol=0, atol=1e-6 * values[0])
+    assert values[-1] < 0.9 * values[0]
+    desired_rho = np.array([desired(t, ideal.axes)[0] for t in times])
+    errors = np.abs(desired_rho - flown[:, : ideal.axes]).max(axis=1)
+    assert errors[-15:].max() < 0.1 * errors[:15].max()
