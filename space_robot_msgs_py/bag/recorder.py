@@ -115,9 +115,13 @@ class BagRecorder:
         if not is_new or self.failure:
             return
         log_ns = self._timebase.stamp_ns(max(0, min(tick, counted.last)))
-        self._open_bytes = self._writer.write(
-            self._written[topic.name], log_ns, sent_ns or log_ns, tick, data
-        )
+        try:
+            self._open_bytes = self._writer.write(
+                self._written[topic.name], log_ns, sent_ns or log_ns, tick, data
+            )
+        except OSError as error:
+            self._fail(error)
+            return
         if self._open_bytes > self._most_bytes:  # no time to flush so far
             self.flush()
 

@@ -9,13 +9,10 @@ from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
-from mcap.records import Channel, Schema
-
 from ..errors import InputError
 from ..topics import Topic
 from ..wire.definitions import definition, jazzy
-from .chunk import OpenChunk
-from .mcap_file import Compression, McapFile, record_bytes
+from .mcap_file import Channel, Compression, McapFile
 from .rosbag2_yaml import FileSummary, bag_information, qos_profiles, to_yaml
 
 DESCRIPTION = "space_robot"
@@ -50,16 +47,14 @@ class BagWriter:
         self._description = dict(description)
         self._compression, self._split_size = compression, split_size
         self._channels = {topic.name: number for number, topic in enumerate(self._topics, 1)}
-        self._definitions = self._schemas_and_channels()
-        self._first_records = record_bytes(*self._definitions)
-        self._chunk = OpenChunk(self._first_records)
+        self._in_files = [_channel(topic) for topic in self._topics]
         self._files: list[McapFile] = []
         self._latched: dict[int, tuple[int, int, bytes] | None] = {
             self._channels[topic.name]: None for topic in self._topics if topic.is_latched
         }
         """Publish time, sequence and bytes of the last message of each latched topic."""
         self._begins_file = False
-        """True if the open chunk, still empty, is the first of a file."""
+        """True if the next message is the first of another file."""
         try:
             path.mkdir(parents=True, exist_ok=True)
             if any(path.iterdir()):
@@ -71,21 +66,27 @@ class BagWriter:
             raise InputError(f"{path}: no bag can be written there ({error.strerror})") from None
 
     def write(self, topic: Topic, log_ns: int, publish_ns: int, sequence: int, data: bytes) -> int:
-        """Add a message.
+        """Add a message; the first after a full file begins another one.
 
         Returns:
             Bytes in the open chunk.
+
+        Raises:
+            OSError: the next file cannot be begun.
         """
-        chunk, channel, sequence = self._chunk, self._channels[topic.name], sequence & 0xFFFFFFFF
+        channel, sequence = self._channels[topic.name], sequence & 0xFFFFFFFF
         if self._begins_file:
             self._begins_file = False
+            self._end_file({})
+            self._begin_file()
             for latched, message in self._latched.items():
                 if message:
-                    chunk.add(latched, log_ns, *message)
-        chunk.add(channel, log_ns, publish_ns, sequence, data)
+                    self._files[-1].add(latched, log_ns, *message)
+        file = self._files[-1]
+        file.add(channel, log_ns, publish_ns, sequence, data)
         if channel in self._latched:
             self._latched[channel] = (publish_ns, sequence, data)
-        return len(chunk.content)
+        return file.open_bytes
 
     def describe(self, description: Mapping[str, str]) -> None:
         """Note more, or what is known better, in this file, those to come and at the end.
@@ -104,16 +105,12 @@ class BagWriter:
             OSError: that failed; `abandon` leaves the whole chunks of before.
             FileNotFoundError: the file is no longer at its path.
         """
-        self._files[-1].check_in_place()
-        if not self._chunk:
-            return
-        if self._is_full():
-            self._end_file({})
-            self._begin_file()
-        self._files[-1].add_chunk(self._chunk)
-        self._whole_bytes = self._files[-1].size
-        self._begins_file = self._is_full()
-        self._chunk = OpenChunk(self._first_records if self._begins_file else b"")
+        file = self._files[-1]
+        file.check_in_place()
+        if file.open_bytes:
+            file.end_chunk()
+            self._whole_bytes = file.size
+            self._begins_file = 0 < self._split_size <= file.size
 
     def close(self, custom: Mapping[str, str]) -> None:
         """Finish the last file and write metadata.yaml, after a `flush`.
@@ -135,12 +132,9 @@ class BagWriter:
         """After a failure: leave the whole chunks and, if there is room, a valid MCAP end."""
         self._files[-1].abandon(self._whole_bytes)
 
-    def _is_full(self) -> bool:
-        return 0 < self._split_size <= self._files[-1].size
-
     def _begin_file(self) -> None:
         path = self.path / f"{self.path.name}_{len(self._files)}.mcap"
-        file = McapFile(path, self._definitions, self._compression)
+        file = McapFile(path, self._in_files, self._compression)
         self._files.append(file)
         try:
             self._add_records(self._description, ())  # no topics yet, as rosbag2 has it
@@ -160,31 +154,16 @@ class BagWriter:
         text = to_yaml(self._information(custom, topics))
         file.add_metadata("rosbag2", {"serialized_metadata": text})
 
-    def _schemas_and_channels(self) -> list[Schema | Channel]:
-        """One schema a type, one channel a topic."""
-        types = dict.fromkeys(topic.type for topic in self._topics)
-        numbers = {name: number for number, name in enumerate(types, 1)}
-        schemas = [
-            Schema(id=number, name=name, encoding="ros2msg", data=definition(name).encode())
-            for name, number in numbers.items()
-        ]
-        channels = [
-            Channel(
-                id=self._channels[topic.name],
-                topic=topic.full_name,
-                message_encoding="cdr",
-                schema_id=numbers[topic.type],
-                metadata={
-                    "offered_qos_profiles": to_yaml(qos_profiles(topic)),
-                    "topic_type_hash": jazzy().hash_rihs01(topic.type),
-                },
-            )
-            for topic in self._topics
-        ]
-        return [*schemas, *channels]
-
     def _information(self, custom: Mapping[str, str], topics: Sequence[Topic]) -> dict[str, object]:
         counts = sum((file.counts for file in self._files), Counter[int]())
         files = [FileSummary(f.path.name, f.span_ns, f.counts.total()) for f in self._files]
         counted = [(topic, counts[self._channels[topic.name]]) for topic in topics]
         return bag_information(files, counted, custom)
+
+
+def _channel(topic: Topic) -> Channel:
+    metadata = {
+        "offered_qos_profiles": to_yaml(qos_profiles(topic)),
+        "topic_type_hash": jazzy().hash_rihs01(topic.type),
+    }
+    return Channel(topic.full_name, topic.type, definition(topic.type).encode(), metadata)
