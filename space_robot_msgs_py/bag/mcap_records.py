@@ -5,10 +5,9 @@ Lengths are checked first, since wrong ones in a damaged file would exhaust the 
 
 from __future__ import annotations
 
-import re
 import struct
 from io import BytesIO
-from typing import Any, BinaryIO
+from typing import Any
 
 import numpy as np
 import zstandard
@@ -41,10 +40,6 @@ _PARSED: dict[int, Any] = {
 }
 DESCRIPTIONS = (Opcode.SCHEMA, Opcode.CHANNEL, Opcode.METADATA)
 PASSED = (Opcode.HEADER, Opcode.ATTACHMENT)
-_CHUNK = re.compile(
-    rb"(?=(\x06.{5}\0\0\0.{28}(?:\0{4}|\x03\0\0\0lz4|\x04\0\0\0zstd)))", re.DOTALL
-)  # opcode, length, two times, size, CRC, compression; looked ahead for: they may overlap
-_LONGEST_CHUNK_HEAD = 64
 PIECE = 1 << 20
 LEAST_MESSAGE = 31
 _MOST_EXPANDED = 1000
@@ -105,20 +100,3 @@ def cause(error: BaseException) -> str:
     if "crc" in text.lower():
         return "CRC"
     return text if len(text) <= 60 else text[:57] + "..."
-
-
-def next_chunk(file: BinaryIO, at: int, size: int) -> int:
-    """Return the next offset of a chunk from ``at`` on, or ``size`` of the file if none."""
-    while at < size:
-        file.seek(at)
-        piece = file.read(PIECE + _LONGEST_CHUNK_HEAD)
-        for match in _CHUNK.finditer(piece):
-            start = at + match.start()
-            _, length = HEAD.unpack_from(piece, match.start())
-            inner = len(match[1]) - HEAD.size + 8
-            file.seek(start + HEAD.size + inner - 8)
-            held = file.read(8)
-            if len(held) == 8 and int.from_bytes(held, "little") == length - inner:
-                return start
-        at += PIECE
-    return size

@@ -1,4 +1,4 @@
-"""Reader of an MCAP file, chunk by chunk; damaged parts are skipped and reported.
+"""Reader of an MCAP file, chunk by chunk, up to its end or its first damage.
 
 The mcap library parses records, and decompresses and checks chunks. Only the messages, of
 which there are millions, are located in compiled code.
@@ -32,7 +32,6 @@ from .mcap_records import (
     cause,
     check_index,
     decompressed,
-    next_chunk,
     parse,
     whole_messages,
 )
@@ -59,7 +58,7 @@ class McapStorage:
         self._schemas: dict[int, Schema] = {}
         self._channels: dict[int, Channel] = {}
         self._index_fault = ""
-        self._faults: list[tuple[int, str]] = []
+        self._fault = ""
         self._of_no_topic = 0
         with path.open("rb") as file:
             self.is_mcap = file.read(len(MCAP0_MAGIC)) == MCAP0_MAGIC
@@ -76,7 +75,7 @@ class McapStorage:
         Raises:
             OSError: the file can no longer be read.
         """
-        self._faults, self._of_no_topic = [], 0
+        self._fault, self._of_no_topic = "", 0
         pieces: list[bytes] = []
         with self.path.open("rb") as file:
             for record in self._records(file):
@@ -95,17 +94,15 @@ class McapStorage:
 
     @property
     def incomplete(self) -> bool:
-        """True if something was skipped."""
-        return bool(self._faults or self._of_no_topic)
+        """True if something could not be read."""
+        return bool(self._fault or self._of_no_topic)
 
     @property
     def damage(self) -> list[str]:
         """Damage of the file; complete after `batches`."""
         texts = [self._index_fault] if self._index_fault else []
-        if self._faults:
-            at, why = self._faults[0]
-            more = f", and {len(self._faults) - 1} places more" if len(self._faults) > 1 else ""
-            texts.append(f"unreadable at byte {at} ({why}){more}")
+        if self._fault:
+            texts.append(self._fault)
         if self._of_no_topic:
             texts.append(f"{self._of_no_topic} messages of an unknown topic")
         return [f"{self.path.name}: {text}" for text in texts]
@@ -157,7 +154,7 @@ class McapStorage:
     def _records(self, file: BinaryIO, before_messages: bool = False) -> Iterator[Any]:
         """The data section's records; messages as the bytes of many records.
 
-        After an incomplete record it continues with the next chunk.
+        They end before a record that cannot be read.
         """
         at = len(MCAP0_MAGIC) if self.is_mcap else 0
         while at < self.size:
@@ -189,10 +186,9 @@ class McapStorage:
             except BROKEN as error:
                 if before_messages:
                     return
-                behind = next_chunk(file, at + 1, self.size)
-                if behind < self.size or self.has_end:  # else it is where writing ended
-                    self._faults.append((at, cause(error)))
-                at = behind
+                if self.has_end:  # else it is where writing ended
+                    self._fault = f"unreadable from byte {at} on ({cause(error)})"
+                return
 
     def _walk(self, pieces: list[bytes]) -> Iterator[Batch]:
         """The messages of several chunks: fewer batches, less to do for each."""
@@ -220,7 +216,7 @@ class McapStorage:
                     self._note(parse(opcode, data[body : body + length].tobytes()))
                 at += HEAD.size + length
             except BROKEN as error:
-                self._faults.append((at, cause(error)))
+                self._fault = f"a chunk is unreadable from byte {at} on ({cause(error)})"
                 break
         return count
 

@@ -60,8 +60,8 @@ def _flip(at: Callable[[Path], int]) -> Callable[[Path], None]:
     return harm
 
 
-def _last_chunk(bag: Path) -> int:
-    start, length = chunks_of(bag)[3]
+def _second_chunk(bag: Path) -> int:
+    start, length = chunks_of(bag)[1]
     return start + length // 2
 
 
@@ -86,9 +86,9 @@ def _second_file(information: dict[str, Any]) -> None:
 
 
 DAMAGES: dict[str, tuple[Callable[[Path], object], list[str]]] = {
-    "last chunk": (
-        _flip(_last_chunk),
-        ["bag_0.mcap: unreadable at byte ", "messages cannot be read", "/joint_states 100"],
+    "second chunk": (
+        _flip(_second_chunk),
+        ["bag_0.mcap: unreadable from byte ", "messages cannot be read", "/joint_states 300"],
     ),
     "index": (_flip(lambda bag: -60), ["bag_0.mcap: its index cannot be read (CRC)"]),
     "footer": (
@@ -131,12 +131,12 @@ def test_what_is_readable_is_read_and_the_rest_told(
     harm(bag)
     log = read_flight(bag)
     assert log.whole.all()
-    assert log.ticks == (300 if kind == "last chunk" else 400)
+    assert log.ticks == (100 if kind == "second chunk" else 400)
     assert_rows_are_the_originals(log, recorded.log)
     told = [*log.damage, log.unfinished]
     assert bool(log.unfinished) == (kind == "footer")
     assert all(any(word in text for text in told) for word in words), told
-    lost = {"last chunk": 100, "split": 400}.get(kind, 0)
+    lost = {"second chunk": 300, "split": 400}.get(kind, 0)
     for topic in (topics.JOINT_STATES, topics.BASE_STATE, topics.COMMAND):
         assert log.lost[topic.full_name] == lost
     assert log.flight == FLIGHT
