@@ -53,16 +53,6 @@ def test_quantiles_are_scipys(told: dict[str, Any], known: Any) -> None:
         assert distribution.quantile(u) == pytest.approx(expected, rel=1e-9, abs=1e-9)
 
 
-def test_keys_do_not_meet() -> None:
-    numbers = {
-        bits(seed, name, number) for seed in range(5) for name in "ab" for number in range(9)
-    }
-    assert len(numbers) == 90
-    pairs = np.array([[uniform(1, "x", k), uniform(1, "y", k)] for k in range(4000)]).T
-    assert abs(np.corrcoef(pairs)[0, 1]) < 0.06
-    assert 0.0 < pairs.min() < pairs.max() < 1.0
-
-
 def test_numbers_are_those_of_every_machine() -> None:
     """Golden: other numbers here are other campaigns for every seed that was ever used."""
     known = [1788990827981690842, 15618775813144590017]

@@ -190,13 +190,6 @@ def test_a_reader_that_has_gone_is_no_error_to_tell(bag: Path) -> None:
     assert (result.returncode, result.stderr) == (1, "")
 
 
-def test_a_replay_that_is_refused_leaves_no_empty_table(tmp_path: Path, space_robot: Run) -> None:
-    code, _, err = space_robot("replay", tmp_path / "nowhere", "--csv", tmp_path / "x.csv")
-    assert code == 2
-    assert list(tmp_path.iterdir()) == []
-    assert "no such bag" in err
-
-
 def test_an_older_file_stays_whole_if_the_new_one_fails(tmp_path: Path) -> None:
     path = tmp_path / "x"
     path.write_text("older")

@@ -152,33 +152,6 @@ def test_eigenvalues_are_scipys(seed: int, m: int) -> None:
     assert found.norm == pytest.approx(np.linalg.norm(w, 2))
 
 
-@given(st.integers(0, 2**32 - 1), st.floats(0.05, 1.0), st.floats(0.5, 1.3), st.floats(0.2, 3.0))
-@settings(max_examples=50, deadline=None)
-def test_an_error_of_the_estimate_grows_as_the_formula_says(
-    seed: int, weight: float, reported: float, given_torque: float
-) -> None:
-    """The recursion of (36) itself, as the controller runs it: force and acceleration apart."""
-    rng = np.random.default_rng(seed)
-    m = 3
-    inertia, h_bar = some_inertia(rng, m), rng.uniform(0.05, 0.5, m)
-    inverse = np.linalg.inv(inertia)
-
-    def tick(memory: np.ndarray) -> np.ndarray:
-        force, acceleration = memory[:m], memory[m:]
-        command = force - h_bar * acceleration  # u and c are left out: they add, no more
-        return np.concatenate(
-            [
-                force + weight * (reported * command - force),
-                acceleration + weight * (given_torque * inverse @ command - acceleration),
-            ]
-        )
-
-    matrix = np.column_stack([tick(column) for column in np.eye(2 * m)])
-    expected = 1.0 + weight * (reported - 1.0 - given_torque * eigenvalues(inertia, h_bar))
-    radius = max(*np.abs(expected), 1.0 - weight)  # what cancels in N_hat only fades
-    assert np.max(np.abs(np.linalg.eigvals(matrix))) == pytest.approx(radius, rel=1e-6)
-
-
 @pytest.mark.parametrize("controller", ["tde_smc", "tde_stc"])
 def test_a_torque_reported_too_large_by_more_than_the_margin_diverges(controller: str) -> None:
     """Of Table IV: 0.31 to 0.79 %. One too small costs accuracy, no more."""
@@ -260,13 +233,6 @@ def test_thrusters_are_told_which_gains_are_for_them() -> None:
         (line,) = remarks_on(Flight(resolve(FlightPlan(actuators=actuators))))
         assert ("thrusters' pulses" in line) is is_said
     assert remarks_on(Flight(resolve(FlightPlan(actuators="thrusters", gains="robust")))) == []
-
-
-def test_an_h_bar_that_is_too_large_is_said_to_diverge() -> None:
-    (line,) = remarks(TOO_LARGE)
-    assert "too large" in line
-    assert "diverge" in line
-    assert "margin" in remarks(TOO_LARGE, corner=100.0)[0]
 
 
 @pytest.mark.parametrize(
