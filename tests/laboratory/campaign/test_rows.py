@@ -203,17 +203,3 @@ def test_a_digest_covers_every_number() -> None:
     digests |= {row.digested().digest, row.digested(b"state").digest}
     assert len(digests) == len(others) + 2
     assert replace(row, task=Task(7, "ctc")).digested().digest in digests
-
-
-def test_a_flight_that_diverges_among_joints_that_stop_comes_to_its_end() -> None:
-    """Near its end velocities have several roots in a step: cutting it never ended."""
-    content = {
-        "scenario": {"case": "3", "sensors": "fine", "duration": 5.0},
-        "laws": ["ctc"],
-        "vary": {"robot.links[*].mass": {"normal": 1.0, "sigma": 0.05, "relative": True}},
-    }
-    flying = RowFlyer.of(Study.model_validate(content), 7, 150)
-    row = flying(Task(89, "ctc"))
-    assert (row.outcome, row.ended_at_s) == ("diverged", pytest.approx(2.602))
-    (other,) = [r for r in flying.together([Task(88, "ctc"), Task(89, "ctc")]) if r.task.run == 89]
-    assert other.digest == row.digest

@@ -15,7 +15,6 @@ from space_robot.tuning.gain_check import noise_gain
 from space_robot.tuning.linear_law import LinearLaw, force_by_rate, linear_law
 from space_robot.tuning.postures import Posture, postures_at
 from space_robot_control.laws import ControlLaw, LawGains, Signals, find_law, per_axis
-from space_robot_control.laws.checked import LawError
 
 Array = NDArray[np.float64]
 PERIOD = 5e-4
@@ -118,20 +117,6 @@ def test_a_jump_at_rest_is_not_in_it_and_rates_move_with_rhodot() -> None:
     assert np.abs(linear.force_by["error_rate"]).max() < 1e-3
     row = np.array([4.0, 0.0, 0.0, 1.0, *[0.0] * 5])  # omega is twice rhodot
     np.testing.assert_allclose(linear.force_by["rho_rate"], np.tile(row, (9, 1)), rtol=1e-4)
-
-
-class Failing(Steps):
-    """A law whose code fails."""
-
-    name = "failing"
-
-    def force(self, signals: Signals) -> Array:
-        raise ValueError("no")
-
-
-def test_a_law_that_fails_is_named() -> None:
-    with pytest.raises(LawError, match="controller failing failed"):
-        linear_law(Failing({"k": ONES}, PERIOD), posture())
 
 
 @pytest.mark.parametrize("name", ["tde_tsmc", "nominal", "indi", "dob", "adrc"])
