@@ -20,16 +20,6 @@ from space_robot.campaign.row.row import Row, Task
 from space_robot.campaign.study import Requirement, Study
 from space_robot_msgs_py.errors import InputError
 
-REQUIRE = {
-    "late": Requirement.model_validate(
-        {"metric": "attitude_max", "from_s": 0.6, "below": 1.0, "in": 0.9}
-    ),
-    "early": Requirement.model_validate(
-        {"metric": "torque_4_6_rms", "to_s": 0.25, "below": 1.0, "in": 0.9}
-    ),
-    "whole": Requirement.model_validate({"metric": "joints_1_3_max", "below": 1.0, "in": 0.9}),
-}
-
 
 @pytest.fixture(scope="module")
 def flown() -> FlownFlight:
@@ -39,7 +29,7 @@ def flown() -> FlownFlight:
 @pytest.fixture(scope="module")
 def measured(flown: FlownFlight) -> Measure:
     """In blocks of 700 ticks."""
-    measure = Measure(flown.flight, REQUIRE)
+    measure = Measure(flown.flight, {})
     for start in range(0, 2400, 700):
         measure.add(flown.log.rows(start, min(start + 700, 2400)))
     return measure
@@ -141,7 +131,7 @@ def test_a_mission_of_segments_has_the_error_of_its_tool() -> None:
         "segments": [{"tool": {"xyz": [0.05, 0.0, -0.05]}, "duration": 1.2}],
     }
     flown = Scenario(controller="ctc", mission=mission).fly()
-    measure = Measure(flown.flight, REQUIRE)
+    measure = Measure(flown.flight, {})
     measure.add(flown.log)
     found, tool = measure.metrics(), flown.metrics["tool"]
     assert list(found) == list(Columns.of_flight(flown.flight).metrics)

@@ -57,13 +57,6 @@ def test_markdown_has_formatted_numbers_and_csv_and_json_all_digits(table: Table
     assert [record["law"] for record in records] == [row["law"] for row in rows]
 
 
-def test_a_group_is_named_once_and_notes_stand_below(table: Table) -> None:
-    text = printed(Table(table.title, table.columns, table.groups, ["as flown"]), 100)
-    assert text.count("case 1") == text.count("case 2") == 1
-    assert text.rstrip().endswith("as flown")
-    assert "case" not in printed(Table.of("flights", COLUMNS, ROWS), 100)
-
-
 def test_a_page_escapes_and_tells_good_from_bad(table: Table) -> None:
     module = template("space_robot.analysis", "table.html.j2").module
     html = str(module.draw(table))  # type: ignore[attr-defined]
