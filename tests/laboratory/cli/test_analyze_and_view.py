@@ -205,15 +205,6 @@ def test_json_of_one_is_an_object_and_of_several_a_list(
     assert part == report_of(excerpt(read_flight(bags[0]), 0.1, 0.2))
 
 
-def test_one_bag_is_a_table_and_further_figures(analyze: Run, bags: tuple[Path, Path]) -> None:
-    result = analyze(bags[0])
-    assert result.code == 0
-    shown = ("RMS, mean", "variation", "maximum", "no limits", "arcsec", "messages lost: none")
-    shown += ("settling is counted from the waypoint at 0 s",)
-    assert [words for words in shown if words not in result.out] == []
-    assert max(map(len, result.out.splitlines())) <= 100
-
-
 def test_bags_of_one_name_are_told_apart(
     analyze: Run, bags: tuple[Path, Path], tmp_path: Path
 ) -> None:
@@ -248,18 +239,6 @@ def test_the_shortest_excerpts_have_what_they_can_have(
     result = analyze(*bags, *words, "--parquet", tmp_path)
     assert result.code == 0
     assert "no settling" in result.out
-
-
-def test_exports_are_named_and_not_overwritten(
-    analyze: Run, bags: tuple[Path, Path], tmp_path: Path
-) -> None:
-    table = tmp_path / "one.parquet"
-    assert analyze(bags[0], "--parquet", table).code == 0
-    before = table.read_bytes()
-    result = analyze(bags[0], "--parquet", table)
-    assert result.code == 2
-    assert result.err.strip().endswith(f"{table}: exists already; it is not overwritten")
-    assert table.read_bytes() == before
 
 
 def test_a_bag_that_nobody_finished_is_analysed_and_said_so(
