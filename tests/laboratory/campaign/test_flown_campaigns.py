@@ -69,6 +69,7 @@ def test_killed_it_goes_on_to_the_same_table(undisturbed: FlownCampaign, tmp_pat
 
     process = context.Process(target=fly)
     process.start()
+    theirs.close()
     ours.recv()
     done = ours.recv()
     process.kill()

@@ -250,12 +250,3 @@ def test_a_folder_appears_whole_or_not_at_all(tmp_path: Path) -> None:
             (place / "a").write_text(text, "utf-8")
     assert [path.name for path in tmp_path.iterdir()] == ["one"]
     assert (folder / "a").read_text("utf-8") == "2"
-
-
-def test_below_a_file_nothing_can_be_written(bag: Path, tmp_path: Path, space_robot: Run) -> None:
-    (tmp_path / "file").touch()
-    for option in ("--csv", "--html", "--plot"):
-        target = tmp_path / "file" / "x" / f"y.{option[2:]}"
-        code, _, err = space_robot("analyze", bag, option, target)
-        assert code == 2
-        assert str(tmp_path / "file") in err.splitlines()[-1]
