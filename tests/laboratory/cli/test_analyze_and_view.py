@@ -8,9 +8,7 @@ import re
 import shutil
 import sys
 from functools import partial
-from html.parser import HTMLParser
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -25,7 +23,6 @@ from space_robot.analysis import excerpt
 from space_robot.analysis.described import robot_of
 from space_robot.analysis.metrics import tracking_error
 from space_robot.cli.main import main
-from space_robot.cli.replay_display import COUNTS, counts
 from space_robot.flight.plan import Flight, FlightPlan, resolve
 from space_robot.flight.simulate import simulate
 from space_robot.view.flights import shown_robot
@@ -61,28 +58,12 @@ def page_file(bags: tuple[Path, Path], tmp_path_factory: pytest.TempPathFactory)
     return out
 
 
-class References(HTMLParser):
-    """What a browser would fetch for a page."""
-
-    def __init__(self, page: str) -> None:
-        super().__init__()
-        self.found: list[str] = []
-        self.feed(page)
-
-    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
-        """Take the addresses of a tag; a page in a page has its own."""
-        for name, value in attrs:
-            if name == "srcdoc":
-                self.found += References(value or "").found
-            elif name in ("src", "href", "data", "action", "poster", "srcset"):
-                self.found.append(value or "")
-
-
 def test_a_page_is_small_and_needs_no_other_file(page_file: Path) -> None:
     page = page_file.read_text("utf-8")
     assert page_file.stat().st_size < LARGEST
     assert Scene(page).duration == pytest.approx(0.3 - 5e-4)
-    assert [ref for ref in References(page).found if not ref.startswith(("data:", "#"))] == []
+    fetched = re.findall(r"""\b(?:src|href|data|srcset)=["']([^"']*)""", html.unescape(page))
+    assert [address for address in fetched if not address.startswith(("data:", "#"))] == []
     own = re.sub(r'srcdoc="[^"]*"', "", page)
     assert not re.search(
         r"https?:(?!//(?:www\.w3\.org|github\.com/leeoniya))|import\(|fetch\(|url\(", own
@@ -224,15 +205,6 @@ def test_json_of_one_is_an_object_and_of_several_a_list(
     assert part == report_of(excerpt(read_flight(bags[0]), 0.1, 0.2))
 
 
-def test_one_bag_is_a_table_and_further_figures(analyze: Run, bags: tuple[Path, Path]) -> None:
-    result = analyze(bags[0])
-    assert result.code == 0
-    shown = ("RMS, mean", "variation", "maximum", "no limits", "arcsec", "messages lost: none")
-    shown += ("settling is counted from the waypoint at 0 s",)
-    assert [words for words in shown if words not in result.out] == []
-    assert max(map(len, result.out.splitlines())) <= 100
-
-
 def test_bags_of_one_name_are_told_apart(
     analyze: Run, bags: tuple[Path, Path], tmp_path: Path
 ) -> None:
@@ -267,18 +239,6 @@ def test_the_shortest_excerpts_have_what_they_can_have(
     result = analyze(*bags, *words, "--parquet", tmp_path)
     assert result.code == 0
     assert "no settling" in result.out
-
-
-def test_exports_are_named_and_not_overwritten(
-    analyze: Run, bags: tuple[Path, Path], tmp_path: Path
-) -> None:
-    table = tmp_path / "one.parquet"
-    assert analyze(bags[0], "--parquet", table).code == 0
-    before = table.read_bytes()
-    result = analyze(bags[0], "--parquet", table)
-    assert result.code == 2
-    assert result.err.strip().endswith(f"{table}: exists already; it is not overwritten")
-    assert table.read_bytes() == before
 
 
 def test_a_bag_that_nobody_finished_is_analysed_and_said_so(
@@ -319,16 +279,3 @@ def test_band_and_window_are_those_of_the_options(analyze: Run, bags: tuple[Path
     assert 0.0 < base["half_cone_arcsec"]["jitter_rms"] < base["half_cone_arcsec"]["max"]
     refused = analyze(bags[0], "--band", "0")
     assert refused.code == 2
-
-
-def test_each_number_of_a_replay_stands_in_the_line_of_its_own() -> None:
-    report: dict[str, Any] = dict.fromkeys(COUNTS, 0)
-    report |= {"unreadable": {"recorded": 0, "replayed": 0}, "ticks_per_s": None}
-    for key, name in COUNTS.items():
-        rows = dict(counts({**report, key: 17}))
-        assert rows.pop(name) == "17"
-        assert "17" not in rows.values()
-    for key, words in (("recorded", "in the bag"), ("replayed", "now")):
-        unreadable = {**report["unreadable"], key: 3}
-        found = [row for row in counts({**report, "unreadable": unreadable}) if "read" in row[0]]
-        assert found == [(f"commands {words} that cannot be read", "3")]

@@ -62,14 +62,6 @@ def test_an_estimate_that_diverges_is_a_failure() -> None:
     assert "remark" not in result.stderr
 
 
-def test_laws_with_a_model_are_sound() -> None:
-    result = run("check", "--controller", "ctc")
-    assert result.exit_code == 0
-    assert "H_S^-1 h_bar" not in result.stdout
-    keys = report("--controller", "ctc")["laws"]["ctc"].keys()
-    assert keys == {"is_stable", "is_sound", "loop_radius", "noise_gain"}
-
-
 def test_a_free_base_leaves_the_joints_to_be_judged() -> None:
     """Table IV: seven times the margin, so that it is sound; the base gets no torque of noise."""
     free = ("--actuators", "none")

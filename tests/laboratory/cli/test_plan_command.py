@@ -90,8 +90,6 @@ def test_sigma_is_of_translations_divided_by_the_tools_distance(mission: Path) -
     jacobian[:3] /= np.linalg.norm(state.position + state.centre_of_mass)
     smallest = np.linalg.svd(jacobian, compute_uv=False)[-1]
     assert hold["singular_value"] == pytest.approx(smallest, rel=1e-9)
-    shown = " ".join(run(mission).stdout.split())
-    assert "translation are divided by the tool's distance from the base" in shown
 
 
 @pytest.mark.parametrize("key", ["base_torque", "momentum"])
@@ -167,10 +165,7 @@ def test_an_orbit_has_torques_by_source(mission: Path) -> None:
         key: max(s["sources"]["gravity_gradient"][key] for s in numbers["segments"])
         for key in ("base_torque", "momentum", "momentum_end")
     }
-    shown = " ".join(run(mission, "--orbit", "iss").stdout.split())
-    assert "gravity gradient" in shown
-    assert "all, without unloading" in shown
-    assert "gravity gradient" not in run(mission).stdout
+    assert "all, without unloading" in " ".join(run(mission, "--orbit", "iss").stdout.split())
 
 
 def test_a_scenario_has_the_mission_its_orbit_and_actuators(

@@ -12,7 +12,7 @@ import pinocchio as pin
 import pytest
 from click.testing import CliRunner, Result
 from paths import CONFIG, DATA
-from urdf_defects import DEFECTS, GOOD, with_defect
+from urdf_defects import GOOD
 
 from space_robot.cli.main import _run, cli
 from space_robot_model.robot import Robot
@@ -165,20 +165,6 @@ def test_plates_of_the_file_and_of_the_shapes(tmp_path: Path) -> None:
     assert re.search(r"together +│ +3 +│ +4.25", shown)
     assert "those of the file" in shown
     assert "made from the shapes" in run(ARM).stdout
-
-
-@pytest.mark.parametrize("name", DEFECTS)
-def test_every_defect_is_one_line_of_every_command(
-    name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    path = tmp_path / "given.urdf"
-    path.write_text(with_defect(name))
-    for command in (["simulate", "--robot", str(path)], ["robot", str(path)]):
-        assert _run(command) == 2
-        said = capsys.readouterr().err
-        assert said.count("\n") == 1
-        assert said.startswith(f"space-robot: error: {path}: ")
-        assert DEFECTS[name].text in said or command[0] == "robot"
 
 
 def test_base_and_repair_are_a_part_of_the_name(

@@ -3,26 +3,19 @@
 from __future__ import annotations
 
 import csv
-import errno
 import io
 import re
-import sys
 import threading
-from pathlib import Path
 from typing import Any
 
 import pytest
-from flights import simulated
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from rich.table import Table as RichTable
 
-from space_robot.analysis import analyze
-from space_robot.analysis.report_tables import rms_table
 from space_robot.analysis.template import template
 from space_robot.console import progress
 from space_robot.console.progress import WATCHER
-from space_robot.console.streams import is_of_output
 from space_robot.console.table_layout import LONGEST_WORD
 from space_robot.console.tables import (
     Column,
@@ -64,13 +57,6 @@ def test_markdown_has_formatted_numbers_and_csv_and_json_all_digits(table: Table
     assert [record["law"] for record in records] == [row["law"] for row in rows]
 
 
-def test_a_group_is_named_once_and_notes_stand_below(table: Table) -> None:
-    text = printed(Table(table.title, table.columns, table.groups, ["as flown"]), 100)
-    assert text.count("case 1") == text.count("case 2") == 1
-    assert text.rstrip().endswith("as flown")
-    assert "case" not in printed(Table.of("flights", COLUMNS, ROWS), 100)
-
-
 def test_a_page_escapes_and_tells_good_from_bad(table: Table) -> None:
     module = template("space_robot.analysis", "table.html.j2").module
     html = str(module.draw(table))  # type: ignore[attr-defined]
@@ -105,14 +91,6 @@ def test_a_table_that_is_too_wide_is_printed_in_parts_with_their_labels() -> Non
     assert printed(table, 200).count("┏") == 1
 
 
-def test_a_path_is_folded_and_all_of_it_is_shown() -> None:
-    path = "/".join(["a_folder"] * 20)
-    table = Table.of("", [Column("file", is_label=True), Column("n")], [[path, "1.5"]])
-    text = printed(table, 40)
-    assert "1.5" in text.split()
-    assert "".join(c for c in text if c in path).count("a_folder") == 20
-
-
 WORDS = st.text("abcdefgh_", min_size=1, max_size=LONGEST_WORD)
 
 
@@ -145,23 +123,6 @@ def shown(width: int, *prints: Any) -> str:
     return file.getvalue()
 
 
-def test_a_narrow_table_becomes_lines_that_name_each_number() -> None:
-    table = RichTable(title="torques")
-    table.add_column("")
-    table.add_column("")
-    table.add_column("one", justify="right")
-    table.add_row("maximum", "base_torque (N m)", "0.123456789")
-    table.add_row("", "torque_1_3 (N m)", "0.2")
-    lines = shown(20, lambda console: show(table, console)).splitlines()
-    assert lines == [
-        "torques",
-        "maximum base_torque (N m)",
-        "  one: 0.123456789",
-        "maximum torque_1_3 (N m)",
-        "  one: 0.2",
-    ]
-
-
 @settings(max_examples=30)
 @given(st.text())
 def test_any_text_is_shown_as_it_is_and_never_as_control_letters(text: str) -> None:
@@ -177,15 +138,6 @@ def test_any_text_is_shown_as_it_is_and_never_as_control_letters(text: str) -> N
     assert all(line.isprintable() for line in out.split("\n"))
     if text.isprintable():
         assert f"<{text}>" in out
-
-
-def test_a_bag_that_does_not_say_what_flew_has_a_title_without_none() -> None:
-    report = analyze(simulated(duration=0.05, case="2"))
-    unknown = dict.fromkeys(("controller", "case", "gains", "robot"))
-    foreign = {**report, **unknown, "laws": []}
-    text = shown(100, lambda console: print_table(rms_table(foreign), console))
-    assert text.startswith("unknown law: 100 ticks, 0.05 s")
-    assert "None" not in text
 
 
 def test_what_is_watched_is_a_line_now_and_then_and_complete_at_the_end(
@@ -208,22 +160,3 @@ def test_what_is_watched_is_a_line_now_and_then_and_complete_at_the_end(
     assert [f"kernels {k}/4" for k in range(1, 5)] == list(dict.fromkeys(said[1:-1]))[-4:]
     assert "4/4" in said[-1]
     assert WATCHER not in {thread.name for thread in threading.enumerate()}
-
-
-def test_an_error_ends_the_watch() -> None:
-    with pytest.raises(KeyError), progress.watching_progress("kernels", 1, lambda: 0):
-        raise KeyError
-    assert WATCHER not in {thread.name for thread in threading.enumerate()}
-
-
-@pytest.mark.parametrize("number", [errno.EPIPE, errno.ENOSPC, errno.EIO])
-def test_what_a_full_output_holds_goes_nowhere(
-    number: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    path = tmp_path / "output"
-    with path.open("w") as output:
-        monkeypatch.setattr(sys, "stdout", output)
-        output.write("held back")
-        assert is_of_output(OSError(number, "why"))
-        output.flush()
-    assert path.read_text() == ""

@@ -186,9 +186,7 @@ def test_the_report_as_json(space_robot: Run, monkeypatch: pytest.MonkeyPatch) -
         assert item["text"]
         assert item["advice"] or item["status"] == "ok", item
     assert [name for name in NAMES if name not in items] == []
-    clock = items["wall clock"]["values"]
-    assert clock["ticks"] == 100
-    assert 0.0 <= clock["median_s"] <= clock["percentile_99_s"] <= clock["worst_s"]
+    assert items["wall clock"]["values"]["ticks"] == 100
 
 
 def test_where_flights_cannot_run_it_says_why_and_ends_with_1(tmp_path: Path) -> None:

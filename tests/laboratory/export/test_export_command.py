@@ -173,46 +173,6 @@ def test_parameters_have_source_and_unit(exported: Exports) -> None:
     assert "static const double SR_CONTROLLER_SIGNALS_MODEL_MASS[7] = {\n    750.0, 20.0," in text
 
 
-def test_a_folder_is_not_overwritten_unasked(tmp_path: Path, space_robot: Run) -> None:
-    other = tmp_path / "thesis"
-    other.mkdir()
-    (other / "chapter.tex").write_text("mine", "utf-8")
-    ran = space_robot("export", "-o", str(other))
-    assert (ran.code, ran.out) == (2, "")
-    assert "exists; --force replaces it" in ran.err
-    ran = space_robot("export", "-o", str(other), "--force")
-    assert ran.code == 2
-    assert "is not an exported folder" in ran.err
-    assert (other / "chapter.tex").read_text("utf-8") == "mine"
-    ran = space_robot("export", "-o", str(tmp_path / "no" / "folder"))
-    assert ran.code == 2
-    assert "there is no folder" in ran.err
-    assert sorted(tmp_path.iterdir()) == [other]
-
-
-PYTHON_LAW = """
-from space_robot_control.laws import ControlLaw, LawGains
-
-class Mine(ControlLaw):
-    name = "mine"
-    gains_type = LawGains
-
-    def force(self, signals):
-        return self.memory.force
-"""
-
-
-def test_a_law_in_python_is_refused(tmp_path: Path, space_robot: Run) -> None:
-    law = tmp_path / "law.py"
-    law.write_text(PYTHON_LAW, "utf-8")
-    ran = space_robot("export", "--controller", f"{law}:Mine", "-o", str(tmp_path / "o"))
-    assert (ran.code, ran.out) == (2, "")
-    assert "line 8: the law 'mine' is a Python function and cannot be exported as C" in ran.err
-    assert str(law) in ran.err
-    assert ran.err.count("\n") == 1
-    assert not (tmp_path / "o").exists()
-
-
 @pytest.mark.docs
 @needs_make
 def test_what_is_verified_is_told_in_json(tmp_path: Path, space_robot: Run) -> None:

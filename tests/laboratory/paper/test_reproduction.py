@@ -24,7 +24,7 @@ from space_robot.paper.reproduction.flights import (
 )
 from space_robot.paper.reproduction.reproduce import check_folder, reproduce
 from space_robot.paper.reproduction.table import cells
-from space_robot.paper.reproduction.table_v import COLUMNS, printed
+from space_robot.paper.reproduction.table_v import COLUMNS
 from space_robot_msgs_py.errors import InputError
 
 SHORT = 0.4
@@ -54,17 +54,6 @@ def test_verdicts_on_the_claims(time_delay_flights: list[Result]) -> None:
     assert [claim.value for claim in growth] == pytest.approx([1.86, 2.41, 2.38, 3.97], rel=0.02)
 
 
-def test_torques_of_the_time_delay_laws_in_every_cell(time_delay_flights: list[Result]) -> None:
-    """Each of the fifteen cells by itself, TDE-STC within 1 % of Table V, friction-free."""
-    for result in time_delay_flights:
-        if result.row.controller == "tde_stc" and not result.variant.friction:
-            assert result.rms is not None
-            for column in ("base_torque", "torque_1_3", "torque_4_6"):
-                expected = printed("tde_stc", result.row.case, column)
-                measured = result.rms["mean_axis"][column]
-                assert measured == pytest.approx(expected, rel=0.01), (result.row, column)
-
-
 def test_tde_smc_chatters_as_the_prototype_did(time_delay_flights: list[Result]) -> None:
     """103, 2.6 and 0.33 N m/s."""
     variation = {
@@ -77,7 +66,7 @@ def test_tde_smc_chatters_as_the_prototype_did(time_delay_flights: list[Result])
     assert variation["tde_stc"] == pytest.approx(0.33, rel=0.05)
 
 
-def test_rows_fly_with_sensors_that_are_not_ideal(space_robot: Run) -> None:
+def test_rows_fly_with_sensors_that_are_not_ideal() -> None:
     """And with the ideal ones if none are named."""
     planned = Planned(TableRow("tde_stc", "1"), Variant("printed", True), shown=False)
     ideal, noisy = (
@@ -92,8 +81,6 @@ def test_rows_fly_with_sensors_that_are_not_ideal(space_robot: Run) -> None:
     assert ideal.parameters["navigation"] == "direct"
     assert noisy.parameters["navigation"]["tracker_across"] == 1e-5
     assert ideal.rms != noisy.rms
-    refused = space_robot("reproduce", "--sensors", "best").err
-    assert "error: unknown sensor 'best': choose one of coarse, fine" in refused
 
 
 def test_printed_computed_torque_gains_diverge_within_ticks() -> None:
