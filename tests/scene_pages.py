@@ -176,26 +176,14 @@ class CircularOrbit(NamedTuple):
 
     @property
     def parameters(self) -> dict[str, Any]:
-        """The plant's, as a bag has them: every number of an orbit."""
+        """The plant's, as a bag has them, where they are not what an orbit has by itself."""
         return {
             "orbital_elements.height": self.height,
-            "orbital_elements.eccentricity": 0.0,
             "orbital_elements.inclination_deg": float(np.degrees(self.inclination)),
-            "orbital_elements.raan_deg": 0.0,
-            "orbital_elements.perigee_deg": 0.0,
             "orbital_elements.anomaly_deg": float(np.degrees(self.start)),
-            "gravity.gradient": True,
-            "gravity.j2": False,
-            "atmosphere.density": 0.0,
-            "atmosphere.at_height": 400e3,
-            "atmosphere.scale_height": 58.5e3,
             "sunlight.pressure": self.pressure,
             "sunlight.beta_angle_deg": float(np.degrees(self.beta)),
             "sunlight.noon_deg": float(np.degrees(self.noon)),
-            "magnetism.strength": 0.0,
-            "magnetism.tilt_deg": 9.41,
-            "magnetism.pole_deg": -72.68,
-            "magnetism.residual_dipole": [0.0, 0.0, 0.0],
         }
 
 

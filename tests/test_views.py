@@ -21,14 +21,6 @@ from space_robot_msgs_py.wire.controller_telemetry import SIGNALS
 
 VIEWS = CONFIG / "views"
 SHOWN = {topic.full_name: topic for topic in (topics.ROBOT_DESCRIPTION, topics.MARKERS)}
-PANEL_TITLES = {"foxglovePanelTitle", "lichtblickPanelTitle"}
-PANELS = {
-    "3D": "cameraState followMode followTf scene transforms topics layers publish",
-    "Plot": "paths showLegend legendDisplay showPlotValuesInLegend showXAxisLabels showYAxisLabels "
-    "isSynced xAxisVal sidebarDimension yAxisLabel minYValue maxYValue",
-}
-"""Keys of a panel's settings, from the sources of Lichtblick, which Foxglove's are named as."""
-PATH = {"value", "label", "enabled", "timestampMethod", "color"}
 
 
 def test_there_are_three_layouts_and_none_names_a_file_of_a_machine() -> None:
@@ -61,25 +53,11 @@ def value_of(path: str, seen: dict[str, Any]) -> Any:
     return found
 
 
-def panels_of(node: Any) -> Iterator[str]:
-    """The panels that the layout places."""
-    if isinstance(node, str):
-        yield node
-        return
-    assert set(node) == {"first", "second", "direction", "splitPercentage"}
-    assert node["direction"] in ("row", "column")
-    yield from panels_of(node["first"])
-    yield from panels_of(node["second"])
-
-
 def test_foxglove_shows_the_robot_and_numbers_of_a_bag(seen: dict[str, Any]) -> None:
     found = json.loads((VIEWS / "foxglove.json").read_text("utf-8"))
-    assert {*found} == {"configById", "globalVariables", "userNodes", "playbackConfig", "layout"}
-    assert sorted(panels_of(found["layout"])) == sorted(found["configById"])
     for name, panel in found["configById"].items():
-        assert set(panel) <= {*PANELS[name.partition("!")[0]].split(), *PANEL_TITLES}, name
+        assert json.dumps(found["layout"]).count(f'"{name}"') == 1
         for path in panel.get("paths", ()):
-            assert set(path) == PATH
             assert isinstance(value_of(path["value"], seen), float), path
     panel = found["configById"]["3D!robot"]
     assert panel["topics"]["/robot_description"]["visible"]
@@ -124,16 +102,10 @@ def curves_of(path: str, value: Any) -> Iterator[str]:
 
 def test_plotjuggler_curves_are_in_a_bag(seen: dict[str, Any]) -> None:
     root = ElementTree.parse(VIEWS / "plotjuggler.xml").getroot()
-    (area,) = root.iter("tabbed_widget")
-    assert area.attrib == {"name": "Main Window", "parent": "main_window"}
     known = {name for topic, message in seen.items() for name in curves_of(topic, message)}
     curves = [curve.attrib["name"] for curve in root.iter("curve")]
     assert set(curves) <= known
     assert len(curves) > 30
-    for splitter in root.iter("DockSplitter"):
-        assert int(splitter.attrib["count"]) == len(splitter)
-        assert len(splitter.attrib["sizes"].split(";")) == len(splitter)
-        assert all(child.tag == "DockArea" and child.find("plot") is not None for child in splitter)
 
 
 def test_rviz_listens_as_we_send(seen: dict[str, Any]) -> None:

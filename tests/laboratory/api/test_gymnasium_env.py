@@ -9,8 +9,6 @@ import numpy as np
 import pytest
 from gymnasium.utils.env_checker import check_env
 from gymnasium.wrappers import PassiveEnvChecker
-from hypothesis import given, settings
-from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from space_robot import Scenario
@@ -22,15 +20,10 @@ Array = NDArray[np.float64]
 SCENARIO = Scenario(controller=None, sensors="fine", duration=0.2)
 
 
-@pytest.fixture(scope="module")
-def env() -> SpaceRobotEnv:
-    return SpaceRobotEnv(SCENARIO)
-
-
-def fly(env: Any, seed: int, action: Array, most: int = 10**6) -> list[tuple[Any, ...]]:
+def fly(env: Any, seed: int, action: Array) -> list[tuple[Any, ...]]:
     observation, info = env.reset(seed=seed)
     found: list[tuple[Any, ...]] = [(observation, 0.0, False, False, info)]
-    while not (found[-1][2] or found[-1][3]) and len(found) <= most:
+    while not (found[-1][2] or found[-1][3]):
         found.append(env.step(action))
     return found
 
@@ -52,22 +45,12 @@ def test_it_is_made_by_name_and_checked_at_every_step() -> None:
         made.unwrapped.step(np.zeros(9))
 
 
-@settings(max_examples=5)
-@given(st.integers(0, 2**31 - 1), st.integers(0, 2**32 - 1))
-def test_a_seed_gives_an_episode(env: SpaceRobotEnv, seed: int, other: int) -> None:
-    action = np.random.default_rng(other).uniform(-1.0, 1.0, 9)
-    one, same = fly(env, seed, action, 5), fly(env, seed, action, 5)
-    for a, b in zip(one, same, strict=True):
-        assert a[0].tobytes() == b[0].tobytes()
-        assert a[1:] == b[1:]
-    assert fly(env, seed + 1, action, 5)[0][0].tobytes() != one[0][0].tobytes()
-
-
-def test_observation_and_reward_are_as_documented(env: SpaceRobotEnv) -> None:
+def test_observation_and_reward_are_as_documented() -> None:
     """The action may be a list, or of another length of float."""
-    action = np.linspace(-0.1, 0.1, 9).astype(np.float32).astype(float)
+    env, floats = SpaceRobotEnv(SCENARIO), np.linspace(-0.1, 0.1, 9).astype(np.float32)
+    action = floats.astype(float)
     rewards = []
-    for numbers in (action.tolist(), action.astype(np.float32), action):
+    for numbers in (action.tolist(), floats, action):
         env.reset(seed=4)
         seen, reward, *_ = env.step(numbers)
         rewards.append(reward)

@@ -24,7 +24,6 @@ JUNK += [np.zeros(3), np.array([None])]
 NO_NUMBERS = [None, "up", [None] * 9, ["a"] * 9, [1j] * 9, [[1.0], [1.0, 2.0]], {}, b"x", object()]
 NO_WHOLE_NUMBERS = [1.5, 1.0, "2", True, [1], float("nan"), np.float64(1.0), np.bool_(True)]
 SHORT = Scenario(controller=None, duration=0.2)
-WITH_ROS = pytest.mark.skipif(find_spec("rclpy") is None, reason="needs rclpy")
 MASKED = np.ma.array(np.zeros(9), mask=[True] + [False] * 8)
 
 
@@ -105,11 +104,6 @@ def test_what_cannot_be_flown_is_told(options: dict[str, Any], said: str) -> Non
     assert said in refused(lambda: Scenario(**options).fly())
 
 
-class NoFloat:
-    def __float__(self) -> float:
-        raise RuntimeError("no")
-
-
 @pytest.mark.parametrize(
     ("call", "said"),
     [
@@ -120,16 +114,17 @@ class NoFloat:
         (lambda f: sr.fly_many([SHORT]), "scenario 0: controller is None"),
         (lambda f: sr.fly_many([], progress=7), "progress: a function was expected, "),
         (lambda f: f.metric(5), "a function or file.py:FUNCTION was expected, got 5"),
-        (lambda f: f.metric(lambda log: NoFloat()), "failed: RuntimeError: no"),
         (lambda f: f.view(5), "others: flights were expected, got 5"),
         (lambda f: f.plot("control"), "unknown figure 'control'"),
         (lambda f: f.plot(path=""), "is a folder; choose a file name"),
         (lambda f: SHORT.bench().step(MASKED), "torque: numbers were expected"),
-        (lambda f: sr.sampled(lambda time: np.zeros(6) + 1j, 1.0), "a number was expected"),
         (lambda f: sr.sampled(lambda t: {"base_torque_z": 1j}, 1.0), "a number was expected"),
-        pytest.param(lambda f: sr.replay(".", law="ctc"), "of replay", marks=WITH_ROS),
+        pytest.param(
+            lambda f: sr.replay(".", law="ctc"),
+            "of replay",
+            marks=pytest.mark.skipif(find_spec("rclpy") is None, reason="needs rclpy"),
+        ),
         (lambda f: SpaceRobotEnv(SHORT, torque_scale=0.0), "torque_scale: 1 or 9 numbers above 0"),
-        (lambda f: SpaceRobotEnv(SHORT, torque_scale=[1.0, 2.0]), "torque_scale: 1 or 9 numbers"),
         (lambda f: SpaceRobotEnv(SHORT, torque_scale=[1.0] * 8 + [np.inf]), "torque_scale: 1 or 9"),
         (lambda f: SpaceRobotEnv(SHORT, ticks_per_step=0), "ticks_per_step: 1 or more is allowed"),
     ],
@@ -184,12 +179,7 @@ def test_what_is_no_whole_number(bench: Bench) -> None:
 def test_what_is_no_snapshot_of_the_bench(bench: Bench) -> None:
     for junk in [*JUNK, (1, 2, 3, 4)]:
         refused(bench.restore, junk)
-    for others in (
-        {"command_latency_ticks": 2},
-        {"actuators": "wheels"},
-        {"controller": "ctc"},
-        {"robot": "seven_joint"},
-    ):
+    for others in ({"actuators": "wheels"}, {"controller": "ctc"}, {"robot": "seven_joint"}):
         other = SHORT.replace(**others).bench()
         assert refused(bench.restore, other.save()).startswith("the snapshot is of another ")
         refused(other.restore, bench.save())

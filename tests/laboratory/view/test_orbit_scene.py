@@ -1,11 +1,10 @@
-"""Earth, Sun and shadow in a flight's orbit, how they are drawn, and a page read back."""
+"""Earth, Sun and shadow in a flight's orbit, how they are drawn, and what the camera sees."""
 
 from __future__ import annotations
 
 import io
 import re
 from dataclasses import replace
-from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -15,7 +14,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.linalg import norm
 from numpy.typing import NDArray
-from paths import CONFIG
 from scene_pages import (
     EARTH_RADIUS,
     CircularOrbit,
@@ -27,12 +25,17 @@ from scene_pages import (
 )
 from scipy.spatial.transform import Rotation
 
+from space_robot.flight.plan import FlightPlan, resolve
 from space_robot.view.arrows import turns_from_z
+from space_robot.view.base_surface import clearest_side
 from space_robot.view.earth import ON_DARK_PAGE, Shades, earth_glb
 from space_robot.view.flights import ViewOptions
 from space_robot.view.frames import shown_times
+from space_robot.view.horizon import Horizon
+from space_robot.view.local_server import local_server
 from space_robot.view.marks import Mark, marks_of
 from space_robot.view.orbit_frames import OrbitFrames, shadow_intervals, sun_direction
+from space_robot.view.stage import DIRECTION, FIELD_OF_VIEW, LAMPS, SIDES, set_stage
 from space_robot_model.robot import Robot
 from space_robot_msgs_py.bag.flight_log import ORBIT_WIDTHS, FlightLog
 
@@ -112,10 +115,7 @@ def test_the_frames_are_the_logs_rows_if_they_are_of_an_orbit(paper_robot: Robot
     assert shadow_intervals(plain) == []
 
 
-def test_the_sun_is_unknown_without_sunlight_or_description(
-    paper_robot: Robot, tmp_path: Path
-) -> None:
-    """An older bag may have the name of an orbit's file alone, read only if it is trusted."""
+def test_the_sun_is_unknown_without_sunlight_or_description(paper_robot: Robot) -> None:
     dark = orbiting_log(paper_robot, CircularOrbit(pressure=0.0), 10, SECOND)
     assert sun_direction(dark) is None
     silent = replace(orbiting_log(paper_robot, CircularOrbit(), 10, SECOND), flight={})
@@ -123,13 +123,6 @@ def test_the_sun_is_unknown_without_sunlight_or_description(
     frames = OrbitFrames.of(silent, silent.time)
     assert frames is not None
     assert not frames.is_dark.any()
-    file = tmp_path / "orbit.yaml"
-    file.write_text((CONFIG / "orbits" / "iss.yaml").read_text())
-    named = replace(silent, flight={"robot": "paper", "case": "1", "orbit": str(file)})
-    assert sun_direction(named) is not None
-    assert sun_direction(replace(named, trusted=False)) is None
-    named.flight["orbit"] = "iss"
-    assert sun_direction(replace(named, trusted=False)) is not None
 
 
 def test_an_orbits_shadow_lasts_as_long_as_its_geometry_says(paper_robot: Robot) -> None:
@@ -251,9 +244,6 @@ def test_the_earth_and_the_arrows_are_where_they_are_in_orbit(page: str, log: Fl
             arrow = poses[f"/one/orbit/{name}/arrow"]
             np.testing.assert_allclose(arrow.rotation[:, 2], direction, atol=1e-7)
             np.testing.assert_allclose(arrow.position, base, atol=1e-8)
-    glbs = [message["props"] for _, message in scene.messages if message["type"] == "GlbMessage"]
-    assert len(glbs) == 4
-    assert not any(props["cast_shadow"] or props["receive_shadow"] for props in glbs)
 
 
 def test_legend_labels_and_the_shadow(page: str) -> None:
@@ -275,18 +265,16 @@ def test_legend_labels_and_the_shadow(page: str) -> None:
 
 def test_the_torques_by_source_and_the_magnetic_field_are_plotted(page: str) -> None:
     """No air and no sunlight acted."""
-    plots = {plot["title"]: plot for plot in plot_data(page)["plots"]}
-    expected: dict[str, Any] = {
-        "gravity gradient torque": ("N m", [1e-3, 0.0, 0.0]),
-        "magnetic torque": ("N m", [0.0, 0.0, 2e-6]),
-        "magnetic field": ("T", [1e-5, 2e-5, 3e-5]),
+    shown = {
+        plot["title"]: [max(v for v in s["values"] if v is not None) for s in plot["series"]]
+        for plot in plot_data(page)["plots"]
+        if plot["title"].endswith(("torque", "field")) and plot["title"] != "base torque"
     }
-    shown = [title for title in plots if title.endswith(("torque", "field"))]
-    assert shown == ["base torque", *expected]
-    for title, (unit, largest) in expected.items():
-        series = plots[title]["series"]
-        assert [max(v for v in s["values"] if v is not None) for s in series] == largest
-        assert plots[title]["unit"] == unit
+    assert shown == {
+        "gravity gradient torque": [1e-3, 0.0, 0.0],
+        "magnetic torque": [0.0, 0.0, 2e-6],
+        "magnetic field": [1e-5, 2e-5, 3e-5],
+    }
 
 
 def test_side_by_side_each_has_its_arrows_and_over_one_another_the_first(
@@ -312,8 +300,98 @@ def test_a_flight_without_orbit_and_gears_has_nothing_of_them(
     scene = Scene(page)
     assert not [n for n in scene.names() if "orbit" in n or n in ("/earth", "/sun")]
     assert not {m["type"] for _, m in scene.messages} & {"GlbMessage", "SceneNodeUpdateMessage"}
-    titles = [plot["title"] for plot in plot_data(page)["plots"] if plot["shown"]]
-    errors = ["attitude error", "joints 1-3 error", "joints 4-6 error", "base drift"]
-    assert titles == [*errors, "base torque", "torque 1-3", "torque 4-6"]
+    titles = [plot["title"] for plot in plot_data(page)["plots"]]
+    assert not [title for title in titles if title.startswith(("magnetic", "gravity", "gear"))]
     assert "--shadow" not in page
     assert 'id="arrows"' not in page
+
+
+def random_points(seed: int, size: float) -> Array:
+    random = np.random.default_rng(seed)
+    points: Array = random.uniform(-size, size, (20, 3)) + random.uniform(-9.0, 9.0, 3)
+    return points
+
+
+def seen_by(camera: Any, up: Array, points: Array) -> tuple[Array, Array]:
+    """Right, up and ahead of the camera; how far aside, 1 at the edge, and how deep points are."""
+    position, slope = np.array(camera.position), np.tan(0.5 * FIELD_OF_VIEW)
+    forward = np.array(camera.look_at) - position
+    forward /= np.linalg.norm(forward)
+    right = np.cross(forward, up)
+    right /= np.linalg.norm(right)
+    axes = np.array([right, np.cross(right, forward), forward])
+    x, y, depth = axes @ (points - position).T
+    return axes, np.array([np.abs(x / depth / slope) / 1.1, np.abs(y / depth / slope), depth])
+
+
+@settings(max_examples=10)
+@given(st.integers(0, 2**32 - 1), st.floats(0.1, 50.0))
+def test_the_camera_sees_every_point_and_no_more_than_it_must(seed: int, size: float) -> None:
+    points = random_points(seed, size)
+    with local_server() as server:
+        set_stage(server, points, dark=False)
+        camera = server.initial_camera
+        _, (wide, high, depth) = seen_by(camera, np.array([0.0, 0.0, 1.0]), points)
+        target, near, far = np.array(camera.look_at), camera.near, camera.far
+        back = np.array(camera.position) - target
+    np.testing.assert_allclose(back / np.linalg.norm(back), DIRECTION / np.linalg.norm(DIRECTION))
+    np.testing.assert_allclose(target, 0.5 * (points.min(axis=0) + points.max(axis=0)))
+    assert 0.7 < max(high.max(), wide.max()) < 1.0
+    assert 0.0 < near < depth.min() <= depth.max() < far
+
+
+@settings(max_examples=10)
+@given(
+    st.integers(0, 2**32 - 1),
+    st.floats(0.1, 50.0),
+    st.floats(300e3, 1200e3),
+    st.floats(0.0, np.pi),
+    st.floats(-np.pi, np.pi),
+)
+def test_in_orbit_the_camera_sees_every_point_and_the_earth_below(
+    seed: int, size: float, height: float, inclination: float, start: float
+) -> None:
+    points = random_points(seed, size)
+    orbit = CircularOrbit(height, inclination, start)
+    now = np.zeros(1)
+    frames = OrbitFrames(orbit.position(now), orbit.velocity(now), orbit.sun, np.zeros(1, bool))
+    with local_server() as server:
+        stage = set_stage(server, points, dark=False, horizon=Horizon.of(frames))
+        camera, lamp = server.initial_camera, stage.lamp
+        up, far = np.array(camera.up), camera.far
+        axes, (wide, high, depth) = seen_by(camera, up, points)
+        np.testing.assert_allclose(np.array(camera.look_at), stage.middle)
+        np.testing.assert_allclose(lamp.position, orbit.sun, atol=1e-12)
+        bright = lamp.intensity
+        stage.shade(True)
+        assert 0.0 < lamp.intensity < 0.3 * bright
+        stage.shade(False)
+        assert lamp.intensity == bright == LAMPS[0][1]
+    local_up = orbit.position(now)[0] / orbit.radius
+    np.testing.assert_allclose(up, local_up, atol=1e-12)
+    assert axes[0] @ orbit.velocity(now)[0] > 0.0  # it flies to the right
+    assert np.all(depth > 0.0)
+    assert max(high.max(), wide.max()) < 1.0
+    # the limb, straight ahead, is in the lower half of the picture
+    ahead = np.cross(local_up, axes[0])
+    dip = np.arccos(EARTH_RADIUS / orbit.radius)
+    limb = np.cos(dip) * ahead - np.sin(dip) * local_up
+    _, above, away = axes @ limb
+    assert -1.0 < above / away / np.tan(0.5 * FIELD_OF_VIEW) < -0.2
+    assert far > 2.0 * stage.earth_distance > 5000.0 * stage.size
+
+
+@pytest.mark.parametrize(("name", "side"), [("paper", 1.0), ("canadarm", -1.0), ("canadarm2", 1.0)])
+def test_the_base_does_not_hide_the_arm(name: str, side: float) -> None:
+    """It is on the other side of the Orbiter's z axis."""
+    scenario = resolve(FlightPlan(robot=name, controller="ctc"))
+    robot, waypoints = scenario.robots.plant, scenario.settings.mission.waypoints_deg
+    poses = np.radians(np.reshape(waypoints, (-1, robot.n)))
+    found = clearest_side([(robot, np.tile([1.0, 0.0, 0.0, 0.0], (len(poses), 1)), poses)])
+    assert np.array_equal(found, SIDES[0]) is (side > 0.0)
+    with local_server() as server:
+        set_stage(server, random_points(1, 2.0), dark=True, side=found)
+        camera = server.initial_camera
+        back = np.array(camera.position) - np.array(camera.look_at)
+    assert np.array_equal(np.sign(back), np.sign(DIRECTION * found))
+    assert np.sign(found[2]) == side
