@@ -66,7 +66,6 @@ setup(
     install_requires=[
         "click>=8.1",
         "jinja2>=3.1",
-        "lz4>=4",
         "matplotlib>=3.8",
         "mcap>=1.5",
         "llvmlite>=0.41",  # numba has the versions that fit

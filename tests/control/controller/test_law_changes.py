@@ -40,7 +40,7 @@ class Pilot(Ground):
         return [result.successful for result in answer.results]
 
     def law(self) -> str:
-        """The parameter ``controller``, as soon as there is one who tells it."""
+        """The parameter ``controller``."""
         request = GetParameters.Request(names=["controller"])
         answer = self.call(GetParameters, "/controller_node/get_parameters", request)
         return str(answer.values[0].string_value)
@@ -108,7 +108,6 @@ def flown(tmp_path_factory: pytest.TempPathFactory) -> Flown:
 
 def change_laws(domain: int) -> None:
     with closing(Pilot(domain)) as pilot:
-        pilot.law()
         pilot.until(lambda: bool(pilot.ask_plant("step")), "an active plant")
         pilot.step(500)
         assert pilot.set(controller="tde_tsmc") == [True]
