@@ -31,7 +31,7 @@ export FASTDDS_BUILTIN_TRANSPORTS ?= UDPv4
 help:
 	@echo "make setup               .venv with the package and ROS 2 Jazzy"
 	@echo "make fly [ARGS=...]      fly case 1 under TDE-STC, e.g. make fly ARGS='--controller ctc'"
-	@echo "make test [ARGS=...]     the tests; ARGS go to pytest"
+	@echo "make test [ARGS=...]     the tests; ARGS go to pytest; DOCS=1: and test-docs"
 	@echo "make test-docs           pages, notebooks, examples, site and wheel: what they show is run"
 	@echo "make check [ARGS=...]    style, types and the tests: what a change must pass"
 	@echo "make quick [ARGS=...]    the tests that start no ROS and take little time"
@@ -55,7 +55,7 @@ fly: $(VENV)/.flies
 	@$(VENV)/bin/space-robot fly --controller tde_stc --case 1 $(ARGS)
 
 test: kernels $(VENV)/.tests
-	$(PYTEST) -m "not docs" $(ARGS)
+	$(PYTEST) $(if $(DOCS),,-m "not docs") $(ARGS)
 
 test-docs: kernels $(VENV)/.tests
 	$(PYTEST) -m docs $(ARGS)

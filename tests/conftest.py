@@ -139,8 +139,9 @@ def pytest_configure(config: pytest.Config) -> None:
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Mark by fixture and by folder; limit every test's time; bring the files into an order.
 
-    Those with marks lie spread among the others, and short ones are left for the end: so the
-    processes of `make test` seldom fly graphs at once, and end together.
+    The documents' are long and come first. Those with marks lie spread among the others, and short
+    ones are left for the end: so the processes of `make test` seldom fly graphs at once, and end
+    together.
     """
     for item in items:
         where = item.path.relative_to(TESTS).as_posix()
@@ -155,6 +156,7 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     for is_marked, until in ((True, FLYING_UNTIL), (False, 1.0)):
         files = dict.fromkeys(item.path for item in items if (item.path in marked) == is_marked)
         places |= {path: until * k / len(files) for k, path in enumerate(files)}
+    places |= {item.path: -1.0 for item in items if item.path.parent.name == "docs"}
     items.sort(key=lambda item: places[item.path])
 
 

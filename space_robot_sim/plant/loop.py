@@ -49,7 +49,7 @@ this plant for silent, and soon enough for one that believes a new time only aft
 GIVE_WAY = Wait(100e-6, is_for_others=True)
 HELD = Wait(0.02)
 """The wait of a paused plant: only a service call ends the pause, and those have their own time."""
-FLUSH_S = 5.0
+FLUSH_S = 2.0
 """Longest wait for listeners at the end of a flight, which may be stopped or dead, s."""
 STOPPED_FLUSH_S = 1.0
 """Longest wait for listeners of a stopped plant, since they may be ending, too, s."""

@@ -32,6 +32,7 @@ SHORTER = {
     r"fly .*--scenario": "--help",  # a scenario is read before
     r"fly .*(kill|stop)_": "--duration {}",
     r"fly": "--composed --duration 0.2",
+    r"new .*--(force|passive)": "--help",  # tests/laboratory/cli/test_new_command.py
     r"reproduce": "--only tde_stc/1 --duration 0.2 --jobs 1",
     r"simulate": "--duration {}",
     r"stability": "--duration 2",
@@ -283,7 +284,7 @@ class PageShell:
 
     def _made_again(self, command: tuple[str, ...]) -> subprocess.CompletedProcess[str] | None:
         """A copy of a robot's folder made before; the first time it is made for the copies."""
-        if command[:2] != ("new", "my.urdf"):
+        if command[:2] != ("new", "my.urdf") or "--help" in command:
             return None
         options = " ".join(command)
         if (kept := self._new.get(options)) is None:
