@@ -44,6 +44,7 @@ MORE: dict[str, tuple[str, ...]] = {
     "guidance": (LOOPS, GRAPHS),
     "flight_code": ("laboratory/flight/test_*code*.py",),
     "batch": ("laboratory/api/*.py",),
+    "flight": ("laboratory/api/*.py",),
     "scenario": ("laboratory/api/*.py", "laboratory/flight/test_*.py"),
     "cli": ("test_start_up.py",),
     "help": ("laboratory/cli/test_*help*.py",),
