@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 import time
 from collections.abc import Collection, Mapping, Sequence
 from functools import partial
@@ -33,7 +32,8 @@ LISTENER_TIMEOUT_S = 5.0
 
 
 MISSION_FAULTS = frozenset({"kill_mission", "stop_mission"})
-_NOT_USED = re.compile(r"rejected: reference: ")
+NOT_USED = "rejected: reference: "
+"""Beginning of the counts of references that a node could not use."""
 
 
 class Degradation(NamedTuple):
@@ -67,7 +67,7 @@ def degradation(
         degraded.warnings.extend(
             f"{node} {key}: {count} messages"
             for key, count in values.items()
-            if _NOT_USED.match(key)
+            if key.startswith(NOT_USED)
         )
     return degraded
 
