@@ -216,7 +216,9 @@ class McapStorage:
                     self._note(parse(opcode, data[body : body + length].tobytes()))
                 at += HEAD.size + length
             except BROKEN as error:
-                self._fault = f"a chunk is unreadable from byte {at} on ({cause(error)})"
+                self._fault = (
+                    self._fault or f"a chunk is unreadable from byte {at} on ({cause(error)})"
+                )
                 break
         return count
 
