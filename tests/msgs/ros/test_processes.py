@@ -71,11 +71,11 @@ def test_a_killed_starter_takes_its_process_with_it(
     held = psutil.Process(starter.pid).children(recursive=True)[-1]
     if is_stopped:
         held.suspend()
+        while held.status() != psutil.STATUS_STOPPED:
+            time.sleep(0.001)
     starter.kill()
     starter.wait()
     if is_stopped:
-        while held.status() != psutil.STATUS_STOPPED:
-            time.sleep(0.001)
         held.resume()
     held.wait(timeout=END_S)
     starter.communicate()
