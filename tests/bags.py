@@ -18,6 +18,7 @@ from space_robot.flight.simulate import simulate
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.bag.accounts import noted_accounts
 from space_robot_msgs_py.bag.flight_log import REFERENCE, FlightLog
+from space_robot_msgs_py.bag.mcap_file import Compression
 from space_robot_msgs_py.bag.metadata import read_information
 from space_robot_msgs_py.bag.reader import read_flight
 from space_robot_msgs_py.bag.recorder import FLIGHT_KEY, BagRecorder
@@ -81,11 +82,13 @@ def chunks_of(bag: Path) -> list[tuple[int, int]]:
     return [(c.chunk_start_offset, c.chunk_length) for c in chunks if c.message_index_offsets]
 
 
-def record(folder: Path, ticks: int = 400, ticks_a_chunk: int = 100) -> Recorded:
+def record(
+    folder: Path, ticks: int = 400, ticks_a_chunk: int = 100, compression: Compression = "lz4"
+) -> Recorded:
     """A flight in a bag whose chunks end at the same ticks as the reference's messages."""
     flown = folder.with_name(folder.name + "_flown")
     simulate(Flight(resolve(FlightPlan(duration=ticks * TIMEBASE.period))), flown)
-    recorder, states = BagRecorder(folder, FLIGHT, TIMEBASE), 0
+    recorder, states = BagRecorder(folder, FLIGHT, TIMEBASE, compression), 0
     for topic, data in messages_of(flown):
         if topic is topics.REFERENCE_JOINTS and states and states % ticks_a_chunk == 0:
             recorder.flush()

@@ -59,6 +59,7 @@ class McapStorage:
         self._channels: dict[int, Channel] = {}
         self._index_fault = ""
         self._fault = ""
+        self._is_broken = False
         self._of_no_topic = 0
         with path.open("rb") as file:
             self.is_mcap = file.read(len(MCAP0_MAGIC)) == MCAP0_MAGIC
@@ -75,7 +76,7 @@ class McapStorage:
         Raises:
             OSError: the file can no longer be read.
         """
-        self._fault, self._of_no_topic = "", 0
+        self._fault, self._of_no_topic, self._is_broken = "", 0, False
         pieces: list[bytes] = []
         with self.path.open("rb") as file:
             for record in self._records(file):
@@ -86,6 +87,8 @@ class McapStorage:
                 if sum(map(len, pieces)) >= _BATCH_BYTES:
                     yield from self._walk(pieces)
                     pieces = []
+                if self._is_broken:
+                    return
             yield from self._walk(pieces)
 
     def topics(self) -> dict[str, str]:
@@ -198,11 +201,14 @@ class McapStorage:
         for piece in pieces:
             start, stop = stop, stop + len(piece)
             count = self._walk_chunk(data[:stop], start, messages, count)
+            if self._is_broken:
+                break
         if count:
             yield from self._by_topic(data, messages[:, :count])
 
     def _walk_chunk(self, data: Bytes, at: int, messages: Integers, count: int) -> int:
-        """Locate messages and channels from ``at`` on; return the messages."""
+        """Locate messages and channels from ``at`` on; return the number of messages."""
+        start = at
         while at < len(data):
             count, at = walk_messages(data, at, messages, count)
             if at == len(data):
@@ -216,9 +222,10 @@ class McapStorage:
                     self._note(parse(opcode, data[body : body + length].tobytes()))
                 at += HEAD.size + length
             except BROKEN as error:
-                self._fault = (
-                    self._fault or f"a chunk is unreadable from byte {at} on ({cause(error)})"
-                )
+                # Damage that stopped `_records` lies behind this chunk.
+                place = f"from its byte {at - start} on"
+                self._fault = f"a chunk is unreadable {place} ({cause(error)})"
+                self._is_broken = True
                 break
         return count
 

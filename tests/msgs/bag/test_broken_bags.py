@@ -37,11 +37,13 @@ from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.wire.clock import ClockCodec
 
 METADATA = "metadata.yaml"
+_CHUNK_CRC = 9 + 24
+"""From a chunk's start: opcode, length, two times and a size stand before it."""
 
 
 @pytest.fixture(scope="module")
 def recorded(tmp_path_factory: pytest.TempPathFactory) -> Recorded:
-    return record(tmp_path_factory.mktemp("whole") / "bag")
+    return record(tmp_path_factory.mktemp("whole") / "bag", compression="none")
 
 
 @pytest.fixture
@@ -63,6 +65,29 @@ def _flip(at: Callable[[Path], int]) -> Callable[[Path], None]:
 def _second_chunk(bag: Path) -> int:
     start, length = chunks_of(bag)[1]
     return start + length // 2
+
+
+def _in_a_chunk(harm: Callable[[bytearray, int], None]) -> Callable[[Path], None]:
+    """The second chunk's records from a place on, where no checksum tells it."""
+
+    def change(bag: Path) -> None:
+        content, (start, _) = bytearray(mcap_file(bag).read_bytes()), chunks_of(bag)[1]
+        crc = start + _CHUNK_CRC
+        assert content[crc + 4 : crc + 8] == bytes(4), "compressed"
+        content[crc : crc + 4] = bytes(4)
+        harm(content, crc + 16)
+        mcap_file(bag).write_bytes(content)
+
+    return change
+
+
+def _longer(content: bytearray, at: int) -> None:
+    content[at + 1 : at + 9] = (1 << 40).to_bytes(8, "little")
+
+
+def _no_message(content: bytearray, at: int) -> None:
+    """A channel's opcode before what is a message."""
+    content[at] = 4
 
 
 def _edit(change: Callable[[dict[str, Any]], object]) -> Callable[[Path], None]:
@@ -89,6 +114,14 @@ DAMAGES: dict[str, tuple[Callable[[Path], object], list[str]]] = {
     "second chunk": (
         _flip(_second_chunk),
         ["bag_0.mcap: unreadable from byte ", "messages cannot be read", "/joint_states 300"],
+    ),
+    "longer message": (
+        _in_a_chunk(_longer),
+        ["bag_0.mcap: a chunk is unreadable from its byte 0 on (a message that is not whole"],
+    ),
+    "no message": (
+        _in_a_chunk(_no_message),
+        ["bag_0.mcap: a chunk is unreadable from its byte 0 on"],
     ),
     "index": (_flip(lambda bag: -60), ["bag_0.mcap: its index cannot be read (CRC)"]),
     "footer": (
@@ -121,6 +154,8 @@ DAMAGES: dict[str, tuple[Callable[[Path], object], list[str]]] = {
     "split": (_edit(_second_file), ["bag_1.mcap, not there", "/joint_states 400"]),
 }
 """How each bag is broken, and what is told."""
+LOST = {"second chunk": 300, "longer message": 300, "no message": 300, "split": 400}
+"""Messages of a topic that are not read."""
 
 
 @pytest.mark.parametrize("kind", DAMAGES)
@@ -131,12 +166,12 @@ def test_what_is_readable_is_read_and_the_rest_told(
     harm(bag)
     log = read_flight(bag)
     assert log.whole.all()
-    assert log.ticks == (100 if kind == "second chunk" else 400)
+    lost = LOST.get(kind, 0)
+    assert log.ticks == (100 if lost == 300 else 400)
     assert_rows_are_the_originals(log, recorded.log)
     told = [*log.damage, log.unfinished]
     assert bool(log.unfinished) == (kind == "footer")
     assert all(any(word in text for text in told) for word in words), told
-    lost = {"second chunk": 300, "split": 400}.get(kind, 0)
     for topic in (topics.JOINT_STATES, topics.BASE_STATE, topics.COMMAND):
         assert log.lost[topic.full_name] == lost
     assert log.flight == FLIGHT

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import gc
 import itertools
+import subprocess
+import sys
 from collections.abc import Sequence
 from types import SimpleNamespace
 from typing import Any
@@ -302,3 +304,24 @@ def test_calls_one_behind_another_take_no_more_than_their_share(
     gaps = [b - a for a, b in itertools.pairwise(at)]
     assert min(gaps) == pytest.approx(lasts + pause, abs=3e-3)
     assert node.reports == pytest.approx((clock.now - 1000.0) / PERIOD_S, rel=0.5)
+
+
+def test_the_middleware_has_a_higher_priority_than_the_loop_or_it_is_told_that_it_is_refused() -> (
+    None
+):
+    """In a process of its own, since its threads keep what they were given."""
+    program = (
+        "import os, threading;"
+        "threading.Thread(target=threading.Event().wait, daemon=True).start();"
+        "from space_robot_msgs_py.ros.node_scheduler import ask_for_fifo;"
+        "print(ask_for_fifo(3));"
+        "tasks = [int(task) for task in os.listdir('/proc/self/task')];"
+        "print([os.sched_getparam(task).sched_priority for task in sorted(tasks)])"
+    )
+    ran = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True)
+    told, priorities = ran.stdout.splitlines()
+    if told == "SCHED_FIFO 3":
+        assert priorities.startswith("[3, 4"), priorities
+    else:
+        assert told.startswith("SCHED_FIFO 3 was not granted ("), told
+        assert set(priorities) <= set("[0, ]")
