@@ -16,7 +16,7 @@ from typing import NamedTuple
 
 from ..errors import InputError
 from ..topics import ROOT
-from .lifeline import starter
+from .process import starter
 
 TRIES, PAUSE_S = 5, 0.01
 """Time to retry: a lock that is only being inspected is free again at once."""

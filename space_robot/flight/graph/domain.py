@@ -13,7 +13,6 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from space_robot_msgs_py.errors import FlightError, InputError
-from space_robot_msgs_py.ros.lifeline import TIMEOUT_S
 from space_robot_msgs_py.ros.locks import (
     FileLock,
     HeldError,
@@ -22,7 +21,7 @@ from space_robot_msgs_py.ros.locks import (
     domain_lock,
     nodes_in,
 )
-from space_robot_msgs_py.ros.process_environment import defaults
+from space_robot_msgs_py.ros.process import TIMEOUT_S, defaults
 from space_robot_msgs_py.topics import ROOT
 
 DOMAINS = range(1, 101)

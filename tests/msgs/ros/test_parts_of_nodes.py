@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.errors import InputError
-from space_robot_msgs_py.ros.process_environment import set_defaults
+from space_robot_msgs_py.ros.process import set_defaults
 from space_robot_msgs_py.samples import Timebase
 
 set_defaults()
