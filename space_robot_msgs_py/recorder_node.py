@@ -16,8 +16,7 @@ from .bag.set_aside import set_aside
 from .config.text import parse_json
 from .errors import InputError, MessageError
 from .ros.endpoints import PolledCallbackGroup, RawPublisher, RawSubscription
-from .ros.health import SENT, Health, Level
-from .ros.loop import Wait
+from .ros.loop import SENT, Health, Level, Wait
 from .ros.managed_node import ManagedNode
 from .ros.node_host import NodeKind, run_nodes
 from .wire.definitions import decode

@@ -1,7 +1,8 @@
 """Locks of ROS domains, nodes and topics, released by the kernel when their holder ends.
 
-Discovery is too slow, and lists a killed node for another 20 s. Each lock is a file in the
-temporary folder with the name of its holder; the file remains after the release.
+Two plants or two controllers in one domain would answer each other's ticks. Discovery is too slow
+to prevent that, and lists a killed node for another 20 s. Each lock is a file in the temporary
+folder with the name of its holder; the file remains after the release.
 """
 
 from __future__ import annotations
@@ -10,13 +11,17 @@ import fcntl
 import os
 import tempfile
 import time
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import ExitStack
 from pathlib import Path
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from ..errors import InputError
 from ..topics import ROOT
 from .process import starter
+
+if TYPE_CHECKING:  # commands look at locks without rclpy
+    from rclpy.node import Node
 
 TRIES, PAUSE_S = 5, 0.01
 """Time to retry: a lock that is only being inspected is free again at once."""
@@ -170,3 +175,51 @@ def _open(path: Path) -> int:
         return descriptor
     except OSError as error:
         raise InputError(f"{path}: cannot be locked ({error.strerror})") from None
+
+
+class TopicClaim:
+    """Exclusive right of this process to publish some topics, until `release` or its end."""
+
+    def __init__(self, node: Node, topic_names: Sequence[str]) -> None:
+        """Claim ``topic_names``, resolved with the node's remappings.
+
+        Raises:
+            InputError: another node has claimed one of them, or a lock file cannot be created.
+        """
+        self._held = ExitStack()
+        domain = node.context.get_domain_id()
+        try:
+            for name in topic_names:
+                self._take(domain, node.resolve_topic_name(name), node.get_name())
+        except BaseException:
+            self.release()
+            raise
+
+    def _take(self, domain: int, topic: str, holder: str) -> None:
+        try:
+            lock = FileLock(topic_lock(domain, topic), holder)
+        except HeldError as error:
+            raise InputError(
+                f"{topic} of ROS domain {domain} is already published by {error.holder.name}"
+            ) from None
+        self._held.callback(lock.release)
+
+    def release(self) -> None:
+        """Release the topics."""
+        self._held.close()
+
+
+def claim_name(node: Node) -> FileLock:
+    """Claim the node's name, so that service calls by name reach one node only.
+
+    Raises:
+        InputError: another node of this project has it, or the lock file cannot be created.
+    """
+    domain, name = node.context.get_domain_id(), node.get_fully_qualified_name()
+    try:
+        return FileLock(node_lock(domain, name), node.get_name())
+    except HeldError as error:
+        raise InputError(
+            f"ROS domain {domain} has a {name} already: {error.holder.name}; end that one, "
+            "or use another domain (ROS_DOMAIN_ID) or name (--ros-args -r __node:=...)"
+        ) from None

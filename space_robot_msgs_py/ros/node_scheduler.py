@@ -10,11 +10,14 @@ from functools import partial
 from pathlib import Path
 from typing import Any, Protocol
 
+from .endpoints import Waiter
 from .loop import Loop, Wait
 from .managed_node import ManagedNode
 from .service_calls import ServiceCalls
-from .waiting import SPIN_S, Waiter
 
+SPIN_S = 300e-6
+"""Time of polling and yielding before sleeping in the wait set. Not under SCHED_FIFO, where
+yielding has no effect and sleeping threads wake without delay."""
 LISTENER_PERIOD_S = 0.02
 REMIND_S = 5.0
 UPKEEP_GAP_S = 2e-3

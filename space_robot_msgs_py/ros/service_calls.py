@@ -3,11 +3,17 @@
 from __future__ import annotations
 
 import time
+import types
+from collections.abc import Callable, Generator
 from typing import Any
 
+from lifecycle_msgs.msg import Transition
+from lifecycle_msgs.srv import ChangeState
+from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.executors import ShutdownException, SingleThreadedExecutor, TimeoutException
 from rclpy.node import Node
 
+from ..errors import FlightError
 from .rclpy_internals import ServiceWaitSet
 
 OVERLOADED_S = 1.0
@@ -15,6 +21,9 @@ OVERLOADED_S = 1.0
 COUNTED_S = 0.1
 """Maximum counted time per call, so that a few slow ones, such as transitions, are no overload."""
 FULL_LOOK_S = 5.0
+FIND_S = 5.0
+ANSWER_S = 180.0
+"""Timeout of a transition, in which a node may compile code."""
 
 
 class ServiceCalls(SingleThreadedExecutor):
@@ -101,3 +110,42 @@ class ServiceCalls(SingleThreadedExecutor):
             return self.wait_for_ready_callbacks(timeout_sec=timeout_s)[0]
         except (TimeoutException, ShutdownException):
             return None
+
+
+@types.coroutine
+def until(condition: Callable[[], bool]) -> Generator[None, None, None]:
+    """Yield to the node until a condition holds; for service callbacks."""
+    while not condition():
+        yield
+
+
+async def change_state(node: Node, name: str, transition: str) -> None:
+    """Request a lifecycle transition of another node, from within a service callback.
+
+    Args:
+        node: that asks.
+        name: of the other node in its namespace.
+        transition: ``configure``, ``activate``, ``deactivate`` or ``cleanup``.
+
+    Raises:
+        FlightError: the other node refuses or does not answer.
+    """
+    client = node.create_client(
+        ChangeState, f"{name}/change_state", callback_group=ReentrantCallbackGroup()
+    )
+    try:
+        await _in_time(client.service_is_ready, FIND_S, f"{name} is not available to {transition}")
+        number = getattr(Transition, f"TRANSITION_{transition.upper()}")
+        answer = client.call_async(ChangeState.Request(transition=Transition(id=number)))
+        await _in_time(answer.done, ANSWER_S, f"{name} does not answer to {transition}")
+        if not answer.result().success:
+            raise FlightError(f"{name} refuses to {transition}: see its log")
+    finally:
+        node.destroy_client(client)
+
+
+async def _in_time(condition: Callable[[], bool], seconds: float, complaint: str) -> None:
+    deadline = time.monotonic() + seconds
+    await until(lambda: condition() or time.monotonic() > deadline)
+    if not condition():
+        raise FlightError(complaint)

@@ -59,11 +59,10 @@ class Player:
             PolledCallbackGroup,
             RawPublisher,
             RawSubscription,
+            Waiter,
         )
-        from space_robot_msgs_py.ros.exclusive import TopicClaim
-        from space_robot_msgs_py.ros.waiting import Waiter, take_or_wait
+        from space_robot_msgs_py.ros.locks import TopicClaim
 
-        self._take_or_wait = take_or_wait
         self._visitor = TemporaryNode("replay_node", domain)
         self.node = self._visitor.node
         self._outs = {t.name: RawPublisher(self.node, t) for t in (*parts, *REFERENCES)}
@@ -102,22 +101,14 @@ class Player:
         """Return when the controller listens to all topics.
 
         Raises:
-            InputError: somebody else publishes states or references here.
             FlightError: it does not come.
         """
-        from space_robot_msgs_py.ros.exclusive import foreign_publishers
-
         until = time.monotonic() + LISTENER_TIMEOUT_S
         while any(out.missing_listeners([CONTROLLER]) for out in self._outs.values()):
             self.check()
             if time.monotonic() > until:
                 raise FlightError(f"{CONTROLLER} does not listen for {LISTENER_TIMEOUT_S:.0f} s")
             time.sleep(POLL_S)
-        if foreign := foreign_publishers(self.node, list(self._outs)):
-            topic, names = next(iter(foreign.items()))
-            raise InputError(
-                f"{topic} is also published by {', '.join(names)}: take another domain"
-            )
 
     def resend_pending(self) -> None:
         """Send the current reference again, as a mission does for new subscribers."""
@@ -216,7 +207,10 @@ class Player:
         begin = time.monotonic()
         ask_again = begin + ASK_AGAIN_S
         while True:
-            data = self._take_or_wait(self._commands, self._waiter, POLL_S)
+            data = self._commands.take()
+            if data is None:
+                self._waiter.wait((self._commands,), POLL_S)
+                data = self._commands.take()
             if data is not None:
                 if self._answers.add(data) == state.tick:
                     return True
