@@ -19,8 +19,8 @@ from space_robot_control.guidance.settings import MissionNodeSettings
 from space_robot_control.laws import laws
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.bag.recorder_settings import RecorderNodeSettings
+from space_robot_msgs_py.config.files import flatten
 from space_robot_msgs_py.config.settings import NodeSettings, leaves
-from space_robot_msgs_py.config.trees import flatten
 from space_robot_sim.faults.grammar import Kind
 from space_robot_sim.plant.faults import PLANT_KINDS
 from space_robot_sim.plant.settings import MOST_TICKS, PlantNodeSettings

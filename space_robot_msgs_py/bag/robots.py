@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Collection, Mapping
 
 from .. import topics
-from ..config.namespace import full_namespace
+from ..config.validation import full_namespace
 from ..errors import InputError
 from .contents import Bag
 from .findings import some_of

@@ -10,10 +10,9 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import InputError
-from .choices import nearest
-from .text import printable
+from .text import nearest, printable
 from .validation import short
-from .yaml_text import check_file
+from .yaml_text import check_readable
 
 MOST_ROWS, MOST_COLUMNS, MOST_VALUES = 100_000, 1_000, 190_000
 LARGEST_CSV = 128 * 2**20
@@ -34,7 +33,7 @@ def read_columns(path: Path) -> dict[str, list[float]]:
         InputError: it cannot be read, is too large, or holds something that is no number; names
             line and column.
     """
-    check_file(path)
+    check_readable(path)
     if path.suffix == ".parquet":
         return _read_parquet(path)
     if path.stat().st_size > LARGEST_CSV:

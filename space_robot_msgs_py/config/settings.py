@@ -17,9 +17,8 @@ from typing_extensions import Self
 
 from ..samples import Timebase
 from ..topics import Topic
-from .directory import GRAPH_FILE, config_directory
-from .files import node_parameters
-from .trees import Tree, merge, nest
+from .files import Tree, merge, nest, node_parameters
+from .installation import GRAPH_FILE, config_directory
 from .validation import StrictModel, short, validate
 
 SHORTEST_PERIOD = 1e-5

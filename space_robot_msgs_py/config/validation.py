@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pickle
+import re
 from collections.abc import Iterable
 from functools import lru_cache
 from pathlib import Path
@@ -11,8 +12,8 @@ from typing import Any, TypeVar, get_args, get_origin
 from pydantic import BaseModel, ConfigDict, ValidationError, ValidationInfo, field_validator
 
 from ..errors import InputError
-from .choices import choices
-from .text import printable
+from ..topics import ROOT
+from .text import choices, printable
 from .yaml_text import YamlTextError, parse_yaml, read_file
 
 
@@ -47,6 +48,7 @@ ON_NUMBERS = {
 """Kinds of errors that show the description of their field, since it has the unit."""
 MOST_KEPT = 100_000
 """Maximum length of a text with cached content, in characters."""
+_NAMESPACE = re.compile(r"(/[A-Za-z_][A-Za-z0-9_]*)+")
 
 
 def read_yaml(path: Path) -> dict[str, Any]:
@@ -160,3 +162,26 @@ def one_of(
         advice = choices(str(name), names, listing=listing)
         raise InputError(f"unknown {what} {short(name)}{context}: {advice}")
     return name
+
+
+def full_namespace(text: str) -> str:
+    """Return a namespace in ROS's form: ``/sat1`` for ``sat1`` or ``/sat1/``, ``/`` if empty.
+
+    Raises:
+        InputError: invalid namespace.
+    """
+    if not (name := text.strip("/")):
+        return ROOT
+    namespace = f"/{name}"
+    if not _NAMESPACE.fullmatch(namespace) or "__" in namespace:
+        raise InputError(
+            f"{short(text)} is not a namespace: letters, digits and _ were expected, not starting "
+            "with a digit, such as sat1 or fleet/sat1"
+        )
+    return namespace
+
+
+def relative(name: str, namespace: str) -> str:
+    """Return a name relative to a namespace; empty if it is in another or a nested one."""
+    prefix, _, last = name.rpartition("/")
+    return last if (prefix or ROOT) == namespace else ""

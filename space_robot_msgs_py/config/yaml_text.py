@@ -17,8 +17,7 @@ from typing import Any, BinaryIO
 import yaml
 
 from ..errors import InputError
-from .choices import MOST_COMPARED, nearest
-from .text import printable
+from .text import MOST_COMPARED, nearest, printable
 
 try:
     from yaml import CSafeLoader as SafeLoader  # four times as fast
@@ -32,9 +31,7 @@ DEEPEST = 64
 LONGEST_NAME = 250
 """Maximum displayed characters of a file's name in errors."""
 MOST_VALUES = 200_000
-"""Largest number of values in a text; they take a second to build."""
-MOST_REPEATED = 100_000
-"""Largest number of values added by aliases."""
+"""Largest number of values in a text, those repeated by aliases included."""
 
 _FLOAT, _TIMESTAMP, _MERGE = (
     f"tag:yaml.org,2002:{kind}" for kind in ("float", "timestamp", "merge")
@@ -59,7 +56,7 @@ def read_file(path: Path) -> str:
         return data.decode("utf-8")
 
 
-def check_file(path: Path) -> None:
+def check_readable(path: Path) -> None:
     """Check that a file can be read.
 
     Raises:
@@ -119,7 +116,7 @@ def parse_yaml(text: str) -> Any:
         YamlTextError: not YAML, a repeated key, or a limit is exceeded.
     """
     try:
-        _measure(text)
+        _check_size(text)
         return yaml.load(text, Loader=_Loader)
     except yaml.YAMLError as error:
         mark = getattr(error, "problem_mark", None)
@@ -130,35 +127,28 @@ def parse_yaml(text: str) -> Any:
         raise YamlTextError(f"not YAML ({error})") from None
 
 
-def _measure(text: str) -> None:
-    """Check the limits from the stream of YAML events, before values are built."""
-    sizes: dict[str, int] = {}
-    opened: list[tuple[str | None, int]] = []
-    size = repeated = 0
+def _check_size(text: str) -> None:
+    """Refuse nesting and aliases that would exhaust the stack or the memory once they are built."""
+    sizes: dict[str | None, int] = {}
+    open_collections: list[tuple[str | None, int]] = []
+    size = 0
     for event in yaml.parse(text, Loader=_Loader):
+        if isinstance(event, yaml.CollectionEndEvent):
+            anchor, before = open_collections.pop()
+            sizes[anchor] = size - before
+        elif isinstance(event, yaml.AliasEvent):
+            if any(anchor == event.anchor for anchor, _ in open_collections):
+                raise _refused(f"the alias {event.anchor!r} contains itself", event)
+            size += sizes.get(event.anchor, 0)
+        elif isinstance(event, yaml.NodeEvent):
+            size += 1
+            sizes[event.anchor] = 1
+            if isinstance(event, yaml.CollectionStartEvent):
+                open_collections.append((event.anchor, size))
         if size > MOST_VALUES:
             raise _refused(f"more than {MOST_VALUES} values", event)
-        if isinstance(event, yaml.CollectionStartEvent):
-            opened.append((event.anchor, size))
-            size += 1
-            if len(opened) > DEEPEST:
-                raise _refused(f"nested deeper than {DEEPEST} levels", event)
-        elif isinstance(event, yaml.CollectionEndEvent):
-            anchor, before = opened.pop()
-            if anchor:
-                sizes[anchor] = size - before
-        elif isinstance(event, yaml.ScalarEvent):
-            size += 1
-            if event.anchor:
-                sizes[event.anchor] = 1
-        elif isinstance(event, yaml.AliasEvent):
-            if any(anchor == event.anchor for anchor, _ in opened):
-                raise _refused(f"the alias {event.anchor!r} contains itself", event)
-            again = sizes.get(event.anchor or "", 0)
-            size += again
-            repeated += again
-            if repeated > MOST_REPEATED:
-                raise _refused(f"aliases repeat more than {MOST_REPEATED} values", event)
+        if len(open_collections) > DEEPEST:
+            raise _refused(f"nested deeper than {DEEPEST} levels", event)
 
 
 def _refused(problem: str, event: Any) -> yaml.YAMLError:
