@@ -1,4 +1,4 @@
-"""Locks of ROS domains, nodes and topics, released by the kernel when their holder ends.
+"""Locks of ROS domains and nodes, released by the kernel when their holder ends.
 
 Two plants or two controllers in one domain would answer each other's ticks. Discovery is too slow
 to prevent that, and lists a killed node for another 20 s. Each lock is a file in the temporary
@@ -11,8 +11,7 @@ import fcntl
 import os
 import tempfile
 import time
-from collections.abc import Iterable, Iterator, Sequence
-from contextlib import ExitStack
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -44,14 +43,9 @@ class HeldError(InputError):
         self.holder = holder
 
 
-def topic_lock(domain: int, topic: str) -> Path:
-    """Return the lock file of the publisher of a topic, given by full name."""
-    # ROS names contain neither dots nor @, so all topics and nodes have different files
-    return _path(f"{domain}{topic.replace('/', '.')}")
-
-
 def node_lock(domain: int, node: str) -> Path:
     """Return the lock file of a node, given by full name."""
+    # ROS names contain neither dots nor @, so all nodes have different files
     return _path(f"{domain}@{node.replace('/', '.')}")
 
 
@@ -175,38 +169,6 @@ def _open(path: Path) -> int:
         return descriptor
     except OSError as error:
         raise InputError(f"{path}: cannot be locked ({error.strerror})") from None
-
-
-class TopicClaim:
-    """Exclusive right of this process to publish some topics, until `release` or its end."""
-
-    def __init__(self, node: Node, topic_names: Sequence[str]) -> None:
-        """Claim ``topic_names``, resolved with the node's remappings.
-
-        Raises:
-            InputError: another node has claimed one of them, or a lock file cannot be created.
-        """
-        self._held = ExitStack()
-        domain = node.context.get_domain_id()
-        try:
-            for name in topic_names:
-                self._take(domain, node.resolve_topic_name(name), node.get_name())
-        except BaseException:
-            self.release()
-            raise
-
-    def _take(self, domain: int, topic: str, holder: str) -> None:
-        try:
-            lock = FileLock(topic_lock(domain, topic), holder)
-        except HeldError as error:
-            raise InputError(
-                f"{topic} of ROS domain {domain} is already published by {error.holder.name}"
-            ) from None
-        self._held.callback(lock.release)
-
-    def release(self) -> None:
-        """Release the topics."""
-        self._held.close()
 
 
 def claim_name(node: Node) -> FileLock:

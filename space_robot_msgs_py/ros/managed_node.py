@@ -20,7 +20,7 @@ from .. import topics
 from ..config.settings import NodeSettings
 from ..errors import InputError, SpaceRobotError
 from ..samples import Timebase
-from .locks import FileLock, TopicClaim, claim_name
+from .locks import FileLock, claim_name
 from .loop import SENT, Health, Level, Loop
 from .parameters import declare_settings, refuse_unknown
 from .rclpy_internals import declared_parameters, forget_parameters, guard_change_state
@@ -55,7 +55,6 @@ class ManagedNode(LifecycleNode, Generic[Schema]):
         """Number of successful configurations."""
         self.let_others_work: Callable[[], None] = lambda: time.sleep(PAUSE_S)
         """Called by a loop while it waits for another node during deactivation."""
-        self._claim: TopicClaim | None = None
         self._name: FileLock | None = None
         self.error: SpaceRobotError | None = None
         """Reason why the last transition failed."""
@@ -97,8 +96,6 @@ class ManagedNode(LifecycleNode, Generic[Schema]):
         values = {**health.values, **sent, "service_calls": self.calls.count}
         if not self.is_active:
             return Health("inactive", values=values)
-        if health.level is Level.OK and self.calls.is_overloaded:
-            return Health("more service calls than can be answered in flight", Level.WARN, values)
         return Health(health.mode, health.level, values)
 
     def claim_name(self) -> None:
@@ -185,9 +182,6 @@ class ManagedNode(LifecycleNode, Generic[Schema]):
                 refuse_unknown(self)
             self.loop = self._make_loop(self, self.settings)
             refuse_unknown(self)
-            sent = [*(output.topic for output in self.loop.outputs), *self._schema.sends]
-            names = sorted({topic.name for topic in sent})
-            self._claim = TopicClaim(self, names)  # also of those that are never published
             self.times_configured += 1
 
         return self._try(configure, undo=self._release)
@@ -251,8 +245,6 @@ class ManagedNode(LifecycleNode, Generic[Schema]):
             if loop is not None:
                 loop.close()
         finally:
-            if self._claim:
-                self._claim.release()
             publishers, subscriptions, parameters = self._entities()
             for publisher in publishers - self._own[0]:
                 self.destroy_publisher(publisher)

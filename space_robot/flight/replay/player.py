@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from space_robot_msgs_py import topics
-from space_robot_msgs_py.errors import FlightError, InputError
+from space_robot_msgs_py.errors import FlightError
 
 from ..graph.temporary_node import TemporaryNode
 from .commands import CommandList, Ticks
@@ -51,9 +51,6 @@ class Player:
             domain: to join.
             answers: to add the controller's to.
             parts: of a state, in the order in which they are sent.
-
-        Raises:
-            InputError: a plant or a mission is in this domain.
         """
         from space_robot_msgs_py.ros.endpoints import (
             PolledCallbackGroup,
@@ -61,16 +58,10 @@ class Player:
             RawSubscription,
             Waiter,
         )
-        from space_robot_msgs_py.ros.locks import TopicClaim
 
         self._visitor = TemporaryNode("replay_node", domain)
         self.node = self._visitor.node
         self._outs = {t.name: RawPublisher(self.node, t) for t in (*parts, *REFERENCES)}
-        try:
-            self._claim = TopicClaim(self.node, list(self._outs))
-        except InputError:
-            self._visitor.leave()
-            raise
         self._parts_out = [self._outs[topic.name] for topic in parts]
         self._commands = RawSubscription(self.node, topics.COMMAND, PolledCallbackGroup())
         self._waiter = Waiter(self.node)
@@ -89,7 +80,6 @@ class Player:
         error: BaseException | None,
         traceback: TracebackType | None,
     ) -> None:
-        self._claim.release()
         self._visitor.leave()
 
     @property

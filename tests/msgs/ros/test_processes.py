@@ -27,7 +27,6 @@ from space_robot_msgs_py.ros.locks import (
     newest_node,
     node_lock,
     nodes_in,
-    topic_lock,
 )
 from space_robot_msgs_py.ros.process import (
     DEFAULTS,
@@ -202,7 +201,7 @@ print("ready", flush=True)
 time.sleep(60)
 """
 NAMES = st.lists(st.from_regex(r"[a-z][a-z0-9_]{0,5}", fullmatch=True), min_size=1, max_size=3)
-KINDS: list[Callable[[int, str], Path]] = [topic_lock, node_lock, domain_lock]
+KINDS: list[Callable[[int, str], Path]] = [node_lock, domain_lock]
 
 
 @pytest.fixture(autouse=True)
@@ -250,7 +249,7 @@ def test_nodes_and_commands_are_found_by_domain_and_namespace() -> None:
     st.tuples(st.sampled_from(KINDS), st.integers(0, 232), NAMES),
     st.tuples(st.sampled_from(KINDS), st.integers(0, 232), NAMES),
 )
-def test_every_topic_and_node_of_every_domain_has_its_own_lock(
+def test_every_node_of_every_domain_has_its_own_lock(
     one: tuple[Callable[[int, str], Path], int, list[str]],
     other: tuple[Callable[[int, str], Path], int, list[str]],
 ) -> None:
