@@ -35,7 +35,7 @@ class ServiceCalls(SingleThreadedExecutor):
         """Number of executed calls."""
         self._unfinished: list[Any] = []
         """Calls whose callback waits for the node's loop."""
-        self._tasks: list[Any] = []
+        self._own_tasks: list[Any] = []
         """Unfinished tasks of rclpy, such as those of an action's goals and results."""
 
     def run_one(self, timeout_s: float = 0.0) -> bool:
@@ -59,8 +59,8 @@ class ServiceCalls(SingleThreadedExecutor):
 
     def create_task(self, callback: Any, *args: Any, **kwargs: Any) -> Any:
         """Execute a callback by one of the next calls of `run_one`."""
-        self._tasks.append(super().create_task(callback, *args, **kwargs))
-        return self._tasks[-1]
+        self._own_tasks.append(super().create_task(callback, *args, **kwargs))
+        return self._own_tasks[-1]
 
     def finish(self) -> None:
         """Resume all waiting callbacks after the end of the loop."""
@@ -68,8 +68,8 @@ class ServiceCalls(SingleThreadedExecutor):
             callback()
 
     def _may_be_called(self) -> bool:
-        self._tasks = [task for task in self._tasks if not task.done()]
-        if self._unfinished or self._tasks:
+        self._own_tasks = [task for task in self._own_tasks if not task.done()]
+        if self._unfinished or self._own_tasks:
             return True
         if (now := time.monotonic()) < self._full_check_at:
             return self._requests.is_called()

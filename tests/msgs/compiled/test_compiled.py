@@ -117,7 +117,7 @@ SHOW = "from space_robot_msgs_py.compiled.cache import cache_directory; print(ca
 
 def test_a_kernel_that_changes_has_another_folder_and_other_code_has_not(tmp_path: Path) -> None:
     root = tmp_path / "root"
-    for package in ("space_robot_msgs_py", "space_robot_model"):
+    for package in ("space_robot_msgs_py", "space_robot_model", "space_robot_sim"):
         shutil.copytree(ROOT / package, root / package, ignore=shutil.ignore_patterns("*.pyc"))
 
     def folder() -> str:
