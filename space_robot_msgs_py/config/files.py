@@ -56,11 +56,7 @@ def is_named(kind: str, name: str) -> bool:
 
 
 def named_layers(kind: str, name: str) -> list[Path]:
-    """Return the `named_file` in a list; an empty list for `GIVEN`.
-
-    Raises:
-        InputError: there is no such file; lists the existing ones.
-    """
+    """Return the `named_file` in a list; an empty list for `GIVEN`."""
     return [] if name == GIVEN else [named_file(kind, name)]
 
 

@@ -37,10 +37,8 @@ def config_directory() -> Path:
 def install_command(extra: str) -> str:
     """Return the command that installs the packages of an extra of ``setup.py``.
 
-    It names the packages, as in ``pip install 'viser>=1.1'``: the project itself is on no index, so
-    that ``pip install 'space_robot[view]'`` would work in no installation, and the packages do
-    wherever the project was installed from. Where it runs without being installed, the extra is
-    installed from its folder.
+    It names them, as in ``pip install 'viser>=1.1'``: the project is on no index, so that ``pip
+    install 'space_robot[view]'`` works only in its folder.
     """
     packages = extra_packages(extra)
     if not packages:

@@ -74,15 +74,7 @@ class NodeSettings(StrictModel):
 
     @classmethod
     def read_layer(cls, path: Path, selected: Mapping[str, str]) -> Tree:
-        """Read what a file says to the node.
-
-        Args:
-            path: one of `layers`.
-            selected: the selectors' values.
-
-        Raises:
-            InputError: the file cannot be read.
-        """
+        """Read what a file of `layers` says to the node, for the selectors' values."""
         return node_parameters(path, cls.node)
 
     @classmethod

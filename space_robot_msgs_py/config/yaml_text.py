@@ -17,19 +17,19 @@ from typing import Any, BinaryIO
 import yaml
 
 from ..errors import InputError
-from .text import MOST_COMPARED, nearest, printable
+from .text import MOST_COMPARED, nearest, printable, shortened
 
 try:
     from yaml import CSafeLoader as SafeLoader  # four times as fast
 except ImportError:  # PyYAML was built without libyaml
     from yaml import SafeLoader  # type: ignore[assignment]
 
+LONGEST_NAME = 250
+"""Maximum displayed characters of a file's name in errors."""
 LARGEST_FILE = 16 * 2**20
 """Largest size of a file, bytes."""
 DEEPEST = 64
 """Largest depth of nested lists and mappings."""
-LONGEST_NAME = 250
-"""Maximum displayed characters of a file's name in errors."""
 MOST_VALUES = 200_000
 """Largest number of values in a text, those repeated by aliases included."""
 
@@ -57,19 +57,14 @@ def read_file(path: Path) -> str:
 
 
 def check_readable(path: Path) -> None:
-    """Check that a file can be read.
-
-    Raises:
-        InputError: the file does not exist, or cannot be read.
-    """
+    """Check that a file can be read; an `InputError` has the reason."""
     with _opened(path):
         pass
 
 
 @contextmanager
 def _opened(path: Path) -> Iterator[BinaryIO]:
-    name = str(path) if str(path).isprintable() else repr(str(path))
-    name = name if len(name) <= LONGEST_NAME else f"{name[:40]}...{name[-40:]}"
+    name = shortened(str(path) if str(path).isprintable() else repr(str(path)), LONGEST_NAME)
     try:
         # opening a pipe must not block
         descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
@@ -151,8 +146,8 @@ def _check_size(text: str) -> None:
             raise _refused(f"nested deeper than {DEEPEST} levels", event)
 
 
-def _refused(problem: str, event: Any) -> yaml.YAMLError:
-    return yaml.constructor.ConstructorError(problem=problem, problem_mark=event.start_mark)
+def _refused(problem: str, place: Any) -> yaml.YAMLError:
+    return yaml.constructor.ConstructorError(problem=problem, problem_mark=place.start_mark)
 
 
 class _Loader(SafeLoader):
@@ -171,30 +166,22 @@ class _Loader(SafeLoader):
             return value
         except (ValueError, TypeError, LookupError, AttributeError, OverflowError):
             kind = node.tag.removeprefix("tag:yaml.org,2002:")
-            said = f" {node.value[:40]!r}" if isinstance(node.value, str) else ""
-            raise yaml.constructor.ConstructorError(
-                problem=f"the value{said} is not of type {kind}", problem_mark=node.start_mark
-            ) from None
+            value = f" {node.value[:40]!r}" if isinstance(node.value, str) else ""
+            raise _refused(f"the value{value} is not of type {kind}", node) from None
 
     def construct_mapping(self, node: Any, deep: bool = False) -> dict[Any, Any]:
         if not isinstance(node, yaml.MappingNode):
-            raise yaml.constructor.ConstructorError(
-                problem="a mapping was expected", problem_mark=node.start_mark
-            )
-        seen = set()
+            raise _refused("a mapping was expected", node)
+        keys = set()
         for key_node, _ in node.value:
             if key_node.tag == _MERGE:
                 continue
             key = self.construct_object(key_node, deep=True)
             if not isinstance(key, Hashable):
-                raise yaml.constructor.ConstructorError(
-                    problem="a key must be a text or a number", problem_mark=key_node.start_mark
-                )
-            if key in seen:
-                raise yaml.constructor.ConstructorError(
-                    problem=f"the key {key!r} occurs twice", problem_mark=key_node.start_mark
-                )
-            seen.add(key)
+                raise _refused("a key must be a text or a number", key_node)
+            if key in keys:
+                raise _refused(f"the key {key!r} occurs twice", key_node)
+            keys.add(key)
         mapping: dict[Any, Any] = super().construct_mapping(node, deep)
         return mapping
 

@@ -215,12 +215,12 @@ class PausedOutput:
 
     def __init__(self, node: Node) -> None:
         self._publisher = RawPublisher(node, topics.SIMULATION_PAUSED)
-        self._told: bool | None = None
+        self._published: bool | None = None
 
     def tell(self, is_paused: bool) -> None:
         """Publish whether the simulation is paused, if this has changed."""
-        if is_paused is not self._told:
-            self._told = is_paused
+        if is_paused is not self._published:
+            self._published = is_paused
             self._publisher.publish(serialize_message(Bool(data=is_paused)))
 
 

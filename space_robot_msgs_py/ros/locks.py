@@ -13,14 +13,11 @@ import tempfile
 import time
 from collections.abc import Iterable, Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 from ..errors import InputError
 from ..topics import ROOT
 from .process import starter
-
-if TYPE_CHECKING:  # commands look at locks without rclpy
-    from rclpy.node import Node
 
 TRIES, PAUSE_S = 5, 0.01
 """Time to retry: a lock that is only being inspected is free again at once."""
@@ -134,14 +131,7 @@ def _holders(paths: Iterable[Path]) -> list[Holder]:
 
 def is_held(path: Path) -> bool:
     """Return True if a lock is held."""
-    try:
-        descriptor = _open(path)
-    except InputError:
-        return False
-    try:
-        return not _try(descriptor, fcntl.LOCK_SH)
-    finally:
-        os.close(descriptor)
+    return bool(_holders([path]))
 
 
 def _try(descriptor: int, kind: int) -> bool:
@@ -169,19 +159,3 @@ def _open(path: Path) -> int:
         return descriptor
     except OSError as error:
         raise InputError(f"{path}: cannot be locked ({error.strerror})") from None
-
-
-def claim_name(node: Node) -> FileLock:
-    """Claim the node's name, so that service calls by name reach one node only.
-
-    Raises:
-        InputError: another node of this project has it, or the lock file cannot be created.
-    """
-    domain, name = node.context.get_domain_id(), node.get_fully_qualified_name()
-    try:
-        return FileLock(node_lock(domain, name), node.get_name())
-    except HeldError as error:
-        raise InputError(
-            f"ROS domain {domain} has a {name} already: {error.holder.name}; end that one, "
-            "or use another domain (ROS_DOMAIN_ID) or name (--ros-args -r __node:=...)"
-        ) from None

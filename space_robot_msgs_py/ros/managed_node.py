@@ -20,7 +20,7 @@ from .. import topics
 from ..config.settings import NodeSettings
 from ..errors import InputError, SpaceRobotError
 from ..samples import Timebase
-from .locks import FileLock, claim_name
+from .locks import FileLock, HeldError, node_lock
 from .loop import SENT, Health, Level, Loop
 from .parameters import declare_settings, refuse_unknown
 from .rclpy_internals import declared_parameters, forget_parameters, guard_change_state
@@ -99,12 +99,19 @@ class ManagedNode(LifecycleNode, Generic[Schema]):
         return Health(health.mode, health.level, values)
 
     def claim_name(self) -> None:
-        """Claim the node's name in the domain, before any service is offered.
+        """Claim the node's name, so that service calls by name reach one node only.
 
         Raises:
-            InputError: another node of this project has the name.
+            InputError: another node of this project in the domain has it.
         """
-        self._name = claim_name(self)
+        domain, name = self.context.get_domain_id(), self.get_fully_qualified_name()
+        try:
+            self._name = FileLock(node_lock(domain, name), self.get_name())
+        except HeldError as error:
+            raise InputError(
+                f"ROS domain {domain} has a {name} already: {error.holder.name}; end that one, "
+                "or use another domain (ROS_DOMAIN_ID) or name (--ros-args -r __node:=...)"
+            ) from None
 
     def destroy_node(self) -> None:
         """Release all resources, the executor before the node."""
@@ -114,20 +121,12 @@ class ManagedNode(LifecycleNode, Generic[Schema]):
             self._name.release()
 
     def start(self) -> None:
-        """Configure and activate.
-
-        Raises:
-            SpaceRobotError: the transition failed.
-        """
+        """Configure and activate; a `SpaceRobotError` says why that failed."""
         self._insist(self.trigger_configure())
         self._insist(self.trigger_activate())
 
     def stop(self) -> None:
-        """Deactivate and clean up, the reverse of `start`.
-
-        Raises:
-            SpaceRobotError: the transition failed.
-        """
+        """Deactivate and clean up; a `SpaceRobotError` says why that failed."""
         self._insist(self.trigger_deactivate())
         self._insist(self.trigger_cleanup())
 
@@ -193,7 +192,7 @@ class ManagedNode(LifecycleNode, Generic[Schema]):
 
     def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Stop the loop."""
-        return self._try(self._stand_down)
+        return self._try(self._deactivate)
 
     def on_cleanup(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Remove topics and parameters; the next configure reads the files again."""
@@ -204,7 +203,7 @@ class ManagedNode(LifecycleNode, Generic[Schema]):
 
         def shut_down() -> None:
             self.is_shut_down = True
-            self._stand_down()
+            self._deactivate()
             self._release()
 
         return self._try(shut_down)
@@ -233,7 +232,7 @@ class ManagedNode(LifecycleNode, Generic[Schema]):
             return TransitionCallbackReturn.ERROR
         return TransitionCallbackReturn.SUCCESS
 
-    def _stand_down(self) -> None:
+    def _deactivate(self) -> None:
         if self.is_active and self.loop is not None:
             self.is_active = False
             self.loop.deactivate()
