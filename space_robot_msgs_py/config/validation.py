@@ -98,37 +98,27 @@ def one_line(error: ValidationError, schema: type[BaseModel], where: str) -> str
     if first["type"] == "model_type":
         text = "a mapping was expected"
     if first["type"] == "extra_forbidden":
-        allowed = choices(str(first["loc"][-1]), _allowed_keys(schema, first["loc"][:-1]))
-        text, got = f"unknown key{got}: {allowed}", ""
-    if first["type"] in ON_NUMBERS and (description := _description(schema, first["loc"])):
+        fields = _field_at(schema, first["loc"][:-1])[0].model_fields
+        allowed = sorted(field.alias or name for name, field in fields.items())
+        text, got = f"unknown key{got}: {choices(str(first['loc'][-1]), allowed)}", ""
+    if first["type"] in ON_NUMBERS and (description := _field_at(schema, first["loc"])[1]):
         got += f" ({description.removesuffix('.')})"
     more = f" (and {len(faults) - 1} more)" if len(faults) > 1 else ""
     return f"{where}: {key + ': ' if key else ''}{text}{got}{more}"
 
 
-def _description(schema: Any, location: tuple[int | str, ...]) -> str:
-    """Return the description of a field, with its unit; empty if it has none."""
+def _field_at(schema: Any, location: tuple[int | str, ...]) -> tuple[Any, str]:
+    """Return the annotation and the description of the field at a location within ``schema``."""
     description = ""
     for step in location:
-        while get_origin(schema) not in (None, list, dict):
-            schema = get_args(schema)[0]
         fields = getattr(schema, "model_fields", {})
-        if step not in fields:
-            return ""
-        schema, description = fields[step].annotation, fields[step].description or ""
-    return description
-
-
-def _allowed_keys(schema: Any, location: tuple[int | str, ...]) -> list[str]:
-    """Return the keys, as in files, of the model at a location within ``schema``."""
-    for step in location:
-        if hasattr(schema, "model_fields"):
-            schema = schema.model_fields[step].annotation
+        if step in fields:
+            schema, description = fields[step].annotation, fields[step].description or ""
         else:  # an item of a list, a value of a mapping
-            schema = get_args(schema)[-1]
+            schema, description = (get_args(schema) or (schema,))[-1], ""
         while get_origin(schema) not in (None, list, dict):  # Annotated, a union with None
             schema = get_args(schema)[0]
-    return sorted(field.alias or name for name, field in schema.model_fields.items())
+    return schema, description
 
 
 def short(value: Any) -> str:
