@@ -20,6 +20,8 @@ from .temporary_node import TemporaryNode
 
 Array = NDArray[np.float64]
 
+MONITOR = "flight_monitor"
+"""Name of the node with which a flight is followed."""
 MOST_AT_ONCE = 1_000
 """Messages of a topic read in one poll, in case of a flood."""
 
@@ -40,11 +42,7 @@ class Monitor:
     """Simulated time from /clock, errors from telemetry, the nodes' modes from /diagnostics."""
 
     def __init__(
-        self,
-        domain: int,
-        namespace: str = topics.ROOT,
-        name: str = "flight_monitor",
-        period: float = 0.0,
+        self, domain: int, namespace: str = topics.ROOT, name: str = MONITOR, period: float = 0.0
     ) -> None:
         """Join the graph.
 

@@ -33,8 +33,10 @@ from .composed import NAME, composed_command, write_parameters
 from .domain import is_quiet, ros_domain
 from .following import follow
 from .listeners import reset_with, wait_for
+from .monitor import MONITOR
 from .node_server import Program
 from .processes import Command, Graph, node_command, node_environment
+from .temporary_node import own_name
 
 COMPOSED_DRAIN_S = 0.002
 """Period of the recorder in one process with the other nodes, which wait while it writes."""
@@ -79,6 +81,8 @@ def fly(
             for remark in remarks:
                 _say(remark)
             parameters = flight_parameters(flight, bag)
+            if flight.scenario.process_faults:  # injected by the clock that the monitor hears
+                parameters["plant"]["wait_for"].append(f"{own_name(MONITOR)}:{topics.CLOCK.name}")
             with ScratchFolder() as scratch:
                 folder = Path(scratch)
                 parameters = with_files(parameters, flight, folder)
