@@ -23,8 +23,8 @@ from space_robot_msgs_py.bag.metadata import read_information
 from space_robot_msgs_py.bag.reader import read_flight
 from space_robot_msgs_py.bag.recorder import FLIGHT_KEY, BagRecorder
 from space_robot_msgs_py.samples import STATE_FIELDS, Timebase
-from space_robot_msgs_py.wire.carrier import wrap
 from space_robot_msgs_py.wire.definitions import definition, jazzy
+from space_robot_msgs_py.wire.viewers import wrap
 
 TIMEBASE = Timebase(500_000)
 FLIGHT = {"controller": "tde_stc", "case": "1", "period": 0.0005}

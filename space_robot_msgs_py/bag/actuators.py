@@ -14,7 +14,7 @@ from ..samples import (
     Timebase,
 )
 from ..wire.definitions import decode
-from ..wire.message import MessageDescription, description
+from ..wire.messages import MessageDescription, describe
 from .batch import Batch
 
 MOST_ACTUATORS = {
@@ -47,8 +47,7 @@ def described(
     topic: topics.Topic, names: tuple[str, ...], joints: tuple[str, ...], timebase: Timebase
 ) -> MessageDescription | None:
     """Describe the messages of a topic for actuators of these names; None: invalid names."""
-    describe = description(topic)
-    if describe is None or not 0 < len(names) <= MOST_ACTUATORS[topic]:
+    if not 0 < len(names) <= MOST_ACTUATORS[topic]:
         return None
     robot = RobotNames(joints)
     if topic is topics.MOTORS_STATE and not set(names) <= set(joints):
@@ -59,4 +58,4 @@ def described(
         robot = robot._replace(geared=names)
     else:
         robot = robot._replace(wheels=names)
-    return describe.of_robot(robot, timebase)
+    return describe(topic, robot, timebase)

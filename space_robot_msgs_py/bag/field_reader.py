@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import MessageError
-from ..wire.message import MessageDescription, Numbers
+from ..wire.messages import MessageDescription, Numbers
 from .batch import Batch
 from .kernels import gather
 

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..compiled.kernels import kernel, subroutine
-from ..wire.compiled_codec import FOREIGN, is_laid_out, little_endian, stamp_of
-from ..wire.message import Offsets
+from ..wire.codecs import FOREIGN, is_laid_out, little_endian, stamp_of
+from ..wire.messages import Offsets
 
 Bytes = NDArray[np.uint8]
 Integers = NDArray[np.int64]

@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from .. import topics
 from ..samples import Timebase
 from ..wire.cdr import header_stamp_ns
-from ..wire.controller_telemetry import TelemetryCodec
 from ..wire.stamp_guard import StampGuard
+from ..wire.telemetry import TelemetryCodec
 
 
 def message_tick(topic: topics.Topic, data: bytes, timebase: Timebase) -> int:

@@ -11,7 +11,7 @@ from typing import Any
 from .. import topics
 from ..errors import FlightError, MessageError
 from ..samples import Timebase
-from ..wire.carrier import unwrap
+from ..wire.viewers import unwrap
 from .accounts import ACCOUNTS_KEY
 from .mcap_file import Compression
 from .message_accounting import (

@@ -12,13 +12,12 @@ from numpy.typing import NDArray
 from .. import topics
 from ..errors import MessageError
 from ..samples import LawInForce, RobotNames, Timebase, in_order
-from ..wire.controller_law import LawCodec
-from ..wire.controller_telemetry import SIGNALS
-from ..wire.message import description
+from ..wire.messages import TELEMETRY_ROWS, describe
+from ..wire.telemetry import LawCodec
 from .actuators import ACTUATOR_COLUMNS, MOST_ACTUATORS, described, names_in
 from .batch import Batch
 from .field_reader import Array, FieldReader, Places
-from .flight_log import ORBIT_WIDTHS, FlightLog, MeasuredStates
+from .flight_log import FlightLog, MeasuredStates
 from .kernels import NO_STAMP, read_stamps
 from .message_accounting import LONGEST_JUMP, MessageAccounting
 
@@ -48,7 +47,7 @@ class Rows:
             timebase: of the stamps.
             origin_ns: stamp of tick 0.
         """
-        self.log = FlightLog.allocate(0, names.joints, timebase, passive_names=names.passive)
+        self.log = FlightLog.allocate(0, names, timebase)
         self.log.commanded_torque = np.empty((0, len(names.axes)))
         self.accounting: dict[str, MessageAccounting] = {}
         self.counts: Counter[str] = Counter()
@@ -60,11 +59,10 @@ class Rows:
         """The times when a state was whole and when its answer was sent, by tick."""
         self._wall_clock = False
         self._rows = self._believed = 0
-        descriptions = {topic: description(topic) for topic in topics.ALL}
         self._readers = {
-            topic: FieldReader(describe.of_robot(names, timebase))
-            for topic, describe in descriptions.items()
-            if describe and topic is not topics.MAGNETOMETER  # /truth/orbit has the same numbers
+            topic: FieldReader(describe(topic, names, timebase))
+            for topic in topics.ALL  # /truth/orbit has the same numbers as /magnetometer
+            if topic not in (topics.LAW, topics.MAGNETOMETER)
         }
         self._unnamed = set(MOST_ACTUATORS)
         """Topics whose actuators' names are still unknown."""
@@ -112,7 +110,7 @@ class Rows:
         if topic in self._unnamed:
             self._learn_actuators(topic, batch)
         if topic is topics.TRUTH_ORBIT and not self.log.orbit_position.shape[1]:
-            for name, width in ORBIT_WIDTHS.items():
+            for name, _, width in self._readers[topic].columns:
                 setattr(self.log, name, np.full((self._rows, width), np.nan))
         reader = self._readers.get(topic)
         if reader and reader.columns:
@@ -130,12 +128,12 @@ class Rows:
         if (names := names_in(topic, batch, log.joint_names)) is None:
             return
         self._unnamed.remove(topic)
-        if (describe := described(topic, names, log.joint_names, log.timebase)) is None:
+        if (description := described(topic, names, log.joint_names, log.timebase)) is None:
             return
-        self._readers[topic] = FieldReader(describe)
+        self._readers[topic] = FieldReader(description)
         if topic is topics.MOTORS_STATE:
             log.geared_names = names
-        for name, _, width in describe.columns:
+        for name, _, width in description.columns:
             if name in ACTUATOR_COLUMNS:
                 setattr(log, name, np.full((self._rows, width), np.nan))
 
@@ -218,8 +216,8 @@ class Rows:
     def _note_errors(self, values: Array) -> None:
         """``values``: (M, ...) the tick, then s, u, N_hat and e of each message, if it is ours."""
         axes = self.log.axes
-        if values.shape[1] == 1 + len(SIGNALS) * axes:
-            first = 1 + SIGNALS.index("e") * axes
+        if values.shape[1] == 1 + len(TELEMETRY_ROWS) * axes:
+            first = 1 + TELEMETRY_ROWS.index("e") * axes
             error = values[:, first : first + axes].copy()
             self._errors.append((values[:, 0].astype(np.int64), error))
 

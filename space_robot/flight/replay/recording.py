@@ -25,7 +25,7 @@ from space_robot_msgs_py.config.text import printable
 from space_robot_msgs_py.errors import InputError, MessageError
 from space_robot_msgs_py.samples import LawInForce, in_order
 from space_robot_msgs_py.topics import Topic
-from space_robot_msgs_py.wire.controller_law import LawCodec
+from space_robot_msgs_py.wire.telemetry import LawCodec
 
 from .commands import CommandList, ReplayedCommands
 

@@ -34,7 +34,7 @@ from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.bag.reader import read_flight
 from space_robot_msgs_py.bag.recorder import BagRecorder
 from space_robot_msgs_py.errors import InputError
-from space_robot_msgs_py.wire.clock import ClockCodec
+from space_robot_msgs_py.wire.telemetry import ClockCodec
 
 METADATA = "metadata.yaml"
 _CHUNK_CRC = 9 + 24

@@ -22,7 +22,7 @@ from space_robot_msgs_py.bag.recorder import BagRecorder
 from space_robot_msgs_py.bag.rows import stamps_of
 from space_robot_msgs_py.samples import STATE_FIELDS
 from space_robot_msgs_py.wire.cdr import header_stamp_ns
-from space_robot_msgs_py.wire.clock import ClockCodec
+from space_robot_msgs_py.wire.telemetry import ClockCodec
 
 KEPT_BACK = (30, 31, 150, 250, 251, 252)
 """Ticks whose state a fault keeps back."""

@@ -31,8 +31,8 @@ from space_robot_msgs_py.bag.rosbag2_yaml import FileSummary, bag_information, t
 from space_robot_msgs_py.bag.writer import DESCRIPTION
 from space_robot_msgs_py.errors import FlightError, InputError
 from space_robot_msgs_py.samples import RobotNames, RobotState, Timebase
-from space_robot_msgs_py.wire.clock import ClockCodec
 from space_robot_msgs_py.wire.codecs import StateCodec
+from space_robot_msgs_py.wire.telemetry import ClockCodec
 
 TIMEBASE = Timebase(500_000)
 FLIGHT = {"controller": "tde_stc", "period": 0.0005}
