@@ -20,6 +20,7 @@ from space_robot.flight.plan import Flight, FlightPlan, resolve
 from space_robot.flight.simulate import simulate
 from space_robot_control.laws import laws
 from space_robot_msgs_py import topics
+from space_robot_msgs_py.bag import rows
 from space_robot_msgs_py.bag.folder import open_bag
 from space_robot_msgs_py.bag.recorder import BagRecorder
 from space_robot_msgs_py.samples import CommandSignals, RobotNames
@@ -73,7 +74,7 @@ def test_a_signal_is_one_line_and_its_topic_another(
     newest = topics.Topic("newest", "sensor_msgs/msg/Temperature", 100, per_tick=True)
     declared = signal(Group.OTHERS, 1, "K", "", "how warm it is").sent(newest, "temperature")
     monkeypatch.setattr(CommandSignals, "newest", declared, raising=False)
-    monkeypatch.setattr(topics, "NEWEST", newest, raising=False)
+    monkeypatch.setattr(rows, "NOT_READ", (*rows.NOT_READ, newest))  # a log has no such column
     monkeypatch.setattr(topics, "ALL", (*topics.ALL, newest))
     monkeypatch.setattr(topics, "RECORDED", (*topics.RECORDED, newest))
     monkeypatch.setitem(topics.BY_NAME, newest.full_name, newest)
