@@ -15,7 +15,7 @@ from .compiled.records import Field
 from .topics import Topic
 
 
-class Group(Enum):
+class Origin(Enum):
     """Who reports a signal, and which robots have it."""
 
     SENSORS = "of base and joints, measured by sensors, which may spoil it"
@@ -54,7 +54,7 @@ class Signal(Field):
     size: int | Each = 0
     unit: str = ""
     frame: str = ""
-    group: Group = Group.OTHERS
+    origin: Origin = Origin.OTHERS
     fields: tuple[MessageField, ...] = ()
     labels: tuple[str, ...] = ()
     """Name of each number, in messages that name their numbers."""
@@ -79,14 +79,14 @@ class Signal(Field):
 
     def column_width(self, names: Any) -> int:
         """Return how many numbers a robot with these `RobotNames` has in a log."""
-        return 0 if self.group is Group.ORBIT and not names.in_orbit else self.width(names)
+        return 0 if self.origin is Origin.ORBIT and not names.in_orbit else self.width(names)
 
 
-def signal(group: Group, size: int | Each, unit: str, frame: str, text: str) -> Any:
+def signal(origin: Origin, size: int | Each, unit: str, frame: str, text: str) -> Any:
     """Declare a `Signal`.
 
     Args:
-        group: who reports it.
+        origin: who reports it.
         size: how many numbers it has.
         unit: of each; of joints that slide read m for rad, and N for N m.
         frame: whose axes it is on, or what it is relative to; empty: none.
@@ -94,7 +94,7 @@ def signal(group: Group, size: int | Each, unit: str, frame: str, text: str) -> 
     """
     room = size.room if isinstance(size, Each) else lambda n: size
     description = ", ".join(filter(None, (text, unit, frame)))
-    return Signal(lambda n: (room(n),), description, False, size, unit, frame, group)
+    return Signal(lambda n: (room(n),), description, False, size, unit, frame, origin)
 
 
 def signals_of(table: type) -> dict[str, Signal]:
