@@ -52,6 +52,7 @@ class Signal(Field):
     """Declaration of a signal: a field of a record, and what it is outside of it."""
 
     size: int | Each = 0
+    text: str = ""
     unit: str = ""
     frame: str = ""
     origin: Origin = Origin.OTHERS
@@ -94,7 +95,7 @@ def signal(origin: Origin, size: int | Each, unit: str, frame: str, text: str) -
     """
     room = size.room if isinstance(size, Each) else lambda n: size
     description = ", ".join(filter(None, (text, unit, frame)))
-    return Signal(lambda n: (room(n),), description, False, size, unit, frame, origin)
+    return Signal(lambda n: (room(n),), description, False, size, text, unit, frame, origin)
 
 
 def signals_of(table: type) -> dict[str, Signal]:
