@@ -13,8 +13,8 @@ from space_robot_msgs_py.ros.loop import Wait
 from space_robot_msgs_py.ros.managed_node import ManagedNode
 from space_robot_msgs_py.samples import RobotNames
 from space_robot_msgs_py.wire.cdr import header_stamp_ns
-from space_robot_msgs_py.wire.reference_codec import ReferenceCodec
 from space_robot_msgs_py.wire.stamp_guard import StampGuard, describe_new_time
+from space_robot_msgs_py.wire.telemetry import ReferenceCodec
 
 from .mission import Mission
 from .mission_changes import MissionChanges

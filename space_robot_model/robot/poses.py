@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 
 from space_robot_msgs_py.samples import RobotState
 from space_robot_msgs_py.topics import INERTIAL_FRAME
-from space_robot_msgs_py.wire.poses import POSE
-from space_robot_msgs_py.wire.tf import Frame
+from space_robot_msgs_py.wire.viewers import POSE, Frame
 
 from ..elementary.sine import sines_cosines
 from .frame_names import frame_names

@@ -25,8 +25,8 @@ from space_robot_msgs_py.ros.loop import Wait
 from space_robot_msgs_py.ros.managed_node import ManagedNode
 from space_robot_msgs_py.ros.paused import PausedOutput
 from space_robot_msgs_py.samples import Command
-from space_robot_msgs_py.wire.clock import ClockCodec
 from space_robot_msgs_py.wire.codecs import CommandCodec, StateCodec
+from space_robot_msgs_py.wire.telemetry import ClockCodec
 
 from .actuator_health import ActuatorHealth
 from .base_output import BaseOutput

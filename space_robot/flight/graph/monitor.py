@@ -13,8 +13,9 @@ from numpy.typing import NDArray
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.config.namespace import relative
 from space_robot_msgs_py.errors import MessageError
-from space_robot_msgs_py.wire.controller_telemetry import SIGNALS, TelemetryCodec
 from space_robot_msgs_py.wire.definitions import decode
+from space_robot_msgs_py.wire.messages import TELEMETRY_ROWS
+from space_robot_msgs_py.wire.telemetry import TelemetryCodec
 
 from .temporary_node import TemporaryNode
 
@@ -99,8 +100,8 @@ class Monitor:
 
     def _read_telemetry(self, data: bytes) -> list[Event]:
         _, rows = TelemetryCodec.decode(data)
-        if rows.ndim == 2 and len(rows) == len(SIGNALS) and rows.shape[1] > 3:
-            self.error = rows[SIGNALS.index("e")]
+        if rows.ndim == 2 and len(rows) == len(TELEMETRY_ROWS) and rows.shape[1] > 3:
+            self.error = rows[TELEMETRY_ROWS.index("e")]
         return []
 
     def _read_diagnostics(self, data: bytes) -> list[Event]:

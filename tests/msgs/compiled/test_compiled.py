@@ -21,7 +21,7 @@ import sys
 import numpy as np
 from space_robot_msgs_py.compiled.cache import cache_directory
 from space_robot_msgs_py.compiled.kernels import kernel
-from space_robot_msgs_py.bag.kernels import walk_messages
+from space_robot_msgs_py.bag.batch import walk_messages
 exec(compile(open({file!r}).read(), {file!r}, "exec"))
 print(double(np.arange(3.0)).sum(), cache_directory(), *{{"scipy.linalg"}} & set(sys.modules))
 """

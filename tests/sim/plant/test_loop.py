@@ -18,8 +18,8 @@ from space_robot_model.robot import Robot
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.errors import FlightError
 from space_robot_msgs_py.samples import Command
-from space_robot_msgs_py.wire.clock import ClockCodec
 from space_robot_msgs_py.wire.codecs import CommandCodec, StateCodec
+from space_robot_msgs_py.wire.telemetry import ClockCodec
 from space_robot_sim.plant.plant import Plant
 from space_robot_sim.plant.settings import PlantNodeSettings
 from space_robot_sim.plant.wall_clock import REMARK_S, SLIP_S, WallClock

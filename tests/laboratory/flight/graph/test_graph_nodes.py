@@ -21,8 +21,8 @@ from space_robot_msgs_py.bag.folder import open_bag
 from space_robot_msgs_py.bag.reader import read_flight
 from space_robot_msgs_py.ros.process_environment import set_defaults
 from space_robot_msgs_py.samples import Timebase
-from space_robot_msgs_py.wire.clock import ClockCodec
-from space_robot_msgs_py.wire.markers import no_markers
+from space_robot_msgs_py.wire.telemetry import ClockCodec
+from space_robot_msgs_py.wire.viewers import no_markers
 from space_robot_sim.plant.run_control import PAUSED
 
 set_defaults()
