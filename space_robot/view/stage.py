@@ -15,7 +15,7 @@ from space_robot_model.robot.base_axes import base_axes
 from space_robot_model.robot.frames import body_frames
 from space_robot_model.robot.transforms import wxyz
 from space_robot_model.robot.tree import Visual
-from space_robot_msgs_py.config.extras import install_command
+from space_robot_msgs_py.config.installation import install_command
 from space_robot_msgs_py.errors import InputError
 
 from .horizon import Horizon

@@ -18,7 +18,7 @@ from space_robot_model.elementary.matrices import direction_norm, dot_rows, norm
 from space_robot_model.elementary.rotations import quaternion_of_rotation, rotation_of_rpy
 from space_robot_model.orbit.ephemeris import Ephemeris
 from space_robot_model.robot.orientation import Angles
-from space_robot_msgs_py.config.choices import choices
+from space_robot_msgs_py.config.text import choices
 from space_robot_msgs_py.config.validation import StrictModel, short
 from space_robot_msgs_py.errors import InputError
 

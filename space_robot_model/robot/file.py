@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import AfterValidator, Field, ValidationInfo, field_validator
 
-from space_robot_msgs_py.config.choices import choices
+from space_robot_msgs_py.config.text import choices
 from space_robot_msgs_py.config.validation import StrictModel, short
 
 from ..elementary.matrices import product

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 
-from space_robot_msgs_py.config.html import html_table
+from space_robot_msgs_py.config.text import html_table
 
 from .tree import TreeArrays
 

@@ -24,8 +24,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from space_robot_msgs_py.config.columns import missing_column, read_columns
-from space_robot_msgs_py.config.files import GIVEN, node_parameters
-from space_robot_msgs_py.config.trees import Tree
+from space_robot_msgs_py.config.files import GIVEN, Tree, node_parameters
 from space_robot_msgs_py.config.validation import StrictModel, read_yaml, validate
 from space_robot_msgs_py.errors import InputError, explained_by
 

@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING
 
 from mcap.writer import MCAP0_MAGIC
 
-from ..config.choices import MOST_COMPARED, MOST_NEAR, nearest
-from ..config.text import printable
+from ..config.text import MOST_COMPARED, MOST_NEAR, nearest, printable
 from ..errors import InputError
 from .batch import Batch
 from .contents import Bag, BagInformation, Storage, read_information, some_of

@@ -17,7 +17,7 @@ from space_robot_model.elementary.symmetric import principal_axes
 from space_robot_model.robot import Robot
 from space_robot_model.robot.plates import plates_of
 from space_robot_model.robot.tree import Plate
-from space_robot_msgs_py.config.trees import flatten
+from space_robot_msgs_py.config.files import flatten
 from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.samples import RobotNames
 

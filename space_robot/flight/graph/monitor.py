@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from space_robot_msgs_py import topics
-from space_robot_msgs_py.config.namespace import relative
+from space_robot_msgs_py.config.validation import relative
 from space_robot_msgs_py.errors import MessageError
 from space_robot_msgs_py.wire.definitions import decode
 from space_robot_msgs_py.wire.messages import TELEMETRY_ROWS

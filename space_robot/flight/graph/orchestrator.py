@@ -20,8 +20,8 @@ from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.bag.folder import open_bag
 from space_robot_msgs_py.bag.reader import read_flight
 from space_robot_msgs_py.bag.selection import Selection
-from space_robot_msgs_py.config.extras import install_command
 from space_robot_msgs_py.config.files import GIVEN
+from space_robot_msgs_py.config.installation import install_command
 from space_robot_msgs_py.errors import FlightError, InputError, SpaceRobotError
 
 from ...processes.interruption import handled_signals

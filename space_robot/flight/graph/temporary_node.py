@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 
 from space_robot_msgs_py.errors import FlightError
-from space_robot_msgs_py.ros.process_environment import set_defaults
+from space_robot_msgs_py.ros.process import set_defaults
 from space_robot_msgs_py.topics import ROOT
 
 

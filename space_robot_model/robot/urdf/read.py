@@ -9,10 +9,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from space_robot_msgs_py.config.choices import choices
-from space_robot_msgs_py.config.extras import install_command
+from space_robot_msgs_py.config.installation import install_command
+from space_robot_msgs_py.config.text import choices
 from space_robot_msgs_py.config.validation import one_of, short
-from space_robot_msgs_py.config.yaml_text import check_file, read_file
+from space_robot_msgs_py.config.yaml_text import check_readable, read_file
 from space_robot_msgs_py.errors import InputError
 
 from ...dynamics.model import MOST_JOINTS
@@ -234,7 +234,7 @@ def expand_xacro(path: Path) -> str:
     Raises:
         InputError: the package is not installed, or cannot expand the file.
     """
-    check_file(path)
+    check_readable(path)
     try:
         import xacro
     except ImportError:

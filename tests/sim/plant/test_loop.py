@@ -26,7 +26,7 @@ from space_robot_sim.plant.wall_clock import REMARK_S, SLIP_S, WallClock
 
 pytest.importorskip("rclpy")
 
-from space_robot_msgs_py.ros.health import Level
+from space_robot_msgs_py.ros.loop import Level
 from space_robot_sim.plant import base_output, loop, own_controller, scene_output, truth_output
 from space_robot_sim.plant.loop import ASK_AGAIN_S, PlantLoop
 

@@ -19,7 +19,7 @@ from space_robot_model.robot.poses import RobotPoses
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.bag.folder import open_bag
 from space_robot_msgs_py.bag.reader import read_flight
-from space_robot_msgs_py.ros.process_environment import set_defaults
+from space_robot_msgs_py.ros.process import set_defaults
 from space_robot_msgs_py.samples import Timebase
 from space_robot_msgs_py.wire.telemetry import ClockCodec
 from space_robot_msgs_py.wire.viewers import no_markers

@@ -1,23 +1,44 @@
-"""Commands that install the packages of an extra, for errors where one of them is missing."""
+"""What is installed: the ``config/`` folder, and the packages of extras.
+
+Light imports only, since the help of commands lists the files of the folder.
+"""
 
 from __future__ import annotations
 
 import re
 import shlex
 from collections.abc import Sequence
+from functools import cache
+from pathlib import Path
 
+from ..errors import InputError
+
+GRAPH_FILE = "space_robot.yaml"
+"""File with the defaults of the graph, in the config folder."""
 DISTRIBUTION = "space_robot"
 """Name of the installed project."""
 _EXTRA = re.compile(r"extra\s*==\s*['\"]([\w-]+)['\"]")
 
 
+@cache
+def config_directory() -> Path:
+    """Return the ``config/`` folder of the source tree, or the one installed under ``share/``.
+
+    Raises:
+        InputError: the installation is incomplete.
+    """
+    for parent in Path(__file__).resolve().parents:
+        for folder in (parent / "config", parent / "share/space_robot/config"):
+            if (folder / GRAPH_FILE).is_file():
+                return folder
+    raise InputError("the package's config folder is not installed: reinstall space_robot")
+
+
 def install_command(extra: str) -> str:
     """Return the command that installs the packages of an extra of ``setup.py``.
 
-    It names the packages, as in ``pip install 'viser>=1.1'``: the project itself is on no index, so
-    that ``pip install 'space_robot[view]'`` would work in no installation, and the packages do
-    wherever the project was installed from. Where it runs without being installed, the extra is
-    installed from its folder.
+    It names them, as in ``pip install 'viser>=1.1'``: the project is on no index, so that ``pip
+    install 'space_robot[view]'`` works only in its folder.
     """
     packages = extra_packages(extra)
     if not packages:
