@@ -231,7 +231,7 @@ def remarks_on(flight: Flight) -> list[str]:
     margin (of default gains only where hardware or a fault tries the margin), of joints that are
     asked too much.
     """
-    from space_robot_model.robot.described import unit_remarks
+    from space_robot_model.robot.description import unit_remarks
 
     from ..flight.mission_demand import demand_remark
     from ..tuning.gain_check import pair_corner

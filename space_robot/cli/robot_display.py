@@ -16,7 +16,7 @@ from ..console.terminal_tables import print_table
 
 
 def print_robot(description: dict[str, Any], findings: Sequence[Finding], console: Console) -> None:
-    """Print the description made by `space_robot_model.robot.described.describe`."""
+    """Print the description made by `space_robot_model.robot.description.describe`."""
     passive = len(description["passive_names"])
     say(
         console,

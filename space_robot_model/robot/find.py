@@ -29,8 +29,8 @@ from space_robot_msgs_py.config.yaml_text import check_file, is_folder
 from space_robot_msgs_py.errors import InputError, explained_by
 
 from .choice import split_choice
+from .files import URDF, YAML, RobotSource, read_robot_file
 from .robot import Robot
-from .source import URDF, YAML, RobotSource, read_robot_file
 
 ROBOTS = "robots"
 """Folder of the shipped robots in the config folder."""

@@ -16,7 +16,7 @@ from .arguments import check_robot, unit_quaternion, vector
 
 if TYPE_CHECKING:
     from ..dynamics.model import Model
-    from .tree import Tool
+    from .parts import Tool
 
 Array = NDArray[np.float64]
 Attitude = Literal["held", "free"]

@@ -8,11 +8,11 @@ from numpy.typing import NDArray
 from space_robot_msgs_py.samples import Timebase
 from space_robot_msgs_py.wire.markers import CUBE, CYLINDER, MESH, SPHERE, Marker, MarkersCodec
 
-from .frame_names import frame_names
+from .names import frame_names
+from .parts import Visual
 from .robot import Robot
 from .shapes import LINK_COLOUR, shapes_of
 from .transforms import wxyz
-from .tree import Visual
 from .urdf_text import mesh_address
 
 Array = NDArray[np.float64]

@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..elementary.matrices import product
+from .parts import Plate, Visual
 from .robot import Robot
 from .shapes import drawn_shapes
-from .tree import Plate, Visual
 
 Array = NDArray[np.float64]
 

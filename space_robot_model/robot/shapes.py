@@ -7,12 +7,10 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
+from .parts import Colour, Visual
 from .robot import Robot
-from .tree import Visual
 
 Array = NDArray[np.float64]
-Colour = tuple[float, float, float, float]
-
 BASE_COLOUR: Colour = (0.80, 0.66, 0.30, 1.0)
 LINK_COLOUR: Colour = (0.82, 0.83, 0.86, 1.0)
 JOINT_COLOUR: Colour = (0.25, 0.28, 0.33, 1.0)

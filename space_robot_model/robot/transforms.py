@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..elementary.matrices import norm
-from .frame_names import frame_names
+from .names import frame_names
 from .robot import Robot
 
 Array = NDArray[np.float64]

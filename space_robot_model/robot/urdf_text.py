@@ -22,11 +22,11 @@ from numpy.typing import NDArray
 
 from ..elementary.matrices import product
 from ..elementary.rotations import rpy_of_rotation
-from .frame_names import distinct, frame_names, printable, urdf_joint_names
 from .inertia import inertia_elements
+from .names import distinct, frame_names, printable, urdf_joint_names
+from .parts import Colour, JointLimits, Visual
 from .robot import Robot
-from .shapes import Colour, shapes_of
-from .tree import JointLimits, Visual
+from .shapes import shapes_of
 from .urdf.fields import LARGEST
 from .urdf.links import MOMENTS
 

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import pickle
 from collections.abc import Iterable
+from dataclasses import InitVar, is_dataclass
 from functools import lru_cache
 from pathlib import Path
-from typing import Any, TypeVar, get_args, get_origin
+from typing import Any, TypeVar, get_args, get_origin, get_type_hints
 
 from pydantic import BaseModel, ConfigDict, ValidationError, ValidationInfo, field_validator
+from pydantic.fields import FieldInfo
 
 from ..errors import InputError
 from .choices import choices
@@ -45,6 +47,8 @@ ON_NUMBERS = {
     *("float_type", "int_type", "byte_size", "byte_size_unit"),
 }
 """Kinds of errors that show the description of their field, since it has the unit."""
+UNKNOWN_KEY = ("extra_forbidden", "unexpected_keyword_argument")
+NO_MAPPING = ("model_type", "dataclass_type", "named_tuple_type", "arguments_type")
 MOST_KEPT = 100_000
 """Maximum length of a text with cached content, in characters."""
 
@@ -87,15 +91,15 @@ def one_line(error: ValidationError, schema: type[BaseModel], where: str) -> str
     """Return the first error as a line with key, value and allowed values."""
     # a misspelt key gives a missing and an unknown key: the unknown one is the cause
     faults = sorted(
-        error.errors(include_url=False), key=lambda fault: fault["type"] != "extra_forbidden"
+        error.errors(include_url=False), key=lambda fault: fault["type"] not in UNKNOWN_KEY
     )
     first = faults[0]
     key = printable(".".join(str(part) for part in first["loc"]))
     got = "" if first["type"] == "missing" else f", got {short(first['input'])}"
     text = first["msg"].removeprefix("Value error, ")
-    if first["type"] == "model_type":
+    if first["type"] in NO_MAPPING:
         text = "a mapping was expected"
-    if first["type"] == "extra_forbidden":
+    if first["type"] in UNKNOWN_KEY:
         allowed = choices(str(first["loc"][-1]), _allowed_keys(schema, first["loc"][:-1]))
         text, got = f"unknown key{got}: {allowed}", ""
     if first["type"] in ON_NUMBERS and (description := _description(schema, first["loc"])):
@@ -108,25 +112,35 @@ def _description(schema: Any, location: tuple[int | str, ...]) -> str:
     """Return the description of a field, with its unit; empty if it has none."""
     description = ""
     for step in location:
-        while get_origin(schema) not in (None, list, dict):
-            schema = get_args(schema)[0]
-        fields = getattr(schema, "model_fields", {})
+        fields = _fields(schema)
         if step not in fields:
             return ""
         schema, description = fields[step].annotation, fields[step].description or ""
+        while get_origin(schema) not in (None, list, dict):
+            schema = get_args(schema)[0]
     return description
 
 
 def _allowed_keys(schema: Any, location: tuple[int | str, ...]) -> list[str]:
     """Return the keys, as in files, of the model at a location within ``schema``."""
     for step in location:
-        if hasattr(schema, "model_fields"):
-            schema = schema.model_fields[step].annotation
-        else:  # an item of a list, a value of a mapping
-            schema = get_args(schema)[-1]
+        fields = _fields(schema)  # none: an item of a list, a value of a mapping
+        schema = fields[step].annotation if fields else get_args(schema)[-1]
         while get_origin(schema) not in (None, list, dict):  # Annotated, a union with None
             schema = get_args(schema)[0]
-    return sorted(field.alias or name for name, field in schema.model_fields.items())
+    return sorted(str(name) for name, field in _fields(schema).items() if not field.exclude)
+
+
+def _fields(schema: Any) -> dict[int | str, FieldInfo]:
+    """Return the fields of a model, dataclass or named tuple, by their keys in files."""
+    fields = getattr(schema, "model_fields", None)
+    if fields is None:
+        if not (is_dataclass(schema) or hasattr(schema, "_fields")):
+            return {}
+        hints = get_type_hints(schema, include_extras=True).items()
+        own = {name: hint.type if isinstance(hint, InitVar) else hint for name, hint in hints}
+        fields = {name: FieldInfo.from_annotation(hint) for name, hint in own.items()}
+    return {field.alias or name: field for name, field in fields.items()}
 
 
 def short(value: Any) -> str:

@@ -1,6 +1,7 @@
 """Strict reading of robots from URDF files, with reports of all defects."""
 
+from .fields import HERE
 from .findings import Finding
-from .read import UrdfRobot, read_urdf
+from .read import UrdfRobot, parse_urdf, read_urdf
 
-__all__ = ["Finding", "UrdfRobot", "read_urdf"]
+__all__ = ["HERE", "Finding", "UrdfRobot", "parse_urdf", "read_urdf"]

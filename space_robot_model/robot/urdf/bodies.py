@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import cast
+from typing import Literal, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from space_robot_msgs_py.config.validation import short
 
 from ...elementary.matrices import product, rotate_tensor
-from ..tree import Body, Joint, JointKind, Tool
+from ..parts import Base, Link, RobotTree, Tool, Visual
 from .fields import HERE, UrdfFrame
 from .findings import Report
 from .graph import Edge, Tree
@@ -20,6 +20,7 @@ from .inertia import inertia_defect, nearest_inertia, solid_inertia
 from .links import NOTHING, UrdfLink
 
 Array = NDArray[np.float64]
+Kind = Literal["revolute", "prismatic", "fixed"]
 
 
 def mend_massless(links: Mapping[str, UrdfLink], tree: Tree, report: Report) -> None:
@@ -126,22 +127,28 @@ def mend_inertias(links: Mapping[str, UrdfLink], tree: Tree, report: Report) -> 
         link.inertia = nearest
 
 
-def make_bodies(links: Mapping[str, UrdfLink], tree: Tree, tools: Sequence[str]) -> list[Body]:
-    """Return a body for each link, the base first, the others in the order of their joints.
+def make_tree(
+    name: str, links: Mapping[str, UrdfLink], tree: Tree, tools: Sequence[str]
+) -> RobotTree:
+    """Return the robot, its links in the order of their joints.
 
     Args:
+        name: of the robot.
         links: by name.
         tree: of links and joints.
         tools: links whose frames are tools, in order of rank.
     """
-    frames = moved_frames(tree)
-    ranks = {name: rank for rank, name in enumerate(tools)}
-    bodies = [_body(links[tree.base], HERE, None, "", ranks.get(tree.base))]
-    for name, edge in tree.edges.items():
-        joint = _joint(edge, frames.get(edge.parent, HERE))
-        frame = frames.get(name, HERE)
-        bodies.append(_body(links[name], frame, joint, edge.parent, ranks.get(name)))
-    return bodies
+    frames, root = moved_frames(tree), links[tree.base]
+    base = Base(root.mass, *_matter(root, HERE), root.name)
+    own = [_link(links[child], edge, frames) for child, edge in tree.edges.items()]
+    visuals = [
+        visual
+        for child in (tree.base, *tree.edges)
+        for visual in _visuals(links[child], frames.get(child, HERE))
+    ]
+    return RobotTree(
+        name, base, own, tools=[_tool(tool, frames) for tool in tools], visuals=visuals
+    )
 
 
 def moved_frames(tree: Tree) -> dict[str, UrdfFrame]:
@@ -173,9 +180,9 @@ def end_frames(links: Mapping[str, UrdfLink], tree: Tree) -> list[str]:
     return sorted(ends, key=lambda name: (-depth[name], place[name]))
 
 
-def _joint(edge: Edge, parent: UrdfFrame) -> Joint:
-    """Return the joint between two bodies; ``parent`` is the frame of the inner one."""
-    joint = edge.joint
+def _link(link: UrdfLink, edge: Edge, frames: Mapping[str, UrdfFrame]) -> Link:
+    """Return a link with its joint, in the frame of its body."""
+    joint, parent = edge.joint, frames.get(edge.parent, HERE)
     rotation = parent.rotation.T
     if edge.is_reversed:
         offset, axis = -parent.position, -joint.axis
@@ -183,38 +190,44 @@ def _joint(edge: Edge, parent: UrdfFrame) -> Joint:
         rotation = product(rotation, joint.frame.rotation)
         offset = product(joint.frame.rotation.T, joint.frame.position - parent.position)
         axis = joint.axis
-    return Joint(
-        joint.name,
-        cast(JointKind, joint.kind),
-        rotation,
-        offset,
-        axis,
-        joint.limits,
-        joint.friction,
+    inertia, com = _matter(link, frames.get(link.name, HERE))
+    return Link(
+        name=link.name,
+        parent=edge.parent,
+        joint=cast(Kind, joint.kind),
+        joint_name=joint.name,
+        rotation=rotation,
+        offset=offset,
+        axis=axis,
+        mass=link.mass,
+        inertia=inertia,
+        com=com,
+        limits=joint.limits,
+        friction=joint.friction,
     )
 
 
-def _body(
-    link: UrdfLink, frame: UrdfFrame, joint: Joint | None, parent: str, rank: int | None
-) -> Body:
-    """Return a link as a body with ``frame`` relative to the link's; with a tool if ranked."""
+def _matter(link: UrdfLink, frame: UrdfFrame) -> tuple[Array, Array]:
+    """Return inertia and centre of mass in a frame that is relative to the link's."""
+    turn = frame.rotation.T
+    return rotate_tensor(turn, link.inertia), product(turn, link.com - frame.position)
+
+
+def _visuals(link: UrdfLink, frame: UrdfFrame) -> list[Visual]:
     turn, at = frame.rotation.T, frame.position
-    visuals = tuple(
+    return [
         replace(
             visual,
             rotation=product(turn, visual.rotation),
             position=product(turn, visual.position - at),
+            link=link.name,
         )
         for visual in link.visuals
-    )
-    tools = () if rank is None else (Tool(link.name, turn, -product(turn, at), rank=rank),)
-    return Body(
-        link.name,
-        link.mass,
-        rotate_tensor(turn, link.inertia),
-        product(turn, link.com - at),
-        parent,
-        joint,
-        tools,
-        visuals,
-    )
+    ]
+
+
+def _tool(name: str, frames: Mapping[str, UrdfFrame]) -> Tool:
+    """Return the frame of a link as a tool."""
+    frame = frames.get(name, HERE)
+    turn = frame.rotation.T
+    return Tool(name, turn, -product(turn, frame.position), link=name)

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...elementary.matrices import rotate_tensor
-from ..tree import Visual
+from ..parts import Visual
 
 Array = NDArray[np.float64]
 

@@ -13,7 +13,7 @@ from space_robot_msgs_py.config.choices import nearest
 from space_robot_msgs_py.config.validation import short
 
 from ...elementary.matrices import norm
-from ..tree import JointFriction, JointLimits
+from ..parts import JointFriction, JointLimits
 from .elements import Element
 from .fields import Fields, UrdfFrame
 from .findings import Report
@@ -52,7 +52,7 @@ class UrdfJoint:
     axis: Array
     """(3,) unit vector in the child's axes."""
     limits: JointLimits
-    friction: JointFriction
+    friction: JointFriction | None
 
     @property
     def part(self) -> str:
@@ -94,7 +94,7 @@ def _joint(element: Element, name: str, links: Mapping[str, UrdfLink], fields: F
         fields.frame(report.only(element, "origin", part)),
         np.array([1.0, 0.0, 0.0]),
         JointLimits(),
-        JointFriction(),
+        None,
     )
     if joint.kind in ("revolute", "prismatic"):
         joint.axis = _axis(report.only(element, "axis", part), fields)
@@ -196,10 +196,10 @@ def _most(element: Element, name: str, fields: Fields) -> float:
     return abs(limit) if limit else math.inf
 
 
-def _friction(element: Element | None, fields: Fields) -> JointFriction:
+def _friction(element: Element | None, fields: Fields) -> JointFriction | None:
     """Return the friction in the file; 0 for a part that is missing in ``<dynamics>``."""
     if element is None:
-        return JointFriction()
+        return None
     fields.report.check_content(element, fields.part, (), ("damping", "friction"))
     coefficients = {}
     for name in ("friction", "damping"):

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from space_robot_msgs_py.config.validation import short
 
 from ...elementary.matrices import rotate_tensor
-from ..tree import Visual
+from ..parts import Visual
 from .elements import Element
 from .fields import Fields
 from .findings import Report

@@ -12,7 +12,7 @@ from xml.sax.saxutils import quoteattr, unescape
 from space_robot_msgs_py.config.validation import short
 from space_robot_msgs_py.errors import InputError
 
-from ..tree import Visual
+from ..parts import Visual
 from .elements import Element
 from .fields import Fields, UrdfFrame
 from .findings import Report, short_tag
