@@ -89,7 +89,7 @@ def _robot_options(function: Any) -> Any:
     @functools.wraps(function)
     def with_choice_of_urdf(*args: Any, base: str | None, repair: bool, **options: Any) -> Any:
         if base or repair:
-            from space_robot_model.robot.choice import with_choice
+            from space_robot_model.robot.find import with_choice
 
             options["robot"] = with_choice(options["robot"], base, repair)
         return function(*args, **options)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from space_robot_model.robot import Robot
 from space_robot_model.robot.names import frame_names
 from space_robot_model.robot.parts import Visual
-from space_robot_model.robot.transforms import Transform, joint_transforms, tool_transforms, wxyz
+from space_robot_model.robot.placements import Transform, joint_transforms, tool_transforms, wxyz
 
 from .mesh import Mesh
 from .meshes import shown_shapes

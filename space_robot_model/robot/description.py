@@ -15,8 +15,8 @@ from space_robot_msgs_py.config.html import html_table
 from ..elementary.matrices import norms
 from .files import gear_document
 from .parts import MANY_TURNS
-from .plates import plates_of
 from .robot import Robot
+from .shapes import plates_of
 
 Array = NDArray[np.float64]
 

@@ -1,7 +1,8 @@
 """Search of a robot by name or path, and of its mission and gains.
 
 A robot is given by a name of ``config/robots``, by a path to a ``.yaml``, ``.urdf`` or ``.xacro``
-(with options, see `space_robot_model.robot.choice`), or by its own folder:
+(with options: ``my.urdf?base=LINK&repair``, so that one text defines a robot in commands, nodes and
+bags), or by its own folder:
 
     robot.yaml (or robot.urdf, robot.xacro)
     mission.yaml
@@ -15,9 +16,12 @@ bags open shipped files only.
 from __future__ import annotations
 
 import os.path
+import re
 import shlex
 from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
+from urllib.parse import quote, unquote
 
 from space_robot_msgs_py.config.arguments import path_text
 from space_robot_msgs_py.config.choices import choices
@@ -28,7 +32,6 @@ from space_robot_msgs_py.config.validation import short
 from space_robot_msgs_py.config.yaml_text import check_file, is_folder
 from space_robot_msgs_py.errors import InputError, explained_by
 
-from .choice import split_choice
 from .files import URDF, YAML, RobotSource, read_robot_file
 from .robot import Robot
 
@@ -39,6 +42,33 @@ OWN = "robot"
 OWN_MISSION, OWN_GAINS = "mission.yaml", "gains"
 TRAJECTORIES = (".csv", ".parquet")
 """Suffixes of missions that are tables of a trajectory."""
+_CHOICE = re.compile(r"\?(?=base=|repair$)(?:base=([^&?./]+))?(?:&?(repair))?$")
+
+
+class RobotChoice(NamedTuple):
+    """A robot's name, split into its parts."""
+
+    name: str
+    """Name without options."""
+    base: str | None
+    """Name of the link that is the satellite; None: the root."""
+    repair: bool
+    """True to repair defects."""
+
+
+def with_choice(robot: str, base: str | None, repair: bool) -> str:
+    """Return the name of a robot with options; `split_choice` is the inverse."""
+    chosen = [f"base={quote(base, safe='').replace('.', '%2E')}"] if base else []
+    chosen += ["repair"] if repair else []
+    return f"{robot}?{'&'.join(chosen)}" if chosen else robot
+
+
+def split_choice(robot: str) -> RobotChoice:
+    """Split a robot's name; any text is accepted."""
+    match = _CHOICE.search(robot)
+    if not match:
+        return RobotChoice(robot, None, False)
+    return RobotChoice(robot[: match.start()], match[1] and unquote(match[1]), bool(match[2]))
 
 
 @dataclass(frozen=True)

@@ -2,52 +2,24 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Literal, NamedTuple, Protocol
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from space_robot_msgs_py.config.validation import one_of
+from space_robot_msgs_py.config.arguments import as_numbers
+from space_robot_msgs_py.config.validation import one_of, short
 from space_robot_msgs_py.errors import InputError
 
 from ..dynamics.tool_kinematics import ToolKinematics, tool_kinematics_into
 from ..elementary.least_squares import null_space, singular_values
-from .arguments import check_robot, unit_quaternion, vector
+from ..elementary.matrices import norm
 
 if TYPE_CHECKING:
-    from ..dynamics.model import Model
-    from .parts import Tool
+    from .robot import Robot
 
 Array = NDArray[np.float64]
 Attitude = Literal["held", "free"]
-
-
-class ModelledRobot(Protocol):
-    """What is needed of a `Robot`."""
-
-    @property
-    def model(self) -> Model:
-        """Numbers for the algorithms."""
-
-    @property
-    def joint_count(self) -> int:
-        """N."""
-
-    @property
-    def order(self) -> tuple[int, ...]:
-        """Joints in the order of ``model``."""
-
-    @property
-    def model_rows(self) -> tuple[int, ...]:
-        """Row in ``model`` of each joint."""
-
-    @property
-    def tools(self) -> tuple[Tool, ...]:
-        """All tools."""
-
-    @property
-    def tool(self) -> Tool:
-        """The first tool."""
 
 
 class ToolState(NamedTuple):
@@ -80,10 +52,7 @@ class ToolState(NamedTuple):
 
 
 def tool_state(
-    robot: ModelledRobot,
-    quaternion_wxyz: ArrayLike,
-    joint_positions: ArrayLike,
-    tool: str | None = None,
+    robot: Robot, quaternion_wxyz: ArrayLike, joint_positions: ArrayLike, tool: str | None = None
 ) -> ToolState:
     """Return pose and Jacobians of a tool.
 
@@ -118,7 +87,7 @@ def tool_state(
 
 
 def tool_jacobian(
-    robot: ModelledRobot,
+    robot: Robot,
     quaternion_wxyz: ArrayLike,
     joint_positions: ArrayLike,
     attitude: Attitude = "held",
@@ -143,7 +112,7 @@ def tool_jacobian(
 
 
 def reaction_null_space(
-    robot: ModelledRobot, quaternion_wxyz: ArrayLike, joint_positions: ArrayLike
+    robot: Robot, quaternion_wxyz: ArrayLike, joint_positions: ArrayLike
 ) -> Array:
     """Return an orthonormal basis of the joint velocities that leave the base's attitude alone.
 
@@ -172,7 +141,7 @@ class MountedTool(NamedTuple):
     point: Array
 
 
-def mounted_tool(robot: ModelledRobot, name: str | None) -> MountedTool:
+def mounted_tool(robot: Robot, name: str | None) -> MountedTool:
     """Return a tool of a robot; None: the first.
 
     Raises:
@@ -192,3 +161,38 @@ def mounted_tool(robot: ModelledRobot, name: str | None) -> MountedTool:
         np.ascontiguousarray(tool.rotation),
         np.ascontiguousarray(tool.position),
     )
+
+
+def vector(value: ArrayLike, size: int, name: str) -> Array:
+    """Return an argument as an array (size,).
+
+    Raises:
+        InputError: it has another type or shape; names it.
+    """
+    array = np.ascontiguousarray(as_numbers(value, name))
+    if array.shape != (size,):
+        raise InputError(f"{name} must have shape ({size},), got {array.shape}")
+    return array
+
+
+def unit_quaternion(value: ArrayLike) -> Array:
+    """Return the argument ``quaternion_wxyz`` (4,), normalised.
+
+    Raises:
+        InputError: it has another type or shape, or is not unit.
+    """
+    array = vector(value, 4, "quaternion_wxyz")
+    length = norm(array)
+    if not abs(length - 1.0) < 1e-6:
+        raise InputError(f"quaternion_wxyz must have norm 1, got {length}")
+    return array / length
+
+
+def check_robot(robot: Any) -> None:
+    """Check that an argument is a `Robot`.
+
+    Raises:
+        InputError: it is not.
+    """
+    if not hasattr(robot, "joint_count"):
+        raise InputError(f"robot: a Robot was expected, got {short(robot)}")

@@ -10,9 +10,9 @@ from space_robot_msgs_py.wire.markers import CUBE, CYLINDER, MESH, SPHERE, Marke
 
 from .names import frame_names
 from .parts import Visual
+from .placements import wxyz
 from .robot import Robot
 from .shapes import LINK_COLOUR, shapes_of
-from .transforms import wxyz
 from .urdf_text import mesh_address
 
 Array = NDArray[np.float64]
@@ -49,7 +49,7 @@ class RobotMarkers:
         self._shapes = [(row[shape.body], _pose(shape)) for shape in shapes]
 
     def encode(self, tick: int, poses: Array) -> bytes:
-        """Return the message of a tick for poses of `space_robot_model.robot.poses`."""
+        """Return the message of a tick for poses of `RobotPoses`."""
         return self._codec.encode(tick, self.poses(poses))
 
     def poses(self, poses: Array) -> Array:

@@ -14,10 +14,8 @@ from space_robot_msgs_py.config.validation import short
 
 from ...elementary.matrices import norm
 from ..parts import JointFriction, JointLimits
-from .elements import Element
-from .fields import Fields, UrdfFrame
-from .findings import Report
 from .links import UrdfLink, read_name
+from .xml import Element, Fields, Report, UrdfFrame
 
 Array = NDArray[np.float64]
 

@@ -16,14 +16,19 @@ from space_robot_msgs_py.errors import InputError
 from ...dynamics.model import MOST_JOINTS
 from ..names import first_repeated, other_meaning
 from ..parts import MOST_LINKS, RobotTree
-from .bodies import check_kinds, end_frames, make_tree, mend_inertias, mend_massless, moved_frames
-from .elements import Element, parse_xml
-from .fields import UrdfFrame
-from .findings import Finding, Report, short_tag
-from .graph import Tree, build_tree
 from .joints import read_joints
-from .links import read_links
-from .visuals import read_colours
+from .links import read_colours, read_links
+from .tree import (
+    Tree,
+    build_tree,
+    check_kinds,
+    end_frames,
+    make_tree,
+    mend_inertias,
+    mend_massless,
+    moved_frames,
+)
+from .xml import Element, Finding, Report, UrdfFrame, parse_xml, short_tag
 
 XACRO = ".xacro"
 MOST_MOVING = 4 * MOST_JOINTS

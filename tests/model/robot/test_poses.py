@@ -23,9 +23,7 @@ from strategies import (
 )
 
 from space_robot_model.robot import Robot
-from space_robot_model.robot.base_axes import base_axes
 from space_robot_model.robot.find import find_robot, robot_names
-from space_robot_model.robot.frames import body_frames
 from space_robot_model.robot.inertia import inertia_tensor
 from space_robot_model.robot.kinematics import (
     manipulability,
@@ -36,10 +34,17 @@ from space_robot_model.robot.kinematics import (
 from space_robot_model.robot.markers import RobotMarkers
 from space_robot_model.robot.names import frame_names
 from space_robot_model.robot.parts import RobotTree, Visual
-from space_robot_model.robot.poses import RobotPoses, tool_poses
+from space_robot_model.robot.placements import (
+    RobotPoses,
+    base_axes,
+    body_frames,
+    joint_transforms,
+    tool_pose,
+    tool_poses,
+    tool_transforms,
+    wxyz,
+)
 from space_robot_model.robot.shapes import BASE_COLOUR, LINK_COLOUR, even_box, shapes_of
-from space_robot_model.robot.tool import tool_pose
-from space_robot_model.robot.transforms import joint_transforms, tool_transforms, wxyz
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.samples import RobotState, Timebase

@@ -33,12 +33,12 @@ from strategies import (
 )
 
 from space_robot_model.robot import Robot
-from space_robot_model.robot.frames import body_frames
 from space_robot_model.robot.gears import flexible_model, geared_joints, motor_momentum, rotor_rows
 from space_robot_model.robot.mission_document import QUATERNION
 from space_robot_model.robot.momentum import Motion, robot_momentum
 from space_robot_model.robot.names import other_meaning
 from space_robot_model.robot.parts import Base, Gear, Link, RobotTree, Spring
+from space_robot_model.robot.placements import body_frames
 from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.topics import BASE_AXES
 from space_robot_sim.environment.disturbance_table import BASE as BASE_LOADS

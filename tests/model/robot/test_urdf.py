@@ -16,11 +16,11 @@ from paths import DATA
 from urdf_defects import DEFECTS, GOOD
 
 from space_robot_model.robot import Robot
+from space_robot_model.robot.inertia import nearest_inertia
 from space_robot_model.robot.parts import MOST_LINKS, JointFriction, JointLimits, Spring
 from space_robot_model.robot.urdf import read_urdf
-from space_robot_model.robot.urdf.inertia import nearest_inertia
+from space_robot_model.robot.urdf.links import mesh_path
 from space_robot_model.robot.urdf.read import MOST_MOVING, parse_urdf
-from space_robot_model.robot.urdf.visuals import mesh_path
 from space_robot_msgs_py.errors import InputError
 
 ARM = DATA / "arm.urdf"

@@ -31,10 +31,9 @@ from space_robot.cli.main import _run
 from space_robot_model.robot import Robot
 from space_robot_model.robot.find import find_robot
 from space_robot_model.robot.flatten import SETTINGS_FRICTION
-from space_robot_model.robot.inertia import inertia_tensor
+from space_robot_model.robot.inertia import SLENDER, inertia_tensor, solid_inertia
 from space_robot_model.robot.parts import Base, Link, Visual
 from space_robot_model.robot.urdf import read_urdf
-from space_robot_model.robot.urdf.inertia import SLENDER, solid_inertia
 from space_robot_model.robot.urdf.read import UrdfRobot, parse_urdf
 from space_robot_msgs_py.errors import InputError
 

@@ -24,8 +24,8 @@ from space_robot_model.robot.dynamics import bias_force, mass_matrix
 from space_robot_model.robot.find import find_robot, robot_names
 from space_robot_model.robot.names import frame_names
 from space_robot_model.robot.parts import Base, JointLimits, Link, RobotTree, Tool, Visual
+from space_robot_model.robot.placements import joint_transforms, tool_transforms
 from space_robot_model.robot.shapes import shapes_of
-from space_robot_model.robot.transforms import joint_transforms, tool_transforms
 from space_robot_model.robot.urdf_text import urdf_text
 from space_robot_msgs_py.topics import INERTIAL_FRAME
 
