@@ -33,6 +33,8 @@ MOMENTS = ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
 class UrdfLink:
     """A link as in the file; vectors are in its axes."""
 
+    fields: Fields
+    """Report of its defects."""
     name: str
     line: int
     mass_line: int
@@ -45,11 +47,6 @@ class UrdfLink:
     """(3,) centre of mass, m."""
     visuals: tuple[Visual, ...]
 
-    @property
-    def part(self) -> str:
-        """Name of the link in errors."""
-        return f"link {short(self.name)}"
-
 
 def read_links(
     robot: Element, colours: Colours, folder: Path, report: Report
@@ -58,15 +55,13 @@ def read_links(
     links: dict[str, UrdfLink] = {}
     for element in robot.all("link"):
         name = read_name(element, report)
+        fields = Fields(report, f"link {short(name)}")
         if name in links:
-            raise report.error(
-                element.line,
-                f"link {short(name)}",
-                f"the name is taken by the link in line {links[name].line}",
-            )
-        links[name] = _link(element, name, colours, folder, report)
+            taken = f"the name is taken by the link in line {links[name].line}"
+            raise fields.error(element, taken)
+        links[name] = _link(element, name, colours, folder, fields)
     if not links:
-        raise report.error(robot.line, "robot", "there is no <link>")
+        raise Fields(report, "robot").error(robot, "there is no <link>")
     return links
 
 
@@ -74,59 +69,55 @@ def read_name(element: Element, report: Report) -> str:
     """Return the name of a link or joint, which must be printable."""
     name = element.attributes.get("name", "")
     if not name.strip() or not name.isprintable():
-        raise report.error(element.line, element.tag, "a printable name is needed", name)
+        raise Fields(report, element.tag).error(element, "a printable name is needed", name)
     return name
 
 
-def _link(element: Element, name: str, colours: Colours, folder: Path, report: Report) -> UrdfLink:
+def _link(element: Element, name: str, colours: Colours, folder: Path, fields: Fields) -> UrdfLink:
     link = UrdfLink(
+        fields,
         name,
         element.line,
         element.line,
         0.0,
         np.zeros((3, 3)),
         np.zeros(3),
-        read_visuals(element, f"link {short(name)}", colours, folder, report),
+        _read_visuals(element, fields, colours, folder),
     )
-    report.check_content(element, link.part, ELEMENTS + EXTENSIONS, ("name", "type"))
-    inertial = report.only(element, "inertial", link.part)
+    fields.check_content(element, ELEMENTS + EXTENSIONS, ("name", "type"))
+    inertial = fields.only(element, "inertial")
     if inertial is not None:
-        _read_inertial(inertial, link, Fields(report, link.part))
+        _read_inertial(inertial, link)
     return link
 
 
-def _read_inertial(inertial: Element, link: UrdfLink, fields: Fields) -> None:
-    report, part = fields.report, link.part
-    report.check_content(inertial, part, ("origin", "mass", "inertia"), ())
-    frame = fields.frame(report.only(inertial, "origin", part))
+def _read_inertial(inertial: Element, link: UrdfLink) -> None:
+    fields = link.fields
+    fields.check_content(inertial, ("origin", "mass", "inertia"), ())
+    frame = fields.frame(fields.only(inertial, "origin"))
     link.com, link.mass_line = frame.position, inertial.line
-    mass = report.only(inertial, "mass", part)
+    mass = fields.only(inertial, "mass")
     if mass is not None:
-        report.check_content(mass, part, (), ("value",))
+        fields.check_content(mass, (), ("value",))
         link.mass, link.mass_line = fields.number(mass, "value"), mass.line
     if link.mass < 0.0:
-        raise report.error(link.mass_line, part, "mass must be at least 0 kg", f"{link.mass:g}")
-    inertia = report.only(inertial, "inertia", part)
+        raise fields.error(link.mass_line, "mass must be at least 0 kg", f"{link.mass:g}")
+    inertia = fields.only(inertial, "inertia")
     if inertia is None:
         return
-    report.check_content(inertia, part, (), MOMENTS)
+    fields.check_content(inertia, (), MOMENTS)
     # urdfdom refuses files with a missing element; a missing product probably means 0
     for product in MOMENTS[3:]:
         if product not in inertia.attributes:
-            report.repaired(inertia.line, part, f"<inertia> needs {product!r}", "", "read as 0")
+            fields.repaired(inertia, f"<inertia> needs {product!r}", "", "read as 0")
     values = [fields.number(inertia, moment) for moment in MOMENTS[:3]]
     values += [fields.number(inertia, product, 0.0) for product in MOMENTS[3:]]
     xx, yy, zz, xy, xz, yz = values
     tensor = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
     link.inertia = rotate_tensor(frame.rotation, tensor)
     if link.mass < NOTHING and link.inertia.any():
-        report.repaired(
-            inertia.line,
-            part,
-            "inertia without mass",
-            f"{np.trace(link.inertia):g} kg m2 (trace)",
-            "the inertia is ignored",
-        )
+        trace = f"{np.trace(link.inertia):g} kg m2 (trace)"
+        fields.repaired(inertia, "inertia without mass", trace, "the inertia is ignored")
         link.inertia = np.zeros((3, 3))
 
 
@@ -144,38 +135,38 @@ def read_colours(robot: Element, report: Report) -> Colours:
     colours: Colours = {}
     for material in [*in_visuals, *robot.all("material")]:
         name = material.attributes.get("name", "")
+        fields = Fields(report, f"material {short(name)}")
         try:
-            colour = _colour(material, {}, Fields(report, f"material {short(name)}"))
+            colour = _colour(material, {}, fields)
         except InputError as error:
-            _left_out(material, f"material {short(name)}", error, "the colour", report)
+            _leave_out(material, fields, error, "the colour")
         else:
             if name and colour:
                 colours[name] = colour
     return colours
 
 
-def read_visuals(
-    link: Element, part: str, colours: Colours, folder: Path, report: Report
+def _read_visuals(
+    link: Element, fields: Fields, colours: Colours, folder: Path
 ) -> tuple[Visual, ...]:
     """Return the shapes of a link; an invalid one is a defect and is omitted."""
     visuals = []
     for element in link.all("visual"):
-        fields = Fields(Report(report.where), part)
+        own = Fields(Report(fields.report.where), fields.part)
         try:
-            visuals.append(_visual(element, fields, colours, folder))
+            visuals.append(_visual(element, own, colours, folder))
         except InputError as error:
-            _left_out(element, part, error, "the shape", report)
-        report.findings += fields.report.findings
+            _leave_out(element, fields, error, "the shape")
+        fields.report.findings += own.report.findings
     return tuple(visuals)
 
 
 def _visual(element: Element, fields: Fields, colours: Colours, folder: Path) -> Visual:
-    report, part = fields.report, fields.part
-    report.check_content(element, part, ("origin", "geometry", "material", "meta"), ("name",))
-    frame = fields.frame(report.only(element, "origin", part))
-    geometry = report.only(element, "geometry", part)
+    fields.check_content(element, ("origin", "geometry", "material", "meta"), ("name",))
+    frame = fields.frame(fields.only(element, "origin"))
+    geometry = fields.only(element, "geometry")
     if geometry is None or len(geometry.children) != 1:
-        raise report.error(element.line, part, "<visual> needs one <geometry> of one shape")
+        raise fields.error(element, "<visual> needs one <geometry> of one shape")
     colour = None
     for material in element.all("material"):
         colour = _colour(material, colours, fields)
@@ -189,7 +180,7 @@ def _shape(
         scale = tuple(map(float, fields.vector(shape, "scale", (1.0, 1.0, 1.0))))
         name = shape.attributes.get("filename", "")
         if not name or not name.isprintable():
-            raise fields.report.error(shape.line, fields.part, "a mesh needs a filename", name)
+            raise fields.error(shape, "a mesh needs a filename", name)
         mesh = mesh_path(name, folder)
         return Visual("mesh", scale, frame.rotation, frame.position, mesh, colour)
     if shape.tag == "box":
@@ -199,19 +190,11 @@ def _shape(
     elif shape.tag == "sphere":
         size = (fields.number(shape, "radius"),)
     else:
-        raise fields.report.error(
-            shape.line,
-            fields.part,
-            "a shape must be box, cylinder, sphere or mesh",
-            short_tag(shape.tag),
-        )
+        kinds = "a shape must be box, cylinder, sphere or mesh"
+        raise fields.error(shape, kinds, short_tag(shape.tag))
     if min(size) <= 0.0:
-        raise fields.report.error(
-            shape.line,
-            fields.part,
-            f"<{shape.tag}> must have sizes above 0",
-            " ".join(f"{edge:g}" for edge in size),
-        )
+        sizes = " ".join(f"{edge:g}" for edge in size)
+        raise fields.error(shape, f"<{shape.tag}> must have sizes above 0", sizes)
     return Visual(shape.tag, size, frame.rotation, frame.position, "", colour)  # type: ignore[arg-type]
 
 
@@ -223,9 +206,9 @@ def _colour(material: Element, colours: Colours, fields: Fields) -> Colour | Non
     return colours.get(material.attributes.get("name", ""))
 
 
-def _left_out(element: Element, part: str, error: InputError, what: str, report: Report) -> None:
-    words = str(error).split(f"{part}: ", 1)[-1]
-    report.repaired(element.line, part, f"<{element.tag}>: {words}", "", f"{what} is ignored")
+def _leave_out(element: Element, fields: Fields, error: InputError, what: str) -> None:
+    words = str(error).split(f"{fields.part}: ", 1)[-1]
+    fields.repaired(element, f"<{element.tag}>: {words}", "", f"{what} is ignored")
 
 
 PACKAGE, FILE = ("package://", "model://"), "file://"

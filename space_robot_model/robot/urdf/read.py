@@ -28,7 +28,7 @@ from .tree import (
     mend_massless,
     moved_frames,
 )
-from .xml import Element, Finding, Report, UrdfFrame, parse_xml, short_tag
+from .xml import Element, Fields, Finding, Report, UrdfFrame, parse_xml, short_tag
 
 XACRO = ".xacro"
 MOST_MOVING = 4 * MOST_JOINTS
@@ -88,10 +88,10 @@ def parse_urdf(
     _check_counts(root, report)
     links = read_links(root, read_colours(root, report), path.absolute().parent, report)
     joints = read_joints(root, links, report)
-    tree = build_tree(links, joints, base, report)
-    mend_massless(links, tree, report)
-    check_kinds(tree, report)
-    mend_inertias(links, tree, report)
+    tree = build_tree(links, joints, base, report.where)
+    mend_massless(links, tree)
+    check_kinds(tree)
+    mend_inertias(links, tree)
     _check_moving(tree, report)
     for tool in tools or ():
         one_of(tool, links, "link", f" for a tool of {report.where}")
@@ -107,20 +107,16 @@ def parse_urdf(
 def _robot_name(root: Element, path: Path, report: Report) -> str:
     """Return the robot's name, after checking the root element."""
     if root.tag != "robot":
-        raise report.error(root.line, f"<{short_tag(root.tag)}>", "the root must be <robot>")
+        raise Fields(report, f"<{short_tag(root.tag)}>").error(root, "the root must be <robot>")
     for element in _all_elements(root):
         if element.tag.startswith("xacro:"):
-            raise report.error(
-                element.line,
-                f"<{short_tag(element.tag)}>",
-                f"xacro must be expanded first: rename the file to end in {XACRO}",
-            )
+            advice = f"xacro must be expanded first: rename the file to end in {XACRO}"
+            raise Fields(report, f"<{short_tag(element.tag)}>").error(element, advice)
     name = root.attributes.get("name", "").strip()
     if name and name.isprintable():
         return name
-    report.repaired(
-        root.line, "robot", "a printable name is required", name, f"named {short(path.stem)}"
-    )
+    repair = f"named {short(path.stem)}"
+    Fields(report, "robot").repaired(root, "a printable name is required", name, repair)
     return path.stem
 
 
@@ -154,7 +150,7 @@ def _check_moving(tree: Tree, report: Report) -> None:
     names = [joint.name for joint in moving]
     for joint in moving:
         if meaning := other_meaning(joint.name, names):
-            raise report.error(joint.line, joint.part, f"it needs another name: this is {meaning}")
+            raise joint.fields.error(joint.line, f"it needs another name: this is {meaning}")
 
 
 def expand_xacro(path: Path) -> str:

@@ -16,7 +16,7 @@ from ..inertia import inertia_defect, nearest_inertia, solid_inertia
 from ..parts import Base, Link, RobotTree, Tool, Visual
 from .joints import UrdfJoint
 from .links import NOTHING, UrdfLink
-from .xml import HERE, Report, UrdfFrame
+from .xml import HERE, UrdfFrame
 
 Array = NDArray[np.float64]
 Kind = Literal["revolute", "prismatic", "fixed"]
@@ -62,7 +62,7 @@ class Tree:
 
 
 def build_tree(
-    links: Mapping[str, UrdfLink], joints: Mapping[str, UrdfJoint], base: str | None, report: Report
+    links: Mapping[str, UrdfLink], joints: Mapping[str, UrdfJoint], base: str | None, where: str
 ) -> Tree:
     """Build the tree of links with ``base``, or the URDF's root, as its root.
 
@@ -72,9 +72,9 @@ def build_tree(
     Raises:
         InputError: the links do not form one tree, or there is no such base.
     """
-    root = _root(links, joints, report)
+    root = _root(links, joints)
     if base is not None:
-        one_of(base, links, "link", f" for the base of {report.where}")
+        one_of(base, links, "link", f" for the base of {where}")
     neighbours: dict[str, list[tuple[str, Edge]]] = {name: [] for name in links}
     for joint in joints.values():
         neighbours[joint.parent].append((joint.child, Edge(joint, joint.parent, False)))
@@ -93,24 +93,22 @@ def build_tree(
     return tree
 
 
-def _root(links: Mapping[str, UrdfLink], joints: Mapping[str, UrdfJoint], report: Report) -> str:
+def _root(links: Mapping[str, UrdfLink], joints: Mapping[str, UrdfJoint]) -> str:
     """Return the link without parent, after checking that it is connected to all others."""
     above: dict[str, UrdfJoint] = {}
     for joint in joints.values():
         if joint.child in above:
             other = above[joint.child]
-            raise report.error(
+            raise joint.fields.error(
                 joint.line,
-                joint.part,
                 f"its child {short(joint.child)} is the child of "
                 f"joint {short(other.name)} (line {other.line}) already: loops cannot be closed",
             )
         above[joint.child] = joint
     roots = [link for link in links.values() if link.name not in above]
     if len(roots) > 1:
-        raise report.error(
+        raise roots[1].fields.error(
             roots[1].line,
-            roots[1].part,
             f"only the root may have no parent, got {len(roots)} such links",
             ", ".join(link.name for link in roots),
         )
@@ -126,11 +124,11 @@ def _root(links: Mapping[str, UrdfLink], joints: Mapping[str, UrdfJoint], report
     for name in links:
         if name not in seen:
             joint = above[name]
-            raise report.error(joint.line, joint.part, "parents and children form a loop")
+            raise joint.fields.error(joint.line, "parents and children form a loop")
     return roots[0].name
 
 
-def mend_massless(links: Mapping[str, UrdfLink], tree: Tree, report: Report) -> None:
+def mend_massless(links: Mapping[str, UrdfLink], tree: Tree) -> None:
     """Lock the joints of massless bodies where possible: at tips and at the root.
 
     Raises:
@@ -150,46 +148,28 @@ def mend_massless(links: Mapping[str, UrdfLink], tree: Tree, report: Report) -> 
                 carried[carriers[tree.edges[name].parent]].append(name)
         tips = [name for name in massless if not carried[name] and name != tree.base]
         if tips:
-            _lock_tip(links[tips[0]], tree, carriers, report)
+            edge = tree.edges[tips[0]]
+            _lock(links[tips[0]], "a moving link", edge, carriers[edge.parent])
         elif tree.base in massless and len(carried[tree.base]) == 1:
-            _lock_root(links[tree.base], carried[tree.base][0], tree, report)
+            child = carried[tree.base][0]
+            _lock(links[tree.base], "the base", tree.edges[child], child)
         else:
             link = links[massless[0]]
             what = "a base that" if link.name == tree.base else "a moving link that"
-            raise report.error(
-                link.mass_line,
-                link.part,
-                f"{what} carries others must have a mass",
-                f"{link.mass:g}",
+            raise link.fields.error(
+                link.mass_line, f"{what} carries others must have a mass", f"{link.mass:g}"
             )
 
 
-def _lock_tip(link: UrdfLink, tree: Tree, carriers: Mapping[str, str], report: Report) -> None:
-    edge = tree.edges[link.name]
-    report.repaired(
-        link.mass_line,
-        link.part,
-        "a moving link must have a mass",
-        f"{link.mass:g}",
-        f"{edge.joint.part} locked at 0, merged into link {short(carriers[edge.parent])}",
-    )
+def _lock(defective: UrdfLink, what: str, edge: Edge, other: str) -> None:
+    """Lock a joint at 0 which moves nothing, or whose child floats freely anyway."""
+    repair = f"{edge.joint.fields.part} locked at 0, merged into link {short(other)}"
+    mass = f"{defective.mass:g}"
+    defective.fields.repaired(defective.mass_line, f"{what} must have a mass", mass, repair)
     edge.joint = replace(edge.joint, kind="fixed")
 
 
-def _lock_root(root: UrdfLink, child: str, tree: Tree, report: Report) -> None:
-    """Lock the only joint of a massless root: its child floats freely anyway."""
-    edge = tree.edges[child]
-    report.repaired(
-        root.mass_line,
-        root.part,
-        "the base must have a mass",
-        f"{root.mass:g}",
-        f"{edge.joint.part} locked at 0, merged into link {short(child)}",
-    )
-    edge.joint = replace(edge.joint, kind="fixed")
-
-
-def check_kinds(tree: Tree, report: Report) -> None:
+def check_kinds(tree: Tree) -> None:
     """Check that no joint has more than one degree of freedom.
 
     Raises:
@@ -197,16 +177,15 @@ def check_kinds(tree: Tree, report: Report) -> None:
     """
     for edge in tree.edges.values():
         if edge.joint.kind in ("floating", "planar"):
-            raise report.error(
+            raise edge.joint.fields.error(
                 edge.joint.line,
-                edge.joint.part,
                 "it has more than one degree of freedom: use revolute, "
                 "continuous and prismatic joints, with links with mass between them",
                 edge.joint.kind,
             )
 
 
-def mend_inertias(links: Mapping[str, UrdfLink], tree: Tree, report: Report) -> None:
+def mend_inertias(links: Mapping[str, UrdfLink], tree: Tree) -> None:
     """Check the physical consistency of every link with mass, and repair inertias.
 
     Zero inertia is allowed for a link that is fixed to one with inertia.
@@ -228,8 +207,8 @@ def mend_inertias(links: Mapping[str, UrdfLink], tree: Tree, report: Report) -> 
             nearest, what = solid_inertia(link.mass, link.visuals)
             repair = f"that of {what}"
         shown = ", ".join(f"{moment:.4g}" for moment in np.linalg.eigvalsh(nearest))
-        report.repaired(
-            link.mass_line, link.part, defect, moments, f"{repair}, principal moments {shown}"
+        link.fields.repaired(
+            link.mass_line, defect, moments, f"{repair}, principal moments {shown}"
         )
         link.inertia = nearest
 

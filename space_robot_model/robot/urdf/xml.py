@@ -126,17 +126,6 @@ class Report:
         self.where = where
         self.findings: list[Finding] = []
 
-    def error(self, line: int, part: str, defect: str, value: str | None = None) -> InputError:
-        """Return the error for an irreparable defect, to be raised."""
-        got = "" if value is None else f", got {short(value)}"
-        error = InputError(f"{self.where}: line {line}: {part}: {defect}{got}")
-        error.help_topic = "own-robot"
-        return error
-
-    def repaired(self, line: int, part: str, defect: str, value: str, repair: str) -> None:
-        """Store a defect with its repair."""
-        self.findings.append(Finding(part, line, defect, value and short(value), repair))
-
     def sorted(self) -> list[Finding]:
         """Return the stored defects, by line."""
         return sorted(self.findings, key=lambda finding: finding.line)
@@ -151,47 +140,6 @@ class Report:
             f"{self.where}: line {first.line}: {first._named()} "
             f"(with --repair: {first.repair}){more}"
         )
-
-    def check_content(
-        self, element: Element, part: str, children: Collection[str], attributes: Collection[str]
-    ) -> None:
-        """Report unknown children and attributes, which are often misspelt, as defects.
-
-        Names with a prefix, such as ``drake:``, are extensions and are ignored.
-        """
-        for name, value in element.attributes.items():
-            if name not in attributes and ":" not in name and name != "xmlns":
-                self.repaired(
-                    element.line,
-                    part,
-                    f"<{short_tag(element.tag)}> has an unknown attribute "
-                    f"{short(name)} (known: {', '.join(attributes) or 'none'})",
-                    value,
-                    "left out",
-                )
-        for child in element.children:
-            if child.tag not in children and ":" not in child.tag:
-                self.repaired(
-                    child.line,
-                    part,
-                    f"<{short_tag(element.tag)}> has an unknown element "
-                    f"<{short_tag(child.tag)}> (known: {', '.join(children) or 'none'})",
-                    "",
-                    "left out",
-                )
-
-    def only(self, element: Element, tag: str, part: str) -> Element | None:
-        """Return the child with a tag, or None; a second one is a defect."""
-        elements = list(element.all(tag))
-        for again in elements[1:]:
-            self.repaired(
-                again.line,
-                part,
-                f"<{tag}> occurs twice",
-                f"line {elements[0].line} and here",
-                "the first one is used",
-            )
-        return elements[0] if elements else None
 
 
 def short_tag(tag: str) -> str:
@@ -220,11 +168,52 @@ HERE = UrdfFrame(np.eye(3), np.zeros(3))
 
 
 class Fields:
-    """Reads the attributes of the elements of one link or joint."""
+    """Reads the elements of one link or joint, and reports their defects."""
 
     def __init__(self, report: Report, part: str) -> None:
         """Store the report for defects, and the name of the link or joint."""
         self.report, self.part = report, part
+
+    def error(self, at: Element | int, defect: str, value: str | None = None) -> InputError:
+        """Return the error for an irreparable defect of an element or line, to be raised."""
+        got = "" if value is None else f", got {short(value)}"
+        line = at if isinstance(at, int) else at.line
+        error = InputError(f"{self.report.where}: line {line}: {self.part}: {defect}{got}")
+        error.help_topic = "own-robot"
+        return error
+
+    def repaired(self, at: Element | int, defect: str, value: str, repair: str) -> None:
+        """Store a defect with its repair."""
+        line = at if isinstance(at, int) else at.line
+        value = value and short(value)
+        self.report.findings.append(Finding(self.part, line, defect, value, repair))
+
+    def check_content(
+        self, element: Element, children: Collection[str], attributes: Collection[str]
+    ) -> None:
+        """Report unknown children and attributes, which are often misspelt, as defects.
+
+        Names with a prefix, such as ``drake:``, are extensions and are ignored.
+        """
+        tag = short_tag(element.tag)
+        for name, value in element.attributes.items():
+            if name not in attributes and ":" not in name and name != "xmlns":
+                known = f"(known: {', '.join(attributes) or 'none'})"
+                unknown = f"<{tag}> has an unknown attribute {short(name)} {known}"
+                self.repaired(element, unknown, value, "left out")
+        for child in element.children:
+            if child.tag not in children and ":" not in child.tag:
+                known = f"(known: {', '.join(children) or 'none'})"
+                unknown = f"<{tag}> has an unknown element <{short_tag(child.tag)}> {known}"
+                self.repaired(child, unknown, "", "left out")
+
+    def only(self, element: Element, tag: str) -> Element | None:
+        """Return the child with a tag, or None; a second one is a defect."""
+        elements = list(element.all(tag))
+        for again in elements[1:]:
+            lines = f"line {elements[0].line} and here"
+            self.repaired(again, f"<{tag}> occurs twice", lines, "the first one is used")
+        return elements[0] if elements else None
 
     def number(self, element: Element, name: str, default: float | None = None) -> float:
         """Return a number; without default the attribute is required."""
@@ -232,9 +221,7 @@ class Fields:
         if text is None and default is not None:
             return default
         if text is None:
-            raise self.report.error(
-                element.line, self.part, f"<{element.tag}> needs the attribute {name!r}"
-            )
+            raise self.error(element, f"<{element.tag}> needs the attribute {name!r}")
         return self._number(element, name, text)
 
     def limit(self, element: Element, name: str) -> float | None:
@@ -257,16 +244,14 @@ class Fields:
             return np.array(default)
         words = (text or "").split()
         if len(words) != count:
-            raise self.report.error(
-                element.line, self.part, f"{element.tag}.{name} must be {count} numbers", text or ""
-            )
+            raise self.error(element, f"{element.tag}.{name} must be {count} numbers", text or "")
         return np.array([self._number(element, name, word) for word in words])
 
     def frame(self, origin: Element | None) -> UrdfFrame:
         """Return the frame of an ``<origin>``, relative to that of its element."""
         if origin is None:
             return HERE
-        self.report.check_content(origin, self.part, (), ("xyz", "rpy"))
+        self.check_content(origin, (), ("xyz", "rpy"))
         zero = (0.0, 0.0, 0.0)
         rotation = rotation_of_rpy(self.vector(origin, "rpy", zero))
         return UrdfFrame(rotation, self.vector(origin, "xyz", zero))
@@ -276,4 +261,4 @@ class Fields:
         if abs(value) <= LARGEST:
             return value
         why = "is not a number" if math.isnan(value) else f"must be at most {LARGEST:g}"
-        raise self.report.error(element.line, self.part, f"{element.tag}.{name} {why}", text)
+        raise self.error(element, f"{element.tag}.{name} {why}", text)
