@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 
 from space_robot_model.robot import Robot
 from space_robot_model.robot.inertia import inertia_tensor
-from space_robot_model.robot.parts import Base, Gear, JointFriction, Link, RobotTree, Spring, Tool
+from space_robot_model.robot.parts import Base, Body, Gear, JointFriction, RobotTree, Spring, Tool
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.samples import Timebase
 
@@ -176,7 +176,7 @@ def random_tree(rng: np.random.Generator, kinds: Sequence[str]) -> RobotTree:
         massless = kind == "fixed" and rng.random() < 0.4
         joint = random_joint(rng, f"j{number}", kind)
         part, tools[f"b{number}"] = _part(rng, f"b{number}", 0.0 if massless else 1.0)
-        parts.append(Link(**part, **joint, parent=parent))
+        parts.append(Body(**part, **joint, parent=parent))
     rng.shuffle(parts)
     links = [part for part in parts if part.name != BASE]
     own = [part for part in parts if part.name == BASE]

@@ -33,8 +33,7 @@ def robot(robot: str, base: str | None, repair: bool, out: Path | None, as_json:
     """
     from space_robot_model.robot import Robot
     from space_robot_model.robot.description import describe
-    from space_robot_model.robot.files import URDF, read_robot_file
-    from space_robot_model.robot.find import robot_as_path, robot_files
+    from space_robot_model.robot.find import URDF, read_robot_file, robot_as_path, robot_files
     from space_robot_model.robot.urdf import read_urdf
     from space_robot_msgs_py.errors import InputError
 

@@ -8,7 +8,7 @@ from typing import Any
 
 from rich.console import Console
 
-from space_robot_model.robot.urdf import Finding
+from space_robot_model.robot.urdf_xml import Finding
 
 from ..console.tables import Column, Group, Table
 from ..console.terminal import say

@@ -1,34 +1,28 @@
-"""Robots in files: a YAML with their parts, a URDF, or a YAML that refers to a URDF."""
+"""A robot as the content of a YAML: with its parts, or one that refers to a URDF."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass, field, fields, is_dataclass, replace
-from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
-import yaml
 from numpy.typing import NDArray
 from pydantic import Field, model_validator
 from typing_extensions import Self
 
 from space_robot_msgs_py.config.choices import choices
-from space_robot_msgs_py.config.validation import StrictModel, one_of, read_yaml, short, validate
-from space_robot_msgs_py.config.yaml_text import parse_yaml, read_file
+from space_robot_msgs_py.config.validation import StrictModel, one_of, short, validate
 from space_robot_msgs_py.errors import InputError
 
 from ..elementary.matrices import product
 from ..elementary.rotations import rpy_of_rotation
 from .inertia import inertia_elements
 from .names import BASE
-from .parts import Drive, Gear, Link, Name, Part, Plate, Plates, RobotTree, Spring, Visual
-from .robot import Robot
-from .urdf import HERE, UrdfRobot, parse_urdf, read_urdf
-
-YAML, URDF = (".yaml", ".yml"), (".urdf", ".xacro")
+from .parts import Body, Drive, Gear, Name, Plate, Plates, RobotPart, RobotTree, Spring, Visual
+from .urdf import UrdfRobot, parse_urdf, read_urdf
+from .urdf_xml import HERE
 
 Array = NDArray[np.float64]
 
@@ -40,7 +34,7 @@ class RobotDocument(StrictModel):
 
 
 @dataclass(frozen=True, kw_only=True)
-class UrdfReference(Part):
+class UrdfReference(RobotPart):
     """Key ``robot`` of a YAML that refers to a URDF, with what a URDF cannot say."""
 
     name: str = ""
@@ -94,7 +88,7 @@ class UrdfReference(Part):
             ),
         )
 
-    def _with_drive(self, link: Link) -> Link:
+    def _with_drive(self, link: Body) -> Body:
         """Return a link with its spring or drive."""
         name = link.joint_label
         if not (spring := self.passive.get(name)):
@@ -163,58 +157,67 @@ def _plain(value: Any, name: str = "") -> Any:
     return value
 
 
-def document_of(robot: Robot) -> dict[str, Any]:
-    """Return the mapping from which `Robot.from_dict` builds the same robot.
+def document_of(tree: RobotTree) -> dict[str, Any]:
+    """Return the mapping from which `Robot.from_dict` builds the same robot, of a flattened tree.
 
     Frames are written in degrees, so numbers may differ from the robot's in their last digits. The
     order of joints is kept.
     """
-    links = [_link(robot, joint) for joint in range(robot.joint_count)]
-    carriers = (BASE, *robot.all_joint_names)
-    return {
-        "robot": {
-            "name": robot.name,
-            "base": {"mass": float(robot.mass[0]), "inertia": _inertia(robot, 0)},
-            "links": links,
-            "tools": [
-                {
-                    "name": tool.name,
-                    "link": carriers[tool.body],
-                    "origin": _origin(tool.rotation, tool.position),
-                }
-                for tool in robot.tools
-            ],
-            **({"plates": plates} if (plates := _on_links(robot.plates, carriers)) else {}),
-            **({"visuals": visuals} if (visuals := _on_links(robot.visuals, carriers)) else {}),
-        }
+    carriers = {link.name: link.joint_label for link in tree.links} | {tree.base.name: BASE}
+    links = sorted(tree.links, key=lambda link: link.passive is not None)
+    robot: dict[str, Any] = {
+        "name": tree.name,
+        "base": {"mass": tree.base.mass, "inertia": _numbers(inertia_elements(tree.base.inertia))},
+        "links": [_link(link, carriers[link.parent]) for link in links],
+        "tools": [
+            {
+                "name": tool.name,
+                "link": carriers[tool.link],
+                "origin": _origin(tool.rotation, tool.position),
+            }
+            for tool in tree.tools
+        ],
     }
+    for key, parts in (("plates", tree.plates), ("visuals", tree.visuals)):
+        if parts:
+            robot[key] = [_on_link(part, carriers[part.link]) for part in parts]
+    return {"robot": robot}
 
 
-def _link(robot: Robot, joint: int) -> dict[str, Any]:
-    body, rotation = joint + 1, robot.rotation[joint]
-    is_prismatic = bool(robot.is_prismatic[joint])
-    link: dict[str, Any] = {
-        "name": robot.all_joint_names[joint],
-        "parent": (BASE, *robot.all_joint_names)[robot.parent[joint]],
-        "joint": "prismatic" if is_prismatic else "revolute",
-        "origin": _origin(rotation, product(rotation, robot.offset[joint])),
-        "mass": float(robot.mass[body]),
-        "inertia": _inertia(robot, body),
-        "com": _numbers(robot.com[body]),
+def _link(link: Body, parent: str) -> dict[str, Any]:
+    is_prismatic = link.joint == "prismatic"
+
+    def number(value: float) -> float:
+        return float(value if is_prismatic else np.degrees(value))
+
+    entry: dict[str, Any] = {
+        "name": link.joint_label,
+        "parent": parent,
+        "joint": link.joint,
+        "origin": _origin(link.rotation, product(link.rotation, link.offset)),
+        "mass": link.mass,
+        "inertia": _numbers(inertia_elements(link.inertia)),
+        "com": _numbers(link.com),
     }
-    friction = robot.friction[joint]
-    if np.isfinite(friction.coulomb):
-        link["friction"] = {"coulomb": friction.coulomb, "viscous": friction.viscous}
-    if joint < robot.n:
-        if limits := _limits(robot, joint):
-            link["limits"] = limits
-        if robot.gears and (gear := robot.gears[joint]):
-            link["drive"] = gear_document(gear)
-        return link
-    spring = robot.springs[joint - robot.n]
-    rest = spring.rest if is_prismatic else float(np.degrees(spring.rest))
-    link["passive"] = {"stiffness": spring.stiffness, "damping": spring.damping, "rest_deg": rest}
-    return link
+    if link.friction:
+        entry["friction"] = link.friction._asdict()
+    lower, upper, velocity, effort = link.limits
+    limits: dict[str, Any] = {}
+    if math.isfinite(lower) and math.isfinite(upper):
+        limits["position_deg"] = [number(lower), number(upper)]
+    if math.isfinite(velocity):
+        limits["velocity_deg"] = number(velocity)
+    if math.isfinite(effort):
+        limits["effort"] = float(effort)
+    if limits:
+        entry["limits"] = limits
+    if link.drive:
+        entry["drive"] = gear_document(link.drive)
+    if link.passive:
+        stiffness, damping, rest = link.passive
+        rest = number(rest)
+        entry["passive"] = {"stiffness": stiffness, "damping": damping, "rest_deg": rest}
+    return entry
 
 
 def gear_document(gear: Gear) -> dict[str, Any]:
@@ -222,105 +225,19 @@ def gear_document(gear: Gear) -> dict[str, Any]:
     return {"gear_ratio" if key == "ratio" else key: own for key, own in gear._asdict().items()}
 
 
-def _on_links(parts: Sequence[Plate | Visual], carriers: Sequence[str]) -> list[dict[str, Any]]:
-    """Return plates or visuals as in a file."""
-    entries = []
-    for part in parts:
-        entry = {"link": carriers[part.body]} | _plain(replace(part, link=""))
-        if isinstance(part, Visual):
-            del entry["rotation"], entry["position"]
-            entry["origin"] = _origin(part.rotation, part.position)
-        else:
-            entry |= {"normal": _numbers(part.normal), "centre": _numbers(part.centre)}
-        entries.append(entry)
-    return entries
-
-
-def _limits(robot: Robot, joint: int) -> dict[str, Any]:
-    own, is_prismatic = robot.limits[joint], robot.is_prismatic[joint]
-
-    def number(value: float) -> float:
-        return float(value if is_prismatic else np.degrees(value))
-
-    limits: dict[str, Any] = {}
-    if np.isfinite((own.lower, own.upper)).all():
-        limits["position_deg"] = [number(own.lower), number(own.upper)]
-    if np.isfinite(own.velocity):
-        limits["velocity_deg"] = number(own.velocity)
-    if np.isfinite(own.effort):
-        limits["effort"] = float(own.effort)
-    return limits
+def _on_link(part: Plate | Visual, link: str) -> dict[str, Any]:
+    """Return a plate or visual as in a file."""
+    entry: dict[str, Any] = {"link": link} | _plain(replace(part, link=""))
+    if isinstance(part, Plate):
+        return entry | {"normal": _numbers(part.normal), "centre": _numbers(part.centre)}
+    del entry["rotation"], entry["position"]
+    return entry | {"origin": _origin(part.rotation, part.position)}
 
 
 def _origin(rotation: Array, position: Array) -> dict[str, Any]:
     return {"xyz": _numbers(position), "rpy_deg": _numbers(np.degrees(rpy_of_rotation(rotation)))}
 
 
-def _inertia(robot: Robot, body: int) -> list[float]:
-    return _numbers(inertia_elements(robot.inertia[body]))
-
-
 def _numbers(values: Array) -> list[float]:
     """Return floats without negative zeros."""
     return [float(value) + 0.0 for value in values]
-
-
-@dataclass(frozen=True)
-class RobotSource:
-    """Content of a robot's file."""
-
-    where: str
-    """Name of the file, for errors."""
-    content: dict[str, Any]
-    """Self-contained mapping for `Robot.from_dict`."""
-    text: str
-    """The same as the text of a YAML file; for a YAML file its own text."""
-    findings: tuple[str, ...] = ()
-    """Defects of a URDF that were repaired."""
-
-    @cached_property
-    def robot(self) -> Robot:
-        """The robot, built from `content`, hence equal to that of a bag with this content."""
-        return replace(Robot.from_dict(self.content, where=self.where), repairs=self.findings)
-
-
-def read_robot_file(file: Path, base: str | None = None, repair: bool = False) -> RobotSource:
-    """Read a robot's file.
-
-    Args:
-        file: YAML or URDF.
-        base: the link that is the satellite, of a URDF (None: its root).
-        repair: whether a URDF's defects are repaired.
-
-    Raises:
-        InputError: the file is invalid, or ``base`` or ``repair`` is set for a YAML.
-    """
-    if file.suffix in URDF:
-        return _of_urdf(file, base, repair)
-    if base or repair:
-        raise InputError(f"{file}: not a URDF, so base and repair cannot be chosen")
-    content = read_yaml(file)
-    if not is_urdf(content):
-        return _of_yaml(str(file), read_file(file))
-    robot = Robot.from_yaml(file)
-    return _of_robot(robot, file, f"From {file.name} and the URDF that it refers to.")
-
-
-@lru_cache(maxsize=16)
-def _of_yaml(where: str, text: str) -> RobotSource:
-    """Return the source of a YAML text; cached, since many flights use the same robot."""
-    return RobotSource(where, parse_yaml(text), text)
-
-
-def _of_urdf(file: Path, base: str | None, repair: bool) -> RobotSource:
-    robot = Robot.from_urdf(file, base, repair)
-    return _of_robot(robot, file, f"From {file.name}{f', base {base}' if base else ''}.")
-
-
-def _of_robot(robot: Robot, file: Path, head: str) -> RobotSource:
-    content = document_of(robot)
-    comments = [head, *(f"Repaired: {text}" for text in robot.repairs)]
-    text = "".join(f"# {line}\n" for line in comments) + yaml.safe_dump(
-        content, sort_keys=False, default_flow_style=None, width=10_000, allow_unicode=True
-    )
-    return RobotSource(str(file), content, text, robot.repairs)

@@ -1,4 +1,4 @@
-"""Conversion of a robot's parts to the arrays of the algorithms, and back.
+"""Conversion of a robot's parts to the arrays of the algorithms.
 
 Links on fixed joints are merged into their parents, every joint axis is the z axis of its body's
 frame, and the base's frame is at its centre of mass.
@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,10 +21,7 @@ from space_robot_msgs_py.samples import MOST_PASSIVE
 from ..dynamics.model import MOST_JOINTS
 from ..elementary.matrices import norm, product, rotate_tensor
 from .names import first_repeated, other_meaning
-from .parts import Base, JointFriction, JointLimits, Link, Plate, RobotTree, Tool, Visual
-
-if TYPE_CHECKING:
-    from .robot import Robot
+from .parts import Base, Body, JointFriction, Plate, RobotTree, Tool, Visual
 
 Array = NDArray[np.float64]
 Part = TypeVar("Part", Tool, Visual, Plate)
@@ -38,7 +35,7 @@ class MovedBody:
     name: str
     parent: int
     """Number of the parent; the base is 0."""
-    joint: Link | None
+    joint: Body | None
     """With the frame of the joint at position zero; None for the base."""
     mass: float = 0.0
     com: Array = field(default_factory=lambda: np.zeros(3))
@@ -158,44 +155,6 @@ def arrays_of(tree: RobotTree, where: str = "robot") -> dict[str, Any]:
     }
 
 
-def tree_of(robot: Robot) -> RobotTree:
-    """Return the parts from which `arrays_of` makes the same robot, branch by branch."""
-    links = []
-    for j in robot.order:
-        passive, friction = j - robot.n, robot.friction[j]
-        links.append(
-            Link(
-                name=robot.body_names[j + 1],
-                parent=robot.body_names[robot.parent[j]],
-                joint="prismatic" if robot.is_prismatic[j] else "revolute",
-                joint_name=robot.all_joint_names[j],
-                rotation=robot.rotation[j],
-                offset=robot.offset[j],
-                mass=float(robot.mass[j + 1]),
-                inertia=robot.inertia[j + 1],
-                com=robot.com[j + 1],
-                limits=robot.limits[j] if passive < 0 else JointLimits(),
-                friction=None if np.isnan(friction.coulomb) else friction,
-                passive=robot.springs[passive] if passive >= 0 else None,
-                drive=robot.gears[j] if passive < 0 and robot.gears else None,
-            )
-        )
-    base = Base(float(robot.mass[0]), robot.inertia[0], robot.com[0], robot.body_names[0])
-    return RobotTree(
-        robot.name,
-        base,
-        links,
-        tools=_on_links(robot, robot.tools),
-        plates=_on_links(robot, robot.plates),
-        visuals=_on_links(robot, robot.visuals),
-        exact=True,
-    )
-
-
-def _on_links(robot: Robot, parts: Sequence[Part]) -> list[Part]:
-    return [replace(part, link=robot.body_names[part.body]) for part in parts]
-
-
 def axes_with_z(axis: Array) -> Array:
     """Return a rotation with the unit vector ``axis`` as third column; exact for z, -x, ..."""
     helper = np.zeros(3)
@@ -211,7 +170,7 @@ def parallel_axes(mass: float, arm: Array) -> Array:
     return parallel_axes
 
 
-def _joint(body: MovedBody) -> Link:
+def _joint(body: MovedBody) -> Body:
     assert body.joint
     return body.joint
 
@@ -220,7 +179,7 @@ def _walk(tree: RobotTree, where: str) -> tuple[list[MovedBody], dict[str, Place
     """Return the bodies of the flattened tree, not yet merged, and the places of all links."""
     bodies, places = [MovedBody(tree.base.name, 0, None)], {}
 
-    def put(part: Base | Link, place: Place) -> None:
+    def put(part: Base | Body, place: Place) -> None:
         places[part.name] = place
         inertia = rotate_tensor(place.rotation, part.inertia)
         bodies[place.body].members.append((part.mass, place.at(part.com), inertia))
@@ -242,7 +201,7 @@ def _walk(tree: RobotTree, where: str) -> tuple[list[MovedBody], dict[str, Place
     return bodies, places
 
 
-def _outwards(tree: RobotTree, where: str) -> Iterator[Link]:
+def _outwards(tree: RobotTree, where: str) -> Iterator[Body]:
     """Yield the links branch by branch from the base, in the order of ``tree.links``."""
     names = [tree.base.name, *(link.name for link in tree.links)]
     joints = [link.joint_label for link in tree.links]
@@ -258,7 +217,7 @@ def _outwards(tree: RobotTree, where: str) -> Iterator[Link]:
                 f"{where}: link {short(body)} needs another name: in campaigns it is all links, or "
                 "one by its number"
             )
-    children: dict[str, list[Link]] = {name: [] for name in names}
+    children: dict[str, list[Body]] = {name: [] for name in names}
     for link in reversed(tree.links):
         if link.parent not in children:
             raise InputError(

@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-import math
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import AfterValidator, Field
 
 from ..elementary.matrices import rotate_tensor
-
-if TYPE_CHECKING:
-    from .parts import Visual
 
 Array = NDArray[np.float64]
 
@@ -63,8 +59,6 @@ ROUNDING = 1e-9
 SLENDER = 1e-3
 """Smallest second moment of a repaired body relative to the largest: a rod of 1 m is then 4 cm
 thick."""
-SOLID = 1000.0
-"""Assumed density of a body of unknown shape, kg/m3."""
 
 
 def inertia_defect(mass: float, inertia: Array) -> tuple[str, str]:
@@ -106,36 +100,3 @@ def nearest_inertia(inertia: Array) -> Array | None:
     second = np.maximum(second, SLENDER * largest)
     nearest = rotate_tensor(axes, np.diag(np.sum(second) - second))
     return 0.5 * (nearest + nearest.T)
-
-
-def solid_inertia(mass: float, visuals: tuple[Visual, ...]) -> tuple[Array, str]:
-    """Return the inertia, kg m2, of a homogeneous body with the first shape, and its description.
-
-    Without a shape it is a sphere with the density of water.
-
-    Args:
-        mass: kg.
-        visuals: shapes of the body; meshes are ignored.
-    """
-    for visual in visuals:
-        if visual.shape != "mesh":
-            turn = visual.rotation
-            inertia: Array = rotate_tensor(turn, np.diag(_solid(mass, visual.shape, visual.size)))
-            return inertia, f"the solid {visual.shape} of its visual"
-    from ..elementary.exponential import exp, log  # slow to import
-
-    radius = exp(log(3.0 * mass / (4.0 * math.pi * SOLID)) / 3.0)
-    ball = _solid(mass, "sphere", (radius,))
-    return np.diag(ball), f"a solid sphere of {radius:.3g} m (density of water)"
-
-
-def _solid(mass: float, shape: str, size: tuple[float, ...]) -> list[float]:
-    """Return the principal moments of a homogeneous solid, kg m2, in its axes."""
-    if shape == "sphere":
-        return [0.4 * mass * size[0] * size[0]] * 3
-    if shape == "cylinder":
-        radius, length = size
-        across = mass * (3.0 * radius * radius + length * length) / 12.0
-        return [across, across, 0.5 * mass * radius * radius]
-    x, y, z = (mass * edge * edge / 12.0 for edge in size)
-    return [y + z, x + z, x + y]

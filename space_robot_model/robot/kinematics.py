@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -16,10 +16,35 @@ from ..elementary.least_squares import null_space, singular_values
 from ..elementary.matrices import norm
 
 if TYPE_CHECKING:
-    from .robot import Robot
+    from ..dynamics.model import Model
+    from .parts import Tool
 
 Array = NDArray[np.float64]
 Attitude = Literal["held", "free"]
+
+
+class ModelledRobot(Protocol):
+    """What is needed of a `Robot`."""
+
+    @property
+    def model(self) -> Model:
+        """Numbers for the algorithms."""
+
+    @property
+    def joint_count(self) -> int:
+        """N."""
+
+    @property
+    def order(self) -> tuple[int, ...]:
+        """Joints in the order of ``model``."""
+
+    @property
+    def model_rows(self) -> tuple[int, ...]:
+        """Row in ``model`` of each joint."""
+
+    @property
+    def tools(self) -> tuple[Tool, ...]:
+        """All tools, the first one first."""
 
 
 class ToolState(NamedTuple):
@@ -52,7 +77,10 @@ class ToolState(NamedTuple):
 
 
 def tool_state(
-    robot: Robot, quaternion_wxyz: ArrayLike, joint_positions: ArrayLike, tool: str | None = None
+    robot: ModelledRobot,
+    quaternion_wxyz: ArrayLike,
+    joint_positions: ArrayLike,
+    tool: str | None = None,
 ) -> ToolState:
     """Return pose and Jacobians of a tool.
 
@@ -87,7 +115,7 @@ def tool_state(
 
 
 def tool_jacobian(
-    robot: Robot,
+    robot: ModelledRobot,
     quaternion_wxyz: ArrayLike,
     joint_positions: ArrayLike,
     attitude: Attitude = "held",
@@ -112,7 +140,7 @@ def tool_jacobian(
 
 
 def reaction_null_space(
-    robot: Robot, quaternion_wxyz: ArrayLike, joint_positions: ArrayLike
+    robot: ModelledRobot, quaternion_wxyz: ArrayLike, joint_positions: ArrayLike
 ) -> Array:
     """Return an orthonormal basis of the joint velocities that leave the base's attitude alone.
 
@@ -141,13 +169,13 @@ class MountedTool(NamedTuple):
     point: Array
 
 
-def mounted_tool(robot: Robot, name: str | None) -> MountedTool:
+def mounted_tool(robot: ModelledRobot, name: str | None) -> MountedTool:
     """Return a tool of a robot; None: the first.
 
     Raises:
         InputError: there is no tool of that name.
     """
-    tool = robot.tool
+    tool = robot.tools[0]
     if name is not None:
         tools = {tool.name: tool for tool in robot.tools}
         if name not in tools:

@@ -8,9 +8,8 @@ from numpy.typing import NDArray
 from space_robot_msgs_py.samples import Timebase
 from space_robot_msgs_py.wire.markers import CUBE, CYLINDER, MESH, SPHERE, Marker, MarkersCodec
 
-from .names import frame_names
 from .parts import Visual
-from .placements import wxyz
+from .placements import frame_names, wxyz
 from .robot import Robot
 from .shapes import LINK_COLOUR, shapes_of
 from .urdf_text import mesh_address

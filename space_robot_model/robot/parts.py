@@ -76,7 +76,7 @@ Moments = Annotated[
 ]
 
 
-class Part:
+class RobotPart:
     """Base class of what a file holds: no unknown keys, only an integer may stand for a float."""
 
     __pydantic_config__ = ConfigDict(
@@ -106,7 +106,7 @@ UNLIMITED = JointLimits()
 
 
 @dataclass(frozen=True)
-class LimitsInDegrees(Part):
+class LimitsInDegrees(RobotPart):
     """Limits of a joint in a file: degrees, deg/s and N m; m, m/s and N for a prismatic joint."""
 
     position_deg: Annotated[list[Real], Field(min_length=2, max_length=2)] | None = None
@@ -229,7 +229,7 @@ def _tensor(elements: Array, is_checked: bool = True) -> Array:
 
 
 @dataclass(frozen=True)
-class Base(Part):
+class Base(RobotPart):
     """The satellite: mass in kg, inertia about the CoM in kg m2."""
 
     mass: Annotated[Real, Field(gt=0.0, le=LARGEST_MASS)]
@@ -243,7 +243,7 @@ class Base(Part):
 
 
 @dataclass(frozen=True)
-class Origin(Part):
+class Origin(RobotPart):
     """A frame relative to its parent: position, m, and rotations about the parent's x, y, z."""
 
     xyz: Vector = field(default_factory=lambda: np.zeros(3))
@@ -256,7 +256,7 @@ class Origin(Part):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Framed(Part):
+class Framed(RobotPart):
     """A part with a frame; in files by ``origin``, or by modified Denavit-Hartenberg parameters."""
 
     alpha_deg: InitVar[Number | None] = None
@@ -285,7 +285,7 @@ class Framed(Part):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Link(Framed):
+class Body(Framed):
     """A body, and the joint between it and its parent; its vectors are in the axes of its frame."""
 
     rotation: Matrix = field(default_factory=lambda: np.eye(3))
@@ -382,7 +382,7 @@ SIZES = {"box": 3, "cylinder": 2, "sphere": 1, "mesh": 3}
 
 
 @dataclass(frozen=True)
-class Visual(Part):
+class Visual(RobotPart):
     """A shape to display a link."""
 
     shape: Literal["box", "cylinder", "sphere", "mesh"]
@@ -419,7 +419,7 @@ class Visual(Part):
 
 
 @dataclass(frozen=True)
-class Plate(Part):
+class Plate(RobotPart):
     """A flat surface of a link, seen from one side, for drag and sunlight: a panel has two."""
 
     area: Annotated[Real, Field(gt=0.0, le=1e6)]
@@ -455,7 +455,7 @@ class Plate(Part):
 Plates = Annotated[list[Plate], Field(max_length=MOST_PLATES)]
 
 
-def _distinct_joints(links: list[Link]) -> list[Link]:
+def _distinct_joints(links: list[Body]) -> list[Body]:
     names = [link.joint_label for link in links]
     if (repeated := first_repeated(names)) is not None:
         raise ValueError(f"joint names must differ, {short(repeated)} occurs twice")
@@ -470,7 +470,7 @@ def _distinct_joints(links: list[Link]) -> list[Link]:
 
 
 @dataclass(frozen=True)
-class RobotTree(Part):
+class RobotTree(RobotPart):
     """A robot as its parts: a base with a tree of links, in any order if they name their parents.
 
     Key ``robot`` of a robot's YAML. `space_robot_model.robot.Robot` is the same as arrays.
@@ -479,7 +479,7 @@ class RobotTree(Part):
     name: Name
     base: Base
     links: Annotated[
-        list[Link], Field(min_length=1, max_length=MOST_LINKS), AfterValidator(_distinct_joints)
+        list[Body], Field(min_length=1, max_length=MOST_LINKS), AfterValidator(_distinct_joints)
     ]
     tool: Tool | None = None
     """The only tool, in files."""

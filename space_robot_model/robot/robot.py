@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import math
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from space_robot_msgs_py.compiled.records import assign
 from space_robot_msgs_py.config.arguments import as_numbers, as_path
+from space_robot_msgs_py.config.html import html_table
 from space_robot_msgs_py.config.validation import read_yaml, short
 from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.topics import BASE_AXES
@@ -20,12 +22,23 @@ from space_robot_msgs_py.topics import BASE_AXES
 from ..dynamics.model import Model
 from ..elementary.matrices import product
 from ..elementary.series import plain_sin_cos
-from .flatten import arrays_of, tree_of
+from .files import exact_document, read_content
+from .flatten import Part, arrays_of
 from .inertia import inertia_elements, inertia_tensor
-from .parts import Gear, JointFriction, JointLimits, Link, Plate, RobotTree, Spring, Tool, Visual
-
-if TYPE_CHECKING:
-    from .urdf import UrdfRobot
+from .parts import (
+    UNLIMITED,
+    Base,
+    Body,
+    Gear,
+    JointFriction,
+    JointLimits,
+    Plate,
+    RobotTree,
+    Spring,
+    Tool,
+    Visual,
+)
+from .urdf import UrdfRobot, read_urdf
 
 Array = NDArray[np.float64]
 
@@ -157,8 +170,6 @@ class Robot:
         Raises:
             InputError: invalid content; names ``where``, key, value and allowed values.
         """
-        from .files import read_content
-
         if not isinstance(content, dict):
             raise InputError(f"{where}: a mapping was expected, got {short(content)}")
         read = read_content(content, folder or Path(), where)
@@ -178,8 +189,6 @@ class Robot:
         Raises:
             InputError: invalid file; names link or joint, line, value and the repair, if any.
         """
-        from .urdf import read_urdf
-
         file = as_path(path, "path")
         return cls._of_urdf(read_urdf(file, base, repair), str(file))
 
@@ -190,20 +199,46 @@ class Robot:
 
     def _repr_html_(self) -> str:
         """Show bodies, joints and limits in a notebook."""
-        from .description import robot_html
-
-        return robot_html(self)
+        return _html(self)
 
     @property
     def tree(self) -> RobotTree:
         """The parts from which `of_tree` builds this robot, branch by branch."""
-        return tree_of(self)
+        base = Base(float(self.mass[0]), self.inertia[0], self.com[0], self.body_names[0])
+        return RobotTree(
+            self.name,
+            base,
+            [self._link(joint) for joint in self.order],
+            tools=self._on_links(self.tools),
+            plates=self._on_links(self.plates),
+            visuals=self._on_links(self.visuals),
+            exact=True,
+        )
+
+    def _link(self, joint: int) -> Body:
+        passive, friction = joint - self.n, self.friction[joint]
+        return Body(
+            name=self.body_names[joint + 1],
+            parent=self.body_names[self.parent[joint]],
+            joint="prismatic" if self.is_prismatic[joint] else "revolute",
+            joint_name=self.all_joint_names[joint],
+            rotation=self.rotation[joint],
+            offset=self.offset[joint],
+            mass=float(self.mass[joint + 1]),
+            inertia=self.inertia[joint + 1],
+            com=self.com[joint + 1],
+            limits=self.limits[joint] if passive < 0 else UNLIMITED,
+            friction=None if np.isnan(friction.coulomb) else friction,
+            passive=self.springs[passive] if passive >= 0 else None,
+            drive=self.gears[joint] if passive < 0 and self.gears else None,
+        )
+
+    def _on_links(self, parts: Sequence[Part]) -> list[Part]:
+        return [replace(part, link=self.body_names[part.body]) for part in parts]
 
     @property
     def content(self) -> dict[str, Any]:
         """All numbers and shapes, as lists and texts; `from_dict` builds the same robot."""
-        from .files import exact_document
-
         return exact_document(self.tree)
 
     @cached_property
@@ -329,7 +364,7 @@ class Robot:
         return model_of(self)
 
 
-def _locked(link: Link, position: float) -> Link:
+def _locked(link: Body, position: float) -> Body:
     """Return a link on a fixed joint with the pose of its joint at ``position``, rad or m."""
     offset, rotation = link.offset, link.rotation
     if link.joint == "prismatic":
@@ -343,7 +378,7 @@ def _locked(link: Link, position: float) -> Link:
         joint="fixed",
         rotation=rotation,
         offset=offset,
-        limits=JointLimits(),
+        limits=UNLIMITED,
         friction=None,
         passive=None,
     )
@@ -371,3 +406,46 @@ def model_of(robot: Robot) -> Model:
             spring = robot.springs[joint - robot.n]
             model.stiffness[row], model.damping[row], model.rest[row] = spring
     return model
+
+
+HTML_HEADS = ("body", "mass, kg", "moved by", "on", "range", "velocity", "effort")
+
+
+def _html(robot: Robot) -> str:
+    """Return the table of a robot: a row per body, with the joint that moves it."""
+    passive = len(robot.passive_names)
+    words = [
+        f"{robot.name}: {float(robot.mass.sum()):g} kg",
+        f"{robot.n} joints with a motor",
+        *([f"{passive} with a spring"] if passive else []),
+        *([f"tools: {', '.join(tool.name for tool in robot.tools)}"] if robot.tools else []),
+    ]
+    return html_table(HTML_HEADS, _html_rows(robot), ", ".join(words))
+
+
+def _html_rows(robot: Robot) -> Iterator[list[str]]:
+    yield [robot.body_names[0], f"{robot.mass[0]:.6g}", *[""] * 5]
+    for number, joint in enumerate(robot.all_joint_names):
+        yield [
+            robot.body_names[number + 1],
+            f"{robot.mass[number + 1]:.6g}",
+            joint,
+            robot.body_names[robot.parent[number]],
+            *_html_limits(robot, number),
+        ]
+
+
+def _html_limits(robot: Robot, number: int) -> list[str]:
+    """Return range, velocity and effort of a joint; empty where there is no limit."""
+    if number >= robot.n:
+        return ["", "", "passive, with a spring"]
+    factor, unit, force = (
+        (1.0, "m", "N") if robot.is_prismatic[number] else (180.0 / math.pi, "deg", "N m")
+    )
+    limits = robot.limits[number]
+    ends = [factor * limits.lower, factor * limits.upper]
+    return [
+        f"{ends[0]:.5g} to {ends[1]:.5g} {unit}" if any(map(math.isfinite, ends)) else "",
+        f"{factor * limits.velocity:.5g} {unit}/s" if math.isfinite(limits.velocity) else "",
+        f"{limits.effort:.5g} {force}" if math.isfinite(limits.effort) else "",
+    ]

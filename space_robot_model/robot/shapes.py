@@ -4,13 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..elementary.matrices import product
 from .parts import Colour, Plate, Visual
-from .robot import Robot
+
+if TYPE_CHECKING:
+    from .robot import Robot
 
 Array = NDArray[np.float64]
 BASE_COLOUR: Colour = (0.80, 0.66, 0.30, 1.0)

@@ -23,12 +23,12 @@ from numpy.typing import NDArray
 from ..elementary.matrices import product
 from ..elementary.rotations import rpy_of_rotation
 from .inertia import inertia_elements
-from .names import distinct, frame_names, printable, urdf_joint_names
 from .parts import Colour, JointLimits, Visual
+from .placements import distinct, frame_names, printable, urdf_joint_names
 from .robot import Robot
 from .shapes import shapes_of
-from .urdf.links import MOMENTS
-from .urdf.xml import LARGEST
+from .urdf_links import MOMENTS
+from .urdf_xml import LARGEST
 
 Array = NDArray[np.float64]
 Materials = dict[Colour, str]
@@ -145,7 +145,7 @@ def _add_origin(element: Element, rotation: Array, position: Array) -> None:
 
 
 def _bound(limit: float) -> str:
-    """Return a limit as text; infinity as the number that `urdf.xml` reads as infinite."""
+    """Return a limit as text; infinity as the number that `urdf_xml` reads as infinite."""
     return _word(limit if math.isfinite(limit) else math.copysign(LARGEST, limit))
 
 

@@ -16,7 +16,7 @@ from strategies import State
 
 from space_robot_model.robot import Robot
 from space_robot_model.robot.dynamics import bias_force, forward_dynamics, mass_matrix
-from space_robot_model.robot.parts import Base, Link, RobotTree
+from space_robot_model.robot.parts import Base, Body, RobotTree
 
 Array = NDArray[np.float64]
 
@@ -198,7 +198,7 @@ def pinocchio_tree(tree: RobotTree) -> pin.Model:
     """
     model = pin.Model()
     model.gravity = pin.Motion.Zero()
-    waiting: list[tuple[Base | Link, int, pin.SE3]] = [(tree.base, 0, pin.SE3.Identity())]
+    waiting: list[tuple[Base | Body, int, pin.SE3]] = [(tree.base, 0, pin.SE3.Identity())]
     while waiting:  # down each branch: Pinocchio's algorithms want joints in that order
         body, carrier, place = waiting.pop()
         if isinstance(body, Base):

@@ -9,10 +9,10 @@ from typing import Any
 import yaml
 
 from space_robot_model.robot import Robot
-from space_robot_model.robot.files import URDF, is_urdf, read_content
-from space_robot_model.robot.find import OWN
+from space_robot_model.robot.files import is_urdf, read_content
+from space_robot_model.robot.find import OWN, URDF
 from space_robot_model.robot.urdf import UrdfRobot
-from space_robot_model.robot.urdf.links import with_absolute_meshes
+from space_robot_model.robot.urdf_links import with_absolute_meshes
 from space_robot_msgs_py.config.validation import one_of, read_yaml
 from space_robot_msgs_py.config.yaml_text import read_file
 from space_robot_msgs_py.errors import InputError

@@ -28,8 +28,7 @@ from space_robot.view.marks import Mark, marks_of, shared_marks
 from space_robot.view.quantities import quantities_of
 from space_robot.view.trails import DESIRED, PIECES, trails
 from space_robot_model.robot import Robot
-from space_robot_model.robot.names import frame_names
-from space_robot_model.robot.placements import tool_pose
+from space_robot_model.robot.placements import frame_names, tool_pose
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.bag.reader import read_flight
 from space_robot_msgs_py.errors import InputError

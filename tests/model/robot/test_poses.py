@@ -32,12 +32,12 @@ from space_robot_model.robot.kinematics import (
     tool_state,
 )
 from space_robot_model.robot.markers import RobotMarkers
-from space_robot_model.robot.names import frame_names
 from space_robot_model.robot.parts import RobotTree, Visual
 from space_robot_model.robot.placements import (
     RobotPoses,
     base_axes,
     body_frames,
+    frame_names,
     joint_transforms,
     tool_pose,
     tool_poses,

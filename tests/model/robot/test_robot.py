@@ -21,7 +21,7 @@ from space_robot_model.robot import Robot
 from space_robot_model.robot.files import document_of
 from space_robot_model.robot.find import find_robot
 from space_robot_model.robot.inertia import inertia_tensor
-from space_robot_model.robot.parts import Base, JointLimits, Link, RobotTree
+from space_robot_model.robot.parts import Base, Body, JointLimits, RobotTree
 from space_robot_msgs_py.config.validation import read_yaml
 from space_robot_msgs_py.errors import InputError
 
@@ -148,7 +148,7 @@ def test_a_robot_file_made_of_a_robot_has_its_limits(paper_robot: Robot) -> None
         *paper_robot.limits[4:],
     ]
     robot = replace(paper_robot, limits=tuple(limits))
-    again = Robot.from_dict(json.loads(json.dumps(document_of(robot))))
+    again = Robot.from_dict(json.loads(json.dumps(document_of(robot.tree))))
     for before, after in zip(robot.limits, again.limits, strict=True):
         assert after == pytest.approx(before)
 
@@ -159,7 +159,7 @@ def test_shapes_are_part_of_the_numbers() -> None:
     assert {shape.shape for shape in robot.visuals} >= {"box", "cylinder", "sphere", "mesh"}
     exact = Robot.from_dict(json.loads(json.dumps(robot.content)))
     assert repr(exact.visuals) == repr(robot.visuals)
-    written = Robot.from_dict(yaml.safe_load(yaml.safe_dump(document_of(robot))))
+    written = Robot.from_dict(yaml.safe_load(yaml.safe_dump(document_of(robot.tree))))
     for before, after in zip(robot.visuals, written.visuals, strict=True):
         assert (after.shape, after.body, after.size) == (before.shape, before.body, before.size)
         assert (after.mesh, after.colour) == (before.mesh, before.colour)
@@ -202,7 +202,7 @@ def chain_of(content: dict[str, Any]) -> RobotTree:
     for link in content["links"]:
         turn = Rotation.from_euler("xyz", link["origin"].get("rpy_deg", [0.0] * 3), True)
         links.append(
-            Link(
+            Body(
                 name=link["name"],
                 parent=parent,
                 joint=link.get("joint", "revolute"),

@@ -37,7 +37,7 @@ from space_robot_model.robot.gears import flexible_model, geared_joints, motor_m
 from space_robot_model.robot.mission_document import QUATERNION
 from space_robot_model.robot.momentum import Motion, robot_momentum
 from space_robot_model.robot.names import other_meaning
-from space_robot_model.robot.parts import Base, Gear, Link, RobotTree, Spring
+from space_robot_model.robot.parts import Base, Body, Gear, RobotTree, Spring
 from space_robot_model.robot.placements import body_frames
 from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.topics import BASE_AXES
@@ -70,7 +70,7 @@ def test_nominal_robot_is_locked_at_rest(seed: int, kinds: list[str]) -> None:
     assert_same_dynamics(robot.nominal, oracle, seed)
 
 
-def _locked(link: Link) -> Link:
+def _locked(link: Body) -> Body:
     if link.passive is None:
         return link
     rest, offset, turn = link.passive.rest, link.offset, np.eye(3)
@@ -91,10 +91,10 @@ def test_no_joint_has_the_name_of_something_else() -> None:
 
 
 HULL = Base(5.0, np.eye(3), name="hull")
-ARM = Link(name="arm", joint_name="j", parent="hull", mass=1.0, inertia=np.eye(3), com=np.zeros(3))
+ARM = Body(name="arm", joint_name="j", parent="hull", mass=1.0, inertia=np.eye(3), com=np.zeros(3))
 
 
-def arms(count: int, spring: Spring | None = None) -> list[Link]:
+def arms(count: int, spring: Spring | None = None) -> list[Body]:
     """Links on the hull."""
     return [replace(ARM, name=f"a{k}", joint_name=f"j{k}", passive=spring) for k in range(count)]
 
@@ -102,7 +102,7 @@ def arms(count: int, spring: Spring | None = None) -> list[Link]:
 SOFT = Spring(1.0, 0.0)
 LEG = replace(ARM, name="leg", parent="leg", joint_name="k")
 THIN = replace(ARM, inertia=np.zeros((3, 3)))
-BAD: list[tuple[list[Link], str]] = [
+BAD: list[tuple[list[Body], str]] = [
     ([ARM, replace(ARM, joint_name="k")], "body names must differ, 'arm' occurs twice"),
     ([ARM, replace(ARM, name="leg")], "joint names must differ, 'j' occurs twice"),
     ([replace(ARM, parent="x")], "'x' of 'arm' is not a body: choose one of hull, arm"),
@@ -116,7 +116,7 @@ BAD: list[tuple[list[Link], str]] = [
 
 
 @pytest.mark.parametrize(("links", "said"), BAD, ids=range(len(BAD)))
-def test_what_is_no_tree_is_said_in_one_line(links: list[Link], said: str) -> None:
+def test_what_is_no_tree_is_said_in_one_line(links: list[Body], said: str) -> None:
     with pytest.raises(InputError) as raised:
         Robot.of_tree(RobotTree("bad", HULL, links), "file.yaml")
     assert str(raised.value).startswith("file.yaml: ")

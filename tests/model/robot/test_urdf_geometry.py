@@ -31,10 +31,10 @@ from space_robot.cli.main import _run
 from space_robot_model.robot import Robot
 from space_robot_model.robot.find import find_robot
 from space_robot_model.robot.flatten import SETTINGS_FRICTION
-from space_robot_model.robot.inertia import SLENDER, inertia_tensor, solid_inertia
-from space_robot_model.robot.parts import Base, Link, Visual
-from space_robot_model.robot.urdf import read_urdf
-from space_robot_model.robot.urdf.read import UrdfRobot, parse_urdf
+from space_robot_model.robot.inertia import SLENDER, inertia_tensor
+from space_robot_model.robot.parts import Base, Body, Visual
+from space_robot_model.robot.urdf import UrdfRobot, parse_urdf, read_urdf
+from space_robot_model.robot.urdf_tree import solid_inertia
 from space_robot_msgs_py.errors import InputError
 
 Array = NDArray[np.float64]
@@ -179,7 +179,7 @@ def test_the_numbers_of_friction(given: str, coulomb: float, viscous: float, fin
     assert len(found.findings) == findings
 
 
-def parts(urdf: UrdfRobot) -> list[Base | Link]:
+def parts(urdf: UrdfRobot) -> list[Base | Body]:
     return [urdf.tree.base, *urdf.tree.links]
 
 

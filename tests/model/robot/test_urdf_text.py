@@ -22,9 +22,8 @@ from strategies import SEEDS, TREES, random_tree
 from space_robot_model.robot import Robot
 from space_robot_model.robot.dynamics import bias_force, mass_matrix
 from space_robot_model.robot.find import find_robot, robot_names
-from space_robot_model.robot.names import frame_names
-from space_robot_model.robot.parts import Base, JointLimits, Link, RobotTree, Tool, Visual
-from space_robot_model.robot.placements import joint_transforms, tool_transforms
+from space_robot_model.robot.parts import Base, Body, JointLimits, RobotTree, Tool, Visual
+from space_robot_model.robot.placements import frame_names, joint_transforms, tool_transforms
 from space_robot_model.robot.shapes import shapes_of
 from space_robot_model.robot.urdf_text import urdf_text
 from space_robot_msgs_py.topics import INERTIAL_FRAME
@@ -180,8 +179,8 @@ def test_shapes(name: str, tmp_path: Path) -> None:
         np.testing.assert_allclose(shape.rotation, given_shape.rotation, atol=1e-14)
 
 
-def link_of(name: str, parent: str, joint: str) -> Link:
-    return Link(
+def link_of(name: str, parent: str, joint: str) -> Body:
+    return Body(
         name=name, parent=parent, joint_name=joint, mass=2.0, inertia=np.eye(3), com=np.zeros(3)
     )
 

@@ -138,7 +138,7 @@ def test_a_kernel_that_changes_has_another_folder_and_other_code_has_not(tmp_pat
     for name, is_kernel in (
         ("space_robot_model/dynamics/aba.py", True),
         ("space_robot_msgs_py/compiled/records.py", True),
-        ("space_robot_model/robot/file.py", False),
+        ("space_robot_model/robot/files.py", False),
         ("space_robot_msgs_py/errors.py", False),
     ):
         text = (root / name).read_text()

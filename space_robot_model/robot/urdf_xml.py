@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from space_robot_msgs_py.config.validation import short
 from space_robot_msgs_py.errors import InputError
 
-from ...elementary.rotations import rotation_of_rpy
+from ..elementary.rotations import rotation_of_rpy
 
 Array = NDArray[np.float64]
 

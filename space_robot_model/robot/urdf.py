@@ -13,12 +13,12 @@ from space_robot_msgs_py.config.validation import one_of, short
 from space_robot_msgs_py.config.yaml_text import check_file, read_file
 from space_robot_msgs_py.errors import InputError
 
-from ...dynamics.model import MOST_JOINTS
-from ..names import first_repeated, other_meaning
-from ..parts import MOST_LINKS, RobotTree
-from .joints import read_joints
-from .links import read_colours, read_links
-from .tree import (
+from ..dynamics.model import MOST_JOINTS
+from .names import first_repeated, other_meaning
+from .parts import MOST_LINKS, RobotTree
+from .urdf_joints import read_joints
+from .urdf_links import read_colours, read_links
+from .urdf_tree import (
     Tree,
     build_tree,
     check_kinds,
@@ -28,7 +28,7 @@ from .tree import (
     mend_massless,
     moved_frames,
 )
-from .xml import Element, Fields, Finding, Report, UrdfFrame, parse_xml, short_tag
+from .urdf_xml import Element, Fields, Finding, Report, UrdfFrame, parse_xml, short_tag
 
 XACRO = ".xacro"
 MOST_MOVING = 4 * MOST_JOINTS

@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 from space_robot_msgs_py.config.choices import nearest
 from space_robot_msgs_py.config.validation import short
 
-from ...elementary.matrices import norm
-from ..parts import JointFriction, JointLimits
-from .links import UrdfLink, read_name
-from .xml import Element, Fields, Report, UrdfFrame
+from ..elementary.matrices import norm
+from .parts import JointFriction, JointLimits
+from .urdf_links import UrdfLink, read_name
+from .urdf_xml import Element, Fields, Report, UrdfFrame
 
 Array = NDArray[np.float64]
 

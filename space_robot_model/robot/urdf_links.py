@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 from space_robot_msgs_py.config.validation import short
 from space_robot_msgs_py.errors import InputError
 
-from ...elementary.matrices import rotate_tensor
-from ..parts import Colour, Visual
-from .xml import Element, Fields, Report, UrdfFrame, short_tag
+from ..elementary.matrices import rotate_tensor
+from .parts import Colour, Visual
+from .urdf_xml import Element, Fields, Report, UrdfFrame, short_tag
 
 Array = NDArray[np.float64]
 

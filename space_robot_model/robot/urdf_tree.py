@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal, cast
@@ -11,15 +12,18 @@ from numpy.typing import NDArray
 
 from space_robot_msgs_py.config.validation import one_of, short
 
-from ...elementary.matrices import product, rotate_tensor
-from ..inertia import inertia_defect, nearest_inertia, solid_inertia
-from ..parts import Base, Link, RobotTree, Tool, Visual
-from .joints import UrdfJoint
-from .links import NOTHING, UrdfLink
-from .xml import HERE, UrdfFrame
+from ..elementary.matrices import product, rotate_tensor
+from .inertia import inertia_defect, nearest_inertia
+from .parts import Base, Body, RobotTree, Tool, Visual
+from .urdf_joints import UrdfJoint
+from .urdf_links import NOTHING, UrdfLink
+from .urdf_xml import HERE, UrdfFrame
 
 Array = NDArray[np.float64]
 Kind = Literal["revolute", "prismatic", "fixed"]
+
+SOLID = 1000.0
+"""Assumed density of a body of unknown shape, kg/m3."""
 
 
 @dataclass
@@ -213,6 +217,39 @@ def mend_inertias(links: Mapping[str, UrdfLink], tree: Tree) -> None:
         link.inertia = nearest
 
 
+def solid_inertia(mass: float, visuals: tuple[Visual, ...]) -> tuple[Array, str]:
+    """Return the inertia, kg m2, of a homogeneous body with the first shape, and its description.
+
+    Without a shape it is a sphere with the density of water.
+
+    Args:
+        mass: kg.
+        visuals: shapes of the body; meshes are ignored.
+    """
+    for visual in visuals:
+        if visual.shape != "mesh":
+            turn = visual.rotation
+            inertia: Array = rotate_tensor(turn, np.diag(_solid(mass, visual.shape, visual.size)))
+            return inertia, f"the solid {visual.shape} of its visual"
+    from ..elementary.exponential import exp, log  # slow to import
+
+    radius = exp(log(3.0 * mass / (4.0 * math.pi * SOLID)) / 3.0)
+    ball = _solid(mass, "sphere", (radius,))
+    return np.diag(ball), f"a solid sphere of {radius:.3g} m (density of water)"
+
+
+def _solid(mass: float, shape: str, size: tuple[float, ...]) -> list[float]:
+    """Return the principal moments of a homogeneous solid, kg m2, in its axes."""
+    if shape == "sphere":
+        return [0.4 * mass * size[0] * size[0]] * 3
+    if shape == "cylinder":
+        radius, length = size
+        across = mass * (3.0 * radius * radius + length * length) / 12.0
+        return [across, across, 0.5 * mass * radius * radius]
+    x, y, z = (mass * edge * edge / 12.0 for edge in size)
+    return [y + z, x + z, x + y]
+
+
 def make_tree(
     name: str, links: Mapping[str, UrdfLink], tree: Tree, tools: Sequence[str]
 ) -> RobotTree:
@@ -266,7 +303,7 @@ def end_frames(links: Mapping[str, UrdfLink], tree: Tree) -> list[str]:
     return sorted(ends, key=lambda name: (-depth[name], place[name]))
 
 
-def _link(link: UrdfLink, edge: Edge, frames: Mapping[str, UrdfFrame]) -> Link:
+def _link(link: UrdfLink, edge: Edge, frames: Mapping[str, UrdfFrame]) -> Body:
     """Return a link with its joint, in the frame of its body."""
     joint, parent = edge.joint, frames.get(edge.parent, HERE)
     rotation = parent.rotation.T
@@ -277,7 +314,7 @@ def _link(link: UrdfLink, edge: Edge, frames: Mapping[str, UrdfFrame]) -> Link:
         offset = product(joint.frame.rotation.T, joint.frame.position - parent.position)
         axis = joint.axis
     inertia, com = _matter(link, frames.get(link.name, HERE))
-    return Link(
+    return Body(
         name=link.name,
         parent=edge.parent,
         joint=cast(Kind, joint.kind),
