@@ -38,8 +38,7 @@ from space_robot_control.guidance.settings import MissionNodeSettings
 from space_robot_control.laws import laws
 from space_robot_model.robot import Robot
 from space_robot_model.robot.find import find_robot
-from space_robot_model.robot.frame_names import frame_names
-from space_robot_model.robot.poses import RobotPoses
+from space_robot_model.robot.placements import RobotPoses, frame_names
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.bag.folder import open_bag

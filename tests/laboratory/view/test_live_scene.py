@@ -18,7 +18,7 @@ from space_robot.view.live import serve as serving
 from space_robot.view.live.listener import Sample
 from space_robot.view.live.serve import LiveOptions, serve
 from space_robot.view.live.view import LiveView
-from space_robot_model.robot.transforms import joint_transforms
+from space_robot_model.robot.placements import joint_transforms
 from space_robot_msgs_py.bag.reader import read_flight
 
 TIMEOUT_S = 120.0

@@ -138,7 +138,7 @@ def test_a_kernel_that_changes_has_another_folder_and_other_code_has_not(tmp_pat
         ("space_robot_model/dynamics/aba.py", "\n", "\n\n", True),
         ("space_robot_msgs_py/compiled/records.py", "\n", "\n\n", True),
         ("space_robot_msgs_py/samples.py", " = 8, 24, 6", " = 9, 24, 6", True),
-        ("space_robot_model/robot/file.py", "\n", "\n\n", False),
+        ("space_robot_model/robot/files.py", "\n", "\n\n", False),
         ("space_robot_msgs_py/errors.py", "\n", "\n\n", False),
     ):
         text = (root / name).read_text()

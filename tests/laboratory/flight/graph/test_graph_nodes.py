@@ -15,7 +15,7 @@ from space_robot.flight.graph.listeners import wait_for
 from space_robot.processes.node_modules import MODULES
 from space_robot_model.robot import Robot
 from space_robot_model.robot.markers import RobotMarkers
-from space_robot_model.robot.poses import RobotPoses
+from space_robot_model.robot.placements import RobotPoses
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.bag.folder import open_bag
 from space_robot_msgs_py.bag.reader import read_flight

@@ -4,42 +4,43 @@ from __future__ import annotations
 
 import contextlib
 import io
-import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 from space_robot_msgs_py.config.installation import install_command
-from space_robot_msgs_py.config.text import choices
 from space_robot_msgs_py.config.validation import one_of, short
 from space_robot_msgs_py.config.yaml_text import check_readable, read_file
 from space_robot_msgs_py.errors import InputError
 
-from ...dynamics.model import MOST_JOINTS
-from ...elementary.matrices import product
-from ..tree import Body, Gear, JointFriction, Plate, Spring, first_repeated, other_meaning
-from .bodies import check_kinds, end_frames, make_bodies, mend_inertias, mend_massless, moved_frames
-from .elements import Element, parse_xml
-from .fields import HERE, UrdfFrame
-from .findings import Finding, Report, short_tag
-from .graph import Tree, build_tree
-from .joints import read_joints
-from .links import read_links
-from .visuals import read_colours
+from ..dynamics.model import MOST_JOINTS
+from .names import first_repeated, other_meaning
+from .parts import MOST_LINKS, RobotTree
+from .urdf_joints import read_joints
+from .urdf_links import read_colours, read_links
+from .urdf_tree import (
+    Tree,
+    build_tree,
+    check_kinds,
+    end_frames,
+    make_tree,
+    mend_inertias,
+    mend_massless,
+    moved_frames,
+)
+from .urdf_xml import Element, Fields, Finding, Report, UrdfFrame, parse_xml, short_tag
 
 XACRO = ".xacro"
-MOST_LINKS = 4000
 MOST_MOVING = 4 * MOST_JOINTS
 """Maximum number of joints that are not fixed; massless ones are locked later."""
 
 
 @dataclass(frozen=True)
 class UrdfRobot:
-    """Content of a URDF, for `space_robot_model.robot.Robot.of_tree`."""
+    """Content of a URDF."""
 
-    name: str
-    bodies: list[Body]
-    """One body for each link, the base first, then in the order of their joints."""
+    tree: RobotTree
+    """One link for each of the file, in the order of their joints."""
     findings: tuple[Finding, ...]
     """Repaired defects."""
     text: str
@@ -87,10 +88,10 @@ def parse_urdf(
     _check_counts(root, report)
     links = read_links(root, read_colours(root, report), path.absolute().parent, report)
     joints = read_joints(root, links, report)
-    tree = build_tree(links, joints, base, report)
-    mend_massless(links, tree, report)
-    check_kinds(tree, report)
-    mend_inertias(links, tree, report)
+    tree = build_tree(links, joints, base, report.where)
+    mend_massless(links, tree)
+    check_kinds(tree)
+    mend_inertias(links, tree)
     _check_moving(tree, report)
     for tool in tools or ():
         one_of(tool, links, "link", f" for a tool of {report.where}")
@@ -99,99 +100,23 @@ def parse_urdf(
     if not repair:
         report.refuse_defects()
     frames = end_frames(links, tree) if tools is None else tools
-    bodies = make_bodies(links, tree, frames)
-    return UrdfRobot(name, bodies, tuple(report.sorted()), text, moved_frames(tree))
-
-
-def with_springs(urdf: UrdfRobot, springs: Mapping[str, Spring], where: str) -> UrdfRobot:
-    """Return the robot with springs instead of motors in some joints.
-
-    URDF has no springs. Their damping replaces that of ``<dynamics>``.
-
-    Raises:
-        InputError: one of the names is not a moving joint.
-    """
-    moving = [body.joint.name for body in urdf.bodies if body.joint and body.joint.kind != "fixed"]
-    for name in springs:
-        one_of(name, moving, "passive joint", f" of {where}")
-    bodies = []
-    for body in urdf.bodies:
-        if body.joint and body.joint.name in springs:
-            coulomb = body.joint.friction.coulomb
-            joint = replace(
-                body.joint,
-                spring=springs[body.joint.name],
-                friction=JointFriction(coulomb, math.nan if math.isnan(coulomb) else 0.0),
-            )
-            body = replace(body, joint=joint)
-        bodies.append(body)
-    return replace(urdf, bodies=bodies)
-
-
-def with_gears(urdf: UrdfRobot, gears: Mapping[str, Gear], where: str) -> UrdfRobot:
-    """Return the robot with gears in some joints with motors.
-
-    Raises:
-        InputError: one of the names is not a joint with a motor.
-    """
-    joints = {body.joint.name: body.joint for body in urdf.bodies if body.joint}
-    motors = [name for name, joint in joints.items() if joint.kind != "fixed" and not joint.spring]
-    for name in gears:
-        if name not in motors:
-            what = "a joint without a motor" if name in joints else "not a joint of the URDF"
-            advice = choices(name, motors)
-            raise InputError(f"{where}: robot.drives: {short(name)} is {what}: {advice}")
-    bodies = [
-        replace(body, joint=replace(body.joint, gear=gears.get(body.joint.name)))
-        if body.joint
-        else body
-        for body in urdf.bodies
-    ]
-    return replace(urdf, bodies=bodies)
-
-
-def with_plates(urdf: UrdfRobot, plates: Sequence[tuple[str, Plate]], where: str) -> UrdfRobot:
-    """Return the robot with plates on links.
-
-    Args:
-        urdf: the robot.
-        plates: with the names of their links, in whose frames they are.
-        where: name of the file, for errors.
-
-    Raises:
-        InputError: there is no such link.
-    """
-    links = [body.name for body in urdf.bodies]
-    by_link: dict[str, list[Plate]] = {link: [] for link in links}
-    for number, (name, plate) in enumerate(plates):
-        if name not in links:
-            key, advice = f"robot.plates.{number}.link", choices(name, links)
-            raise InputError(f"{where}: {key}: no link {short(name)}: {advice}")
-        frame = urdf.frames.get(name, HERE)
-        turn = frame.rotation.T
-        normal, centre = product(turn, plate.normal), product(turn, plate.centre - frame.position)
-        by_link[name].append(replace(plate, normal=normal, centre=centre))
-    bodies = [replace(body, plates=tuple(by_link[body.name])) for body in urdf.bodies]
-    return replace(urdf, bodies=bodies)
+    whole = make_tree(name, links, tree, frames)
+    return UrdfRobot(whole, tuple(report.sorted()), text, moved_frames(tree))
 
 
 def _robot_name(root: Element, path: Path, report: Report) -> str:
     """Return the robot's name, after checking the root element."""
     if root.tag != "robot":
-        raise report.error(root.line, f"<{short_tag(root.tag)}>", "the root must be <robot>")
+        raise Fields(report, f"<{short_tag(root.tag)}>").error(root, "the root must be <robot>")
     for element in _all_elements(root):
         if element.tag.startswith("xacro:"):
-            raise report.error(
-                element.line,
-                f"<{short_tag(element.tag)}>",
-                f"xacro must be expanded first: rename the file to end in {XACRO}",
-            )
+            advice = f"xacro must be expanded first: rename the file to end in {XACRO}"
+            raise Fields(report, f"<{short_tag(element.tag)}>").error(element, advice)
     name = root.attributes.get("name", "").strip()
     if name and name.isprintable():
         return name
-    report.repaired(
-        root.line, "robot", "a printable name is required", name, f"named {short(path.stem)}"
-    )
+    repair = f"named {short(path.stem)}"
+    Fields(report, "robot").repaired(root, "a printable name is required", name, repair)
     return path.stem
 
 
@@ -225,7 +150,7 @@ def _check_moving(tree: Tree, report: Report) -> None:
     names = [joint.name for joint in moving]
     for joint in moving:
         if meaning := other_meaning(joint.name, names):
-            raise report.error(joint.line, joint.part, f"it needs another name: this is {meaning}")
+            raise joint.fields.error(joint.line, f"it needs another name: this is {meaning}")
 
 
 def expand_xacro(path: Path) -> str:

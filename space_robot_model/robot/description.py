@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..elementary.matrices import norms
-from .link_file import drive_of
-from .plates import plates_of
+from .files import gear_document
+from .parts import MANY_TURNS
 from .robot import Robot
-from .tree import MANY_TURNS, Gear
+from .shapes import plates_of
 
 Array = NDArray[np.float64]
 
@@ -95,13 +95,9 @@ def _joint(robot: Robot, number: int) -> dict[str, Any]:
     if is_actuated:
         gear = robot.gears[number] if robot.gears else None
         limits = robot.limits[number]._asdict()
-        return {**entry, "limits": limits, **({"drive": _drive(gear)} if gear else {})}
+        drive = gear and {**gear_document(gear), "reflected_inertia": gear.reflected_inertia}
+        return {**entry, "limits": limits, **({"drive": drive} if gear else {})}
     return {**entry, "spring": robot.springs[number - robot.n]._asdict()}
-
-
-def _drive(gear: Gear) -> dict[str, Any]:
-    """Return the drive as in a robot's file, and its inertia on the link's side."""
-    return {**drive_of(gear), "reflected_inertia": gear.reflected_inertia}
 
 
 def _plates(robot: Robot) -> dict[str, Any]:

@@ -12,12 +12,10 @@ from numpy.typing import NDArray
 from space_robot_msgs_py.config.text import nearest
 from space_robot_msgs_py.config.validation import short
 
-from ...elementary.matrices import norm
-from ..tree import JointFriction, JointLimits
-from .elements import Element
-from .fields import Fields, UrdfFrame
-from .findings import Report
-from .links import UrdfLink, read_name
+from ..elementary.matrices import norm
+from .parts import JointFriction, JointLimits
+from .urdf_links import UrdfLink, read_name
+from .urdf_xml import Element, Fields, Report, UrdfFrame
 
 Array = NDArray[np.float64]
 
@@ -41,6 +39,8 @@ NEARLY_ONE = 1e-3
 class UrdfJoint:
     """A joint as in the file."""
 
+    fields: Fields
+    """Report of its defects."""
     name: str
     line: int
     kind: str
@@ -52,12 +52,7 @@ class UrdfJoint:
     axis: Array
     """(3,) unit vector in the child's axes."""
     limits: JointLimits
-    friction: JointFriction
-
-    @property
-    def part(self) -> str:
-        """Name of the joint in errors."""
-        return f"joint {short(self.name)}"
+    friction: JointFriction | None
 
 
 def read_joints(
@@ -67,92 +62,84 @@ def read_joints(
     joints: dict[str, UrdfJoint] = {}
     for element in robot.all("joint"):
         name = read_name(element, report)
-        part = f"joint {short(name)}"
+        fields = Fields(report, f"joint {short(name)}")
         if name in joints:
-            raise report.error(
-                element.line, part, f"the name is taken by the joint in line {joints[name].line}"
-            )
-        joints[name] = _joint(element, name, links, Fields(report, part))
+            taken = f"the name is taken by the joint in line {joints[name].line}"
+            raise fields.error(element, taken)
+        joints[name] = _joint(element, name, links, fields)
     return joints
 
 
 def _joint(element: Element, name: str, links: Mapping[str, UrdfLink], fields: Fields) -> UrdfJoint:
-    report, part = fields.report, fields.part
-    report.check_content(element, part, ELEMENTS + EXTENSIONS, ("name", "type"))
+    fields.check_content(element, ELEMENTS + EXTENSIONS, ("name", "type"))
     written = element.attributes.get("type", "")
     if written not in KINDS:
-        raise report.error(element.line, part, f"type must be one of {', '.join(KINDS)}", written)
+        raise fields.error(element, f"type must be one of {', '.join(KINDS)}", written)
     parent, child = (_end(element, tag, links, fields) for tag in ("parent", "child"))
     if parent == child:
-        raise report.error(element.line, part, "parent and child must be different links", parent)
+        raise fields.error(element, "parent and child must be different links", parent)
     joint = UrdfJoint(
+        fields,
         name,
         element.line,
         KINDS[written],
         parent,
         child,
-        fields.frame(report.only(element, "origin", part)),
+        fields.frame(fields.only(element, "origin")),
         np.array([1.0, 0.0, 0.0]),
         JointLimits(),
-        JointFriction(),
+        None,
     )
     if joint.kind in ("revolute", "prismatic"):
-        joint.axis = _axis(report.only(element, "axis", part), fields)
-        limit = report.only(element, "limit", part)
+        joint.axis = _axis(fields.only(element, "axis"), fields)
+        limit = fields.only(element, "limit")
         joint.limits = _limits(element, limit, written == "continuous", fields)
-        joint.friction = _friction(report.only(element, "dynamics", part), fields)
-        mimic = report.only(element, "mimic", part)
+        joint.friction = _friction(fields.only(element, "dynamics"), fields)
+        mimic = fields.only(element, "mimic")
         if mimic is not None:
-            report.repaired(
-                mimic.line,
-                part,
-                "<mimic>: joints cannot be coupled",
-                mimic.attributes.get("joint", ""),
-                "made independent",
-            )
+            other = mimic.attributes.get("joint", "")
+            what = "<mimic>: joints cannot be coupled"
+            fields.repaired(mimic, what, other, "made independent")
     return joint
 
 
 def _end(element: Element, tag: str, links: Mapping[str, UrdfLink], fields: Fields) -> str:
     """Return the name of the link at one end of a joint."""
-    end = fields.report.only(element, tag, fields.part)
+    end = fields.only(element, tag)
     name = end.attributes.get("link", "") if end is not None else ""
     if end is None or not name:
-        raise fields.report.error(element.line, fields.part, f'<{tag} link="..."/> is missing')
+        raise fields.error(element, f'<{tag} link="..."/> is missing')
     if name not in links:
         near = " or ".join(nearest(name, list(links)))
         advice = f" (did you mean {near}?)" if near else ""
         what = f"the {tag} is not a known link{advice}"
-        raise fields.report.error(end.line, fields.part, what, name)
+        raise fields.error(end, what, name)
     return name
 
 
 def _axis(element: Element | None, fields: Fields) -> Array:
     if element is None:
         return np.array([1.0, 0.0, 0.0])  # as URDF says
-    fields.report.check_content(element, fields.part, (), ("xyz",))
+    fields.check_content(element, (), ("xyz",))
     axis = fields.vector(element, "xyz", None)
     length = norm(axis)
     text = element.attributes.get("xyz", "")
     if length < NEARLY_ONE:
-        raise fields.report.error(element.line, fields.part, "the axis has no direction", text)
+        raise fields.error(element, "the axis has no direction", text)
     if abs(length - 1.0) > NEARLY_ONE:
-        fields.report.repaired(
-            element.line, fields.part, "the axis must have length 1", text, "normalised"
-        )
+        fields.repaired(element, "the axis must have length 1", text, "normalised")
     return axis / length
 
 
 def _limits(
     joint: Element, element: Element | None, continuous: bool, fields: Fields
 ) -> JointLimits:
-    report, part = fields.report, fields.part
     if element is None:
         if not continuous:
             kind = joint.attributes["type"]
-            report.repaired(joint.line, part, f"a {kind} joint needs a <limit>", "", "no limits")
+            fields.repaired(joint, f"a {kind} joint needs a <limit>", "", "no limits")
         return JointLimits()
-    report.check_content(element, part, (), LIMITS)
+    fields.check_content(element, (), LIMITS)
     lower, upper = (-math.inf, math.inf) if continuous else _range(element, fields)
     return JointLimits(
         lower, upper, _most(element, "velocity", fields), _most(element, "effort", fields)
@@ -164,18 +151,11 @@ def _range(element: Element, fields: Fields) -> tuple[float, float]:
     lower, upper = (fields.limit(element, name) or 0.0 for name in ("lower", "upper"))
     interval = f"{lower:g} to {upper:g}"
     if lower > upper:
-        fields.report.repaired(
-            element.line, fields.part, "lower is above upper", interval, "exchanged"
-        )
+        fields.repaired(element, "lower is above upper", interval, "exchanged")
         return upper, lower
     if lower == upper:
-        fields.report.repaired(
-            element.line,
-            fields.part,
-            "lower and upper are equal",
-            interval,
-            "no limits of position",
-        )
+        what = "lower and upper are equal"
+        fields.repaired(element, what, interval, "no limits of position")
         return -math.inf, math.inf
     return lower, upper
 
@@ -186,31 +166,21 @@ def _most(element: Element, name: str, fields: Fields) -> float:
     if limit is not None and limit > 0.0:
         return limit
     repair = "made positive" if limit else f"no limit of {name}"
-    fields.report.repaired(
-        element.line,
-        fields.part,
-        f"limit.{name} must be present and above 0",
-        element.attributes.get(name, ""),
-        repair,
-    )
+    what = f"limit.{name} must be present and above 0"
+    fields.repaired(element, what, element.attributes.get(name, ""), repair)
     return abs(limit) if limit else math.inf
 
 
-def _friction(element: Element | None, fields: Fields) -> JointFriction:
+def _friction(element: Element | None, fields: Fields) -> JointFriction | None:
     """Return the friction in the file; 0 for a part that is missing in ``<dynamics>``."""
     if element is None:
-        return JointFriction()
-    fields.report.check_content(element, fields.part, (), ("damping", "friction"))
+        return None
+    fields.check_content(element, (), ("damping", "friction"))
     coefficients = {}
     for name in ("friction", "damping"):
         value = fields.number(element, name, 0.0)
         if value < 0.0:
-            fields.report.repaired(
-                element.line,
-                fields.part,
-                f"dynamics.{name} must be at least 0",
-                element.attributes[name],
-                "read as 0",
-            )
+            what = f"dynamics.{name} must be at least 0"
+            fields.repaired(element, what, element.attributes[name], "read as 0")
         coefficients[name] = max(value, 0.0)
     return JointFriction(coulomb=coefficients["friction"], viscous=coefficients["damping"])
