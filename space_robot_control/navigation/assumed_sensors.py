@@ -7,10 +7,12 @@ from collections.abc import Mapping
 from typing import Any
 
 from space_robot_model.elementary.matrices import norm
-from space_robot_model.hardware.encoders import EncoderSettings
-from space_robot_model.hardware.gyro import GyroSettings
-from space_robot_model.hardware.sensors import SensorSettings
-from space_robot_model.hardware.star_tracker import StarTrackerSettings
+from space_robot_model.hardware.sensors import (
+    EncoderSettings,
+    GyroSettings,
+    SensorSettings,
+    StarTrackerSettings,
+)
 from space_robot_msgs_py.config.files import named_file, node_parameters
 from space_robot_msgs_py.config.validation import validate
 

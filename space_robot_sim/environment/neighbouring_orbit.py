@@ -20,7 +20,7 @@ from space_robot_model.orbit.gravity import gravity
 from space_robot_model.robot.inertia import inertia_tensor
 from space_robot_msgs_py.errors import InputError
 
-from .orbit_settings import OrbitSettings
+from .orbit import OrbitSettings
 from .target import Target, TargetMotion
 
 Array = NDArray[np.float64]

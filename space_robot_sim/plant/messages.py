@@ -12,9 +12,9 @@ from typing import NamedTuple
 from space_robot_msgs_py.samples import RobotNames, RobotState
 from space_robot_msgs_py.wire.codecs import StateCodec
 
-from ..faults.link import awaited_stamp
+from ..faults.messages import MessageFaults, awaited_stamp
 from .command_guard import CommandGuard
-from .faults import FaultSettings, MessageFaults
+from .faults import FaultSettings
 
 NONE = -1
 """No tick."""
@@ -74,7 +74,7 @@ class FaultyExchange(PlantMessages):
     def take(self, tick: int) -> None:
         """See `PlantMessages.take`; the command may act in a later tick, or never."""
         faults, offered = self._faults, self._guard.offered
-        faults.corruption.corrupt_command(offered, tick)
+        faults.corrupt_command(offered, tick)
         faults.commands.send(tick, offered.torque.copy(), offered.tick)
 
     def end(self, tick: int) -> None:

@@ -15,7 +15,7 @@ from space_robot_msgs_py.samples import State
 
 from ..actuators.actuators import Actuators, actuate
 from ..environment.environment import Environment
-from ..environment.prescribed_loads import begin_loads
+from ..environment.loads import begin_loads
 from ..sensors.sensors import Sensors, sense
 from .integrator import MOST_NUMBERS, Stages, first_motor_angle
 from .stick_slip import integrate

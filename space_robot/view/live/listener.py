@@ -27,7 +27,7 @@ from space_robot_msgs_py.wire.truth_base import TruthBase
 from space_robot_msgs_py.wire.truth_joints import TruthJoints
 from space_robot_msgs_py.wire.truth_orbit import TruthOrbit
 from space_robot_msgs_py.wire.wheels_state import WheelsState
-from space_robot_sim.environment.orbit_settings import OrbitSettings
+from space_robot_sim.environment.orbit import OrbitSettings
 
 from ...flight.graph.monitor import Event, Monitor
 from ...flight.graph.node_names import PLANT

@@ -41,7 +41,7 @@ from space_robot_model.robot import Robot
 from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.samples import RobotState
 from space_robot_sim.environment.neighbouring_orbit import fall, hill_axes, meet
-from space_robot_sim.environment.orbit_settings import OrbitSettings
+from space_robot_sim.environment.orbit import OrbitSettings
 from space_robot_sim.environment.target import Target
 from space_robot_sim.plant.plant import Plant
 from space_robot_sim.plant.surroundings import REPORT_TICKS

@@ -15,9 +15,10 @@ from space_robot_model.robot import Robot
 from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.samples import STATE_FIELDS, Command, RobotNames, RobotState, Timebase
 from space_robot_msgs_py.wire.codecs import StateCodec
+from space_robot_sim.faults.messages import MessageFaults
 from space_robot_sim.plant.actuator_health import ActuatorHealth
 from space_robot_sim.plant.command_guard import CommandGuard
-from space_robot_sim.plant.faults import FaultSettings, MessageFaults
+from space_robot_sim.plant.faults import FaultSettings
 from space_robot_sim.plant.messages import (
     NONE,
     FaultyExchange,

@@ -16,7 +16,7 @@ from pydantic import ValidationError
 from scipy.linalg import expm
 from scipy.spatial.transform import Rotation
 
-from space_robot_model.hardware.star_tracker import StarTrackerSettings
+from space_robot_model.hardware.sensors import StarTrackerSettings
 from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.samples import RobotState
 

@@ -14,10 +14,11 @@ from random_samples import assert_same
 from robots import GearedFlight
 from strategies import SEEDS, random_robot, rotor_room, with_gears
 
-from space_robot_model.hardware.encoders import EncoderSettings
+from space_robot_model.hardware.sensors import EncoderSettings
 from space_robot_model.robot import Robot
 from space_robot_model.robot.tree import Encoder, Gear
 from space_robot_msgs_py.samples import ACTUATOR_FIELDS, ALL_FIELDS, PASSIVE_FIELDS, RobotState
+from space_robot_sim.component import Installation
 from space_robot_sim.faults.schedule import BLOCK_TICKS
 from space_robot_sim.sensors.encoders import Encoders
 
@@ -36,7 +37,7 @@ def test_the_step_of_a_joint_that_slides_is_a_share_of_a_metre(bits: int) -> Non
     """Beside joints that turn, in the step and in what is told at rest."""
     slides, settings = np.arange(N) % 3 == 1, EncoderSettings(bits=bits)
     rest = a_state().block[0]
-    encoders = Encoders.build(N, settings, PERIOD, rest, slides)
+    encoders = Encoders.build(settings, Installation(N, PERIOD, rest, is_prismatic=slides))
     step = np.where(slides, 1.0, 2.0 * np.pi) / 2**bits if bits else np.zeros(N)
     np.testing.assert_array_equal(encoders.step, step)
     told = encoders.history[0]
