@@ -23,7 +23,7 @@ from space_robot_sim.environment.friction import Friction, FrictionSettings
 from space_robot_sim.environment.neighbouring_orbit import meet
 from space_robot_sim.environment.orbit import OrbitSettings
 from space_robot_sim.environment.target import Target
-from space_robot_sim.plant.gear_mounting import mount_gears
+from space_robot_sim.plant.mounting import mount_gears
 from space_robot_sim.plant.plant import Plant, PlantSettings
 from space_robot_sim.plant.tick import update_true_state
 

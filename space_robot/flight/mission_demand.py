@@ -30,8 +30,7 @@ from space_robot_msgs_py.topics import BASE_AXES
 from space_robot_sim.component import Installation
 from space_robot_sim.environment.environment import Environment, EnvironmentSettings
 from space_robot_sim.environment.orbit import OrbitSettings
-from space_robot_sim.plant.surroundings import REPORT_TICKS
-from space_robot_sim.plant.tick import PlantMemory, update_true_state
+from space_robot_sim.plant.tick import REPORT_TICKS, PlantMemory, update_true_state
 
 from ..scenario.resolved import ResolvedScenario
 

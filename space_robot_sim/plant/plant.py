@@ -34,9 +34,8 @@ from ..environment.environment import Environment, EnvironmentSettings, with_pay
 from ..environment.loads import LoadSchedule
 from ..sensors.sensors import Sensors
 from .faults import FaultSettings
-from .gear_mounting import MOST_SUBSTEPS, check_springs, measured_motors, mount_gears
+from .mounting import MOST_SUBSTEPS, check_springs, measured_motors, mount_gears, mount_wheels
 from .tick import RATE_LIMIT, PlantMemory, measure, step, update_true_state
-from .wheel_mounting import mount_wheels
 
 Array = NDArray[np.float64]
 Block = NDArray[Any]
