@@ -14,7 +14,7 @@ from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.samples import MOST_TORQUERS, RobotNames
 
 from ..robot import Robot
-from .lists import NO_VECTORS, MountedSheet, Positive, Vectors, are_directions, directions
+from .sheets import NO_VECTORS, MountedSheet, Positive, Vectors, are_directions, directions
 from .thrusters import ThrusterSettings
 from .wheels import WheelSettings
 

@@ -8,7 +8,7 @@ from pydantic import Field
 
 from space_robot_msgs_py.config.validation import StrictModel
 
-from .lists import PER_AXIS, Numbers, Sizes
+from .sheets import PER_AXIS, Numbers, Sizes
 
 Limit = Annotated[float, Field(ge=0.0, le=1e9)]
 

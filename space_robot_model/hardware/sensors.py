@@ -16,6 +16,7 @@ Sigma = Annotated[float, Field(ge=0.0, le=1e3)]
 OnAxes = Annotated[
     list[Annotated[float, Field(ge=-10.0, le=10.0)]], Field(min_length=3, max_length=3)
 ]
+Tesla = Annotated[float, Field(ge=-1.0, le=1.0)]
 
 LEAST_RATE = 1e-6
 """Smallest rate of a star tracker, Hz: one measurement in eleven days."""
@@ -126,9 +127,21 @@ class EncoderSettings(StrictModel):
         return whole / 2.0**self.bits if self.bits else 0.0
 
 
+class MagnetometerSettings(StrictModel):
+    """A magnetometer, which magnetic torquers need; by default without error."""
+
+    noise: Annotated[float, Field(ge=0.0, le=1.0)] = Field(
+        0.0, description="white noise of each sample, T"
+    )
+    bias: Annotated[list[Tesla], Field(min_length=3, max_length=3)] = Field(
+        [0.0, 0.0, 0.0], description="constant bias on base x, y, z, T"
+    )
+
+
 class SensorSettings(StrictModel):
     """Settings of all sensors."""
 
     star_tracker: StarTrackerSettings = StarTrackerSettings()
     gyro: GyroSettings = GyroSettings()
     encoders: EncoderSettings = EncoderSettings()
+    magnetometer: MagnetometerSettings = MagnetometerSettings()

@@ -12,7 +12,7 @@ from pydantic import AfterValidator, Field
 from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.samples import MOST_THRUSTERS
 
-from .lists import (
+from .sheets import (
     FEWEST,
     NO_VECTORS,
     MountedSheet,
@@ -30,6 +30,8 @@ Array = NDArray[np.float64]
 STANDARD_GRAVITY = 9.80665
 """m/s2."""
 PER_THRUSTER = "one value for all thrusters, or one per thruster"
+Positions = Annotated[Vectors, AfterValidator(partial(are_vectors, most=MOST_THRUSTERS))]
+Directions = Annotated[Vectors, AfterValidator(partial(are_directions, most=MOST_THRUSTERS))]
 Times = Annotated[list[Annotated[float, Field(ge=0.0, le=1.0)]], FEWEST]
 
 
@@ -38,19 +40,15 @@ class ThrusterSettings(MountedSheet):
 
     section: ClassVar[str] = "thrusters"
 
-    positions: Annotated[Vectors, AfterValidator(partial(are_vectors, most=MOST_THRUSTERS))] = (
-        Field(
-            NO_VECTORS,
-            description="positions from the base's CoM, in the base frame, m: x, y, z of each "
-            "thruster, one behind the other ([0.0]: no thrusters)",
-        )
+    positions: Positions = Field(
+        NO_VECTORS,
+        description="positions from the base's CoM, in the base frame, m: x, y, z of each "
+        "thruster, one behind the other ([0.0]: no thrusters)",
     )
-    directions: Annotated[Vectors, AfterValidator(partial(are_directions, most=MOST_THRUSTERS))] = (
-        Field(
-            NO_VECTORS,
-            description="directions of the force on the base, in the base frame: x, y, z of each "
-            "thruster, one behind the other",
-        )
+    directions: Directions = Field(
+        NO_VECTORS,
+        description="directions of the force on the base, in the base frame: x, y, z of each "
+        "thruster, one behind the other",
     )
     force: Positive = Field([1.0], description=f"force of an open thruster, N; {PER_THRUSTER}")
     shortest_pulse: Times = Field(

@@ -12,7 +12,7 @@ from pydantic import AfterValidator, Field
 from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.samples import MOST_WHEELS
 
-from .lists import NO_VECTORS, MountedSheet, Positive, Sizes, Vectors, are_directions, directions
+from .sheets import NO_VECTORS, MountedSheet, Positive, Sizes, Vectors, are_directions, directions
 
 Array = NDArray[np.float64]
 

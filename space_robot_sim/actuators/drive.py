@@ -26,14 +26,13 @@ than the smallest eigenvalue of ``a H_S^-1 H_bar``. What the drives give (a) mat
 from __future__ import annotations
 
 from decimal import Decimal
-from operator import mul, sub, truediv
 from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from space_robot_model.elementary.steps import in_steps
-from space_robot_model.hardware.lists import per_axis
+from space_robot_model.hardware.sheets import per_axis
 from space_robot_msgs_py.compiled.kernels import kernel
 from space_robot_msgs_py.compiled.lanes import all_lanes, any_lane, uniform, where
 from space_robot_msgs_py.compiled.records import Origin, assign, shaped
@@ -44,7 +43,7 @@ from ..faults.grammar import About, Argument, Kind
 Array = NDArray[np.float64]
 
 LIMIT = Argument("TORQUE", "N m", 0.0, 1e6)
-TORQUE = Argument("TORQUE", "N m", -1e6, 1e6, about=About.AXIS)
+TORQUE = Argument("TORQUE", "N m", -1e6, 1e6, About.AXIS)
 
 
 def _axes(name: str) -> Origin:
@@ -66,19 +65,17 @@ class TorqueLimit(Component):
         Kind(
             "saturate_base",
             LIMIT,
-            None,
             "torque limit of an ideal base",
-            field="limit",
-            change=np.minimum,
+            "limit",
+            np.minimum,
             group="base",
         ),
         Kind(
             "saturate_joints",
             LIMIT,
-            None,
             "torque limit of the joints' motors",
-            field="limit",
-            change=np.minimum,
+            "limit",
+            np.minimum,
             group="joints",
         ),
     )
@@ -141,18 +138,13 @@ class Drive(Component):
     FAULTS: ClassVar[tuple[Kind, ...]] = (
         Kind(
             "drive_scale",
-            Argument("FACTOR", "1", -100.0, 100.0, about=About.AXIS),
-            None,
+            Argument("FACTOR", "1", -100.0, 100.0, About.AXIS),
             "the applied torque is FACTOR times the commanded torque",
-            field="scale",
-            change=mul,
+            "scale",
+            np.multiply,
         ),
         Kind(
-            "drive_bias",
-            TORQUE,
-            None,
-            "the applied torque is TORQUE plus the commanded torque",
-            field="bias",
+            "drive_bias", TORQUE, "the applied torque is TORQUE plus the commanded torque", "bias"
         ),
     )
 
@@ -198,19 +190,17 @@ class TorqueEcho(Component):
     FAULTS: ClassVar[tuple[Kind, ...]] = (
         Kind(
             "torque_scale",
-            Argument("FACTOR", "1", 1e-3, 1e3, about=About.AXIS),
-            None,
+            Argument("FACTOR", "1", 1e-3, 1e3, About.AXIS),
             "the applied torque is FACTOR times the reported torque",
-            field="scale",
-            change=truediv,
+            "scale",
+            np.divide,
         ),
         Kind(
             "torque_bias",
             TORQUE,
-            None,
             "the applied torque is TORQUE plus the reported torque",
-            field="bias",
-            change=sub,
+            "bias",
+            np.subtract,
         ),
     )
 

@@ -22,6 +22,8 @@ from ..faults.grammar import About, Argument, Kind, switch_on
 
 Array = NDArray[np.float64]
 
+ONE = Argument(about=About.THRUSTER)
+
 
 class Thrusters(Component):
     """Thrusters of one base; entries beyond the last thruster are zero."""
@@ -58,22 +60,8 @@ class Thrusters(Component):
     """Propellant used so far, kg."""
 
     FAULTS: ClassVar[tuple[Kind, ...]] = (
-        Kind(
-            "thruster_stuck_on",
-            Argument("", "", 0.0, 0.0, about=About.THRUSTER),
-            None,
-            "a thruster's valve stays open",
-            field="stuck_on",
-            change=switch_on,
-        ),
-        Kind(
-            "thruster_stuck_off",
-            Argument("", "", 0.0, 0.0, about=About.THRUSTER),
-            None,
-            "a thruster's valve stays closed",
-            field="stuck_off",
-            change=switch_on,
-        ),
+        Kind("thruster_stuck_on", ONE, "a thruster's valve stays open", "stuck_on", switch_on),
+        Kind("thruster_stuck_off", ONE, "a thruster's valve stays closed", "stuck_off", switch_on),
     )
 
 

@@ -56,11 +56,10 @@ class Wheels(Component):
     FAULTS: ClassVar[tuple[Kind, ...]] = (
         Kind(
             "wheel_fail",
-            Argument("", "", 0.0, 0.0, about=About.WHEEL),
-            None,
+            Argument(about=About.WHEEL),
             "the motor of a reaction wheel has no torque: the wheel turns freely",
-            field="failed",
-            change=switch_on,
+            "failed",
+            switch_on,
         ),
     )
 

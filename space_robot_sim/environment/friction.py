@@ -17,7 +17,7 @@ from space_robot_model.dynamics.model import MOST_JOINTS, MOST_MOVING
 from space_robot_model.robot import Robot
 from space_robot_msgs_py.compiled.kernels import kernel
 from space_robot_msgs_py.compiled.lanes import uniform, whole
-from space_robot_msgs_py.compiled.records import Origin, assign, shaped
+from space_robot_msgs_py.compiled.records import Origin, shaped
 from space_robot_msgs_py.config.validation import StrictModel
 
 from ..component import Component, Installation
@@ -76,22 +76,13 @@ class Friction(Component):
     FAULTS: ClassVar[tuple[Kind, ...]] = (
         Kind(
             "stuck_joint",
-            Argument("TORQUE", "N m", 0.0, 1e3, about=About.JOINT),
-            None,
+            Argument("TORQUE", "N m", 0.0, 1e3, About.JOINT),
             "a joint's Coulomb friction is raised to TORQUE",
-            field="coulomb",
-            change=np.maximum,
+            "coulomb",
+            np.maximum,
             rows="row",
         ),
     )
-
-    @staticmethod
-    def add_wheels(friction: Friction, coulomb: Array, viscous: Array) -> None:
-        """Append wheels with friction (W,), N m and N m s/rad, after the joints."""
-        joints = int(friction.count)
-        stop = joints + coulomb.size
-        assign(friction, count=stop)
-        friction.coulomb[joints:stop], friction.viscous[joints:stop] = coulomb, viscous
 
 
 @kernel

@@ -48,12 +48,14 @@ class Argument(NamedTuple):
     Without a ``symbol`` there is no number: the axes alone are given.
     """
 
-    symbol: str
-    unit: str
-    low: float
-    high: float
-    whole: bool = False
+    symbol: str = ""
+    unit: str = ""
+    low: float = 0.0
+    high: float = 0.0
     about: About | None = None
+    whole: bool = False
+    default: float | None = None
+    """The number when none is given; None: it must be given."""
 
     @property
     def form(self) -> str:
@@ -76,18 +78,21 @@ class Kind(NamedTuple):
 
     name: str
     argument: Argument | None
-    default: float | None
-    """The argument when none is given; None: it must be given."""
     description: str
-    lasts: bool = True
-    """The fault acts over a stretch of time, so that an end may be given."""
     field: str = ""
     """Array of the component's record that it changes; empty: it changes no component."""
     change: Change = np.add
+    lasts: bool = True
+    """The fault acts over a stretch of time, so that an end may be given."""
     group: str = ""
     """Axes that it is about where none is named: "base" or "joints"."""
     rows: str = ""
     """Field of the record with the place of each joint in the array; empty: they are in order."""
+
+    @property
+    def default(self) -> float | None:
+        """The argument's number when none is given; None: it must be given, if there is one."""
+        return self.argument.default if self.argument else None
 
     @property
     def form(self) -> str:

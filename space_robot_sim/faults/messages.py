@@ -16,31 +16,29 @@ from .schedule import Schedule
 
 Item = TypeVar("Item")
 
-PROBABILITY = Argument("P", "probability per tick", 0.0, 1.0)
-TICKS = Argument("TICKS", "ticks", 0.0, 1e6, whole=True)
+PROBABILITY = Argument("P", "probability per tick", 0.0, 1.0, default=1.0)
+TICKS = Argument("TICKS", "ticks", 0.0, 1e6, whole=True, default=1.0)
 
 
 def _link_kinds(what: str) -> tuple[Kind, ...]:
     return (
-        Kind(f"drop_{what}", PROBABILITY, 1.0, f"a {what} is lost"),
-        Kind(f"repeat_{what}", PROBABILITY, 1.0, f"a {what} arrives again one tick later"),
-        Kind(f"delay_{what}", TICKS, 1.0, f"{what}s arrive TICKS late"),
-        Kind(
-            f"jitter_{what}", TICKS, 1.0, f"{what}s arrive 0 to TICKS late, uniformly distributed"
-        ),
+        Kind(f"drop_{what}", PROBABILITY, f"a {what} is lost"),
+        Kind(f"repeat_{what}", PROBABILITY, f"a {what} arrives again one tick later"),
+        Kind(f"delay_{what}", TICKS, f"{what}s arrive TICKS late"),
+        Kind(f"jitter_{what}", TICKS, f"{what}s arrive 0 to TICKS late, uniformly distributed"),
     )
 
 
 MESSAGE_KINDS = by_name(
     *_link_kinds("state"),
     *_link_kinds("command"),
-    Kind("nan_state", PROBABILITY, 1.0, "one measured number is NaN"),
-    Kind("inf_state", PROBABILITY, 1.0, "one measured number is infinite"),
-    Kind("scaled_quaternion", PROBABILITY, 1.0, "the measured quaternion's norm is 0.9 or 1.1"),
-    Kind("stamp_back", PROBABILITY, 1.0, "a state's stamp is 1 to 10 ticks early"),
-    Kind("stamp_jump", PROBABILITY, 1.0, "a state's stamp is 1000000 ticks late"),
-    Kind("nan_command", PROBABILITY, 1.0, "one commanded torque is NaN"),
-    Kind("inf_command", PROBABILITY, 1.0, "one commanded torque is infinite"),
+    Kind("nan_state", PROBABILITY, "one measured number is NaN"),
+    Kind("inf_state", PROBABILITY, "one measured number is infinite"),
+    Kind("scaled_quaternion", PROBABILITY, "the measured quaternion's norm is 0.9 or 1.1"),
+    Kind("stamp_back", PROBABILITY, "a state's stamp is 1 to 10 ticks early"),
+    Kind("stamp_jump", PROBABILITY, "a state's stamp is 1000000 ticks late"),
+    Kind("nan_command", PROBABILITY, "one commanded torque is NaN"),
+    Kind("inf_command", PROBABILITY, "one commanded torque is infinite"),
 )
 """The kinds of faults of messages between plant and controller."""
 QUATERNION_NORMS = (0.9, 1.1)

@@ -38,7 +38,10 @@ def mount_wheels(
     assign(model, wheel_count=count)
     model.wheel_axis[:count] = wheels.unit_axes
     model.wheel_inertia[:count] = wheels.values("rotor_inertia")
-    Friction.add_wheels(friction, wheels.values("coulomb"), wheels.values("viscous"))
+    rows = slice(int(friction.count), int(friction.count) + count)
+    assign(friction, count=rows.stop)
+    friction.coulomb[rows] = wheels.values("coulomb")
+    friction.viscous[rows] = wheels.values("viscous")
     velocities[:count] = wheels.values("initial_speed")
 
 

@@ -188,8 +188,8 @@ def step(
 
 @kernel
 def update_true_state(block: Block, tick: int, period: float) -> None:
-    """Call `look` from Python."""
-    look(block[0], tick, period)
+    """Call `write_true_state` from Python."""
+    write_true_state(block[0], tick, period)
 
 
 @kernel
@@ -243,7 +243,7 @@ def begin_interval(
 
 
 @kernel
-def look(memory: PlantMemory, tick: int, period: float) -> None:
+def write_true_state(memory: PlantMemory, tick: int, period: float) -> None:
     """Write the true state of ``tick``, and what the robot meets there."""
     write_truth(memory.model, memory.x, memory.rotation, memory.truth)
     meet_surroundings(
@@ -254,7 +254,7 @@ def look(memory: PlantMemory, tick: int, period: float) -> None:
 @kernel
 def end_interval(memory: PlantMemory, tick: int, period: float) -> float:
     """Write the true state of ``tick``, which is reached, and return its `fastest_rate`."""
-    look(memory, tick, period)
+    write_true_state(memory, tick, period)
     fastest: float = fastest_rate(memory.model, memory.x)
     return fastest
 

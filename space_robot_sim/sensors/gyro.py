@@ -18,6 +18,10 @@ from ..faults.schedule import BLOCK_TICKS
 
 Array = NDArray[np.float64]
 
+SIGMA = Argument("SIGMA", "rad/s", 0.0, 1e3)
+STEP = Argument("STEP", "rad/s", 1e-12, 1e3)
+BIAS = Argument("RATE", "rad/s", -10.0, 10.0, About.BASE_AXIS)
+
 
 class Gyro(Component):
     """Parameters and state of a gyro.
@@ -50,30 +54,9 @@ class Gyro(Component):
     """Standard normal numbers, a row a tick: n_v (3), n_u (3)."""
 
     FAULTS: ClassVar[tuple[Kind, ...]] = (
-        Kind(
-            "noise_gyro",
-            Argument("SIGMA", "rad/s", 0.0, 1e3),
-            None,
-            "noise on the measured base rate",
-            field="sigma",
-            change=add_in_quadrature,
-        ),
-        Kind(
-            "gyro_bias",
-            Argument("RATE", "rad/s", -10.0, 10.0, about=About.BASE_AXIS),
-            None,
-            "RATE is added to the measured base rate about an axis",
-            field="offset",
-            change=np.add,
-        ),
-        Kind(
-            "quantise_gyro",
-            Argument("STEP", "rad/s", 1e-12, 1e3),
-            None,
-            "the measured base rate is quantised",
-            field="step",
-            change=np.maximum,
-        ),
+        Kind("noise_gyro", SIGMA, "noise on the measured base rate", "sigma", add_in_quadrature),
+        Kind("gyro_bias", BIAS, "RATE is added to the measured base rate about an axis", "offset"),
+        Kind("quantise_gyro", STEP, "the measured base rate is quantised", "step", np.maximum),
     )
 
 

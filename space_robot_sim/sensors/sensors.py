@@ -18,6 +18,7 @@ from ..component import Component
 from ..faults.schedule import BLOCK_TICKS
 from .encoders import Encoders, read_encoders, see_motors
 from .gyro import Gyro, read_gyro
+from .magnetometer import Magnetometer, read_magnetometer
 from .star_tracker import StarTracker, track_stars
 
 Array = NDArray[np.float64]
@@ -33,6 +34,7 @@ class Sensors(Component):
     star_tracker: StarTracker = nested(StarTracker)
     gyro: Gyro = nested(Gyro)
     encoders: Encoders = nested(Encoders)
+    magnetometer: Magnetometer = nested(Magnetometer)
     are_ideal: float = shaped(
         lambda n: (),
         uniform=True,
@@ -45,8 +47,8 @@ class Sensors(Component):
     """The block of ticks whose random numbers have been drawn; -1: none yet."""
 
 
-STAR_TRACKER, GYRO, ENCODERS = (
-    zlib.crc32(name.encode()) for name in ("star_tracker", "gyro", "encoders")
+STAR_TRACKER, GYRO, ENCODERS, MAGNETOMETER = (
+    zlib.crc32(name.encode()) for name in SensorSettings.model_fields
 )
 """Keys of the sensors' random numbers."""
 
@@ -56,8 +58,8 @@ def sense(sensors: Sensors, truth: State, tick: int, period: float, measured: St
     """Write the measurements of ``truth`` at ``tick`` into ``measured``; call once a tick.
 
     The torques in ``measured`` are left alone; position and velocity of the base, the speeds of its
-    wheels, the motion of joints without motors and of motors behind gears, and what there is to
-    know of an orbit have no error.
+    wheels, the motion of joints without motors and of motors behind gears, place and velocity in an
+    orbit and torques from outside have no error.
     """
     measured.base_position[:] = truth.base_position
     measured.base_velocity[:] = truth.base_velocity
@@ -81,6 +83,7 @@ def sense(sensors: Sensors, truth: State, tick: int, period: float, measured: St
         track_stars(sensors.star_tracker, truth, tick, measured)
         read_gyro(sensors.gyro, truth, tick, period, measured)
         read_encoders(sensors.encoders, truth, tick, period, measured)
+        read_magnetometer(sensors.magnetometer, truth, tick, measured)
 
 
 @kernel
@@ -97,3 +100,4 @@ def _draw(sensors: Sensors, tick: int) -> None:
     normal_numbers(sensors.star_tracker.draws, sensors.seed, STAR_TRACKER, block)
     normal_numbers(sensors.gyro.draws, sensors.seed, GYRO, block)
     normal_numbers(sensors.encoders.draws, sensors.seed, ENCODERS, block)
+    normal_numbers(sensors.magnetometer.draws, sensors.seed, MAGNETOMETER, block)

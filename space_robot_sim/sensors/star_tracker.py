@@ -78,26 +78,23 @@ class StarTracker(Component):
         Kind(
             "noise_attitude",
             Argument("SIGMA", "rad", 0.0, 1e3),
-            None,
             "noise of standard deviation SIGMA about each axis of the measured attitude",
-            field="sigma",
-            change=add_in_quadrature,
+            "sigma",
+            add_in_quadrature,
         ),
         Kind(
             "tracker_blind",
             None,
-            None,
             "no attitude is measured; the last one is held",
-            field="blind",
-            change=switch_on,
+            "blind",
+            switch_on,
         ),
         Kind(
             "quantise_attitude",
             Argument("STEP", "rad", 1e-12, 1.0),
-            None,
             "the measured quaternion is quantised in steps of STEP / 2",
-            field="step",
-            change=np.maximum,
+            "step",
+            np.maximum,
         ),
     )
 

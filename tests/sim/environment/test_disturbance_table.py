@@ -17,6 +17,7 @@ from strategies import KINDS, random_bodies, random_robot
 
 from space_robot_model.dynamics.model import MOST_JOINTS
 from space_robot_model.robot import Robot
+from space_robot_msgs_py.compiled.records import assign
 from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.samples import MOST_WHEELS, RobotNames
 from space_robot_sim.component import ComponentFaults, Installation
@@ -63,11 +64,12 @@ def test_friction_of_the_largest_robot_with_the_most_wheels_is_each_ones_own() -
         FrictionSettings(coulomb=0.3, viscous=0.7), Installation(robot.n, robot=robot)
     )
     wheels, out = np.arange(1.0, MOST_WHEELS + 1.0), np.full(MOST_JOINTS + MOST_WHEELS, np.nan)
-    Friction.add_wheels(joints, 10.0 * wheels, 100.0 * wheels)
+    joints.coulomb[MOST_JOINTS : out.size] = 10.0 * wheels
+    joints.viscous[MOST_JOINTS : out.size] = 100.0 * wheels
+    assign(joints, count=out.size)
     friction_torque(joints, np.full(out.size, 2.0), np.ones(out.size), out)
     np.testing.assert_array_equal(out[:MOST_JOINTS], 0.3 + 0.7 * 2.0)
     np.testing.assert_array_equal(out[MOST_JOINTS:], 10.0 * wheels + 100.0 * wheels * 2.0)
-    assert joints.count == out.size
 
 
 def equation_61(n: int, k: float, t: float) -> Array:

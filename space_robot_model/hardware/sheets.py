@@ -1,19 +1,22 @@
-"""Flat lists, as in ROS parameters: vectors, and one value for all or one for each."""
+"""What data sheets have in common: flat lists, as ROS parameters are, and reading from a file."""
 
 from __future__ import annotations
 
-from typing import Annotated, ClassVar
+from typing import Annotated, ClassVar, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field
+from pydantic import BaseModel, Field
 
-from space_robot_msgs_py.config.validation import StrictModel
+from space_robot_msgs_py.config.files import named_file, node_parameters
+from space_robot_msgs_py.config.validation import StrictModel, validate
 from space_robot_msgs_py.errors import InputError
 
 from ..elementary.matrices import direction_norm, unit_rows
 
 Array = NDArray[np.float64]
+
+Sheet = TypeVar("Sheet", bound=BaseModel)
 
 NO_VECTORS = [0.0]
 """Value for an empty list, because ROS has no empty list of numbers."""
@@ -23,6 +26,26 @@ Numbers = Annotated[list[Annotated[float, Field(ge=-1e9, le=1e9)]], FEWEST]
 Sizes = Annotated[list[Annotated[float, Field(ge=0.0, le=1e9)]], FEWEST]
 Positive = Annotated[list[Annotated[float, Field(gt=0.0, le=1e9)]], FEWEST]
 PER_AXIS = "one value for all axes, or one per axis: base x, y, z, joints"
+
+
+def read_sheet(sheet: type[Sheet], folder: str, name: str) -> Sheet:
+    """Return what the flight software assumes of hardware: the sheet in a file of the plant's.
+
+    Parameters of the plant that are not in the sheet (a misaligned wheel, a weak thruster) are
+    left out.
+
+    Args:
+        sheet: class of the sheet.
+        folder: of config/, as "sensors".
+        name: of a file in it, or a path.
+
+    Raises:
+        InputError: there is no such file, or it is wrong.
+    """
+    path = named_file(folder, name)
+    tree = node_parameters(path, "plant")
+    own = {key: tree[key] for key in sheet.model_fields if key in tree}
+    return validate(sheet, own, str(path))
 
 
 class MountedSheet(StrictModel):
