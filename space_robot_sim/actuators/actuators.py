@@ -81,11 +81,7 @@ class ActuatorSettings(
     """Settings of the actuators."""
 
     def check(self, robot: Robot, file: str) -> None:
-        """Check the settings, see `BaseActuatorSettings.check`.
-
-        Raises:
-            InputError: the settings do not fit.
-        """
+        """Check the settings, see `BaseActuatorSettings.check`."""
         super().check(robot, file)
         if self.base_actuation != "ideal" and self.base_torque_limit:
             raise InputError(

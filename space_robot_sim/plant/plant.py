@@ -61,11 +61,7 @@ class PlantSettings(ActuatorSettings, EnvironmentSettings, SensorSettings, Fault
     )
 
     def check(self, robot: Robot, file: str) -> None:
-        """Check the actuators and what they need, see `ActuatorSettings.check`.
-
-        Raises:
-            InputError: the settings do not fit.
-        """
+        """Check the actuators and what they need, see `ActuatorSettings.check`."""
         super().check(robot, file)
         if self.torquer_count and not (self.has_orbit and self.magnetism.strength):
             raise InputError(
@@ -92,7 +88,7 @@ class Plant(RecordOwner):
 
     `truth` is the true state at the current tick, `state` what the sensors tell of it; `step`
     applies a command until the next one. Parts fail as ``settings.faults`` says. Momentum and
-    energy follow from `truth` alone (`space_robot_sim.plant.conservation`). A copy, also one by
+    energy follow from `truth` alone (`space_robot_model.robot.momentum`). A copy, also one by
     `pickle`, flies on to the same bits.
     """
 

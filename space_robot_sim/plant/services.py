@@ -33,7 +33,10 @@ class SimulationState(Enum):
 
 
 class Simulation:
-    """Control of a node's plant: pause, step and reset, in any lifecycle state."""
+    """Control of a node's plant: pause, step and reset.
+
+    All raise an `InputError` if the plant is not active.
+    """
 
     def __init__(self, node: ManagedNode[PlantNodeSettings]) -> None:
         self._node = node
@@ -48,21 +51,13 @@ class Simulation:
             return SimulationState.STOPPED
         return SimulationState.PAUSED if self._loop.control.is_paused else SimulationState.PLAYING
 
-    def pause(self) -> str:
-        """Hold the plant at the present tick; return what to say of it.
-
-        Raises:
-            InputError: the plant is not active.
-        """
+    async def pause(self) -> str:
+        """Hold the plant at the present tick; return what to say of it."""
         is_news = self._loop.control.pause()
         return self._told(f"{'' if is_news else 'already '}paused at {self._now}")
 
-    def resume(self) -> str:
-        """Let the plant run on; return what to say of it.
-
-        Raises:
-            InputError: the plant is not active.
-        """
+    async def resume(self) -> str:
+        """Let the plant run on; return what to say of it."""
         is_news = self._loop.control.resume()
         return self._told(f"{'goes on' if is_news else 'runs already'} at {self._now}")
 
@@ -201,24 +196,17 @@ class StandardServices:
             return self._end(response, self._result.RESULT_FEATURE_UNSUPPORTED, text)
         if wanted is simulation.state:
             return self._end(response, kind.ALREADY_IN_TARGET_STATE)
-        try:
-            if wanted is SimulationState.PLAYING:
-                simulation.resume()
-            elif wanted is SimulationState.PAUSED:
-                simulation.pause()
-            else:
-                await simulation.reset(stop=True)
-        except (InputError, FlightError) as error:
-            return self._end(response, kind.STATE_TRANSITION_ERROR, str(error))
-        return self._end(response, self._result.RESULT_OK)
+        acts: dict[SimulationState, Callable[[], Awaitable[str]]] = {
+            SimulationState.PLAYING: simulation.resume,
+            SimulationState.PAUSED: simulation.pause,
+            SimulationState.STOPPED: partial(simulation.reset, stop=True),
+        }
+        return await self._answer(acts[wanted](), response, kind.STATE_TRANSITION_ERROR)
 
     async def step(self, request: Any, response: Any) -> Any:
         """Step; answered once the steps are done."""
-        try:
-            await self._simulation.step(request.steps)
-        except (InputError, FlightError) as error:
-            return self._end(response, self._result.RESULT_OPERATION_FAILED, str(error))
-        return self._end(response, self._result.RESULT_OK)
+        step = self._simulation.step(request.steps)
+        return await self._answer(step, response, self._result.RESULT_OPERATION_FAILED)
 
     async def reset(self, request: Any, response: Any) -> Any:
         """Reset time and state together: of a flight neither can be reset alone."""
@@ -227,10 +215,14 @@ class StandardServices:
         if request.scope != kind.SCOPE_DEFAULT and request.scope & both != both:
             text = "only time and state together can be reset"
             return self._end(response, self._result.RESULT_FEATURE_UNSUPPORTED, text)
+        reset = self._simulation.reset()
+        return await self._answer(reset, response, self._result.RESULT_OPERATION_FAILED)
+
+    async def _answer(self, act: Awaitable[str], response: Any, failed: int) -> Any:
         try:
-            await self._simulation.reset()
+            await act
         except (InputError, FlightError) as error:
-            return self._end(response, self._result.RESULT_OPERATION_FAILED, str(error))
+            return self._end(response, failed, str(error))
         return self._end(response, self._result.RESULT_OK)
 
     def _end(self, response: Any, result: int, text: str = "") -> Any:
@@ -248,16 +240,10 @@ def offer_services(node: ManagedNode[PlantNodeSettings]) -> None:
     node.declare_parameter(STEP_TICKS, 1, descriptor)
     group = ReentrantCallbackGroup()  # a step is served for as long as it takes, others meanwhile
 
-    async def pause() -> str:
-        return simulation.pause()
-
-    async def resume() -> str:
-        return simulation.resume()
-
     async def step() -> str:
         return await simulation.step(int(node.get_parameter(STEP_TICKS).value))
 
-    for act in (pause, resume, step, simulation.reset):
+    for act in (simulation.pause, simulation.resume, step, simulation.reset):
         node.create_service(
             Trigger, f"~/{act.__name__}", partial(_serve, act), callback_group=group
         )
