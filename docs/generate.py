@@ -44,6 +44,7 @@ EXAMPLES = {
     "TORQUE": "0.5",
     "JOINT": "3",
     "BASE_AXIS=RATE": "base_x=1e-5",
+    "BASE_AXIS=FIELD": "base_x=1e-6",
     "JOINT=TORQUE": "3=20",
     "SECONDS": "1.5",
     "AXIS=FACTOR": "all=0.99",

@@ -28,10 +28,9 @@ from space_robot_msgs_py.simulated_time import tick_from
 from space_robot_sim.actuators.actuators import ActuatorSettings
 from space_robot_sim.environment.captures import Captures
 from space_robot_sim.environment.disturbance_table import JSON
-from space_robot_sim.environment.environment import EnvironmentSettings
+from space_robot_sim.environment.environment import EnvironmentSettings, with_payload
 from space_robot_sim.environment.events import Event, named_targets, parse_events
-from space_robot_sim.environment.orbit_settings import OrbitSettings
-from space_robot_sim.environment.payload import with_payload
+from space_robot_sim.environment.orbit import OrbitSettings
 from space_robot_sim.plant.settings import PlantNodeSettings
 
 from ..flight.start_step import StartStep

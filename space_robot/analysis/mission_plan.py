@@ -21,7 +21,7 @@ from space_robot_model.hardware.base_actuators import BaseActuatorSettings
 from space_robot_model.robot import Robot
 from space_robot_msgs_py.config.installation import config_directory
 from space_robot_msgs_py.errors import InputError
-from space_robot_sim.environment.orbit_settings import OrbitSettings
+from space_robot_sim.environment.orbit import OrbitSettings
 
 from ..flight.mission_demand import PieceDemand, SourceDemand, excess, mission_demand
 from .joint_margins import joint_margins

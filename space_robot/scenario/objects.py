@@ -27,7 +27,7 @@ from space_robot_msgs_py.config.validation import StrictModel, validate
 from space_robot_sim.actuators.actuators import ActuatorSettings
 from space_robot_sim.environment.environment import EnvironmentSettings
 from space_robot_sim.environment.events import Capture, Release
-from space_robot_sim.environment.orbit_settings import OrbitSettings
+from space_robot_sim.environment.orbit import OrbitSettings
 
 from .disturbances import as_disturbance
 

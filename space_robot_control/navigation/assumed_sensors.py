@@ -7,17 +7,16 @@ from collections.abc import Mapping
 from typing import Any
 
 from space_robot_model.elementary.matrices import norm
-from space_robot_model.hardware.encoders import EncoderSettings
-from space_robot_model.hardware.gyro import GyroSettings
-from space_robot_model.hardware.sensors import SensorSettings
-from space_robot_model.hardware.star_tracker import StarTrackerSettings
-from space_robot_msgs_py.config.files import named_file, node_parameters
-from space_robot_msgs_py.config.validation import validate
+from space_robot_model.hardware.sensors import (
+    EncoderSettings,
+    GyroSettings,
+    SensorSettings,
+    StarTrackerSettings,
+)
+from space_robot_model.hardware.sheets import read_sheet
 
 from .settings import NavigationFilterSettings
 
-OWNER = "plant"
-"""Node whose parameters are in the sensors' files."""
 LEAST_ANGLE = 1e-7
 """rad; no tracker is assumed to be better, for nothing else in the filter is that exact."""
 LEAST = 1e-9
@@ -53,20 +52,8 @@ def completed(
     lacking = [name for name, value in numbers.items() if not _is_given(name, value)]
     if not lacking:
         return settings
-    assumed = assumed_numbers(read_sensors(sensors), period)
+    assumed = assumed_numbers(read_sheet(SensorSettings, "sensors", sensors), period)
     return settings.model_copy(update={name: assumed[name] for name in lacking})
-
-
-def read_sensors(name: str) -> SensorSettings:
-    """Read the sensors of a file of config/sensors, or at a path.
-
-    Raises:
-        InputError: there is no such file, or it is wrong.
-    """
-    path = named_file("sensors", name)
-    tree = node_parameters(path, OWNER)
-    own = {key: tree[key] for key in SensorSettings.model_fields if key in tree}
-    return validate(SensorSettings, own, str(path))
 
 
 def assumed_numbers(sensors: SensorSettings, period: float) -> Mapping[str, Any]:

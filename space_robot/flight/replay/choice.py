@@ -9,7 +9,7 @@ from typing import Any
 
 import yaml
 
-from space_robot_control.allocation.assumed_actuators import OWNER, assumed_actuators
+from space_robot_control.allocation.assumed_actuators import assumed_actuators
 from space_robot_control.controller.gains import (
     build_law,
     build_laws,
@@ -162,7 +162,7 @@ class ControllerChoice:
             return {}
         name = Path(str(flown.get("actuators", ""))).stem
         path = self._folder / f"actuators_{name if is_plain(name) else 'recorded'}.yaml"
-        _write(path, {f"{OWNER}_node": {"ros__parameters": content}})
+        _write(path, {"plant_node": {"ros__parameters": content}})
         return {"actuators": str(path)}
 
     def _gains(self, of_laws: Mapping[str, Tree]) -> dict[str, Any]:

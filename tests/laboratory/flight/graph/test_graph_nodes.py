@@ -23,7 +23,7 @@ from space_robot_msgs_py.ros.process import set_defaults
 from space_robot_msgs_py.samples import Timebase
 from space_robot_msgs_py.wire.telemetry import ClockCodec
 from space_robot_msgs_py.wire.viewers import no_markers
-from space_robot_sim.plant.run_control import PAUSED
+from space_robot_sim.plant.pacing import PAUSED
 
 set_defaults()
 rclpy = pytest.importorskip("rclpy")

@@ -1,4 +1,4 @@
-"""The gears of a plant's joints, put into its model, its friction and its state."""
+"""Wheels and gears of a plant, put into its model, its friction and its state."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from space_robot_model.dynamics.model import Model
+from space_robot_model.hardware.wheels import WheelSettings
 from space_robot_model.robot import Robot
 from space_robot_model.robot.gears import flexible_model, geared_joints
 from space_robot_msgs_py.compiled.records import assign
@@ -18,6 +19,30 @@ from space_robot_msgs_py.errors import InputError
 from ..environment.friction import Friction
 
 Array = NDArray[np.float64]
+
+
+def mount_wheels(
+    wheels: WheelSettings, model: Model, friction: Friction, velocities: Array
+) -> None:
+    """Mount ``wheels`` on a plant's base, with their velocities at tick 0.
+
+    Args:
+        wheels: which fit the base.
+        model: of the plant's robot.
+        friction: in which that of the wheels is put.
+        velocities: (MOST_WHEELS,) of the wheels in the plant's state, rad/s.
+    """
+    count = wheels.count
+    if not count:
+        return
+    assign(model, wheel_count=count)
+    model.wheel_axis[:count] = wheels.unit_axes
+    model.wheel_inertia[:count] = wheels.values("rotor_inertia")
+    rows = slice(int(friction.count), int(friction.count) + count)
+    assign(friction, count=rows.stop)
+    friction.coulomb[rows] = wheels.values("coulomb")
+    friction.viscous[rows] = wheels.values("viscous")
+    velocities[:count] = wheels.values("initial_speed")
 
 
 STABLE = 2.61
