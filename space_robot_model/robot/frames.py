@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..elementary.sine import sines_cosines
+from ..elementary.functions import sines_cosines
 from .robot import Robot
 
 Array = NDArray[np.float64]

@@ -14,7 +14,7 @@ from space_robot_msgs_py.topics import INERTIAL_FRAME
 from space_robot_msgs_py.wire.poses import POSE
 from space_robot_msgs_py.wire.tf import Frame
 
-from ..elementary.sine import sines_cosines
+from ..elementary.functions import sines_cosines
 from .frame_names import frame_names
 from .robot import Robot
 from .transforms import Transform, joint_transforms, tool_transforms

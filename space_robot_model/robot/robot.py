@@ -19,7 +19,7 @@ from space_robot_msgs_py.topics import BASE_AXES
 
 from ..dynamics.model import Model
 from ..elementary.matrices import product
-from ..elementary.series import plain_sin_cos
+from ..elementary.rotations import plain_sin_cos
 from .file import _RobotDocument
 from .inertia import inertia_elements, inertia_tensor
 from .numbers import Document, are_numbers, numbers_of

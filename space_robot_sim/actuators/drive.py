@@ -22,7 +22,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from space_robot_model.elementary.steps import in_steps
+from space_robot_model.elementary.functions import in_steps
 from space_robot_model.hardware.drives import DriveSettings
 from space_robot_model.hardware.per_axis import per_axis
 from space_robot_msgs_py.compiled.kernels import kernel

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from space_robot_model.dynamics.algebra import Vector, add, dot, scale, store, subtract, vector
-from space_robot_model.elementary.series import plain_sin_cos
-from space_robot_model.elementary.sine import sin_cos
+from space_robot_model.elementary.functions import sin_cos
+from space_robot_model.elementary.rotations import plain_sin_cos
 from space_robot_model.orbit.elements import EARTH_RADIUS, TO_RAD, state_of
 from space_robot_msgs_py.compiled.kernels import kernel, subroutine
 from space_robot_msgs_py.compiled.lanes import where

@@ -51,7 +51,7 @@ class Spring(NamedTuple):
 
 
 class Gear(NamedTuple):
-    """Drive of a joint with a motor on the parent, a gear and a spring (dynamics.rotors)."""
+    """Drive of a joint with a motor on the parent, a gear and a spring (dynamics.kinematics)."""
 
     rotor_inertia: float
     """Inertia of the rotor about its axis, kg m2; its mass and static inertia are the parent's."""

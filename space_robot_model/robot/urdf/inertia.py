@@ -52,7 +52,7 @@ def nearest_inertia(inertia: Array) -> Array | None:
     inequalities for physically consistent inertial parameter identification). The nearest such
     matrix has the negative eigenvalues raised to 0 (Higham 1988), here to a little above.
     """
-    from ...elementary.symmetric import principal_axes  # numba: slow to import
+    from ...elementary.linear_algebra import principal_axes  # numba: slow to import
 
     moments, axes = principal_axes(inertia)
     second = 0.5 * np.sum(moments) - moments
@@ -78,7 +78,7 @@ def solid_inertia(mass: float, visuals: tuple[Visual, ...]) -> tuple[Array, str]
             turn = visual.rotation
             inertia: Array = rotate_tensor(turn, np.diag(_solid(mass, visual.shape, visual.size)))
             return inertia, f"the solid {visual.shape} of its visual"
-    from ...elementary.exponential import exp, log  # slow to import
+    from ...elementary.functions import exp, log  # slow to import
 
     radius = exp(log(3.0 * mass / (4.0 * math.pi * SOLID)) / 3.0)
     ball = _solid(mass, "sphere", (radius,))
