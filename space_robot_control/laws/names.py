@@ -53,11 +53,7 @@ def laws() -> dict[str, type[ControlLaw]]:
 
 @explained_by("own-law")
 def find_law(name: str) -> type[ControlLaw]:
-    """Return the law class by name, by ``path/file.py:Class``, or by ``module:Class``.
-
-    Raises:
-        InputError: there is no such law.
-    """
+    """Return the law class by name, by ``path/file.py:Class``, or by ``module:Class``."""
     if name in laws():
         return laws()[name]
     if name.endswith(ENDING):
@@ -85,12 +81,7 @@ def law_file(name: str) -> Path | None:
 
 
 def import_file(path: Path) -> ModuleType:
-    """Import a Python file, once per process.
-
-    Raises:
-        InputError: there is no such file.
-        Exception: whatever its code raises.
-    """
+    """Import a Python file, once per process; its code may raise anything."""
     check_file(path)
     digest = hashlib.sha256(str(path.resolve()).encode()).hexdigest()[:12]
     name = f"{path.stem}_{digest}"
@@ -178,40 +169,17 @@ def is_plain(name: str) -> bool:
 
 
 def require_shipped_file(what: str, name: str, where: str = "bag") -> None:
-    """Check that a name from an untrusted source refers to a shipped file.
-
-    Args:
-        what: kind of file, for the error.
-        name: to be checked.
-        where: source of the name, for the error.
-
-    Raises:
-        NotTrustedError: it is a path.
-    """
+    """Raise `NotTrustedError` for a file's name that is a path; ``what`` is the kind of file."""
     if not is_plain(name):
         raise NotTrustedError(
-            f"the {where} refers to a file as its {what}, {_shortened(name)}: read only with "
-            "--trust"
+            f"the {where} refers to a file as its {what}, {short(name)}: read only with --trust"
         )
 
 
 def require_shipped_law(name: str, where: str = "bag") -> None:
-    """Check that a law's name from an untrusted source is that of a shipped law.
-
-    Args:
-        name: of the law.
-        where: source of the name, for the error.
-
-    Raises:
-        NotTrustedError: it is not the name of a shipped law.
-    """
+    """Raise `NotTrustedError` for a law's name that is not that of a shipped law."""
     if name not in laws():
         raise NotTrustedError(
-            f"the {where} uses the law {_shortened(name)}, which is not a shipped one: --trust "
+            f"the {where} uses the law {short(name)}, which is not a shipped one: --trust "
             "imports a module:Class or file.py:Class, which runs its code"
         )
-
-
-def _shortened(name: str) -> str:
-    text = repr(name)
-    return text if len(text) <= 80 else f"{text[:77]}..."

@@ -69,6 +69,20 @@ def cross(a: Vector, b: Vector) -> Vector:
 
 
 @subroutine
+def combine(x: Vector, y: Vector, z: Vector, a: float, b: float, c: float) -> Vector:
+    """Return ``a x + b y + c z``."""
+    return add(add(scale(x, a), scale(y, b)), scale(z, c))
+
+
+@subroutine
+def rotate_axes(x: Vector, y: Vector, z: Vector, rotation: Array) -> tuple[Vector, Vector, Vector]:
+    """Return the axes of a frame with a ``rotation`` (9,), row by row, relative to x, y, z."""
+    e = rotation
+    first, second = combine(x, y, z, e[0], e[3], e[6]), combine(x, y, z, e[1], e[4], e[7])
+    return first, second, combine(x, y, z, e[2], e[5], e[8])
+
+
+@subroutine
 def symmetric(row: Array) -> Symmetric:
     """Return the six numbers of ``row``."""
     return row[0], row[1], row[2], row[3], row[4], row[5]

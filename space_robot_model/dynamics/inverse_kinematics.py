@@ -142,7 +142,7 @@ class FreeBase(Record):
 
 
 @subroutine
-def halves(stage: int) -> int:
+def half_steps(stage: int) -> int:
     """Return how many half steps a stage of Runge and Kutta's method is ahead."""
     return (stage + 1) // 2
 
@@ -164,12 +164,12 @@ def free_attitude_into(
     axes, origin = np.eye(3), np.zeros(3)
     for k in range(1, len(out)):
         for stage in range(4):
-            row = 2 * (k - 1) + halves(stage)
+            row = 2 * (k - 1) + half_steps(stage)
             _begin_stage(stage, spacing, out[k - 1], work)
             tool_kinematics_into(model, work.quaternion, positions[row], 0, axes, origin, work.tool)
             for j in range(rates.shape[1]):
                 work.rates[stage, j] = rates[row, j]
-            _turn(stage, work)
+            _fill_attitude_rate(stage, work)
         _end_step(spacing, out[k - 1], out[k], work)
 
 
@@ -211,8 +211,8 @@ def follow_free_path_into(
     wanted, scratch, largest = np.zeros(rows), np.zeros((6, 7)), 0.0
     for k in range(1, len(joints)):
         for stage in range(4):
-            row = 2 * (k - 1) + halves(stage)
-            part = 0.5 * spacing * halves(stage)
+            row = 2 * (k - 1) + half_steps(stage)
+            part = 0.5 * spacing * half_steps(stage)
             for j in range(n):
                 work.joints[j] = joints[k - 1, j]
                 if stage:
@@ -229,7 +229,7 @@ def follow_free_path_into(
                     largest = abs(wanted[i])
                 wanted[i] = twists[row, i] + GAIN * wanted[i]
             least_squares_into(tool.free[:rows], wanted, scratch, work.rates[stage])
-            _turn(stage, work)
+            _fill_attitude_rate(stage, work)
         for j in range(n):
             total = work.rates[0, j] + 2.0 * work.rates[1, j]
             total += 2.0 * work.rates[2, j] + work.rates[3, j]
@@ -240,7 +240,7 @@ def follow_free_path_into(
 
 @subroutine
 def _begin_stage(stage: int, spacing: float, before: Array, work: FreeBase) -> None:
-    part = 0.5 * spacing * halves(stage)
+    part = 0.5 * spacing * half_steps(stage)
     for i in range(4):
         work.quaternion[i] = before[i]
         if stage:
@@ -249,7 +249,7 @@ def _begin_stage(stage: int, spacing: float, before: Array, work: FreeBase) -> N
 
 
 @subroutine
-def _turn(stage: int, work: FreeBase) -> None:
+def _fill_attitude_rate(stage: int, work: FreeBase) -> None:
     for i in range(3):
         work.omega[i] = 0.0
         for j in range(work.rates.shape[1]):

@@ -14,10 +14,12 @@ from .algebra import (
     Symmetric,
     Vector,
     add,
+    combine,
     cross,
     dot,
     load_frame,
     load_motion,
+    rotate_axes,
     scale,
     store,
     store_frame,
@@ -58,13 +60,9 @@ def forward_kinematics(model: Model, quaternion: Array, joint_positions: Array, 
         x = (axes[0], axes[3], axes[6])
         y = (axes[1], axes[4], axes[7])
         z = (axes[2], axes[5], axes[8])
-        e, offset, motion = model.rotation[j], model.offset[j], data.motion[j + 1]
-        x, y, z = (
-            _combined(x, y, z, e[0], e[3], e[6]),
-            _combined(x, y, z, e[1], e[4], e[7]),
-            _combined(x, y, z, e[2], e[5], e[8]),
-        )
-        joint = add(joint, _combined(x, y, z, offset[0], offset[1], offset[2]))
+        offset, motion = model.offset[j], data.motion[j + 1]
+        x, y, z = rotate_axes(x, y, z, model.rotation[j])
+        joint = add(joint, combine(x, y, z, offset[0], offset[1], offset[2]))
         if uniform(model.is_prismatic[j]) == 0.0:
             ct, st = data.turn[j, 0], data.turn[j, 1]
             x, y = add(scale(x, ct), scale(y, st)), subtract(scale(y, ct), scale(x, st))
@@ -77,12 +75,6 @@ def forward_kinematics(model: Model, quaternion: Array, joint_positions: Array, 
         axes = (x[0], y[0], z[0], x[1], y[1], z[1], x[2], y[2], z[2])
         store_frame(axes, joint, data.frame[j + 1])
     _place(model, data)
-
-
-@subroutine
-def _combined(x: Vector, y: Vector, z: Vector, a: float, b: float, c: float) -> Vector:
-    """Return ``a x + b y + c z``."""
-    return add(add(scale(x, a), scale(y, b)), scale(z, c))
 
 
 @subroutine

@@ -51,6 +51,7 @@ from .algebra import (
     add,
     cross,
     dot,
+    rotate_axes,
     scale,
     store,
     subtract,
@@ -231,13 +232,9 @@ def vectors_into(model: Model, quaternion: Array, joint_positions: Array, out: R
         for c in range(3):
             out.axes[0, 3 * k + c] = out.vectors[c, k] = out.rotation[c, k]
     for j in range(whole(model.joint_count)):
-        parent, e = out.axes[whole(model.parent[j])], model.rotation[j]
+        parent = out.axes[whole(model.parent[j])]
         x, y, z = vector(parent, 0), vector(parent, 3), vector(parent, 6)
-        x, y, z = (
-            add(add(scale(x, e[0]), scale(y, e[3])), scale(z, e[6])),
-            add(add(scale(x, e[1]), scale(y, e[4])), scale(z, e[7])),
-            add(add(scale(x, e[2]), scale(y, e[5])), scale(z, e[8])),
-        )
+        x, y, z = rotate_axes(x, y, z, model.rotation[j])
         if uniform(model.is_prismatic[j]) == 0.0:
             st, ct = sin_cos(joint_positions[j])
             x, y = add(scale(x, ct), scale(y, st)), subtract(scale(y, ct), scale(x, st))

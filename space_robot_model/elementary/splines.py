@@ -5,8 +5,6 @@ SciPy solves for the rates with LAPACK, whose sums differ between processors.
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -15,52 +13,14 @@ from space_robot_msgs_py.compiled.kernels import kernel
 Array = NDArray[np.float64]
 
 
-@kernel
-def spline_rates_into(times: Array, values: Array, rates: Array, work: Array) -> None:
-    """Fill the inner rows of ``rates`` so that the second derivative is continuous.
-
-    By Thomas' elimination of the tridiagonal system (de Boor, A Practical Guide to Splines, IV).
-
-    Args:
-        times: (K,) s, rising.
-        values: (K, D) at these times.
-        rates: (K, D); the first and the last row are given.
-        work: (K,) scratch.
-    """
-    last = len(times) - 1
-    for k in range(1, last):
-        before, after = 1.0 / (times[k] - times[k - 1]), 1.0 / (times[k + 1] - times[k])
-        pivot = 2.0 * (before + after) - before * work[k - 1] if k > 1 else 2.0 * (before + after)
-        work[k] = after / pivot
-        for d in range(values.shape[1]):
-            slope = before * before * (values[k, d] - values[k - 1, d])
-            slope += after * after * (values[k + 1, d] - values[k, d])
-            rates[k, d] = (3.0 * slope - before * rates[k - 1, d]) / pivot
-    for k in range(last - 1, 0, -1):
-        for d in range(values.shape[1]):
-            rates[k, d] -= work[k] * rates[k + 1, d]
-
-
-class Places(NamedTuple):
-    """Where times (T,) are among the knots of a spline; outside of them: at the nearer end."""
-
-    piece: NDArray[np.intp]
-    """(T,) number of the knot before."""
-    span: Array
-    """(T, 1) s, between the knots before and after."""
-    share: Array
-    """(T, 1) of the span that has passed."""
-    is_outside: NDArray[np.bool_]
-    """(T,) whether the time is before the first knot or after the last."""
-
-
-def places(knots: Array, time: Array) -> Places:
-    """Return where times (T,) are among ``knots`` (K,), rising, at least two."""
+def _locate(knots: Array, time: Array) -> tuple[NDArray[np.intp], Array, Array, NDArray[np.bool_]]:
+    # knot before each time, the span to the next (T, 1), the share of it that has passed, and
+    # whether the time is outside: then it counts as the nearer end
     inside = np.clip(time, knots[0], knots[-1])
     k = np.clip(np.searchsorted(knots, inside, side="right") - 1, 0, len(knots) - 2)
     span = (knots[k + 1] - knots[k])[:, np.newaxis]
     share = (inside - knots[k])[:, np.newaxis] / span
-    return Places(k, span, share, (time < knots[0]) | (time > knots[-1]))
+    return k, span, share, (time < knots[0]) | (time > knots[-1])
 
 
 class CubicSpline:
@@ -84,14 +44,14 @@ class CubicSpline:
         self.times, self.values = times, np.ascontiguousarray(values)
         self.rates = np.empty_like(self.values)
         self.rates[0], self.rates[-1] = first_rate, last_rate
-        spline_rates_into(self.times, self.values, self.rates, np.zeros(len(times)))
+        _fill_rates(self.times, self.values, self.rates, np.zeros(len(times)))
 
     def at(self, time: Array) -> Array:
         """Return (T, 3, D): value, rate (1/s) and second derivative (1/s2).
 
         Outside its times the spline is at rest at the nearer end.
         """
-        k, span, u, is_outside = places(self.times, time)
+        k, span, u, is_outside = _locate(self.times, time)
         first, rise = self.values[k], self.values[k + 1] - self.values[k]
         m0, m1 = self.rates[k] * span, self.rates[k + 1] * span
         square, cube = 3.0 * rise - 2.0 * m0 - m1, m0 + m1 - 2.0 * rise
@@ -101,6 +61,24 @@ class CubicSpline:
         rows[:, 2] = (2.0 * square + u * 6.0 * cube) / (span * span)
         rows[is_outside, 1:] = 0.0
         return rows
+
+
+@kernel
+def _fill_rates(times: Array, values: Array, rates: Array, work: Array) -> None:
+    # Thomas' elimination of the tridiagonal system of inner rates with which the second derivative
+    # is continuous (de Boor, A Practical Guide to Splines, IV)
+    last = len(times) - 1
+    for k in range(1, last):
+        before, after = 1.0 / (times[k] - times[k - 1]), 1.0 / (times[k + 1] - times[k])
+        pivot = 2.0 * (before + after) - before * work[k - 1] if k > 1 else 2.0 * (before + after)
+        work[k] = after / pivot
+        for d in range(values.shape[1]):
+            slope = before * before * (values[k, d] - values[k - 1, d])
+            slope += after * after * (values[k + 1, d] - values[k, d])
+            rates[k, d] = (3.0 * slope - before * rates[k - 1, d]) / pivot
+    for k in range(last - 1, 0, -1):
+        for d in range(values.shape[1]):
+            rates[k, d] -= work[k] * rates[k + 1, d]
 
 
 class QuinticSpline:
@@ -120,7 +98,7 @@ class QuinticSpline:
 
         Outside its times the spline is at rest at the nearer end.
         """
-        k, h, u, is_outside = places(self.times, time)
+        k, h, u, is_outside = _locate(self.times, time)
         first, last = self.states[k], self.states[k + 1]
         c0, c1, c2 = first[:, 0], first[:, 1] * h, 0.5 * first[:, 2] * h * h
         # what is left of the values at the end, and of h times and h^2 times their derivatives
