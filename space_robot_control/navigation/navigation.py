@@ -21,8 +21,16 @@ from .attitude_filter import (
     propagate,
     start,
 )
-from .joint_filter import JointFilter, begin_joints, filter_joints, tune
-from .low_pass import LowPass, begin_low_pass, low_pass_weight, pass_low
+from .rate_filters import (
+    JointFilter,
+    LowPass,
+    begin_joints,
+    begin_low_pass,
+    filter_joints,
+    low_pass_weight,
+    pass_low,
+    tune,
+)
 from .settings import NavigationFilterSettings
 
 Array = NDArray[np.float64]
@@ -95,7 +103,7 @@ class Navigation(Record):
 def navigate(navigation: Navigation, tick: int, measured: State, period: float) -> None:
     """Estimate the state at ``tick`` from ``measured`` into ``navigation.estimate``.
 
-    The measured state is usable, see `..kernels.status_of`: others must not come here. Over states
+    The caller has checked that the measured state is usable (`status_of`). Over states
     that were lost (up to `LONGEST_BRIDGE`) the rates are interpolated; after more of them the
     attitude begins anew, and after a jump back in time everything does.
     """

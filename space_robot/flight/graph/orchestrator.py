@@ -13,7 +13,7 @@ from typing import Any
 import click
 import yaml
 
-from space_robot_control.allocation.assumed_actuators import OWNER
+from space_robot_control.allocation.settings import OWNER
 from space_robot_model.robot.find import robot_files
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.bag.flight_log import FlightLog

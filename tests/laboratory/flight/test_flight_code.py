@@ -168,4 +168,4 @@ def test_one_that_falls_silent_ends_the_flight(monkeypatch: pytest.MonkeyPatch) 
         computer = FlightComputer(exported, "127.0.0.1", server.getsockname()[1])
         thread.join()
         with pytest.raises(FlightError, match="the flight computer does not answer"):
-            computer.judge(0)
+            computer.judge_stamp(0)

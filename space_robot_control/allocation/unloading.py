@@ -1,12 +1,14 @@
-"""Unloading of the wheels by magnetic torquers.
+"""Unloading of the wheels: thrusters in turns, magnetic torquers all the time.
 
-The cross-product law (Camillo & Markley, "Orbit-averaged behavior of magnetic control laws for
-momentum unloading", J. Guidance and Control 3(6), 1980)
+Magnetic torquers follow the cross-product law (Camillo & Markley, "Orbit-averaged behavior of
+magnetic control laws for momentum unloading", J. Guidance and Control 3(6), 1980)
 
     m = k (h x B) / |B|^2        turns the base with    m x B = -k (h - (h . b) b),  b = B / |B|
 
 takes the momentum h across the field from the wheels, with time constant 1/k; along an orbit the
 field turns, and no direction is left out. Beyond the largest dipoles m keeps its direction.
+
+Thrusters begin when a wheel is full beyond a share, and end below another one.
 """
 
 from __future__ import annotations
@@ -14,17 +16,21 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from space_robot_model.dynamics.algebra import Vector, add, cross, dot, scale, store, vector
 from space_robot_model.hardware.magnetic_torquers import MagneticTorquerSettings
 from space_robot_msgs_py.compiled.kernels import kernel
 from space_robot_msgs_py.compiled.records import Record, assign, shaped
 from space_robot_msgs_py.samples import MOST_TORQUERS
 
 from .settings import AllocationSettings
+from .wheels import AssumedWheels, stored_momentum
 
 Array = NDArray[np.float64]
 
 LEAST_FIELD = 1e-10
 """Field below which torquers are left alone, T: 1e-5 of the Earth's in a low orbit."""
+WHEELS_SHARE = 0.5
+"""Share of the wheels' torque available to unloading."""
 
 
 class AssumedTorquers(Record):
@@ -62,30 +68,61 @@ class AssumedTorquers(Record):
 
 
 @kernel
-def dump_momentum(torquers: AssumedTorquers, x: float, y: float, z: float) -> None:
+def dump_momentum(torquers: AssumedTorquers, momentum: Vector) -> None:
     """Write the ``dipole`` of each torquer, and their ``torque``.
 
-    ``x, y, z`` are the momentum of the wheels, N m s, base frame.
+    ``momentum`` is that of the wheels, N m s, base frame.
     """
-    field, torque = torquers.magnetic_field, torquers.torque
-    square = field[0] * field[0] + field[1] * field[1] + field[2] * field[2]
+    field = vector(torquers.magnetic_field, 0)
+    square = dot(field, field)
     rate = torquers.gain / square if square > LEAST_FIELD * LEAST_FIELD else 0.0
-    wanted_x = rate * (y * field[2] - z * field[1])
-    wanted_y = rate * (z * field[0] - x * field[2])
-    wanted_z = rate * (x * field[1] - y * field[0])
+    wanted = scale(cross(momentum, field), rate)
     excess = 1.0
     for k in range(int(torquers.count)):
-        row = torquers.inverse[k]
-        torquers.dipole[k] = row[0] * wanted_x + row[1] * wanted_y + row[2] * wanted_z
+        torquers.dipole[k] = dot(vector(torquers.inverse[k], 0), wanted)
         excess = max(excess, abs(torquers.dipole[k]) / torquers.max_dipole[k])
-    a, b, c = 0.0, 0.0, 0.0
+    total = (0.0, 0.0, 0.0)
     for k in range(int(torquers.count)):
         load = torquers.dipole[k] / torquers.max_dipole[k]
         dipole = load / excess * torquers.max_dipole[k]  # no dipole is above its limit
         torquers.dipole[k] = dipole
-        a += dipole * torquers.axis[k, 0]
-        b += dipole * torquers.axis[k, 1]
-        c += dipole * torquers.axis[k, 2]
-    torque[0] = b * field[2] - c * field[1]
-    torque[1] = c * field[0] - a * field[2]
-    torque[2] = a * field[1] - b * field[0]
+        total = add(total, scale(vector(torquers.axis[k], 0), dipole))
+    store(cross(total, field), torquers.torque, 0)
+
+
+class Unloading(Record):
+    """Settings and state of the unloading by thrusters."""
+
+    above: float = shaped(lambda n: ())
+    """Share of the largest momentum at which unloading begins."""
+    to: float = shaped(lambda n: ())
+    """Share of the largest momentum at which unloading stops."""
+    rate: float = shaped(lambda n: ())
+    """1/s."""
+    is_active: float = shaped(lambda n: ())
+    """0 or 1."""
+
+    @classmethod
+    def build(cls, n: int, settings: AllocationSettings) -> Unloading:
+        """Read the settings."""
+        unloading = cls.allocate(n)
+        above = settings.unload_above if settings.thrusters_unload else np.inf
+        assign(unloading, above=above, to=settings.unload_to, rate=1.0 / settings.unload_time)
+        return unloading
+
+
+@kernel
+def find_unloading(unloading: Unloading, wheels: AssumedWheels, torque: Array) -> None:
+    """Write the unloading ``torque`` (3,) N m for the thrusters, zero if inactive."""
+    momentum, fullest = stored_momentum(wheels), 0.0
+    for k in range(int(wheels.count)):
+        fullest = max(fullest, abs(wheels.momentum[k]) / wheels.max_momentum[k])
+    if fullest > unloading.above:
+        unloading.is_active = 1.0
+    elif fullest < unloading.to:
+        unloading.is_active = 0.0
+    rate, excess = unloading.rate * unloading.is_active, 1.0
+    for k in range(int(wheels.count)):
+        load = abs(dot(vector(wheels.healthy.inverse[k], 0), momentum)) * rate
+        excess = max(excess, load / (WHEELS_SHARE * wheels.max_torque[k]))
+    store(scale(momentum, -rate / excess), torque, 0)

@@ -1,7 +1,11 @@
-"""Supervision of a controller in one record: kernels that answer every state, good or bad.
+"""The tick of a controller: every state is answered, by the law or by a safe command.
 
-They call nothing of Python and know no ROS, so they are what flies, compiled here or as C.
-`.supervisor` explains the modes.
+    stamp --> judge_stamp --> admit_state --> compute_command --> conclude --> command
+                              checks, navigation,   law, transfer,     hold, then
+                              signals               allocation         safe mode
+
+`controller_tick` is the same without the supervision, for loops whose flight ends with a state that
+is not usable: these call `compute_signals` and `compute_command` alone.
 """
 
 from __future__ import annotations
@@ -11,20 +15,24 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from space_robot_model.dynamics.rho_space import force_for
 from space_robot_msgs_py.compiled.kernels import RecordFunction, kernel
+from space_robot_msgs_py.compiled.lanes import uniform
 from space_robot_msgs_py.compiled.records import Block, Record, nested, shaped
 from space_robot_msgs_py.samples import MOST_THRUSTERS, MOST_TORQUERS, MOST_WHEELS, Reference
 from space_robot_msgs_py.wire.stamp_guard import accept
 
 from ..laws.compiled import LawCode
-from .kernels import compute_command
-from .signal_kernels import (
+from .signals import (
     LARGEST,
     NORM_TOLERANCE,
     SINGULAR,
     USABLE,
-    compute_signals_for,
+    compute_signals,
+    compute_signals_as_desired,
+    copy_reference,
     error_eta,
+    torque_from_force,
 )
 from .time_delay_estimation import LONGEST_GAP
 
@@ -91,12 +99,98 @@ class Supervision(Record):
     base's actuators, N m and N."""
 
 
+@kernel
+def controller_tick(
+    block: Block,
+    law: LawCode,
+    allocate: RecordFunction,
+    tick: int,
+    state: Block,
+    reference: Block,
+    torque: Array,
+    period: float,
+) -> int:
+    """Run a whole tick of the controller with a compiled law.
+
+    Args:
+        block: of the `ControllerMemory`.
+        law: a `CompiledLaw.code`.
+        allocate: an `allocation_code`.
+        tick: of the state.
+        state: of a `State`.
+        reference: of a `Reference`.
+        torque: (m+A,) command to be written, if the state is `USABLE`: torque of every axis,
+            N m, then what is asked of each of the base's actuators.
+        period: s.
+
+    Returns:
+        The status of the state, see `compute_signals`.
+    """
+    status: int = compute_signals(
+        block, tick, state, reference, law.h_bar, law.estimate, law.uses_model, period
+    )
+    if status == USABLE:
+        compute_command(block, law, allocate, tick, torque, period)
+    return status
+
+
+@kernel
+def compute_command(
+    block: Block, law: LawCode, allocate: RecordFunction, tick: int, torque: Array, period: float
+) -> None:
+    """Compute the command of a tick from its signals, see `controller_tick`."""
+    signals, memory = block[0].signals, law.memory[0]
+    law.run(signals, law.gains[0], memory, period)
+    if law.adds_inertia:
+        force_for(signals.nominal, memory.u, memory.force, memory.force)
+    apply_transfer(block, tick, memory.force, torque)
+    allocation, axes = block[0].allocation, memory.force.size
+    allocate(allocation, float(tick))
+    for k in range(axes, torque.size):
+        torque[k] = allocation.command[k - axes]
+
+
+@kernel
+def engage(block: Block) -> None:
+    """Let a law, whose memory has been cleared, take over from the applied force."""
+    memory = block[0]
+    memory.signals.n_hat[:] = 0.0
+    memory.transfer_left = -1.0
+
+
+@kernel
+def apply_transfer(block: Block, tick: int, force: Array, torque: Array) -> None:
+    """Write the ``torque`` of a law's ``force`` (m,), which takes over from the one applied before.
+
+    ``F_S + (F_applied - F_S at the takeover) fade``, the fade falling from 1 to 0. At tick 0
+    nothing has been applied, so nothing is taken over. A base that is not controlled gets none.
+    The base's part is what its actuators are asked for.
+    """
+    memory = block[0]
+    if uniform(memory.transfer_left) < 0.0:
+        memory.transfer_left = uniform(memory.transfer_ticks) if tick > 0 else 0.0
+        for i in range(force.size):
+            memory.transfer[i] = memory.signals.applied_force[i] - force[i]
+    fade = uniform(memory.transfer_left) / uniform(memory.transfer_ticks)
+    for i in range(force.size):
+        memory.force[i] = force[i]
+        if fade > 0.0:
+            memory.force[i] += fade * memory.transfer[i]
+    if fade > 0.0:
+        memory.transfer_left -= 1.0
+    torque_from_force(memory.jacobian, memory.force, torque)
+    if uniform(memory.controls_base) == 0.0:
+        for k in range(3):
+            memory.force[k] = torque[k] = 0.0
+    memory.allocation.demand[:] = torque[:3]
+
+
 accept_stamp = kernel(accept)
 """`accept`, compiled."""
 
 
 @kernel
-def judge(block: Block, tick: int) -> int:
+def judge_stamp(block: Block, tick: int) -> int:
     """Return `ANSWERED`, `NEW` or `REFUSED` for a state of ``tick``."""
     supervision = block[0]
     if tick < 0 or tick > LAST_TICK:
@@ -192,8 +286,8 @@ def admit_state(
     is_near = abs(error_eta(desired.quaternion, quaternion)) < least
     if is_near and is_unit(quaternion) and controller[0].controls_base == 1.0:
         return SINGULAR
-    status: int = compute_signals_for(
-        controller, tick, state, desired, h_bar, estimate, uses_model, period
+    status: int = compute_signals_as_desired(
+        controller, tick, state, h_bar, estimate, uses_model, period
     )
     return status_with_reference if status == USABLE else status
 
@@ -220,12 +314,7 @@ def take_reference(
         is_usable = is_usable and abs(reference.joint_velocities[i]) <= LARGEST
         is_usable = is_usable and abs(reference.joint_accelerations[i]) <= LARGEST
     if is_usable:
-        desired.joint_positions[:] = reference.joint_positions
-        desired.joint_velocities[:] = reference.joint_velocities
-        desired.joint_accelerations[:] = reference.joint_accelerations
-        desired.quaternion[:] = reference.quaternion
-        desired.omega_base[:] = reference.omega_base
-        desired.alpha_base[:] = reference.alpha_base
+        copy_reference(reference, desired)
         supervision.has_reference = 1.0
         return USABLE
     desired.joint_velocities[:] = desired.joint_accelerations[:] = 0.0
