@@ -34,18 +34,15 @@ Array = NDArray[np.float64]
 class Allocation(Record):
     """Settings and memory of the allocation."""
 
-    is_used: float = shaped(lambda n: ())
-    """0: the base's actuators are ideal, or there are none."""
+    is_used: float = shaped(lambda n: (), "0: the base's actuators are ideal, or there are none")
     wheels: AssumedWheels = nested(AssumedWheels)
     thrusters: AssumedThrusters = nested(AssumedThrusters)
     torquers: AssumedTorquers = nested(AssumedTorquers)
     unloading: Unloading = nested(Unloading)
-    of_thrusters: Array = shaped(lambda n: (3,))
-    """Torque demanded of the thrusters, N m."""
+    of_thrusters: Array = shaped(lambda n: (3,), "Torque demanded of the thrusters, N m")
     expected: Array = shaped(lambda n: (3,))
     """Torque expected of the thrusters from the present tick to the next, N m."""
-    demand: Array = shaped(lambda n: (3,))
-    """Torque demanded of the base, N m, base frame."""
+    demand: Array = shaped(lambda n: (3,), "Torque demanded of the base, N m, base frame")
     reported_speeds: Array = shaped(lambda n: (MOST_WHEELS,))
     """Speeds of the wheels at the present tick, rad/s."""
     reported_torques: Array = shaped(lambda n: (MOST_WHEELS,))

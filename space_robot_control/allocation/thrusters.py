@@ -55,17 +55,14 @@ class AssumedThrusters(Record):
     """Thrusters of one base as assumed by the flight software."""
 
     count: float = shaped(lambda n: ())
-    period: float = shaped(lambda n: ())
-    """Length of a tick, s."""
-    force: Array = shaped(lambda n: (MOST_THRUSTERS,))
-    """Of each open thruster, N."""
+    period: float = shaped(lambda n: (), "Length of a tick, s")
+    force: Array = shaped(lambda n: (MOST_THRUSTERS,), "Of each open thruster, N")
     wrench: Array = shaped(lambda n: (MOST_THRUSTERS, 6))
     """Of each open thruster: torque about the base's CoM, then its weighed force; N m, base
     frame."""
     shortest: Array = shaped(lambda n: (MOST_THRUSTERS,))
     """Ticks for which a valve stays open, 1 or more."""
-    delay: Array = shaped(lambda n: (MOST_THRUSTERS,))
-    """Ticks from a command to its valve."""
+    delay: Array = shaped(lambda n: (MOST_THRUSTERS,), "Ticks from a command to its valve")
     peak: Array = shaped(lambda n: (2, 3))
     """Largest share of its time for which a thruster is open for a torque of 1 N m about +x, +y,
     +z, and about -x, -y, -z; 1/(N m)."""
@@ -76,32 +73,23 @@ class AssumedThrusters(Record):
     expected: Array = shaped(lambda n: (LONGEST_DELAY, 3))
     """Ring buffer of the torque expected from commands so far, by tick, N m."""
 
-    kind: float = shaped(lambda n: ())
-    """`PWM`, `SIGMA_DELTA` or `SCHMITT`."""
-    slot: float = shaped(lambda n: ())
-    """Ticks from one decision to the next."""
+    kind: float = shaped(lambda n: (), "`PWM`, `SIGMA_DELTA` or `SCHMITT`")
+    slot: float = shaped(lambda n: (), "Ticks from one decision to the next")
     on: float = shaped(lambda n: ())
     """Shortest pulses owed at which the Schmitt trigger opens a thruster."""
-    off: float = shaped(lambda n: ())
-    """Shortest pulses owed at which it closes it."""
-    forget: float = shaped(lambda n: ())
-    """Share of the force owed that is forgotten in a tick."""
-    modulated_at: float = shaped(lambda n: ())
-    """Last tick; -1: none."""
-    slot_left: float = shaped(lambda n: ())
-    """Ticks until the next decision."""
+    off: float = shaped(lambda n: (), "Shortest pulses owed at which it closes it")
+    forget: float = shaped(lambda n: (), "Share of the force owed that is forgotten in a tick")
+    modulated_at: float = shaped(lambda n: (), "Last tick; -1: none")
+    slot_left: float = shaped(lambda n: (), "Ticks until the next decision")
     reach: float = shaped(lambda n: ())
     """Share of the demand that the thrusters can give, at the last decision."""
-    demand: Array = shaped(lambda n: (6,))
-    """N m; see ``wrench``. No force is demanded."""
-    owed: Array = shaped(lambda n: (6,))
-    """e, N m s."""
+    demand: Array = shaped(lambda n: (6,), "N m; see ``wrench``. No force is demanded")
+    owed: Array = shaped(lambda n: (6,), "e, N m s")
     open_for: Array = shaped(lambda n: (MOST_THRUSTERS,))
     """Ticks for which each valve will stay open."""
     impulse: Array = shaped(lambda n: (6,))
     """Scratch: impulse that the pulses under decision are to give, N m s."""
-    pulses: Array = shaped(lambda n: (MOST_THRUSTERS,))
-    """Number of pulses so far."""
+    pulses: Array = shaped(lambda n: (MOST_THRUSTERS,), "Number of pulses so far")
 
     @classmethod
     def build(

@@ -37,18 +37,13 @@ class AssumedTorquers(Record):
     """Magnetic torquers of one base as assumed by the flight software."""
 
     count: float = shaped(lambda n: ())
-    gain: float = shaped(lambda n: ())
-    """k, 1/s."""
-    axis: Array = shaped(lambda n: (MOST_TORQUERS, 3))
-    """Unit vectors, base frame."""
+    gain: float = shaped(lambda n: (), "k, 1/s")
+    axis: Array = shaped(lambda n: (MOST_TORQUERS, 3), "Unit vectors, base frame")
     inverse: Array = shaped(lambda n: (MOST_TORQUERS, 3))
     """Dipole of each torquer by a dipole of the base: pseudo-inverse of the axes; 1."""
-    max_dipole: Array = shaped(lambda n: (MOST_TORQUERS,))
-    """A m2."""
-    magnetic_field: Array = shaped(lambda n: (3,))
-    """As measured at the present tick, T, base frame."""
-    dipole: Array = shaped(lambda n: (MOST_TORQUERS,))
-    """Commanded at the present tick, A m2."""
+    max_dipole: Array = shaped(lambda n: (MOST_TORQUERS,), "A m2")
+    magnetic_field: Array = shaped(lambda n: (3,), "As measured at the present tick, T, base frame")
+    dipole: Array = shaped(lambda n: (MOST_TORQUERS,), "Commanded at the present tick, A m2")
     torque: Array = shaped(lambda n: (3,))
     """On the base, expected of them from the present tick to the next, N m, base frame."""
 
@@ -93,14 +88,10 @@ def dump_momentum(torquers: AssumedTorquers, momentum: Vector) -> None:
 class Unloading(Record):
     """Settings and state of the unloading by thrusters."""
 
-    above: float = shaped(lambda n: ())
-    """Share of the largest momentum at which unloading begins."""
-    to: float = shaped(lambda n: ())
-    """Share of the largest momentum at which unloading stops."""
-    rate: float = shaped(lambda n: ())
-    """1/s."""
-    is_active: float = shaped(lambda n: ())
-    """0 or 1."""
+    above: float = shaped(lambda n: (), "Share of the largest momentum at which unloading begins")
+    to: float = shaped(lambda n: (), "Share of the largest momentum at which unloading stops")
+    rate: float = shaped(lambda n: (), "1/s")
+    is_active: float = shaped(lambda n: (), "0 or 1")
 
     @classmethod
     def build(cls, n: int, settings: AllocationSettings) -> Unloading:

@@ -45,26 +45,21 @@ LEAST_EIGENVALUE = 1e-8
 class WheelSet(Record):
     """A subset of the wheels, with its tables, computed anew when a wheel is excluded."""
 
-    takes_part: Array = shaped(lambda n: (MOST_WHEELS,))
-    """1 for each wheel in the set, else 0."""
+    takes_part: Array = shaped(lambda n: (MOST_WHEELS,), "1 for each wheel in the set, else 0")
     column: Array = shaped(lambda n: (MOST_WHEELS, 3))
     """Axis times full load, N m; 0 for a wheel that takes no part."""
     full_load: Array = shaped(lambda n: (MOST_WHEELS,))
     """Torque in which the load of each wheel is measured, N m."""
-    rank: float = shaped(lambda n: ())
-    """Number of independent axes."""
+    rank: float = shaped(lambda n: (), "Number of independent axes")
     inverse: Array = shaped(lambda n: (MOST_WHEELS, 3))
     """``A^+`` of least ``sum (u_k / full load)^2``; 1."""
-    beyond: Array = shaped(lambda n: (3, 3))
-    """Projector onto the torques that the set cannot give."""
-    pairs: float = shaped(lambda n: ())
-    """Number of rows in use of the following tables."""
+    beyond: Array = shaped(lambda n: (3, 3), "Projector onto the torques that the set cannot give")
+    pairs: float = shaped(lambda n: (), "Number of rows in use of the following tables")
     facet: Array = shaped(lambda n: (MOST_PAIRS, 3))
     """Normal of each facet of the largest torques, over its distance from the origin, 1/(N m)."""
     null: Array = shaped(lambda n: (MOST_WHEELS,))
     """Momenta that cancel one another, the largest part 1; 0 where there is none."""
-    matrix: Array = shaped(lambda n: (3, 3, 3))
-    """Scratch."""
+    matrix: Array = shaped(lambda n: (3, 3, 3), "Scratch")
 
 
 @kernel

@@ -53,18 +53,12 @@ class AssumedWheels(Record):
     """Wheels of one base as assumed by the flight software."""
 
     count: float = shaped(lambda n: ())
-    period: float = shaped(lambda n: ())
-    """Length of a tick, s."""
-    is_least_largest: float = shaped(lambda n: ())
-    """0: they share a torque by the pseudo-inverse."""
-    axis: Array = shaped(lambda n: (MOST_WHEELS, 3))
-    """Unit vectors, base frame."""
-    inertia: Array = shaped(lambda n: (MOST_WHEELS,))
-    """Inertia of each rotor about its axis, kg m2."""
-    max_torque: Array = shaped(lambda n: (MOST_WHEELS,))
-    """N m; inf: no limit."""
-    max_momentum: Array = shaped(lambda n: (MOST_WHEELS,))
-    """N m s; inf: no limit."""
+    period: float = shaped(lambda n: (), "Length of a tick, s")
+    is_least_largest: float = shaped(lambda n: (), "0: they share a torque by the pseudo-inverse")
+    axis: Array = shaped(lambda n: (MOST_WHEELS, 3), "Unit vectors, base frame")
+    inertia: Array = shaped(lambda n: (MOST_WHEELS,), "Inertia of each rotor about its axis, kg m2")
+    max_torque: Array = shaped(lambda n: (MOST_WHEELS,), "N m; inf: no limit")
+    max_momentum: Array = shaped(lambda n: (MOST_WHEELS,), "N m s; inf: no limit")
     momentum: Array = shaped(lambda n: (MOST_WHEELS,))
     """Inertia times speed at the present tick, N m s; 0 for a wheel that has failed."""
     healthy: WheelSet = nested(WheelSet)
@@ -79,24 +73,17 @@ class AssumedWheels(Record):
     """Ticks so far in which the demand was beyond the motors' torques."""
     full_ticks: float = shaped(lambda n: ())
     """Ticks so far in which a wheel would have been sped up beyond its largest momentum."""
-    null_gain: float = shaped(lambda n: ())
-    """1/s; 0: there is no null motion."""
+    null_gain: float = shaped(lambda n: (), "1/s; 0: there is no null motion")
     null_share: float = shaped(lambda n: ())
     """Share of a motor's largest torque available to the null motion."""
-    least_speed: float = shaped(lambda n: ())
-    """rad/s."""
-    c: float = shaped(lambda n: ())
-    """N m s."""
-    stored: Array = shaped(lambda n: (MOST_WHEELS,))
-    """``A^+ A h``, N m s."""
-    null_torque: Array = shaped(lambda n: (MOST_WHEELS,))
-    """u of the null motion, N m."""
+    least_speed: float = shaped(lambda n: (), "rad/s")
+    c: float = shaped(lambda n: (), "N m s")
+    stored: Array = shaped(lambda n: (MOST_WHEELS,), "``A^+ A h``, N m s")
+    null_torque: Array = shaped(lambda n: (MOST_WHEELS,), "u of the null motion, N m")
     failure_ticks: float = shaped(lambda n: ())
     """Ticks of silence in a row until a wheel has failed; 0: never."""
-    asked_at: float = shaped(lambda n: ())
-    """Tick of the command `asked`; -1: never."""
-    asked: Array = shaped(lambda n: (MOST_WHEELS,))
-    """Motors' torques at that tick, N m."""
+    asked_at: float = shaped(lambda n: (), "Tick of the command `asked`; -1: never")
+    asked: Array = shaped(lambda n: (MOST_WHEELS,), "Motors' torques at that tick, N m")
     silent_ticks: Array = shaped(lambda n: (MOST_WHEELS,))
     """Consecutive silent ticks, of the ticks with a sufficient command."""
 
@@ -168,14 +155,12 @@ def _share_torque(wheels: AssumedWheels, demand: Vector) -> None:
     else:
         least_squares(wheels.healthy, count, wanted, torque)
     wheels.is_scaled = 1.0 if scale_down(wheels, torque) else 0.0
-    if not _is_any_full(wheels):
-        wheels.scaled_ticks += wheels.is_scaled
-        return
-    wheels.full_ticks += 1.0
     free = wheels.free
     for k in range(count):
         free.takes_part[k] = wheels.healthy.takes_part[k]
-    while _take_out_full(wheels):
+    is_full = _take_out_full(wheels)
+    wheels.full_ticks += 1.0 if is_full else 0.0
+    while is_full:
         tabulate(free, wheels.axis, count)
         left = wanted
         for k in range(count):
@@ -186,6 +171,7 @@ def _share_torque(wheels: AssumedWheels, demand: Vector) -> None:
                 torque[k] = dot(vector(free.inverse[k], 0), left)
         if scale_down(wheels, torque):
             wheels.is_scaled = 1.0
+        is_full = _take_out_full(wheels)
     wheels.scaled_ticks += wheels.is_scaled
 
 
@@ -217,15 +203,6 @@ def _momentum_room(wheels: AssumedWheels, k: int, side: float) -> float:
     left = (FULL * wheels.max_momentum[k] - side * wheels.momentum[k]) / wheels.period
     room: float = max(left, 0.0)
     return room
-
-
-@subroutine
-def _is_any_full(wheels: AssumedWheels) -> bool:
-    for k in range(int(wheels.count)):
-        side = 1.0 if wheels.torque[k] > 0.0 else -1.0
-        if abs(wheels.torque[k]) > _momentum_room(wheels, k, side):
-            return True
-    return False
 
 
 @subroutine
@@ -330,27 +307,22 @@ def observe_wheels(wheels: AssumedWheels, tick: float, speeds: Array, torques: A
             heard += 0.0 if is_silent else 1.0
     if heard == 0.0 and silent > 1.0:
         return
-    is_any = False
+    has_failed = False
     for k in range(count):
-        if not _is_asked(wheels, k):
-            continue
-        if abs(torques[k]) >= LEAST_GIVEN * abs(wheels.asked[k]):
-            wheels.silent_ticks[k] = 0.0
-            continue
-        wheels.silent_ticks[k] += 1.0
-        if wheels.silent_ticks[k] >= wheels.failure_ticks:
-            healthy.takes_part[k] = 0.0
-            wheels.momentum[k] = 0.0
-            is_any = True
-    if is_any:
+        if _is_asked(wheels, k):
+            is_silent = abs(torques[k]) < LEAST_GIVEN * abs(wheels.asked[k])
+            wheels.silent_ticks[k] = wheels.silent_ticks[k] + 1.0 if is_silent else 0.0
+            if wheels.silent_ticks[k] >= wheels.failure_ticks:
+                healthy.takes_part[k] = 0.0
+                wheels.momentum[k] = 0.0
+                has_failed = True
+    if has_failed:
         tabulate(healthy, wheels.axis, count)
 
 
 @subroutine
 def _is_asked(wheels: AssumedWheels, k: int) -> bool:
     """Return True if a healthy wheel below its largest momentum was commanded a torque."""
-    return bool(
-        wheels.healthy.takes_part[k] == 1.0
-        and abs(wheels.asked[k]) > LEAST_ASKED * wheels.healthy.full_load[k]
-        and abs(wheels.momentum[k]) < (2.0 * FULL - 1.0) * wheels.max_momentum[k]
-    )
+    is_commanded = abs(wheels.asked[k]) > LEAST_ASKED * wheels.healthy.full_load[k]
+    is_below = abs(wheels.momentum[k]) < (2.0 * FULL - 1.0) * wheels.max_momentum[k]
+    return bool(wheels.healthy.takes_part[k] == 1.0 and is_commanded and is_below)

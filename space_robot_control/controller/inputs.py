@@ -186,19 +186,12 @@ class ReferenceInput:
         """When the wait began that has not ended well yet; 0: none."""
         codec, buffer = ReferenceCodec(robot.joint_names, timebase), self.buffer
         group = PolledCallbackGroup()
-        self._halves = (
-            _Half(
-                RawSubscription(node, topics.REFERENCE_JOINTS, group, QUEUE_DEPTH),
-                codec.decode_joints,
-                buffer.add_joints,
-            ),
-            _Half(
-                RawSubscription(node, topics.REFERENCE_BASE, group, QUEUE_DEPTH),
-                codec.decode_base,
-                buffer.add_base,
-            ),
+        self.inputs = tuple(
+            RawSubscription(node, topic, group, QUEUE_DEPTH)
+            for topic in (topics.REFERENCE_JOINTS, topics.REFERENCE_BASE)
         )
-        self.inputs = tuple(half.input for half in self._halves)
+        decoders = (codec.decode_joints, buffer.add_joints), (codec.decode_base, buffer.add_base)
+        self._halves = [(entry, *pair) for entry, pair in zip(self.inputs, decoders, strict=True)]
         self.wait = Wait(TIMEOUT_S, self.inputs)
         """The wait while `at` has no row."""
 
@@ -240,7 +233,25 @@ class ReferenceInput:
 
     def take(self) -> bool:
         """Take the next valid message of each half; return whether there was any."""
-        return any([half.take(self.rejected) for half in self._halves])
+        return any([self._take(*half) for half in self._halves])
+
+    def _take(
+        self,
+        entry: RawSubscription,
+        decode: Callable[[bytes], tuple[int, Array]],
+        add: Callable[[int, Array], None],
+    ) -> bool:
+        for _ in range(MOST_AT_ONCE):
+            data = entry.take()
+            if data is None:
+                return False
+            try:
+                add(*decode(data))
+            except MessageError as error:
+                self.rejected[f"reference: {error.reason}"] += 1
+                continue
+            return True
+        return False
 
     def _look_for(self, tick: int) -> bool:
         """Take messages until ``tick`` is covered or the timeout is over."""
@@ -255,30 +266,4 @@ class ReferenceInput:
                 break
         if now >= self._until + (DRAIN_S if has_come else 0.0):
             self._until = 0.0
-        return False
-
-
-class _Half:
-    """One of the two topics."""
-
-    def __init__(
-        self,
-        source: RawSubscription,
-        decode: Callable[[bytes], tuple[int, Array]],
-        add: Callable[[int, Array], None],
-    ) -> None:
-        self.input, self._decode, self._add = source, decode, add
-
-    def take(self, rejected: Counter[str]) -> bool:
-        """Take the next good message, if there is one."""
-        for _ in range(MOST_AT_ONCE):
-            data = self.input.take()
-            if data is None:
-                return False
-            try:
-                self._add(*self._decode(data))
-            except MessageError as error:
-                rejected[f"reference: {error.reason}"] += 1
-                continue
-            return True
         return False

@@ -59,34 +59,26 @@ class ControllerMemory(Record):
     signals: Signals = nested(Signals)
     """Signals of the last tick."""
     pair: TimeDelayPair = nested(TimeDelayPair)
-    jacobian: Array = shaped(lambda n: (3, 3))
-    """J0 of q_e."""
-    last_jacobian_inverse: Array = shaped(lambda n: (3, 3))
-    """J0^-1 of the last tick."""
+    jacobian: Array = shaped(lambda n: (3, 3), "J0 of q_e")
+    last_jacobian_inverse: Array = shaped(lambda n: (3, 3), "J0^-1 of the last tick")
     rotation: Array = shaped(lambda n: (3, 3))
     """Scratch: rotation from the base to the desired frame."""
     omega_desired: Array = shaped(lambda n: (3,))
     """Desired angular velocity on the base's axes, rad/s; zero if that is not controlled."""
     error: Array = shaped(lambda n: (4,))
     """Scratch: q_e of the last tick, had the reference moved as it does now."""
-    turn: Array = shaped(lambda n: (4,))
-    """Scratch: the desired frame's turn back to the last tick."""
-    turned_jacobian: Array = shaped(lambda n: (3, 3))
-    """Scratch: J0 of ``error``."""
+    turn: Array = shaped(lambda n: (4,), "Scratch: the desired frame's turn back to the last tick")
+    turned_jacobian: Array = shaped(lambda n: (3, 3), "Scratch: J0 of ``error``")
     pair_is_as_measured: float = shaped(lambda n: ())
     """1 if the time-delay pair has rates as they were measured, 0 if as navigation has them."""
     rate_as_measured: Array = shaped(lambda n: (n + 3,))
     """Scratch: rhodot without the navigation's low-pass."""
-    force_as_measured: Array = shaped(lambda n: (n + 3,))
-    """Scratch: F_S without the same."""
-    omega: Array = shaped(lambda n: (3,))
-    """Scratch."""
-    force: Array = shaped(lambda n: (n + 3,))
-    """F_S commanded."""
+    force_as_measured: Array = shaped(lambda n: (n + 3,), "Scratch: F_S without the same")
+    omega: Array = shaped(lambda n: (3,), "Scratch")
+    force: Array = shaped(lambda n: (n + 3,), "F_S commanded")
     transfer: Array = shaped(lambda n: (n + 3,))
     """Applied force minus force of the law in force when it took over."""
-    transfer_ticks: float = shaped(lambda n: (), uniform=True)
-    """Length of a transfer."""
+    transfer_ticks: float = shaped(lambda n: (), "Length of a transfer", uniform=True)
     transfer_left: float = shaped(lambda n: ())
     """Ticks until ``transfer`` has faded; -1: the law takes over at this tick."""
     navigation: Navigation = nested(Navigation)
@@ -108,15 +100,8 @@ def compute_signals(
 
     Without a base to control all of them are zero on its axes, and none asks for J0^-1.
 
-    Args:
-        block: of the `ControllerMemory`.
-        tick: of the state.
-        state: of a `State`.
-        reference: of a `Reference`.
-        h_bar: see `LawCode`, as estimate and uses_model.
-        estimate: inertia of the time-delay estimate.
-        uses_model: True if the nominal model is needed.
-        period: s.
+    ``block`` is of the `ControllerMemory`; ``state`` and ``reference`` are of a `State` and a
+    `Reference`; ``h_bar``, ``estimate`` and ``uses_model`` are those of a `LawCode`.
 
     Returns:
         `USABLE`, or why the state is not: then nothing was done, but that navigation may have taken

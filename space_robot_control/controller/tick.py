@@ -5,7 +5,11 @@
                               signals               allocation         safe mode
 
 `controller_tick` is the same without the supervision, for loops whose flight ends with a state that
-is not usable: these call `compute_signals` and `compute_command` alone.
+is not usable. Kernels have these arguments in common:
+
+- ``block``: of the `Supervision`, or of the `ControllerMemory` where ``controller`` is not given,
+- ``law``: a `CompiledLaw.code`; ``allocate``: an `allocation_code`,
+- ``tick``: of the state; ``state``, ``reference``: of a `State` and a `Reference`; ``period``: s.
 """
 
 from __future__ import annotations
@@ -60,14 +64,11 @@ NOMINAL_FROM_ETA = 0.05
 class Stamps(Record):
     """Check of the stamps of states, see `StampGuard`."""
 
-    longest_jump: float = shaped(lambda n: ())
-    """Largest accepted step, ticks."""
-    last: float = shaped(lambda n: ())
-    """Last accepted tick; -1 before the first."""
+    longest_jump: float = shaped(lambda n: (), "Largest accepted step, ticks")
+    last: float = shaped(lambda n: (), "Last accepted tick; -1 before the first")
     is_new_time: float = shaped(lambda n: ())
     """1 if the last accepted tick started a new time, else 0."""
-    other: float = shaped(lambda n: ())
-    """Last rejected tick."""
+    other: float = shaped(lambda n: (), "Last rejected tick")
     agreeing: float = shaped(lambda n: ())
     """Number of consistent ticks that were rejected one after the other."""
 
@@ -75,23 +76,16 @@ class Stamps(Record):
 class Supervision(Record):
     """Settings and memory of a supervisor."""
 
-    hold_ticks: float = shaped(lambda n: ())
-    """Invalid states for which the last torque is held."""
-    first_valve: float = shaped(lambda n: ())
-    """Index of the first thruster in ``command``."""
+    hold_ticks: float = shaped(lambda n: (), "Invalid states for which the last torque is held")
+    first_valve: float = shaped(lambda n: (), "Index of the first thruster in ``command``")
     stamps: Stamps = nested(Stamps)
-    answered: float = shaped(lambda n: ())
-    """Last tick answered; -1: none."""
-    mode: float = shaped(lambda n: ())
-    """`NOMINAL`, `HOLDING` or `SAFE`."""
+    answered: float = shaped(lambda n: (), "Last tick answered; -1: none")
+    mode: float = shaped(lambda n: (), "`NOMINAL`, `HOLDING` or `SAFE`")
     reason: float = shaped(lambda n: ())
     """Status of the last state; in nominal mode `USABLE` or `REFERENCE_HELD`."""
-    last_tick: float = shaped(lambda n: ())
-    """Last tick answered by the law; -1: none."""
-    has_reference: float = shaped(lambda n: ())
-    """1 once a reference has been usable, else 0."""
-    held_since: float = shaped(lambda n: ())
-    """Tick at which holding began."""
+    last_tick: float = shaped(lambda n: (), "Last tick answered by the law; -1: none")
+    has_reference: float = shaped(lambda n: (), "1 once a reference has been usable, else 0")
+    held_since: float = shaped(lambda n: (), "Tick at which holding began")
     rejected: Array = shaped(lambda n: (STATUSES,))
     """Number of states not used, or whose reference was not, by status."""
     command: Array = shaped(lambda n: (n + 3 + MOST_WHEELS + MOST_THRUSTERS + MOST_TORQUERS,))
@@ -110,21 +104,10 @@ def controller_tick(
     torque: Array,
     period: float,
 ) -> int:
-    """Run a whole tick of the controller with a compiled law.
+    """Run a whole tick of the controller with a compiled law; return the status of the state.
 
-    Args:
-        block: of the `ControllerMemory`.
-        law: a `CompiledLaw.code`.
-        allocate: an `allocation_code`.
-        tick: of the state.
-        state: of a `State`.
-        reference: of a `Reference`.
-        torque: (m+A,) command to be written, if the state is `USABLE`: torque of every axis,
-            N m, then what is asked of each of the base's actuators.
-        period: s.
-
-    Returns:
-        The status of the state, see `compute_signals`.
+    If that is `USABLE`, the command is written into ``torque`` (m+A,): torque of every axis, N m,
+    then what is asked of each of the base's actuators.
     """
     status: int = compute_signals(
         block, tick, state, reference, law.h_bar, law.estimate, law.uses_model, period
@@ -204,13 +187,7 @@ def judge_stamp(block: Block, tick: int) -> int:
 
 @kernel
 def swaps_due(ticks: Array, made: int, tick: int) -> int:
-    """Return how many swaps are due at ``tick``; ``made`` have been.
-
-    Args:
-        ticks: (k,) of the swaps, increasing.
-        made: number of those already made.
-        tick: that is to be answered.
-    """
+    """Return how many swaps at the increasing ``ticks`` (k,) are due; ``made`` have been."""
     due = made
     while due < ticks.size and ticks[due] <= tick:
         due += 1
@@ -238,16 +215,6 @@ def answer_state(
 ) -> int:
     """Write the command for a state, from the law or safe, into ``command`` of the supervision.
 
-    Args:
-        block: of the `Supervision`.
-        controller: of the `ControllerMemory`.
-        law: a `CompiledLaw.code`.
-        allocate: an `allocation_code`.
-        tick: of the state.
-        state: of a `State`.
-        reference: of a `Reference`.
-        period: s.
-
     Returns:
         The status of the state.
     """
@@ -273,8 +240,6 @@ def admit_state(
     period: float,
 ) -> int:
     """Compute the signals of a state that is usable, and not too near to an error of 180 degrees.
-
-    Args: see `compute_signals`.
 
     Returns:
         The status of the state.

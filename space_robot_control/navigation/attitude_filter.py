@@ -50,8 +50,7 @@ class Scratch(Record):
     quaternion: Array = shaped(lambda n: (4,))
     present: Array = shaped(lambda n: (4,))
     rotation: Array = shaped(lambda n: (3,))
-    transition: Array = shaped(lambda n: (3, 6))
-    """Upper half of the transition matrix."""
+    transition: Array = shaped(lambda n: (3, 6), "Upper half of the transition matrix")
     upper: Array = shaped(lambda n: (3, 6))
     gain: Array = shaped(lambda n: (6, 3))
     weighted: Array = shaped(lambda n: (6, 3))
@@ -63,34 +62,25 @@ class AttitudeFilter(Record):
 
     noise: Array = shaped(lambda n: (3, 3))
     """Covariance of a tracker's measurement on the base's axes, rad2."""
-    angle_walk: float = shaped(lambda n: ())
-    """Square of the gyro's angle random walk, rad2/s."""
-    rate_walk: float = shaped(lambda n: ())
-    """Square of its rate random walk, rad2/s3."""
-    initial_bias_variance: float = shaped(lambda n: ())
-    """rad2/s2."""
+    angle_walk: float = shaped(lambda n: (), "Square of the gyro's angle random walk, rad2/s")
+    rate_walk: float = shaped(lambda n: (), "Square of its rate random walk, rad2/s3")
+    initial_bias_variance: float = shaped(lambda n: (), "rad2/s2")
     gate: float = shaped(lambda n: ())
     """Square of the largest accepted innovation, in standard deviations."""
-    delay: float = shaped(lambda n: (), uniform=True)
-    """D, ticks."""
-    stage: float = shaped(lambda n: ())
-    """`NOT_STARTED`, `STARTED` or `FILTERING`."""
+    delay: float = shaped(lambda n: (), "D, ticks", uniform=True)
+    stage: float = shaped(lambda n: (), "`NOT_STARTED`, `STARTED` or `FILTERING`")
     reported: Array = shaped(lambda n: (4,))
     """The tracker's last measurement, which is held until the next."""
     quaternion: Array = shaped(lambda n: (4,))
     """Estimated attitude at k - D, from the base to the inertial frame."""
-    bias: Array = shaped(lambda n: (3,))
-    """Estimated bias of the gyro, rad/s."""
+    bias: Array = shaped(lambda n: (3,), "Estimated bias of the gyro, rad/s")
     covariance: Array = shaped(lambda n: (6, 6))
     """Of the errors of attitude (base's axes, rad) and bias (rad/s) at k - D."""
-    present: Array = shaped(lambda n: (4,))
-    """Estimated attitude at k."""
+    present: Array = shaped(lambda n: (4,), "Estimated attitude at k")
     innovation: Array = shaped(lambda n: (3,))
     """Of the last measurement: measured less estimated attitude on the base's axes, rad."""
-    updates: float = shaped(lambda n: ())
-    """Number of measurements used."""
-    rejected: float = shaped(lambda n: ())
-    """Number of measurements rejected by the gate."""
+    updates: float = shaped(lambda n: (), "Number of measurements used")
+    rejected: float = shaped(lambda n: (), "Number of measurements rejected by the gate")
     rejected_in_a_row: float = shaped(lambda n: ())
     gyro: Array = shaped(lambda n: (RING, 3))
     """Samples of the last ticks, rad/s, by tick modulo `RING`."""

@@ -45,17 +45,13 @@ class Navigation(Record):
 
     is_filtered: float = shaped(lambda n: (), uniform=True)
     """0: the laws see the measured state itself."""
-    is_active: float = shaped(lambda n: ())
-    """1 from the first state on."""
-    tick: float = shaped(lambda n: ())
-    """Tick of the last state."""
+    is_active: float = shaped(lambda n: (), "1 from the first state on")
+    tick: float = shaped(lambda n: (), "Tick of the last state")
     attitude: AttitudeFilter = nested(AttitudeFilter)
     low_pass: LowPass = nested(LowPass)
     joints: JointFilter = nested(JointFilter)
-    gyro: Array = shaped(lambda n: (3,))
-    """Last sample, rad/s."""
-    between: Array = shaped(lambda n: (3,))
-    """Scratch: a sample between two, or a rate; rad/s."""
+    gyro: Array = shaped(lambda n: (3,), "Last sample, rad/s")
+    between: Array = shaped(lambda n: (3,), "Scratch: a sample between two, or a rate; rad/s")
     estimate: State = nested(State)
     """What the laws see. Its torque lags as its rates do: so it is the one that belongs to them."""
 

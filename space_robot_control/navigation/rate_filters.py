@@ -49,11 +49,9 @@ class LowPass(Record):
     weight: float = shaped(lambda n: ())
     """Of a new sample in each stage, see `low_pass_weight`; 0: no low-pass."""
     rate_stage: Array = shaped(lambda n: (3,))
-    rate: Array = shaped(lambda n: (3,))
-    """rad/s."""
+    rate: Array = shaped(lambda n: (3,), "rad/s")
     torque_stage: Array = shaped(lambda n: (3,))
-    torque: Array = shaped(lambda n: (3,))
-    """N m."""
+    torque: Array = shaped(lambda n: (3,), "N m")
 
 
 @kernel
@@ -89,20 +87,15 @@ class JointFilter(Record):
     """Of an angle's innovation on angle, rate and acceleration: 1, 1/s, 1/s2."""
     rate_gain: Array = shaped(lambda n: (3,))
     """Of a rate's innovation, taken after the angle's: s, 1, 1/s; zero if there is none."""
-    angle: Array = shaped(lambda n: (n,))
-    """rad."""
-    rate: Array = shaped(lambda n: (n,))
-    """rad/s."""
-    acceleration: Array = shaped(lambda n: (n,))
-    """rad/s2."""
+    angle: Array = shaped(lambda n: (n,), "rad")
+    rate: Array = shaped(lambda n: (n,), "rad/s")
+    acceleration: Array = shaped(lambda n: (n,), "rad/s2")
     angle_lag: Array = shaped(lambda n: (n,))
     """Lag of the angle of the same filter on a unit inertia that the torque accelerates, rad."""
-    rate_lag: Array = shaped(lambda n: (n,))
-    """Lag of that filter's rate, rad/s."""
+    rate_lag: Array = shaped(lambda n: (n,), "Lag of that filter's rate, rad/s")
     torque_assumed: Array = shaped(lambda n: (n,))
     """Acceleration that this filter estimates of the unit inertia: N m."""
-    torque: Array = shaped(lambda n: (n,))
-    """The torque that lags as the rate does, N m."""
+    torque: Array = shaped(lambda n: (n,), "The torque that lags as the rate does, N m")
 
 
 def jerk_density(bandwidth: float, angle_noise: float, rate_noise: float, period: float) -> float:
