@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from space_robot_control.allocation.assumed_actuators import assumed_actuators
+from space_robot_control.allocation.settings import assumed_actuators
 from space_robot_control.guidance.courses import Piece
 from space_robot_control.guidance.demand import MotionDemand
 from space_robot_control.guidance.mission import Mission

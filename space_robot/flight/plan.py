@@ -80,8 +80,8 @@ class Flight:
         return self.plant_settings.has_message_faults or not is_plain
 
     @cached_property
-    def supervisor(self) -> Supervisor | None:
-        """What answers in the place of the usual supervisor; None if that one does.
+    def supervisor(self) -> Supervisor:
+        """What answers the states, where the controller has to answer as a node does.
 
         The flight code in C is compiled, or the flight computer greeted, at the first request.
 

@@ -14,7 +14,7 @@ from typing import Annotated, Any
 import numpy as np
 from pydantic import BaseModel, BeforeValidator, PlainValidator
 
-from space_robot_control.controller.plain_laws import law_of
+from space_robot_control.controller.law_choice import law_of
 from space_robot_control.guidance.mission import MissionSettings
 from space_robot_control.laws import ControlLaw, find_law, importable_name, laws
 from space_robot_model.hardware.base_actuators import BaseActuatorSettings

@@ -11,7 +11,7 @@ from typing import Any
 from pydantic import BaseModel
 
 from space_robot_control.allocation.settings import AllocationSettings
-from space_robot_control.controller.plain_laws import NoLaw
+from space_robot_control.controller.law_choice import NoLaw
 from space_robot_control.controller.settings import DEFAULT, ControllerNodeSettings
 from space_robot_control.guidance.mission import Mission, MissionSettings
 from space_robot_control.guidance.settings import MissionNodeSettings
