@@ -1,7 +1,7 @@
 """A mission that asks less of the base: bent legs, tools with the least momentum, longer segments.
 
 With k times the duration a segment from rest to rest asks for 1/k of the momentum and 1/k^2 of the
-torque: see `space_robot_control.guidance.durations`.
+torque: see `space_robot_control.guidance.demand`.
 """
 
 from __future__ import annotations
@@ -14,10 +14,10 @@ from typing import Any
 import numpy as np
 import yaml
 
-from space_robot_control.guidance.checks import check_piece
 from space_robot_control.guidance.courses import BentLeg, Piece, QuinticLeg
+from space_robot_control.guidance.limits import check_piece
 from space_robot_control.guidance.mission import Mission, MissionSettings
-from space_robot_control.guidance.segments import read_segments
+from space_robot_control.guidance.segments import HoldSegment, read_segments
 from space_robot_model.robot import Robot
 from space_robot_msgs_py.config.yaml_text import parse_yaml
 from space_robot_msgs_py.errors import InputError
@@ -118,8 +118,7 @@ def _segments(settings: MissionSettings) -> list[dict[str, Any]]:
 def _of_duration(text: str, span: float) -> str:
     content = parse_yaml(text)
     (segment,) = read_segments([text])
-    if segment.hold is None:
-        content.pop("fast", None)
+    if not isinstance(segment, HoldSegment):
         content["duration"] = span
     return json.dumps(content)
 

@@ -14,7 +14,7 @@ from space_robot_control.allocation.assumed_actuators import assumed_actuators
 from space_robot_control.guidance.courses import Piece
 from space_robot_control.guidance.demand import MotionDemand
 from space_robot_control.guidance.mission import Mission
-from space_robot_control.guidance.tool_path import ToolFollower
+from space_robot_control.guidance.tool_paths import ToolFollower
 from space_robot_model.elementary.least_squares import singular_values
 from space_robot_model.elementary.matrices import norms
 from space_robot_model.hardware.base_actuators import BaseActuatorSettings

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from space_robot_control.guidance.courses import FEWEST_KNOTS, MOST_KNOTS, Piece, sample_times
 from space_robot_control.guidance.demand import MotionDemand, demand
-from space_robot_control.guidance.segments import read_segments
+from space_robot_control.guidance.segments import ToolSegment, read_segments
 from space_robot_model.elementary.matrices import norms
 from space_robot_model.hardware.base_actuators import BaseActuatorSettings
 from space_robot_model.hardware.capability import actuator_load, carried_momentum
@@ -261,7 +261,7 @@ def held_base_remark(scenario: ResolvedScenario) -> str:
         if segment and segment.is_base_free:
             continue
         times = np.linspace(piece.begin, piece.end, FEWEST_KNOTS)
-        leads_tool = segment and segment.tool and segment.tool.frame != "base"
+        leads_tool = isinstance(segment, ToolSegment) and segment.tool.frame != "base"
         if leads_tool or piece.base.at(times)[:, 4:7].any():
             turns = any(scenario.plant.initial_rate_deg_s)
             advice = "" if turns else ": base: free plans for that"

@@ -7,7 +7,7 @@ from typing import Any
 
 from space_robot_control.controller.controller import Controller
 from space_robot_control.controller.supervisor import Supervisor
-from space_robot_control.flight_code.choice import supervisor_of
+from space_robot_control.flight_code.supervisors import supervisor_of
 from space_robot_control.laws import ControlLaw
 from space_robot_msgs_py.errors import InputError
 from space_robot_sim.plant.description import plant_description

@@ -13,8 +13,7 @@ from pydantic import BaseModel
 from space_robot_control.allocation.settings import AllocationSettings
 from space_robot_control.controller.plain_laws import NoLaw
 from space_robot_control.controller.settings import DEFAULT, ControllerNodeSettings
-from space_robot_control.guidance.mission import Mission, MissionSettings
-from space_robot_control.guidance.settings import MissionNodeSettings
+from space_robot_control.guidance.mission import Mission, MissionNodeSettings, MissionSettings
 from space_robot_control.laws import ControlLaw
 from space_robot_model.hardware.base_actuators import BaseActuatorSettings
 from space_robot_model.hardware.magnetic_torquers import MagneticTorquerSettings

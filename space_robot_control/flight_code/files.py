@@ -14,8 +14,7 @@ from space_robot_msgs_py.compiled.records import Field as RecordField
 from space_robot_msgs_py.compiled.records import Record
 
 from .c99 import language as lang
-from .c99.functions import Function, syntax_of
-from .c99.program import CALL, CONSTANT, FIELD, Constant, KernelProgram
+from .c99.program import CALL, CONSTANT, FIELD, Constant, Function, KernelProgram, syntax_of
 
 WIDTH = 100
 """Longest line."""
@@ -135,7 +134,6 @@ class Files:
         return CONSTANT.sub(lambda m: self._constants[int(m[1])], text)
 
     def _named_numbers(self) -> list[Constant]:
-        """Return the constants that are read."""
         numbers = {int(number) for number in CONSTANT.findall(self._text)}
         return [c for c, number in self.program.named_numbers.items() if number in numbers]
 
@@ -248,13 +246,11 @@ class Files:
         return f"{kind.name} {name}"
 
     def _is_local(self, function: Function) -> bool:
-        """Return whether only its own file calls a function."""
         number = self.program.functions.index(function)
         home = self.room_of(function.body.__module__)
         return number not in self._roots and self._calling_rooms[number] == {home}
 
     def _function_names(self) -> dict[int, str]:
-        """Return names by number: the kernel's, with module or law where several have it."""
         bare = {f: f.body.__name__.lstrip("_") for f in self.functions}
         names: dict[int, str] = {}
         taken: set[str] = set()
@@ -278,7 +274,6 @@ class Files:
         return names
 
     def _constant_names(self) -> dict[int, str]:
-        """Return names by number: the constant's, with its module's where several are."""
         constants = self._named_numbers()
         names = {}
         for constant in constants:

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import json
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import cached_property
 from itertools import pairwise
-from typing import TYPE_CHECKING, Annotated
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,21 +17,25 @@ from pydantic import Field
 from space_robot_model.elementary.matrices import direction_norm
 from space_robot_model.orbit.ephemeris import AssumedOrbit, Ephemeris
 from space_robot_model.robot import Robot
+from space_robot_model.robot.find import mission_layers
+from space_robot_model.robot.mission_document import mission_layer
 from space_robot_model.robot.orientation import Rates
-from space_robot_msgs_py.config.settings import Texts
+from space_robot_msgs_py.config.columns import read_columns
+from space_robot_msgs_py.config.settings import NodeSettings, Texts
+from space_robot_msgs_py.config.trees import Tree
 from space_robot_msgs_py.config.validation import StrictModel
+from space_robot_msgs_py.config.yaml_text import YamlTextError, parse_yaml
 from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.samples import ReferenceChunk
 
-from .checks import check_piece
 from .courses import BaseMotion, Piece, QuinticLeg, SteadyTurn
-from .limits import MissionLimits, check_positions
-from .segments import read_pointing, read_segments
+from .limits import MissionLimits, check_piece, check_positions
+from .planner import Planner
+from .segments import FileSegment, PointingGoal, read_pointing, read_segments
 
 if TYPE_CHECKING:
     from .live import TrajectoryPoint
-    from .planner import Planner
-    from .pointing import PointingCourse, PointingGoal
+    from .pointing import PointingCourse
 
 Array = NDArray[np.float64]
 
@@ -79,6 +85,67 @@ class MissionSettings(StrictModel):
     def written_segments(self) -> list[str]:
         """The segments without empty texts."""
         return [text for text in self.segments if text.strip()]
+
+
+class MissionNodeSettings(MissionSettings, NodeSettings):
+    """Parameters of mission_node."""
+
+    node: ClassVar[str] = "mission"
+    selectors: ClassVar[tuple[str, ...]] = ("robot", "mission")
+
+    mission: str = Field(
+        "",
+        description="a mission of config/missions, or a path to its YAML or to a trajectory in "
+        "CSV or Parquet (empty: the robot's)",
+    )
+    goto: str = Field(
+        "",
+        description="a segment to fly from now on in place of the mission, as YAML text, set in "
+        "flight; the same text again is ignored",
+    )
+    chunk_ticks: Annotated[int, Field(ge=1, le=10_000)] = Field(
+        100, description="ticks per message of the reference"
+    )
+    lead_ticks: Annotated[int, Field(ge=1, le=10_000)] = Field(
+        1000, description="lead of the reference ahead of the plant, ticks"
+    )
+
+    @classmethod
+    def layers(cls, selected: Mapping[str, str]) -> list[Path]:
+        """The mission's own file over the graph's."""
+        return [*super().layers(selected), *mission_layers(selected["robot"], selected["mission"])]
+
+    @classmethod
+    def read_layer(cls, path: Path, selected: Mapping[str, str]) -> Tree:
+        """Read a parameter file, a mission's document, or a trajectory.
+
+        Raises:
+            InputError: the file cannot be read, or a key in it is wrong.
+        """
+        layer = mission_layer(path, cls.node, selected["robot"])
+        if texts := layer.get("segments"):
+            layer["segments"] = [with_columns(text, path.parent) for text in texts]
+        return layer
+
+
+def with_columns(text: str, folder: Path) -> str:
+    """Return the text of a segment with the columns of its file in place of the file's name.
+
+    Args:
+        text: of the segment, YAML.
+        folder: where a relative path begins.
+
+    Raises:
+        InputError: the file cannot be read.
+    """
+    try:
+        content = parse_yaml(text)
+    except YamlTextError:
+        return text  # refused where segments are read
+    if not isinstance(content, dict) or not isinstance(name := content.get("file"), str):
+        return text
+    rest = {key: value for key, value in content.items() if key != "file"}
+    return json.dumps({"trajectory": read_columns(folder / name), **rest})
 
 
 class Mission:
@@ -143,8 +210,6 @@ class Mission:
         )
 
     def _new_planner(self) -> Planner:
-        from .planner import Planner  # slow to import, and a mission of waypoints needs none
-
         return Planner(self._robot, *self._start, self._limits, lambda: self.ephemeris)
 
     @cached_property
@@ -215,7 +280,8 @@ class Mission:
         segments = read_segments([segment])
         if not segments:
             raise InputError("a segment was expected, got an empty text")
-        if segments[0].file is not None:  # whoever reaches the node could have it read any file
+        # whoever reaches the node could have it read any file
+        if isinstance(segments[0], FileSegment):
             raise InputError("file: no file is read in flight, give the columns as trajectory")
         pieces = self._new_planner().plan(begin, joints[0], base, segments)
         self._replace([*before, *pieces])
@@ -263,14 +329,12 @@ class Mission:
         return piece
 
     def _state_at(self, tick: int) -> tuple[float, Array, Array, BaseMotion]:
-        """Return time, the reference of joints (3, n) and base (10,), and how the base goes on."""
         chunk, time = self.chunk(tick, 1), tick * self.period
         piece = self.pieces[int(np.searchsorted(self._begins[1:], time, side="right"))]
         base = BaseMotion(chunk.base[0, :4], piece.base if piece.mode else None, piece.mode)
         return time, chunk.joints[0], chunk.base[0], base
 
     def _replace(self, pieces: list[Piece]) -> None:
-        """Put pieces in the place of all that begins later."""
         kept = [piece for piece in self.pieces if piece.begin < pieces[0].begin]
         self.pieces = [*kept, *pieces]
         self._begins = np.array([piece.begin for piece in self.pieces])
@@ -290,7 +354,6 @@ class Mission:
 
 
 def _leg(begin: float, end: float, start: Array, goal: Array, base: BaseMotion) -> Piece:
-    """Return a leg of the joints between two waypoints; the attitude or what points is held."""
     attitude = base.held.at(np.array([float(end)]))[0, :4]
     course = QuinticLeg(begin, float(end - begin), start, goal - start)
     return Piece(float(begin), float(end), course, base.held, goal, attitude, mode=base.mode)

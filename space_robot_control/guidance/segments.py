@@ -1,36 +1,294 @@
-"""Segments of a mission as they are written in its file."""
+"""Segments of a mission: what is written of each kind, and the courses that it becomes.
+
+A kind is one class: its keys with their limits, and `joints`, the course of the joints that it
+makes. Splines and tools are imported where they are used: they are slow to import, and a mission of
+joints needs none.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Annotated, Any, Literal
+import math
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Annotated, Any, ClassVar, Literal, NamedTuple
 
-from pydantic import Field, PlainValidator, model_validator
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import BeforeValidator, Field, PlainValidator, field_validator, model_validator
 
-from space_robot_model.elementary.matrices import direction_norm
-from space_robot_model.robot.orientation import Attitude, Degrees, Orientation, Vector
+from space_robot_model.elementary.matrices import direction_norm, norm, product
+from space_robot_model.elementary.rotations import quaternion_of_rotation, rotation_of_rpy
+from space_robot_model.orbit.ephemeris import Ephemeris
+from space_robot_model.robot import Robot
+from space_robot_model.robot.orientation import Angles, Attitude, Degrees, Orientation, Vector
 from space_robot_msgs_py.config.choices import choices
+from space_robot_msgs_py.config.columns import read_columns
 from space_robot_msgs_py.config.text import printable
 from space_robot_msgs_py.config.validation import StrictModel, short, validate
 from space_robot_msgs_py.config.yaml_text import YamlTextError, parse_yaml
 from space_robot_msgs_py.errors import InputError
 
-from .pointing import PointingGoal
+from .courses import BaseMotion, BentLeg, Course, QuinticLeg, knots
+from .limits import FARTHEST, shown_unit
+
+Array = NDArray[np.float64]
+Maker = Callable[[float], tuple[Course, Course]]
+"""Makes the courses of joints and base of a segment of a duration in s."""
+JointMaker = Callable[[float, Course], Course]
+"""Makes the course of the joints in a duration in s, while the base moves along a course."""
 
 MOST_SEGMENTS = 5_000
 """Largest number of segments of a mission; each is planned for a few milliseconds."""
-Seconds = Annotated[float, Field(ge=1e-6, le=1e6)]
 MOST_BENDS = 100
 Frame = Literal["inertial", "base", "start", "orbit"]
-MOTIONS = ("joints_deg", "tool", "hold", "reactionless_deg", "file", "trajectory")
-"""Keys of which a segment has one; a segment of the base alone has none."""
-WRITTEN = (
-    *("joints_deg", "bends_deg", "tool", "hold", "reactionless", "file"),
-    *("base", "duration"),
-)
-"""Keys of a segment in a mission's document."""
-ALONE = ("reactionless_deg", "file", "trajectory")
-"""Those that go without ``base``."""
+Point = Literal["nadir", "velocity", "sun", "target", "inertial"]
+ABOUT = ("velocity", "nadir", "normal", "sun", "target")
+"""Second directions that have a name; any other is a vector on inertial axes."""
+FAR = math.sqrt(0.5)
+"""Cosine of 45 degrees."""
+LEAST_DEG = 1.0
+"""Least angle between two directions that define an attitude, degrees."""
+NEEDS_ORBIT = "needs an orbit: choose one (--orbit NAME), or set mission.assumed_orbit"
+
+
+class SegmentStart(NamedTuple):
+    """Where a segment begins."""
+
+    robot: Robot
+    """As the flight software knows it."""
+    time: float
+    """s."""
+    joints: Array
+    """(n,) rad, or m of prismatic joints."""
+    base: BaseMotion
+    origin: Callable[[], Array]
+    """Returns the origin (3,) of the inertial frame from the robot's centre of mass, m."""
+    ephemeris: Callable[[], Ephemeris | None]
+    """Returns that of the assumed orbit; None: there is none."""
+
+
+# what a segment says of the base
+
+
+class BaseTurn(StrictModel):
+    """``base: {turn_deg: 190, axis: [1, 2, 3]}``: a turn about one axis, from rest to rest."""
+
+    turn_deg: Degrees = Field(description="angle, degrees")
+    axis: Vector = Field(description="of the turn, base frame, any length")
+
+    @model_validator(mode="after")
+    def _has_axis(self) -> BaseTurn:
+        direction_norm(self.axis, "axis")
+        return self
+
+
+class PointingGoal(StrictModel):
+    """``base: {point: ...}``: where an axis of the base points, and how the base turns about it."""
+
+    point: Point = Field(
+        description="direction in which the axis points: nadir (the Earth's centre), velocity (of "
+        "the orbit, as seen from the inertial frame), sun, target, or inertial (that of the key "
+        "direction)"
+    )
+    axis: Vector = Field([0.0, 0.0, 1.0], description="axis that points, base frame, of any length")
+    direction: Vector | None = Field(
+        None, description="direction to point in, inertial axes, of any length: for point: inertial"
+    )
+    about: str | Vector | None = Field(
+        None,
+        description="second direction, towards which about_axis is turned as far as axis allows: "
+        "velocity, nadir, normal (of the orbit), sun, target, or a vector on inertial axes (none: "
+        "velocity for nadir, nadir for velocity, normal for target; for sun and inertial the "
+        "inertial z axis, or x where z is within 45 degrees of the direction)",
+    )
+    about_axis: Vector | None = Field(
+        None,
+        description="axis that is turned towards about, base frame, of any length (none: the first "
+        "of x, y and z that is at least 45 degrees from axis)",
+    )
+    offset_deg: Angles = Field(
+        [0.0, 0.0, 0.0],
+        description="roll, pitch, yaw about fixed axes, degrees: the base's attitude in the frame "
+        "that points",
+    )
+
+    @field_validator("about", mode="before")
+    @classmethod
+    def _is_direction(cls, about: object) -> object:
+        if isinstance(about, str) and about not in ABOUT:
+            raise ValueError(f"{choices(about, ABOUT)}, or a direction [x, y, z] on inertial axes")
+        return about
+
+    @model_validator(mode="after")
+    def _has_directions(self) -> PointingGoal:
+        for key in ("axis", "direction", "about", "about_axis"):
+            if isinstance(vector := getattr(self, key), list):
+                direction_norm(vector, key)
+        if (self.point == "inertial") != (self.direction is not None):
+            raise ValueError(
+                "point: inertial needs direction: [x, y, z], inertial axes"
+                if self.direction is None
+                else f"direction is for point: inertial, not for {self.point}"
+            )
+        if self.about == self.point:
+            raise ValueError(
+                f"about: {self.about} is the direction that the axis points in: choose another one "
+                f"of {', '.join(name for name in ABOUT if name != self.point)}"
+            )
+        pairs = [("axis", self.axis, "about_axis", self.about_axis)]
+        if isinstance(self.about, list):
+            pairs.append(("direction", self.direction or [], "about", self.about))
+        for name, first, other, second in pairs:
+            if first and second and (angle := _line_angle(first, second)) < LEAST_DEG:
+                raise ValueError(
+                    f"{name} {short(first)} and {other} {short(second)} are parallel to "
+                    f"{angle:.2g} degrees, at least {LEAST_DEG:g} are needed"
+                )
+        return self
+
+    @property
+    def from_base(self) -> Array:
+        """(4,) quaternion from the base's frame to that whose first axis points.
+
+        The second axis of that frame is in the half plane of the first one and ``about``.
+        """
+        near = np.abs(self.axis) > FAR * norm(self.axis)
+        far = [float(k == int(np.argmin(near))) for k in range(3)]
+        first = np.array(self.axis) / norm(self.axis)
+        normal = np.cross(first, self.about_axis or far)
+        normal = normal / norm(normal)
+        axes = np.column_stack((first, np.cross(normal, first), normal))
+        offset = rotation_of_rpy(np.radians(self.offset_deg))
+        return quaternion_of_rotation(product(axes.T, offset))
+
+
+def _line_angle(first: Sequence[float], second: Sequence[float]) -> float:
+    a, b = np.array(first) / norm(first), np.array(second) / norm(second)
+    return math.degrees(math.asin(min(norm(np.cross(a, b)), 1.0)))  # for comparisons only
+
+
+BaseGoal = Attitude | PointingGoal | BaseTurn | Literal["free"]
+KINDS_OF_BASE: dict[str, type[Attitude] | type[PointingGoal] | type[BaseTurn]] = {
+    "rpy_deg": Attitude,
+    "quaternion": Attitude,
+    "point": PointingGoal,
+    "turn_deg": BaseTurn,
+}
+"""Keys that tell what is said of the base."""
+BASE_KEYS = tuple(dict.fromkeys(k for kind in KINDS_OF_BASE.values() for k in kind.model_fields))
+
+
+def _base_goal(content: Any) -> BaseGoal:
+    if isinstance(content, (Attitude, PointingGoal, BaseTurn)) or content == "free":
+        goal: BaseGoal = content
+        return goal
+    if isinstance(content, str):
+        content = {"point": content}
+    keys = [key for key in KINDS_OF_BASE if isinstance(content, dict) and key in content]
+    if len({KINDS_OF_BASE[key] for key in keys}) > 1:
+        raise ValueError(f"{' and '.join(keys)} were given: give one of them")
+    return (KINDS_OF_BASE[keys[0]] if keys else Attitude).model_validate(content)
+
+
+def _seconds(content: Any) -> Any:
+    if content is None:
+        raise ValueError("give s, or fast")
+    return None if content == "fast" else content
+
+
+# the kinds
+
+
+class Segment(StrictModel):
+    """A part of a mission in which the joints stay, and the base moves; the kinds are below."""
+
+    key: ClassVar[str] = "base"
+    """That a segment of this kind has."""
+    excludes: ClassVar[tuple[str, ...]] = ()
+    """Keys of all kinds that this one has not."""
+
+    base: Annotated[BaseGoal | None, PlainValidator(_base_goal)] = Field(
+        None,
+        description="attitude, turn, or what the base points at from now on; free: it turns as the "
+        "arm's motion turns it",
+    )
+    duration: Annotated[
+        Annotated[float, Field(ge=1e-6, le=1e6)] | None, BeforeValidator(_seconds)
+    ] = Field(None, description="s, or fast: as the limits of joints and base allow")
+
+    @classmethod
+    def allowed_keys(cls) -> tuple[str, ...]:
+        """Return the keys that a segment of this kind may have."""
+        return tuple(key for key in cls.model_fields if key not in cls.excludes)
+
+    @property
+    def is_base_free(self) -> bool:
+        """Whether the base turns as the arm's motion turns it."""
+        return self.base == "free"
+
+    @property
+    def span(self) -> float | None:
+        """The duration, s; None: as fast as the limits allow."""
+        return self.duration
+
+    @property
+    def motion(self) -> str:
+        """What the segment moves, in a word or two."""
+        words = [self.key.removesuffix("_deg")] if self.key != "base" else []
+        words += ["free base" if self.is_base_free else "base"] if self.base is not None else []
+        return " and ".join(words)
+
+    def joints(self, start: SegmentStart) -> JointMaker:
+        """Return what makes the course of the joints from a start.
+
+        Raises:
+            InputError: they cannot move so.
+        """
+        rise = np.zeros_like(start.joints)
+        return lambda span, _: QuinticLeg(start.time, span, start.joints, rise)
+
+    def courses(self, start: SegmentStart, turn: Callable[[float], Course]) -> Maker:
+        """Return what makes the courses of joints and base from a start.
+
+        Args:
+            start: of the segment.
+            turn: makes the course of a base that is not free in a duration, s.
+        """
+        make = self.joints(start)
+
+        def led(span: float) -> tuple[Course, Course]:
+            base = turn(span)
+            return make(span, base), base
+
+        def freed(span: float) -> tuple[Course, Course]:
+            from .free_base import free_attitude
+
+            joints, quaternion = make(span, turn(span)), start.base.quaternion
+            times = knots(span)
+            return joints, free_attitude(start.robot, joints, quaternion, start.time, times)
+
+        return freed if self.is_base_free else led
+
+
+class JointSegment(Segment):
+    """The joints go to a posture, on a line in their space or bent."""
+
+    key = "joints_deg"
+    joints_deg: list[float] = Field(description="joints, degrees or m")
+    bends_deg: list[list[float]] | None = Field(
+        None,
+        max_length=MOST_BENDS,
+        description="amplitudes of bends on the way to joints_deg, by sin(pi s), sin(2 pi s), ...:"
+        " a list of joints each, degrees or m",
+    )
+
+    def joints(self, start: SegmentStart) -> JointMaker:
+        """Return what makes the course of the joints from a start."""
+        rise = posture(start.robot, self.joints_deg, "joints_deg") - start.joints
+        if self.bends_deg is None:
+            return lambda span, _: QuinticLeg(start.time, span, start.joints, rise)
+        bends = np.array([posture(start.robot, bend, "bends_deg") for bend in self.bends_deg])
+        return lambda span, _: BentLeg(start.time, span, start.joints, rise, bends)
 
 
 class ToolGoal(Orientation):
@@ -57,123 +315,118 @@ class ToolGoal(Orientation):
         return self
 
 
-class BaseTurn(StrictModel):
-    """``base: {turn_deg: 190, axis: [1, 2, 3]}``: a turn about one axis, from rest to rest."""
+class ToolSegment(Segment):
+    """A tool goes in a straight line, and turns about one axis."""
 
-    turn_deg: Degrees = Field(description="angle, degrees")
-    axis: Vector = Field(description="of the turn, base frame, any length")
+    key = "tool"
+    tool: ToolGoal
 
-    @model_validator(mode="after")
-    def _has_axis(self) -> BaseTurn:
-        direction_norm(self.axis, "axis")
-        return self
+    def courses(self, start: SegmentStart, turn: Callable[[float], Course]) -> Maker:
+        """Return what makes the courses of joints and base from a start."""
+        from .tool_paths import ToolCourses
 
+        if self.is_base_free and self.tool.frame != "base":
+            return ToolCourses(self.tool, start).free
+        return super().courses(start, turn)
 
-KINDS_OF_BASE: dict[str, type[Attitude] | type[PointingGoal] | type[BaseTurn]] = {
-    "rpy_deg": Attitude,
-    "quaternion": Attitude,
-    "point": PointingGoal,
-    "turn_deg": BaseTurn,
-}
-"""Keys that tell what is said of the base."""
-OF_BASE = tuple(dict.fromkeys(key for kind in KINDS_OF_BASE.values() for key in kind.model_fields))
-"""All keys of ``base``."""
+    def joints(self, start: SegmentStart) -> JointMaker:
+        """Return what makes the course of the joints from a start."""
+        from .tool_paths import ToolCourses
+
+        return ToolCourses(self.tool, start).led
 
 
-def base_goal(content: Any) -> Attitude | PointingGoal | BaseTurn:
-    """Return where a segment brings the base, by its keys; a name is what the base points at.
+class HoldSegment(Segment):
+    """The joints stay."""
 
-    Raises:
-        ValidationError: a key or a value is wrong.
-    """
-    if isinstance(content, (Attitude, PointingGoal, BaseTurn)):
-        return content
-    if isinstance(content, str):
-        content = {"point": content}
-    keys = [key for key in KINDS_OF_BASE if isinstance(content, dict) and key in content]
-    if len({KINDS_OF_BASE[key] for key in keys}) > 1:
-        raise ValueError(f"{' and '.join(keys)} were given: give one of them")
-    return (KINDS_OF_BASE[keys[0]] if keys else Attitude).model_validate(content)
-
-
-class Segment(StrictModel):
-    """A part of a mission; the joints move from rest to rest."""
-
-    joints_deg: list[float] | None = Field(None, description="joints, degrees or m")
-    bends_deg: list[list[float]] | None = Field(
-        None,
-        max_length=MOST_BENDS,
-        description="amplitudes of bends on the way to joints_deg, by sin(pi s), sin(2 pi s), ...:"
-        " a list of joints each, degrees or m",
-    )
-    tool: ToolGoal | None = None
-    hold: Seconds | None = Field(None, description="time to stay, s")
-    reactionless_deg: list[float] | None = Field(
-        None, description="joints to approach without a torque on the base, degrees or m"
-    )
-    file: str | None = Field(None, description="CSV or Parquet file of a trajectory")
-    trajectory: dict[str, list[float]] | None = Field(
-        None, description="the columns of such a file"
-    )
-    base: Annotated[Attitude | PointingGoal | BaseTurn | None, PlainValidator(base_goal)] = Field(
-        None, description="attitude, turn, or what the base points at from now on"
-    )
-    is_base_free: bool = Field(
-        False, description="the base turns as the arm's motion turns it: base: free"
-    )
-    duration: Seconds | None = Field(None, description="s")
-    fast: bool = Field(False, description="as fast as the limits of joints and base allow")
-
-    @model_validator(mode="before")
-    @classmethod
-    def _as_written(cls, content: Any) -> Any:
-        """Accept ``reactionless: {joints_deg: [...]}``, ``base: free`` and ``duration: fast``."""
-        if not isinstance(content, dict):
-            return content
-        content = dict(content)
-        if "reactionless" in content:
-            inner = content.pop("reactionless")
-            if not isinstance(inner, dict) or set(inner) != {"joints_deg"}:
-                expected = "reactionless: {joints_deg: [...]} was expected"
-                raise ValueError(f"{expected}, got {short(inner)}")
-            content["reactionless_deg"] = inner["joints_deg"]
-        if content.get("base") == "free":
-            content |= {"is_base_free": True}
-            del content["base"]
-        if content.get("duration") == "fast":
-            content |= {"fast": True}
-            del content["duration"]
-        return content
-
-    @model_validator(mode="after")
-    def _fits(self) -> Segment:
-        motions = [name for name in MOTIONS if getattr(self, name) is not None]
-        if len(motions) > 1:
-            raise ValueError(f"{' and '.join(motions)} were given: a segment has one of them")
-        if not motions and self.base is None:
-            raise ValueError(f"give one of {', '.join(MOTIONS)}, or base")
-        if self.base is not None and motions and motions[0] in ALONE:
-            raise ValueError(f"base cannot be combined with {motions[0]}")
-        if self.bends_deg is not None and self.joints_deg is None:
-            raise ValueError("bends_deg needs joints_deg")
-        if self.is_base_free and (not motions or motions[0] in ("hold", *ALONE)):
-            raise ValueError("base: free needs joints_deg or tool")
-        timed = [self.duration is not None, self.fast, self.hold is not None]
-        if self.file is not None or self.trajectory is not None:
-            if any(timed):
-                raise ValueError("a trajectory has its own duration")
-        elif sum(timed) != 1:
-            raise ValueError("give duration (s), or duration: fast; hold has its own")
-        return self
+    key = "hold"
+    excludes = ("duration",)
+    hold: Annotated[float, Field(ge=1e-6, le=1e6)] = Field(description="time to stay, s")
 
     @property
-    def motion(self) -> str:
-        """What the segment moves, in a word or two."""
-        moved = [name for name in MOTIONS if getattr(self, name) is not None]
-        words = [name.removesuffix("_deg") for name in moved]
-        if self.is_base_free:
-            words.append("free base")
-        return " and ".join([*words, "base"] if self.base is not None else words)
+    def span(self) -> float | None:
+        """The duration, s."""
+        return self.hold
+
+
+class Posture(StrictModel):
+    """A posture to approach."""
+
+    joints_deg: list[float] = Field(description="joints, degrees or m")
+
+
+class ReactionlessSegment(Segment):
+    """The joints approach a posture without a torque on the base."""
+
+    key = "reactionless"
+    excludes = ("base",)
+    reactionless: Posture
+
+    def joints(self, start: SegmentStart) -> JointMaker:
+        """Return what makes the course of the joints from a start."""
+        from .free_base import reactionless_course
+
+        goal = posture(start.robot, self.reactionless.joints_deg, "reactionless")
+        return reactionless_course(start, goal)
+
+
+class TableSegment(Segment):
+    """Joints, and maybe the base, follow the columns of a table, which has its own duration."""
+
+    key = "trajectory"
+    excludes: ClassVar[tuple[str, ...]] = ("base", "duration")
+    trajectory: dict[str, list[float]] = Field(description="the columns of such a file")
+
+    @property
+    def columns(self) -> dict[str, list[float]]:
+        """The columns of the table by name."""
+        return self.trajectory
+
+
+class FileSegment(TableSegment):
+    """The same from a file."""
+
+    key = "file"
+    excludes = ("base", "duration", "trajectory")
+    trajectory: dict[str, list[float]] = Field(default_factory=dict)
+    file: str = Field(description="CSV or Parquet file of a trajectory")
+
+    @property
+    def columns(self) -> dict[str, list[float]]:
+        """The columns of the table by name."""
+        return read_columns(Path(self.file))
+
+
+SEGMENT_KINDS: dict[str, type[Segment]] = {
+    kind.key: kind
+    for kind in (
+        *(JointSegment, ToolSegment, HoldSegment, ReactionlessSegment),
+        *(FileSegment, TableSegment, Segment),
+    )
+}
+"""Kinds of segments by the key that each of them has."""
+SEGMENT_KEYS = tuple(
+    dict.fromkeys(key for kind in SEGMENT_KINDS.values() for key in kind.allowed_keys())
+)
+
+
+def posture(robot: Robot, values: Sequence[float], key: str) -> Array:
+    """Return the positions (n,) of joints that are written in degrees, rad or m.
+
+    Raises:
+        InputError: there are too few or too many values, or one is too large; names the key.
+    """
+    if len(values) != robot.n:
+        raise InputError(f"{key}: {robot.n} values were expected, got {len(values)}")
+    positions = robot.from_degrees(values)
+    if (far := np.abs(positions)).max() > FARTHEST:
+        joint = int(np.argmax(far))
+        scale, unit = shown_unit(robot, joint)
+        raise InputError(
+            f"{key}: joint {robot.joint_names[joint]!r}: at most {FARTHEST * scale:.6g} "
+            f"{unit} can be flown, got {values[joint]:g}"
+        )
+    return positions
 
 
 def read_segments(texts: Sequence[str]) -> list[Segment]:
@@ -182,19 +435,33 @@ def read_segments(texts: Sequence[str]) -> list[Segment]:
     Raises:
         InputError: a segment is wrong; names it, counted from 1.
     """
-    written, segments = [text for text in texts if text.strip()], []
+    written = [text for text in texts if text.strip()]
     if len(written) > MOST_SEGMENTS:
         raise InputError(f"{len(written)} segments, at most {MOST_SEGMENTS} are planned")
-    for number, text in enumerate(written, 1):
-        try:
-            content = parse_yaml(text)
-        except YamlTextError as error:
-            raise InputError(f"segment {number}: {error}") from None
-        _check_keys(content, f"segment {number}", (*WRITTEN, *Segment.model_fields), WRITTEN)
-        if isinstance(content, dict) and isinstance(base := content.get("base"), dict):
-            _check_keys(base, f"segment {number}: base", OF_BASE, OF_BASE)
-        segments.append(validate(Segment, content, f"segment {number}"))
-    return segments
+    return [_segment(text, f"segment {number}") for number, text in enumerate(written, 1)]
+
+
+def _segment(text: str, where: str) -> Segment:
+    content = _parsed(text, where)
+    if not isinstance(content, Mapping):
+        return validate(Segment, content, where)
+    _check_keys(content, where, SEGMENT_KEYS)
+    if isinstance(base := content.get("base"), dict):
+        _check_keys(base, f"{where}: base", BASE_KEYS)
+    motions = [key for key in SEGMENT_KINDS if key in content and key != "base"]
+    if len(motions) > 1:
+        raise InputError(f"{where}: {' and '.join(motions)} were given: a segment has one of them")
+    if not motions and "base" not in content:
+        raise InputError(f"{where}: give one of {', '.join(SEGMENT_KINDS)}")
+    kind = SEGMENT_KINDS[motions[0] if motions else "base"]
+    if wrong := [key for key in content if key not in kind.allowed_keys()]:
+        raise InputError(f"{where}: {wrong[0]} does not go with {kind.key}")
+    if "duration" in kind.allowed_keys() and "duration" not in content:
+        raise InputError(f"{where}: give duration (s), or duration: fast")
+    segment = validate(kind, content, where)
+    if segment.is_base_free and not isinstance(segment, (JointSegment, ToolSegment)):
+        raise InputError(f"{where}: base: free needs joints_deg or tool")
+    return segment
 
 
 def read_pointing(text: str, where: str) -> PointingGoal:
@@ -203,20 +470,23 @@ def read_pointing(text: str, where: str) -> PointingGoal:
     Raises:
         InputError: it is wrong; names ``where``.
     """
-    try:
-        content = parse_yaml(text)
-    except YamlTextError as error:
-        raise InputError(f"{where}: {error}") from None
+    content = _parsed(text, where)
     content = {"point": content} if isinstance(content, str) else content
-    _check_keys(content, where, tuple(PointingGoal.model_fields), tuple(PointingGoal.model_fields))
+    _check_keys(content, where, tuple(PointingGoal.model_fields))
     return validate(PointingGoal, content, where)
 
 
-def _check_keys(content: Any, where: str, known: Sequence[str], allowed: Sequence[str]) -> None:
-    """Refuse a key that is not ``known``, with those that a document may have."""
+def _parsed(text: str, where: str) -> Any:
+    try:
+        return parse_yaml(text)
+    except YamlTextError as error:
+        raise InputError(f"{where}: {error}") from None
+
+
+def _check_keys(content: Any, where: str, known: Sequence[str]) -> None:
     for key, value in content.items() if isinstance(content, dict) else ():
         if key not in known:
-            advice = choices(str(key), allowed)
+            advice = choices(str(key), known)
             raise InputError(
                 f"{where}: {printable(str(key))}: unknown key, got {short(value)}: {advice}"
             )

@@ -1,10 +1,18 @@
-"""All functions, structs and constants of an export, found from its first kernels on."""
+"""All functions, structs and constants of an export, found from its first kernels on.
+
+A function is one kernel, for one set of argument types.
+"""
 
 from __future__ import annotations
 
+import ast
+import inspect
 import re
+import textwrap
 from collections.abc import Callable, Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from functools import cache
+from pathlib import Path
 from types import FunctionType
 from typing import Any, NamedTuple
 
@@ -12,11 +20,157 @@ from space_robot_msgs_py.compiled.records import Field as RecordField
 from space_robot_msgs_py.compiled.records import Record
 
 from . import language as lang
-from .functions import Function, kind_of_argument, passed, syntax_of, translated
-from .language import RefusedError, Value
+from .language import ArrayOf, Known, Pointer, RefusedError, Value, number_of
+from .statements import Statements, declared
 
+MOST_PASSES = 5
+"""Passes over a function until the types of its names have settled; two are usual."""
 FIELD, CALL, CONSTANT = map(re.compile, (r"«(\d+):(\w+)»", r"¤(\d+)\(", r"¶(\d+);"))
 """Markers of fields, calls and constants, whose names are decided at the end."""
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """An argument in C."""
+
+    name: str
+    type: lang.Type
+    is_written: bool
+    """Whether the memory that it points to is written."""
+
+
+@dataclass(frozen=True)
+class Function:
+    """A translated kernel."""
+
+    body: Callable[..., Any]
+    """The kernel as plain Python."""
+    label: str
+    """Of a bundle that it was made for; empty if for none."""
+    parameters: tuple[Parameter, ...]
+    arguments: tuple[tuple[str, ...], ...]
+    """Names of the parameters that each argument in Python becomes in C."""
+    result: lang.Type
+    lines: tuple[str, ...]
+    stores: frozenset[lang.FieldName]
+    """Fields of records that it writes."""
+
+
+@cache
+def syntax_of(body: Callable[..., Any]) -> tuple[ast.FunctionDef, str]:
+    """Return the syntax tree of a function, and its file from the package's folder on."""
+    tree = ast.parse(textwrap.dedent(inspect.getsource(body))).body[0]
+    path = Path(inspect.getsourcefile(body) or "?")
+    packages = [k for k, part in enumerate(path.parts) if part.startswith("space_robot_")]
+    file = "/".join(path.parts[packages[-1] :]) if packages else str(path)
+    if not isinstance(tree, ast.FunctionDef):
+        line = body.__code__.co_firstlineno
+        raise lang.NotInSubsetError(file, line, "a lambda", "write a kernel with def")
+    return tree, file
+
+
+class _Translation(Statements):
+    """Translation of one kernel for arguments of given types."""
+
+    def __init__(
+        self, program: Any, body: Callable[..., Any], kinds: tuple[lang.Type, ...]
+    ) -> None:
+        tree, file = syntax_of(body)
+        super().__init__(program, body, tree, file)
+        self.arguments: list[tuple[str, ...]] = []
+        self.parameters: list[tuple[str, lang.Type]] = []
+        for argument, kind in zip(tree.args.args, kinds, strict=True):
+            before = len(self.parameters)
+            self.names[argument.arg] = self._parameter(argument.arg, kind)
+            self.types[argument.arg] = kind
+            self.arguments.append(tuple(name for name, _ in self.parameters[before:]))
+
+    def _parameter(self, name: str, kind: lang.Type) -> Value:
+        if isinstance(kind, Known):
+            is_number = isinstance(kind.value, (bool, int))
+            bound = number_of(kind.value) if is_number else Value(kind, name)
+            return replace(bound, is_bound=is_number)
+        if isinstance(kind, lang.Bundle):
+            parts: dict[str, Value] = {}
+            for item, of in kind.items:
+                if isinstance(of, lang.FieldOf):
+                    owner = parts[of.item]
+                    pointer = replace(owner, type=Pointer(owner.type.record))
+                    parts[item] = self.field(pointer, of.name)
+                else:
+                    parts[item] = self._parameter(f"{name}_{item}", of)
+            return Value(kind, name, parts=tuple(parts.values()))
+        if kind != lang.EMPTY:  # C has no such arrays
+            self.parameters.append((name, kind))
+        return Value(kind, name, roots=frozenset({name}))
+
+
+def translated(
+    program: Any, body: Callable[..., Any], kinds: tuple[lang.Type, ...], label: str
+) -> Function:
+    """Translate a kernel of a program for types of arguments; ``label`` is a bundle's.
+
+    Raises:
+        NotInSubsetError: a construct has no translation.
+    """
+    types: dict[str, lang.Type] = {}
+    result: lang.Type = None
+    for _ in range(MOST_PASSES):
+        translation = _Translation(program, body, kinds)
+        translation.types |= types
+        translation.result = result
+        translation.body()
+        if translation.types == types and translation.result == result:
+            break
+        types, result = dict(translation.types), translation.result
+    written = set(translation.written)
+    for value in translation.names.values():
+        if isinstance(value.type, ArrayOf) and len(value.type.shape) > 1:
+            written |= value.roots  # C99 cannot pass variable rows as constant ones
+    lines = declared(translation.lines, _declarations(translation, written))
+    text = "\n".join(lines)
+    is_used = {p: bool(re.search(rf"\b{p}\b", text)) for p, _ in translation.parameters}
+    own = {argument.arg for argument in translation.tree.args.args}
+    kept = [(p, kind) for p, kind in translation.parameters if is_used[p] or p in own]
+    ignored = [f"    (void){p};" for p, _ in kept if not is_used[p]]
+    return Function(
+        body,
+        label,
+        tuple(Parameter(p, kind, p in written) for p, kind in kept),
+        tuple(tuple(p for p in names if p in dict(kept)) for names in translation.arguments),
+        translation.result or lang.NOTHING,
+        tuple(ignored + lines),
+        frozenset(translation.stores),
+    )
+
+
+def _declarations(translation: _Translation, written: set[str]) -> dict[str, str]:
+    declarations = {}
+    for name, kind in translation.types.items():
+        if name not in translation.own and not isinstance(kind, Known):
+            is_pointer = isinstance(kind, (Pointer, lang.BlockOf, ArrayOf))
+            const = "const " if is_pointer and name not in written else ""
+            declarations[name] = f"{const}{translation.declared(kind, name)}"
+    return declarations
+
+
+def passed(function: Function, arguments: tuple[Value, ...]) -> list[Value]:
+    """Return the value of each parameter in a call."""
+    values: list[Value] = []
+    for names, argument in zip(function.arguments, arguments, strict=True):
+        if isinstance(argument.type, lang.Bundle):
+            items = zip(argument.type.items, argument.parts, strict=True)
+            by_name = {f"_{item}": part for (item, _), part in items}
+            values += [next(v for end, v in by_name.items() if n.endswith(end)) for n in names]
+        elif names:
+            values.append(argument)
+    return values
+
+
+def kind_of_argument(value: Value) -> lang.Type:
+    """Return the type of a parameter for an argument; a truth value that is known is bound."""
+    is_bound = value.is_bound or (value.type == lang.BOOL and value.constant is not None)
+    return Known(value.constant) if is_bound else value.type
 
 
 def _names(function: Function) -> list[tuple[str, bool]]:

@@ -1,17 +1,26 @@
-"""Statements of kernels as statements of C."""
+"""Statements of kernels as statements of C, and where C declares the local names."""
 
 from __future__ import annotations
 
 import ast
-from collections.abc import Sequence
+import re
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
+from functools import cache
 from typing import Any
 
 from . import language as lang
-from .declarations import INDENT, MARK, assigned_in, names_in
 from .expressions import Expressions
 from .language import ArrayOf, Known, Pointer, RefusedError, Value, cast, number_of
 
+RESERVED = re.compile(
+    "auto|case|char|const|default|do|double|enum|extern|goto|inline|long|register|restrict|short|"
+    "signed|sizeof|static|struct|switch|typedef|union|unsigned|void|volatile"
+)
+INDENT = "    "
+MARK = "§"
+"""Stands around a local name where it gets a value."""
 TRANSPARENT = ("any_lane", "all_lanes", "uniform", "bool")
 """Words that give a truth value as it is."""
 
@@ -61,7 +70,6 @@ class Statements(Expressions):
         self.lines.append(f"{INDENT * self._depth}{line}")
 
     def _block(self, statements: Sequence[ast.stmt]) -> bool:
-        """Translate statements until one leaves the block; return whether one does."""
         before, is_left = self.facts, False
         for statement in statements:
             kind = type(statement).__name__.lower()
@@ -78,7 +86,6 @@ class Statements(Expressions):
         return is_left
 
     def _learn(self, test: ast.expr, is_true: bool) -> None:
-        """Note that a condition of names that never change is true or false from here on."""
         while True:
             if isinstance(test, ast.UnaryOp) and isinstance(test.op, ast.Not):
                 test, is_true = test.operand, not is_true
@@ -92,7 +99,6 @@ class Statements(Expressions):
             self.facts = {**self.facts, ast.dump(test): is_true}
 
     def _is_steady_name(self, name: str) -> bool:
-        """Return whether a truth value has the same value wherever it is read."""
         most = 0 if name in self.own else 1
         return self.names[name].type == lang.BOOL and self.assigned[name] <= most
 
@@ -127,7 +133,6 @@ class Statements(Expressions):
             self._assign(node.target, self.translate(node.value))
 
     def _assign_together(self, target: ast.Tuple, source: ast.expr) -> None:
-        """Assign a tuple to several targets; all values are there before the first is stored."""
         if not isinstance(source, ast.Tuple):
             value = self.translate(source)
             if not isinstance(value.type, lang.TupleOf):
@@ -191,7 +196,6 @@ class Statements(Expressions):
         self.stores |= place.fields
 
     def _store(self, place: Value, value: Value) -> None:
-        """Write a number into a number or into a whole array, or an array into an array."""
         self.write(place)
         if not isinstance(place.type, ArrayOf):
             self.emit(f"{place.text} = {cast(value, lang.FLOAT).text};")
@@ -302,7 +306,6 @@ class Statements(Expressions):
 
     @staticmethod
     def _is_steady(bound: ast.expr, loop: ast.For) -> bool:
-        """Return whether a bound is made of names that the loop leaves alone."""
         nodes = list(ast.walk(bound))
         if any(isinstance(n, (ast.Attribute, ast.Subscript, ast.Call)) for n in nodes):
             return False
@@ -362,9 +365,95 @@ class Statements(Expressions):
     _break_statement = _continue_statement = _leave_statement
 
     def _fresh(self, name: str) -> str:
-        """Return a name that the function does not have yet."""
         while True:
             count = self._counter[name] = self._counter.get(name, 0) + 1
             fresh = name if count == 1 else f"{name}_{count}"
             if fresh not in self._taken:
                 return fresh
+
+
+def names_in(nodes: Iterable[ast.AST], stored: bool = False) -> Counter[str]:
+    """Return how often names are mentioned; ``stored``: how often they get a value."""
+    counted: Counter[str] = Counter()
+    for node in nodes:
+        counted.update(_names_in(node, stored))
+    return counted
+
+
+@cache
+def _names_in(node: ast.AST, stored: bool) -> Counter[str]:
+    names = (n for n in ast.walk(node) if isinstance(n, ast.Name))
+    return Counter(n.id for n in names if not stored or isinstance(n.ctx, ast.Store))
+
+
+@cache
+def assigned_in(tree: ast.FunctionDef) -> Counter[str]:
+    """Return how often names get a value in a function.
+
+    Raises:
+        RefusedError: what a loop counts is mentioned outside of it, where it differs in C.
+    """
+    inside: Counter[str] = Counter()
+    for loop in (n for n in ast.walk(tree) if isinstance(n, ast.For)):
+        for name in names_in([loop.target]):
+            if name in names_in(loop.body, stored=True):
+                raise RefusedError(f"{name!r} set beside its loop", "use another name")
+            inside[name] += names_in([loop])[name]
+    mentioned = names_in([tree])
+    for name in filter(RESERVED.fullmatch, mentioned):
+        raise RefusedError(f"the name {name!r}", "C has it: use another one")
+    for name, count in inside.items():
+        if mentioned[name] != count and name != "_":
+            raise RefusedError(f"{name!r} outside of its loop", "use another name")
+    return names_in([tree], stored=True)
+
+
+def declared(lines: Sequence[str], declarations: Mapping[str, str]) -> list[str]:
+    """Return lines in which each name is declared in the innermost block that has it.
+
+    Args:
+        lines: of a function, indented, with a `MARK` around a name that gets a value.
+        declarations: of each local name.
+    """
+    done = list(lines)
+    for name, declaration in declarations.items():
+        value = f"{MARK}{name}{MARK} = "
+        mention = re.compile(rf"(?<![\w.>:]){name}\b")
+        places = [k for k, line in enumerate(done) if mention.search(line)]
+        for place in reversed(places):  # what nobody reads
+            _, is_value, source = done[place].partition(value)
+            if len(places) == 1 and is_value and "(" not in source:
+                del done[place]
+                places = []
+        if not places:
+            continue
+        first, level = places[0], _level(done[places[0]])
+        while not _is_in_block(done, first, level, places[-1]):
+            level -= 1
+            first = _beginning(done, first, level)
+        is_in_loop = any(_is_loop_around(done, k, first) for k in range(first))
+        if first == places[0] and done[first].strip().startswith(value):
+            done[first] = done[first].replace(value, f"{declaration} = ")
+        else:
+            place, level = (0, 1) if is_in_loop else (first, level)
+            done.insert(place, f"{INDENT * level}{declaration};")
+    return [line.replace(MARK, "") for line in done]
+
+
+def _level(line: str) -> int:
+    return (len(line) - len(line.lstrip())) // len(INDENT)
+
+
+def _is_in_block(lines: Sequence[str], first: int, level: int, last: int) -> bool:
+    return all(_level(line) >= level for line in lines[first : last + 1])
+
+
+def _beginning(lines: Sequence[str], place: int, level: int) -> int:
+    while _level(lines[place]) > level or lines[place].strip().startswith("}"):
+        place -= 1
+    return place
+
+
+def _is_loop_around(lines: Sequence[str], head: int, place: int) -> bool:
+    level, is_loop = _level(lines[head]), lines[head].strip().startswith(("for (", "while ("))
+    return is_loop and all(_level(line) > level for line in lines[head + 1 : place + 1])

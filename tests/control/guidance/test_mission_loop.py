@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from space_robot_control.guidance.settings import MissionNodeSettings
+from space_robot_control.guidance.mission import MissionNodeSettings
 from space_robot_model.robot import Robot
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.ros.health import Level
@@ -21,10 +21,15 @@ from space_robot_msgs_py.wire.reference_codec import ReferenceCodec
 pytest.importorskip("rclpy")
 
 
-from space_robot_control.guidance import loop, mission_changes
-from space_robot_control.guidance.loop import CLOCK_WAIT_S, GREET_S, MOST_AT_ONCE, MissionLoop
+from space_robot_control.guidance import loop
+from space_robot_control.guidance.loop import (
+    CLOCK_WAIT_S,
+    GREET_S,
+    MOST_AT_ONCE,
+    TOLD_S,
+    MissionLoop,
+)
 from space_robot_control.guidance.mission import Mission
-from space_robot_control.guidance.mission_changes import TOLD_S
 
 CHUNK, LEAD = 10, 35
 NO_TRAJECTORIES = {"trajectories accepted": 0, "trajectories refused": 0}
@@ -68,7 +73,6 @@ class Bench:
         patch.setattr(time, "monotonic", lambda: self.now)
         for name in ("RawPublisher", "RawSubscription"):
             patch.setattr(loop, name, Topic)
-        patch.setattr(mission_changes, "RawSubscription", Topic)
         self.settings = MissionNodeSettings.resolve({"chunk_ticks": chunk, "lead_ticks": LEAD})
         self.node: Any = Node()
         self.loop = MissionLoop(self.node, self.settings)

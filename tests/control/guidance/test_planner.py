@@ -14,8 +14,7 @@ from scipy.spatial.transform import Rotation
 from strategies import random_robot
 
 from space_robot_control.guidance.demand import MotionDemand, demand
-from space_robot_control.guidance.mission import Mission, MissionSettings
-from space_robot_control.guidance.trajectory_file import with_columns
+from space_robot_control.guidance.mission import Mission, MissionSettings, with_columns
 from space_robot_model.robot import Robot
 from space_robot_model.robot.find import find_robot
 from space_robot_model.robot.kinematics import tool_state
