@@ -180,12 +180,7 @@ class Files:
                 text += f"    double at[{len(kind.items)}];\n"
             else:
                 for k, item in enumerate(kind.items):
-                    inner = (
-                        self.program.tuple_name(item)
-                        if isinstance(item, lang.TupleOf)
-                        else item.name
-                    )
-                    text += f"    {inner} item_{k};\n"
+                    text += f"    {self.program.type_name(item)} item_{k};\n"
             text += f"}} {name};\n\n"
         return text
 
@@ -202,17 +197,15 @@ class Files:
 
     def prototype(self, function: Function) -> str:
         """Return a function's head."""
-        parameters = ", ".join(
-            self._parameter(p.name, p.type, p.is_written) for p in function.parameters
-        )
-        kind = function.result
-        result = self.program.tuple_name(kind) if isinstance(kind, lang.TupleOf) else kind.name
+        parameters = ", ".join(map(self.program.parameter, function.parameters))
+        result = self.program.type_name(function.result)
         return f"{result} {self.name_of(function)}({parameters or 'void'})"
 
     def prototypes(self) -> str:
         """Return the declarations of the functions that several files call."""
         shared = [f for f in self.functions if not self._is_local(f)]
-        return "".join(f"{wrapped(self.prototype(f))};\n" for f in shared)
+        before = self.program.target.shared_function
+        return "".join(f"{wrapped(before + self.prototype(f))};\n" for f in shared)
 
     def rooms(self) -> dict[str, str]:
         """Return the functions by file."""
@@ -227,23 +220,11 @@ class Files:
         said = ast.get_docstring(tree) or tree.name
         line = function.body.__code__.co_firstlineno
         text = comment(f"{said}\n\nPython: {tree.name}, {file}, line {line}.")
-        text += wrapped(
-            f"{'static ' if self._is_local(function) else ''}{self.prototype(function)}"
-        )
+        target = self.program.target
+        before = target.local_function if self._is_local(function) else target.shared_function
+        text += wrapped(f"{before}{self.prototype(function)}")
         lines = (wrapped(self.final(line)) for line in function.lines)
         return "\n".join([text, "{", *lines, "}", ""])
-
-    def _parameter(self, name: str, kind: lang.Type, is_written: bool) -> str:
-        const = "" if is_written else "const "
-        if isinstance(kind, (lang.Pointer, lang.BlockOf)):
-            return f"{const}{self.program.struct_name(kind.record)} *{name}"
-        if isinstance(kind, lang.ArrayOf):
-            sizes = "".join(f"[{size}]" for size in kind.shape[1:])
-            first = "" if kind.shape[0] is None else kind.shape[0]
-            return f"{const if not sizes else ''}double {name}[{first}]{sizes}"
-        if isinstance(kind, lang.TupleOf):
-            return f"{self.program.tuple_name(kind)} {name}"
-        return f"{kind.name} {name}"
 
     def _is_local(self, function: Function) -> bool:
         number = self.program.functions.index(function)

@@ -218,11 +218,9 @@ class Expressions:
         text = f"{owner.at(lang.POSTFIX)}{arrow}«{id(record)}:{name}»"
         if not isinstance(declared, RecordField):
             return Value(Pointer(declared), text, lang.POSTFIX, roots=owner.roots, is_pointer=False)
-        shape = self.program.shape(record, name)
-        constant = self.program.constants.get(field)
-        if not shape:
-            return Value(lang.FLOAT, text, lang.POSTFIX, constant, owner.roots, frozenset({field}))
-        return Value(ArrayOf(shape), text, lang.POSTFIX, constant, owner.roots, frozenset({field}))
+        shape, constant = self.program.shape(record, name), self.program.constants.get(field)
+        kind = ArrayOf(shape) if shape else lang.FLOAT
+        return Value(kind, text, lang.POSTFIX, constant, owner.roots, frozenset({field}))
 
     @staticmethod
     def length(array: Value) -> Value:
@@ -283,14 +281,11 @@ class Expressions:
     def element(owner: Value, place: Value) -> Value:
         """Return an element, or a row, of an array."""
         text = place.text
-        if owner.offset:
-            text = (
-                owner.offset
-                if place.constant == 0
-                else f"{owner.offset} + {place.at(lang.PRODUCT)}"
-            )
-            if place.constant is not None and owner.offset.isdigit():
-                text = str(int(owner.offset) + place.constant)
+        if owner.offset and place.constant is not None and owner.offset.isdigit():
+            text = str(int(owner.offset) + place.constant)
+        elif owner.offset:
+            rest = "" if place.constant == 0 else f" + {place.at(lang.PRODUCT)}"
+            text = f"{owner.offset}{rest}"
         rest = owner.type.shape[1:]
         kind = ArrayOf(rest) if rest else lang.FLOAT
         element = f"{owner.at(lang.POSTFIX)}[{text}]"
@@ -312,15 +307,11 @@ class Expressions:
         return replace(owner, type=ArrayOf((known,)), offset=offset)
 
     def _tuple(self, node: ast.Tuple) -> Value:
-        return self.tuple_of([self.translate(item) for item in node.elts])
-
-    def tuple_of(self, items: list[Value]) -> Value:
-        """Return a tuple of values."""
+        items = [self.translate(item) for item in node.elts]
         items = [cast(item, lang.FLOAT) if item.type == lang.INT else item for item in items]
         kind = lang.TupleOf(tuple(item.type for item in items))
-        texts = ", ".join(item.text for item in items)
-        inside = f"{{{{{texts}}}}}" if kind.is_uniform else f"{{{texts}}}"
-        text = f"({self.program.tuple_name(kind)}){inside}"
+        texts, name = ", ".join(item.text for item in items), self.program.tuple_name(kind)
+        text = self.program.target.tuple_of(name, texts, kind.is_uniform)
         lang.check_order(items)
         calls = max((item.calls for item in items), default=0)
         return Value(kind, text, lang.POSTFIX, parts=tuple(items), calls=calls)

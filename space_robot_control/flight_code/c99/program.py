@@ -20,7 +20,7 @@ from space_robot_msgs_py.compiled.records import Field as RecordField
 from space_robot_msgs_py.compiled.records import Record
 
 from . import language as lang
-from .language import ArrayOf, Known, Pointer, RefusedError, Value, number_of
+from .language import ArrayOf, Known, Pointer, RefusedError, Value
 from .statements import Statements, declared
 
 MOST_PASSES = 5
@@ -69,42 +69,6 @@ def syntax_of(body: Callable[..., Any]) -> tuple[ast.FunctionDef, str]:
     return tree, file
 
 
-class _Translation(Statements):
-    """Translation of one kernel for arguments of given types."""
-
-    def __init__(
-        self, program: Any, body: Callable[..., Any], kinds: tuple[lang.Type, ...]
-    ) -> None:
-        tree, file = syntax_of(body)
-        super().__init__(program, body, tree, file)
-        self.arguments: list[tuple[str, ...]] = []
-        self.parameters: list[tuple[str, lang.Type]] = []
-        for argument, kind in zip(tree.args.args, kinds, strict=True):
-            before = len(self.parameters)
-            self.names[argument.arg] = self._parameter(argument.arg, kind)
-            self.types[argument.arg] = kind
-            self.arguments.append(tuple(name for name, _ in self.parameters[before:]))
-
-    def _parameter(self, name: str, kind: lang.Type) -> Value:
-        if isinstance(kind, Known):
-            is_number = isinstance(kind.value, (bool, int))
-            bound = number_of(kind.value) if is_number else Value(kind, name)
-            return replace(bound, is_bound=is_number)
-        if isinstance(kind, lang.Bundle):
-            parts: dict[str, Value] = {}
-            for item, of in kind.items:
-                if isinstance(of, lang.FieldOf):
-                    owner = parts[of.item]
-                    pointer = replace(owner, type=Pointer(owner.type.record))
-                    parts[item] = self.field(pointer, of.name)
-                else:
-                    parts[item] = self._parameter(f"{name}_{item}", of)
-            return Value(kind, name, parts=tuple(parts.values()))
-        if kind != lang.EMPTY:  # C has no such arrays
-            self.parameters.append((name, kind))
-        return Value(kind, name, roots=frozenset({name}))
-
-
 def translated(
     program: Any, body: Callable[..., Any], kinds: tuple[lang.Type, ...], label: str
 ) -> Function:
@@ -116,7 +80,7 @@ def translated(
     types: dict[str, lang.Type] = {}
     result: lang.Type = None
     for _ in range(MOST_PASSES):
-        translation = _Translation(program, body, kinds)
+        translation = Statements(program, body, *syntax_of(body), kinds)
         translation.types |= types
         translation.result = result
         translation.body()
@@ -144,14 +108,12 @@ def translated(
     )
 
 
-def _declarations(translation: _Translation, written: set[str]) -> dict[str, str]:
-    declarations = {}
-    for name, kind in translation.types.items():
-        if name not in translation.own and not isinstance(kind, Known):
-            is_pointer = isinstance(kind, (Pointer, lang.BlockOf, ArrayOf))
-            const = "const " if is_pointer and name not in written else ""
-            declarations[name] = f"{const}{translation.declared(kind, name)}"
-    return declarations
+def _declarations(translation: Statements, written: set[str]) -> dict[str, str]:
+    return {
+        name: translation.program.declaration(kind, name, name in written)
+        for name, kind in translation.types.items()
+        if name not in translation.own and not isinstance(kind, Known)
+    }
 
 
 def passed(function: Function, arguments: tuple[Value, ...]) -> list[Value]:
@@ -191,14 +153,17 @@ class KernelProgram:
     a branch that they decide is left out, and so is what only that branch needs.
     """
 
-    def __init__(self, sizes: Mapping[str, int], joints: int) -> None:
+    def __init__(
+        self, sizes: Mapping[str, int], joints: int, target: lang.C99 | None = None
+    ) -> None:
         """Begin.
 
         Args:
             sizes: numbers that stand for constants of modules, by name, as capacities of arrays.
             joints: n, of which the shapes of records are functions.
+            target: the language that is written; None: C99.
         """
-        self.sizes, self.joints = dict(sizes), joints
+        self.sizes, self.joints, self.target = dict(sizes), joints, target or lang.C99()
         self.constants: dict[lang.FieldName, float] = {}
         """Fields that never change; of an array, all of its numbers are the same."""
         self.functions: list[Function] = []
@@ -248,6 +213,34 @@ class KernelProgram:
             name = str(len(inner)) if kind.is_uniform else "".join(inner)
             self.tuples[kind] = f"{lang.PREFIX}tuple_{name}"
         return self.tuples[kind]
+
+    def type_name(self, kind: lang.Type) -> str:
+        """Return the name of a scalar's or tuple's type."""
+        name: str = self.tuple_name(kind) if isinstance(kind, lang.TupleOf) else kind.name
+        return name
+
+    def declaration(self, kind: lang.Type, name: str, is_written: bool = True) -> str:
+        """Return the declaration of a local name; a pointer is to constants if not written."""
+        const = "" if is_written else "const "
+        if isinstance(kind, (Pointer, lang.BlockOf)):
+            return f"{const}{self.struct_name(kind.record)} *{name}"
+        if isinstance(kind, ArrayOf) and len(kind.shape) == 1:
+            return f"{const}double *{name}"
+        if isinstance(kind, ArrayOf):
+            sizes = "".join(f"[{size}]" for size in kind.shape[1:])
+            return f"{const}double (*{name}){sizes}"
+        return f"{self.type_name(kind)} {name}"
+
+    def parameter(self, parameter: Parameter) -> str:
+        """Return the declaration of a parameter, with the sizes of an array."""
+        kind = parameter.type
+        if not isinstance(kind, ArrayOf):
+            return self.declaration(kind, parameter.name, parameter.is_written)
+        first, *rest = ("" if size is None else size for size in kind.shape)
+        # C99 cannot pass variable rows as constant ones
+        const = "const " if not rest and not parameter.is_written else ""
+        sizes = "".join(f"[{size}]" for size in rest)
+        return f"{const}double {parameter.name}[{first}]{sizes}"
 
     def call(self, body: Callable[..., Any], arguments: tuple[Value, ...], inside: Any) -> Value:
         """Return the call of a kernel by a translation, ``inside`` which it stands."""

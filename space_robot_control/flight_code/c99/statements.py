@@ -28,8 +28,18 @@ TRANSPARENT = ("any_lane", "all_lanes", "uniform", "bool")
 class Statements(Expressions):
     """Translator of the statements of one function."""
 
-    def __init__(self, program: Any, function: Any, tree: ast.FunctionDef, file: str) -> None:
-        """Translate the body of ``tree``, the syntax of ``function``, which stands in ``file``."""
+    def __init__(
+        self,
+        program: Any,
+        function: Any,
+        tree: ast.FunctionDef,
+        file: str,
+        kinds: Sequence[lang.Type],
+    ) -> None:
+        """Translate the body of ``tree``, the syntax of ``function``, which stands in ``file``.
+
+        ``kinds`` are the types of the arguments.
+        """
         super().__init__(program, function)
         self.tree, self.file = tree, file
         self.first_line = function.__code__.co_firstlineno
@@ -47,6 +57,33 @@ class Statements(Expressions):
         self._roots: dict[str, frozenset[str]] = {}
         self._depth = 1
         self._counter: dict[str, int] = {}
+        self.parameters: list[tuple[str, lang.Type]] = []
+        self.arguments: list[tuple[str, ...]] = []
+        """Names of the parameters in C that each argument becomes."""
+        for argument, kind in zip(tree.args.args, kinds, strict=True):
+            before = len(self.parameters)
+            self.names[argument.arg] = self._parameter(argument.arg, kind)
+            self.types[argument.arg] = kind
+            self.arguments.append(tuple(name for name, _ in self.parameters[before:]))
+
+    def _parameter(self, name: str, kind: lang.Type) -> Value:
+        if isinstance(kind, Known):
+            is_number = isinstance(kind.value, (bool, int))
+            bound = number_of(kind.value) if is_number else Value(kind, name)
+            return replace(bound, is_bound=is_number)
+        if isinstance(kind, lang.Bundle):
+            parts: dict[str, Value] = {}
+            for item, of in kind.items:
+                if isinstance(of, lang.FieldOf):
+                    owner = parts[of.item]
+                    pointer = replace(owner, type=Pointer(owner.type.record))
+                    parts[item] = self.field(pointer, of.name)
+                else:
+                    parts[item] = self._parameter(f"{name}_{item}", of)
+            return Value(kind, name, parts=tuple(parts.values()))
+        if kind != lang.EMPTY:  # C has no such arrays
+            self.parameters.append((name, kind))
+        return Value(kind, name, roots=frozenset({name}))
 
     def body(self) -> None:
         """Translate all statements.
@@ -102,18 +139,6 @@ class Statements(Expressions):
         most = 0 if name in self.own else 1
         return self.names[name].type == lang.BOOL and self.assigned[name] <= most
 
-    def declared(self, kind: lang.Type, name: str) -> str:
-        """Return C's declaration of a name of a type."""
-        if isinstance(kind, (Pointer, lang.BlockOf)):
-            return f"{self.program.struct_name(kind.record)} *{name}"
-        if isinstance(kind, ArrayOf):
-            if len(kind.shape) == 1:
-                return f"double *{name}"
-            return f"double (*{name}){''.join(f'[{size}]' for size in kind.shape[1:])}"
-        if isinstance(kind, lang.TupleOf):
-            return f"{self.program.tuple_name(kind)} {name}"
-        return f"{kind.name} {name}"
-
     # assignments
 
     def _assign_statement(self, node: ast.Assign) -> None:
@@ -122,9 +147,7 @@ class Statements(Expressions):
             return
         value = self.translate(node.value)
         if len(node.targets) > 1 and (value.calls or isinstance(value.type, lang.TupleOf)):
-            name = self._fresh("value")
-            self.emit(f"const {self.declared(value.type, name)} = {value.text};")
-            value = replace(value, text=name, rank=lang.ATOM, calls=0)
+            value = self._named("value", value)
         for target in node.targets:
             self._assign(target, value)
 
@@ -139,8 +162,7 @@ class Statements(Expressions):
                 raise RefusedError(f"unpacking {lang.described(value.type)}", "return tuples")
             name = value.text
             if value.calls or not name.isidentifier():
-                name = self._fresh("result")
-                self.emit(f"const {self.declared(value.type, name)} = {value.text};")
+                name = self._named("result", value).text
             for k, (part, kind) in enumerate(zip(target.elts, value.type.items, strict=True)):
                 item = f"{name}.at[{k}]" if value.type.is_uniform else f"{name}.item_{k}"
                 self._assign(part, Value(kind, item, lang.POSTFIX))
@@ -153,9 +175,7 @@ class Statements(Expressions):
             loads = values[k].calls or "[" in values[k].text or "->" in values[k].text
             touched = bool(mentioned & set(written)) or (stores and loads)
             if touched and not isinstance(values[k].type, (Pointer, ArrayOf)):
-                name = self._fresh("new")
-                self.emit(f"const {self.declared(values[k].type, name)} = {values[k].text};")
-                values[k] = replace(values[k], text=name, rank=lang.ATOM, calls=0)
+                values[k] = self._named("new", values[k])
         for part, value in zip(target.elts, values, strict=True):
             self._assign(part, value)
 
@@ -363,6 +383,11 @@ class Statements(Expressions):
         return True
 
     _break_statement = _continue_statement = _leave_statement
+
+    def _named(self, name: str, value: Value) -> Value:
+        fresh = self._fresh(name)
+        self.emit(f"const {self.program.declaration(value.type, fresh)} = {value.text};")
+        return replace(value, text=fresh, rank=lang.ATOM, calls=0)
 
     def _fresh(self, name: str) -> str:
         while True:
