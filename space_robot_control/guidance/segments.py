@@ -349,7 +349,7 @@ class HoldSegment(Segment):
         return self.hold
 
 
-class Posture(StrictModel):
+class PostureGoal(StrictModel):
     """A posture to approach."""
 
     joints_deg: list[float] = Field(description="joints, degrees or m")
@@ -360,7 +360,7 @@ class ReactionlessSegment(Segment):
 
     key = "reactionless"
     excludes = ("base",)
-    reactionless: Posture
+    reactionless: PostureGoal
 
     def joints(self, start: SegmentStart) -> JointMaker:
         """Return what makes the course of the joints from a start."""

@@ -30,7 +30,7 @@ from .courses import Piece
 from .live import GoalTolerances, GoalVerdict
 
 if TYPE_CHECKING:
-    from .loop import MissionChanges
+    from .mission_changes import MissionChanges
 
 Array = NDArray[np.float64]
 

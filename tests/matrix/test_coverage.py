@@ -123,7 +123,7 @@ def test_every_kind_of_segment_is_flown() -> None:
     settings = [flight.mission_settings for flight in flights().values()]
     segments = [segment for flight in flights().values() for segment in begun(flight)]
     for kind in SEGMENT_KINDS.values():
-        if kind.key != "file":  # it becomes a trajectory
+        if kind.key != "trajectory":  # what a file becomes
             flown = [segment for segment in segments if type(segment) is kind]
             for key in {*kind.allowed_keys()} - {"base", "duration"}:
                 assert any(getattr(segment, key) for segment in flown), (kind.key, key)

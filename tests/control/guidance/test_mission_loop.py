@@ -21,15 +21,10 @@ from space_robot_msgs_py.wire.reference_codec import ReferenceCodec
 pytest.importorskip("rclpy")
 
 
-from space_robot_control.guidance import loop
-from space_robot_control.guidance.loop import (
-    CLOCK_WAIT_S,
-    GREET_S,
-    MOST_AT_ONCE,
-    TOLD_S,
-    MissionLoop,
-)
+from space_robot_control.guidance import loop, mission_changes
+from space_robot_control.guidance.loop import CLOCK_WAIT_S, GREET_S, MOST_AT_ONCE, MissionLoop
 from space_robot_control.guidance.mission import Mission
+from space_robot_control.guidance.mission_changes import TOLD_S
 
 CHUNK, LEAD = 10, 35
 NO_TRAJECTORIES = {"trajectories accepted": 0, "trajectories refused": 0}
@@ -73,6 +68,7 @@ class Bench:
         patch.setattr(time, "monotonic", lambda: self.now)
         for name in ("RawPublisher", "RawSubscription"):
             patch.setattr(loop, name, Topic)
+        patch.setattr(mission_changes, "RawSubscription", Topic)
         self.settings = MissionNodeSettings.resolve({"chunk_ticks": chunk, "lead_ticks": LEAD})
         self.node: Any = Node()
         self.loop = MissionLoop(self.node, self.settings)
