@@ -7,6 +7,7 @@ after it ends it is at rest, unless the base turns on.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 import numpy as np
@@ -17,8 +18,10 @@ from space_robot_model.elementary.matrices import dot_rows, norm
 if TYPE_CHECKING:
     from space_robot_model.elementary.quintic_spline import QuinticSpline
     from space_robot_model.elementary.spline import CubicSpline
+    from space_robot_model.orbit.ephemeris import Ephemeris
+    from space_robot_model.robot import Robot
 
-    from .segments import PointingGoal
+    from .goals import PointingGoal
 
 Array = NDArray[np.float64]
 
@@ -72,6 +75,28 @@ class BaseMotion(NamedTuple):
     def held(self) -> Course:
         """The course of a segment that does not lead the base."""
         return self.course or at_rest(self.quaternion)
+
+
+class SegmentStart(NamedTuple):
+    """Where a segment begins."""
+
+    robot: Robot
+    """As the flight software knows it."""
+    time: float
+    """s."""
+    joints: Array
+    """(n,) rad, or m of prismatic joints."""
+    base: BaseMotion
+    origin: Callable[[], Array]
+    """Returns the origin (3,) of the inertial frame from the robot's centre of mass, m."""
+    ephemeris: Callable[[], Ephemeris | None]
+    """Returns that of the assumed orbit; None: there is none."""
+
+
+Maker = Callable[[float], tuple[Course, Course]]
+"""Makes the courses of joints and base of a segment of a duration in s."""
+JointMaker = Callable[[float, Course], Course]
+"""Makes the course of the joints in a duration in s, while the base moves along a course."""
 
 
 def quintic(u: Array) -> tuple[Array, Array, Array]:

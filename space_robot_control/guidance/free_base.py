@@ -25,8 +25,7 @@ from space_robot_model.robot import Robot
 from space_robot_msgs_py.compiled.kernels import kernel
 from space_robot_msgs_py.errors import InputError
 
-from .courses import AttitudeCourse, Course, SplineCourse, knots, quintic
-from .segments import JointMaker, SegmentStart
+from .courses import AttitudeCourse, Course, JointMaker, SegmentStart, SplineCourse, knots, quintic
 
 Array = NDArray[np.float64]
 

@@ -29,9 +29,10 @@ from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.samples import ReferenceChunk
 
 from .courses import BaseMotion, Piece, QuinticLeg, SteadyTurn
+from .goals import PointingGoal
 from .limits import MissionLimits, check_piece, check_positions
 from .planner import Planner
-from .segments import FileSegment, PointingGoal, read_pointing, read_segments
+from .segments import FileSegment, read_pointing, read_segments
 
 if TYPE_CHECKING:
     from .live import TrajectoryPoint

@@ -15,16 +15,10 @@ from space_robot_model.orbit.ephemeris import Ephemeris
 from space_robot_model.robot import Robot
 from space_robot_msgs_py.errors import InputError
 
-from .courses import BaseMotion, Course, Piece, Slew, at_rest, turn_between
+from .courses import BaseMotion, Course, Piece, SegmentStart, Slew, at_rest, turn_between
+from .goals import BaseTurn, PointingGoal
 from .limits import LONGEST_S, MissionLimits, check_piece
-from .segments import (
-    BaseTurn,
-    PointingGoal,
-    ReactionlessSegment,
-    Segment,
-    SegmentStart,
-    TableSegment,
-)
+from .segments import ReactionlessSegment, Segment, TableSegment
 
 Array = NDArray[np.float64]
 

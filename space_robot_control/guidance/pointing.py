@@ -33,7 +33,7 @@ from space_robot_msgs_py.compiled.kernels import kernel, subroutine
 from space_robot_msgs_py.config.validation import short
 from space_robot_msgs_py.errors import InputError
 
-from .segments import FAR, LEAST_DEG, PointingGoal
+from .goals import FAR, LEAST_DEG, PointingGoal
 
 Array = NDArray[np.float64]
 Derivatives = tuple[Vector, Vector, Vector]

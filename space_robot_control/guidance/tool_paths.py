@@ -24,6 +24,7 @@ from .courses import (
     MOST_KNOTS,
     AttitudeCourse,
     Course,
+    SegmentStart,
     SplineCourse,
     knots,
     multiplied,
@@ -33,8 +34,8 @@ from .courses import (
 )
 from .demand import demand
 from .free_base import with_middles
+from .goals import PointingGoal, ToolGoal
 from .pointing import PointingCourse
-from .segments import NEEDS_ORBIT, PointingGoal, SegmentStart, ToolGoal
 
 Array = NDArray[np.float64]
 
@@ -46,6 +47,7 @@ CARRIED = 1e-9
 """Rate of the base against the path's axes above which it carries the tool along, rad/s."""
 FREE_TOLERANCE = 1e-7
 """Largest error of a tool on its path with the base free, m and rad."""
+NEEDS_ORBIT = "needs an orbit: choose one (--orbit NAME), or set mission.assumed_orbit"
 ORBIT_AXES = PointingGoal(point="nadir")
 """The frame of tools' goals that turns with the orbit, as a base that points."""
 BACK = np.array([1.0, -1.0, -1.0, -1.0])

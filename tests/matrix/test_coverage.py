@@ -14,11 +14,10 @@ from matrix.scenarios import CELLS, PLANS, in_root
 from space_robot.flight.plan import Flight
 from space_robot.scenario.faults import KINDS, PROCESS_KINDS
 from space_robot.scenario.option_table import names
+from space_robot_control.guidance.goals import Frame, Point
 from space_robot_control.guidance.segments import (
     KINDS_OF_BASE,
     SEGMENT_KINDS,
-    Frame,
-    Point,
     Segment,
     ToolSegment,
     read_pointing,

@@ -14,10 +14,10 @@ from scipy.spatial.transform import Rotation
 from strategies import random_quaternion
 
 from space_robot_control.guidance.courses import Slew
+from space_robot_control.guidance.goals import PointingGoal
 from space_robot_control.guidance.live import TrajectoryPoint
 from space_robot_control.guidance.mission import Mission, MissionSettings, pointing_start
 from space_robot_control.guidance.pointing import PointingCourse
-from space_robot_control.guidance.segments import PointingGoal
 from space_robot_control.guidance.tool_paths import JOIN_S
 from space_robot_model.orbit.ephemeris import AssumedOrbit, Ephemeris
 from space_robot_model.robot.find import find_robot
