@@ -84,10 +84,10 @@ def planned_segments(
         start_rate: see `mission_demand`.
 
     Raises:
-        InputError: it has a single waypoint.
+        InputError: it has no segments.
     """
     if not mission.duration:
-        raise InputError("the mission has no motion to plan: a single waypoint")
+        raise InputError("the mission has no motion to plan: no segments")
     follower = ToolFollower(robot.nominal, None)
     demands = mission_demand(robot, mission.pieces, orbit or OrbitSettings(), start_rate)
     return [_planned(asked, follower) for asked in demands]

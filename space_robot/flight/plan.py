@@ -137,7 +137,7 @@ class Flight:
     @property
     def brief(self) -> dict[str, Any]:
         """What metrics need of `description`; a hundred times faster."""
-        if self.mission_settings.has_segments:  # the tool's path is in the scenario
+        if self.mission.leads_tool:  # its path is in the scenario
             return self.description
         return plant_description(self.robot, {}, self.plant, self.plant_settings)
 

@@ -142,13 +142,13 @@ class ResolvedScenario:
         """Number of ticks of the flight.
 
         Raises:
-            InputError: the flight is too long, or the mission defines no duration.
+            InputError: the flight is too long, or the mission has no segments.
         """
         duration, period = self.options.duration, self.plant.period
         if duration is None:
             duration = self.reference.duration
         if duration <= 0.0:
-            raise InputError("the mission has a single waypoint: give a duration")
+            raise InputError("the mission has no segments: give a duration")
         ticks = max(1, math.floor(duration / period + 1e-6))
         if ticks > MOST_TICKS:
             raise InputError(

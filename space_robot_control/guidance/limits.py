@@ -24,7 +24,7 @@ from .courses import Piece, sample_times
 Array = NDArray[np.float64]
 
 ROUNDING = 1e-9
-"""rad or m, by which a waypoint may be beyond a limit: both were written in degrees, maybe."""
+"""rad or m, by which a posture may be beyond a limit: both were written in degrees, maybe."""
 HALFWAY = 15.0 / 8.0
 """Largest velocity of a quintic leg from rest to rest, as a share of its mean velocity."""
 SHORTEST_S, LONGEST_S = 1e-6, 1e6
@@ -52,7 +52,9 @@ class MissionLimits(StrictModel):
         0.0, description="of each joint, degrees/s2, or m/s2 of prismatic joints"
     )
     check_actuators: bool = Field(
-        True, description="refuse segments that ask the base's actuators for more than they give"
+        True,
+        description="refuse segments that ask the base's actuators for more than they give; else "
+        "flights warn of them",
     )
 
 
@@ -74,13 +76,12 @@ def shown_unit(robot: Robot, joint: int) -> tuple[float, str]:
 
 
 @np.errstate(all="ignore")  # numbers that overflow are refused here, in one line
-def check_piece(robot: Robot, piece: Piece, has_limits: bool = True) -> None:
+def check_piece(robot: Robot, piece: Piece) -> None:
     """Check a segment: finite, neither too long nor too sudden, within the limits of the joints.
 
     Args:
         robot: as the flight software knows it.
         piece: the segment.
-        has_limits: False: the limits of position and velocity of the joints are not checked.
 
     Raises:
         InputError: naming joint, time, value and limit.
@@ -94,7 +95,7 @@ def check_piece(robot: Robot, piece: Piece, has_limits: bool = True) -> None:
     for time in _times(piece):
         joints, base = piece.joints.at(time), piece.base.at(time)
         _check_motion(robot, time, joints, base)
-        for joint, limits in enumerate(robot.limits if has_limits else ()):
+        for joint, limits in enumerate(robot.limits):
             _check_limits(robot, joint, limits, time, joints[:, :, joint])
 
 
@@ -165,44 +166,20 @@ def _check_limits(
         )
 
 
-def check_positions(robot: Robot, waypoints: Array) -> None:
-    """Check that all ``waypoints`` (K, n), rad or m, are within the joints' limits.
+def check_start(robot: Robot, joints: Array) -> None:
+    """Check that the joints (n,), rad or m, of a start are within their limits.
 
     Raises:
         InputError: naming the first one beyond.
     """
-    for number, waypoint in enumerate(waypoints):
-        for joint, (name, limits) in enumerate(zip(robot.joint_names, robot.limits, strict=True)):
-            low, high, position = limits.lower, limits.upper, float(waypoint[joint])
-            if low - ROUNDING <= position <= high + ROUNDING:
-                continue
+    for joint, (name, limits) in enumerate(zip(robot.joint_names, robot.limits, strict=True)):
+        low, high, position = limits.lower, limits.upper, float(joints[joint])
+        if not low - ROUNDING <= position <= high + ROUNDING:
             scale, unit = shown_unit(robot, joint)
             raise InputError(
-                f"waypoints_deg: waypoint {number + 1} has joint {name!r} at "
-                f"{position * scale:.6g} {unit}, its limits are {low * scale:.6g} to "
-                f"{high * scale:.6g} {unit}"
+                f"the start has joint {name!r} at {position * scale:.6g} {unit}, its limits are "
+                f"{low * scale:.6g} to {high * scale:.6g} {unit}"
             )
-
-
-def too_fast(robot: Robot, times: Array, waypoints: Array) -> list[Beyond]:
-    """Return the joints whose desired velocity is above their limit somewhere, and the largest.
-
-    ``times`` (K,) s, and ``waypoints`` (K, n), rad or m.
-    """
-    if len(times) < 2:
-        return []
-    legs = np.abs(np.diff(waypoints, axis=0)) / np.diff(times)[:, np.newaxis]
-    return [
-        Beyond(name, float(fastest), limits.velocity, "m/s" if is_prismatic else "rad/s")
-        for name, fastest, limits, is_prismatic in zip(
-            robot.joint_names,
-            HALFWAY * legs.max(axis=0),
-            robot.limits,
-            robot.is_prismatic[: robot.n],
-            strict=True,
-        )
-        if fastest > limits.velocity * (1.0 + ROUNDING)
-    ]
 
 
 def turn_remarks(robot: Robot, pieces: Iterable[Piece]) -> list[str]:

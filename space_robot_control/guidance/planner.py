@@ -18,7 +18,7 @@ from space_robot_msgs_py.errors import InputError
 from .courses import BaseMotion, Course, Piece, SegmentStart, Slew, at_rest, turn_between
 from .goals import BaseTurn, PointingGoal
 from .limits import LONGEST_S, MissionLimits, check_piece
-from .segments import ReactionlessSegment, Segment, TableSegment
+from .segments import JointSegment, ReactionlessSegment, Segment, TableSegment, posture
 
 Array = NDArray[np.float64]
 
@@ -112,7 +112,11 @@ class Planner:
 
             trial = make(TRIAL_S)
             span = shortest_duration(self._robot, self._limits, *trial, start.time, TRIAL_S)
-        return _ended(segment, start.time, span, *make(span))._replace(mode=led.mode), led.course
+        piece = _ended(segment, start.time, span, *make(span))._replace(mode=led.mode)
+        if isinstance(segment, JointSegment):  # to the last bit what is written
+            goal = posture(self._robot, segment.joints_deg, segment.key)
+            piece = piece._replace(goal=goal)
+        return piece, led.course
 
     def _led(self, segment: Segment, start: SegmentStart) -> LedBase:
         begin, base = start.time, start.base

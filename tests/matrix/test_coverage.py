@@ -111,7 +111,7 @@ def test_every_event_happens() -> None:
 
 def begun(flight: Flight) -> Iterator[Segment]:
     """The segments that have begun before the flight is over."""
-    time = flight.mission_settings.waypoint_times[-1]
+    time = 0.0
     for segment in read_segments(flight.mission_settings.segments):
         if time < flight.ticks * flight.period:
             yield segment

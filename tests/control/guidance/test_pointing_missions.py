@@ -38,7 +38,7 @@ IDENTITY = np.array([1.0, 0.0, 0.0, 0.0])
 
 def planned(*segments: dict[str, Any], orbit: bool = True, **settings: Any) -> Mission:
     texts = [json.dumps(segment) for segment in segments]
-    numbers = {"waypoints_deg": START, "segments": texts, **settings}
+    numbers = {"joints_deg": START, "segments": texts, **settings}
     if orbit:
         numbers["assumed_orbit"] = ISS
     return Mission(ROBOT, MissionSettings.model_validate(numbers), PERIOD)
@@ -117,14 +117,14 @@ def test_a_mode_goes_on_after_the_missions_end_and_is_not_slewed_to_again() -> N
     once = planned({"hold": 20}, base_point=NADIR)
     thrice = planned({"hold": 5}, {"base": "nadir", "hold": 5}, {"hold": 2}, base_point=NADIR)
     assert np.array_equal(whole(once)[1], whole(thrice, beyond=8.0)[1])
-    waypoints = {"waypoint_times": [0.0, 5.0], "waypoints_deg": [*START, *NEAR]}
-    assert np.array_equal(whole(once)[1], whole(planned(**waypoints, base_point=NADIR), 15.0)[1])
+    moved = planned({"joints_deg": NEAR, "duration": 5}, base_point=NADIR)
+    assert np.array_equal(whole(once)[1], whole(moved, 15.0)[1])
     still = planned(base_point=NADIR)
     assert np.array_equal(still.chunk(0, 100).base, once.chunk(0, 100).base)
 
 
 def test_a_mission_that_starts_pointing_begins_on_its_course() -> None:
-    settings = MissionSettings(waypoints_deg=START, base_point=NADIR, assumed_orbit=ISS)
+    settings = MissionSettings(joints_deg=START, base_point=NADIR, assumed_orbit=ISS)
     attitude, rate_deg_s = pointing_start(settings)
     row = Mission(ROBOT, settings, PERIOD).chunk(0, 1).base[0]
     np.testing.assert_array_equal(attitude, row[:4])
