@@ -8,7 +8,7 @@ from space_robot_msgs_py.ros.managed_node import NodeKind
 from space_robot_msgs_py.ros.node_host import run_nodes
 
 from .guidance.loop import MissionLoop
-from .guidance.settings import MissionNodeSettings
+from .guidance.mission import MissionNodeSettings
 
 NODE = NodeKind(MissionNodeSettings, MissionLoop, changeable=("goto",))
 

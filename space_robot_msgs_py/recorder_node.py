@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import os
 import time
 from contextlib import suppress
@@ -12,7 +13,6 @@ from typing import NoReturn
 from . import topics
 from .bag.recorder import BagRecorder
 from .bag.recorder_settings import RecorderNodeSettings
-from .bag.set_aside import set_aside
 from .config.text import parse_json
 from .errors import InputError, MessageError
 from .ros.endpoints import PolledCallbackGroup, RawPublisher, RawSubscription
@@ -227,6 +227,20 @@ class RecorderLoop:
         if self.failure and not self._is_failure_logged:
             self._is_failure_logged = True
             self._node.log(f"the bag is no longer written: {self.failure}; the flight goes on")
+
+
+def set_aside(bag: Path) -> Path:
+    """Rename a bag that is closed to ``<bag>_before_reset_<number>``, the first free; return that.
+
+    Raises:
+        InputError: it cannot be renamed.
+    """
+    names = (bag.with_name(f"{bag.name}_before_reset_{number}") for number in itertools.count(1))
+    free = next(name for name in names if not name.exists())
+    try:
+        return bag.rename(free)
+    except OSError as error:
+        raise InputError(f"{bag}: cannot be renamed to {free.name} ({error.strerror})") from None
 
 
 NODE = NodeKind(RecorderNodeSettings, RecorderLoop)

@@ -5,11 +5,13 @@ from __future__ import annotations
 import pickle
 import re
 from collections.abc import Iterable
+from dataclasses import InitVar, is_dataclass
 from functools import lru_cache
 from pathlib import Path
-from typing import Any, TypeVar, get_args, get_origin
+from typing import Any, TypeVar, get_args, get_origin, get_type_hints
 
 from pydantic import BaseModel, ConfigDict, ValidationError, ValidationInfo, field_validator
+from pydantic.fields import FieldInfo
 
 from ..errors import InputError
 from ..topics import ROOT
@@ -46,6 +48,8 @@ ON_NUMBERS = {
     *("float_type", "int_type", "byte_size", "byte_size_unit"),
 }
 """Kinds of errors that show the description of their field, since it has the unit."""
+UNKNOWN_KEY = ("extra_forbidden", "unexpected_keyword_argument")
+NO_MAPPING = ("model_type", "dataclass_type", "named_tuple_type", "arguments_type")
 MOST_KEPT = 100_000
 """Maximum length of a text with cached content, in characters."""
 _NAMESPACE = re.compile(r"(/[A-Za-z_][A-Za-z0-9_]*)+")
@@ -89,17 +93,17 @@ def one_line(error: ValidationError, schema: type[BaseModel], where: str) -> str
     """Return the first error as a line with key, value and allowed values."""
     # a misspelt key gives a missing and an unknown key: the unknown one is the cause
     faults = sorted(
-        error.errors(include_url=False), key=lambda fault: fault["type"] != "extra_forbidden"
+        error.errors(include_url=False), key=lambda fault: fault["type"] not in UNKNOWN_KEY
     )
     first = faults[0]
     key = printable(".".join(str(part) for part in first["loc"]))
     got = "" if first["type"] == "missing" else f", got {short(first['input'])}"
     text = first["msg"].removeprefix("Value error, ")
-    if first["type"] == "model_type":
+    if first["type"] in NO_MAPPING:
         text = "a mapping was expected"
-    if first["type"] == "extra_forbidden":
-        fields = _field_at(schema, first["loc"][:-1])[0].model_fields
-        allowed = sorted(field.alias or name for name, field in fields.items())
+    if first["type"] in UNKNOWN_KEY:
+        fields = _fields(_field_at(schema, first["loc"][:-1])[0]).items()
+        allowed = sorted(str(name) for name, field in fields if not field.exclude)
         text, got = f"unknown key{got}: {choices(str(first['loc'][-1]), allowed)}", ""
     if first["type"] in ON_NUMBERS and (description := _field_at(schema, first["loc"])[1]):
         got += f" ({description.removesuffix('.')})"
@@ -111,7 +115,7 @@ def _field_at(schema: Any, location: tuple[int | str, ...]) -> tuple[Any, str]:
     """Return the annotation and the description of the field at a location within ``schema``."""
     description = ""
     for step in location:
-        fields = getattr(schema, "model_fields", {})
+        fields = _fields(schema)
         if step in fields:
             schema, description = fields[step].annotation, fields[step].description or ""
         else:  # an item of a list, a value of a mapping
@@ -119,6 +123,18 @@ def _field_at(schema: Any, location: tuple[int | str, ...]) -> tuple[Any, str]:
         while get_origin(schema) not in (None, list, dict):  # Annotated, a union with None
             schema = get_args(schema)[0]
     return schema, description
+
+
+def _fields(schema: Any) -> dict[int | str, FieldInfo]:
+    """Return the fields of a model, dataclass or named tuple, by their keys in files."""
+    fields = getattr(schema, "model_fields", None)
+    if fields is None:
+        if not (is_dataclass(schema) or hasattr(schema, "_fields")):
+            return {}
+        hints = get_type_hints(schema, include_extras=True).items()
+        own = {name: hint.type if isinstance(hint, InitVar) else hint for name, hint in hints}
+        fields = {name: FieldInfo.from_annotation(hint) for name, hint in own.items()}
+    return {field.alias or name: field for name, field in fields.items()}
 
 
 def short(value: Any) -> str:

@@ -9,6 +9,11 @@ from space_robot_msgs_py.ros.process import set_defaults
 from space_robot_msgs_py.topics import ROOT
 
 
+def own_name(name: str) -> str:
+    """Return the name of this process's node of a ``name``."""
+    return f"{name}_{os.getpid()}"
+
+
 class TemporaryNode:
     """Node ``<name>_<pid>`` in a domain, without services or logs."""
 
@@ -34,7 +39,7 @@ class TemporaryNode:
         except Exception as error:  # RCLError is private
             raise FlightError(f"ROS does not start: {str(error).splitlines()[0]}") from None
         self.node = rclpy.create_node(
-            f"{name}_{os.getpid()}",
+            own_name(name),
             context=self._context,
             namespace=namespace,
             start_parameter_services=False,

@@ -35,7 +35,7 @@ from space_robot_control.laws import ControlLaw, find_law
 from space_robot_model.robot import Robot
 from space_robot_model.robot.find import find_robot
 from space_robot_model.robot.gears import geared_joints
-from space_robot_model.robot.tree import Encoder, Gear
+from space_robot_model.robot.parts import Encoder, Gear
 from space_robot_sim.plant.tick import update_true_state
 
 Array = NDArray[np.float64]
@@ -114,11 +114,7 @@ def held_flight(
 
     ``base_rate``: of the base at the start about each axis, rad/s.
     """
-    mission = {
-        "waypoint_times": [0.0],
-        "waypoints_deg": POSTURE_DEG,
-        "base_quaternion": quaternion.tolist(),
-    }
+    mission = {"joints_deg": POSTURE_DEG, "base_quaternion": quaternion.tolist()}
     plan = FlightPlan(
         controller=law,
         gains=dict(gains),

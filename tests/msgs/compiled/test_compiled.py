@@ -20,7 +20,7 @@ import sys
 import numpy as np
 from space_robot_msgs_py.compiled.cache import cache_directory
 from space_robot_msgs_py.compiled.kernels import kernel
-from space_robot_msgs_py.bag.kernels import walk_messages
+from space_robot_msgs_py.bag.batch import walk_messages
 exec(compile(open({file!r}).read(), {file!r}, "exec"))
 print(double(np.arange(3.0)).sum(), cache_directory(), *{{"scipy.linalg"}} & set(sys.modules))
 """
@@ -138,7 +138,7 @@ def test_a_kernel_that_changes_has_another_folder_and_other_code_has_not(tmp_pat
         ("space_robot_model/dynamics/aba.py", "\n", "\n\n", True),
         ("space_robot_msgs_py/compiled/records.py", "\n", "\n\n", True),
         ("space_robot_msgs_py/samples.py", " = 8, 24, 6", " = 9, 24, 6", True),
-        ("space_robot_model/robot/file.py", "\n", "\n\n", False),
+        ("space_robot_model/robot/files.py", "\n", "\n\n", False),
         ("space_robot_msgs_py/errors.py", "\n", "\n\n", False),
     ):
         text = (root / name).read_text()
