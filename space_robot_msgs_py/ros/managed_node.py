@@ -97,10 +97,10 @@ class ManagedNode(LifecycleNode, Generic[Schema]):
         return self.settings.timebase if self.settings else NO_TIME
 
     def _health(self) -> Health:
-        """Return the loop's health with the numbers of sent messages, for the recorder's check."""
         if self.loop is None:
             return Health("unconfigured")
         health = self.loop.health()
+        # the recorder compares these numbers with those of the messages that it received
         sent = {f"{SENT}{output.full_name}": output.sent for output in self.loop.outputs}
         values = {**health.values, **sent, "service_calls": self.calls.count}
         if not self.is_active:
@@ -248,7 +248,6 @@ class ManagedNode(LifecycleNode, Generic[Schema]):
             self.loop.deactivate()
 
     def _release(self) -> None:
-        """Close the loop, and destroy everything created by configure."""
         loop, self.loop = self.loop, None
         try:
             if loop is not None:
@@ -320,7 +319,6 @@ class Diagnostics:
             self._publisher.wait_for_all_acked(Duration(seconds=FLUSH_S))
 
     def _rate(self, health: Health, now: float) -> dict[str, float]:
-        """Return the ticks per second of wall-clock time since the last report."""
         tick = health.values.get("tick")
         if not isinstance(tick, int):
             return {}

@@ -47,7 +47,7 @@ def run_nodes(*kinds: NodeKind[Any], arguments: list[str] | None = None) -> NoRe
     try:
         _, *others = rclpy.utilities.remove_ros_args(sys.argv if arguments is None else arguments)
         if others:
-            _answer(schemas, others)
+            _print_usage(schemas, others)
         rclpy.init(args=arguments, signal_handler_options=SignalHandlerOptions.NO)
     except InputError as error:
         sys.exit(_say(who, error))
@@ -87,12 +87,7 @@ def run_nodes(*kinds: NodeKind[Any], arguments: list[str] | None = None) -> NoRe
     os._exit(code)
 
 
-def _answer(schemas: Sequence[type[NodeSettings]], others: Sequence[str]) -> None:
-    """Print the usage and exit, if this is requested by the arguments that are not ROS's.
-
-    Raises:
-        InputError: other arguments.
-    """
+def _print_usage(schemas: Sequence[type[NodeSettings]], others: Sequence[str]) -> None:
     if not {"-h", "--help"} & set(others):
         raise InputError(
             f"unknown argument {short(others[0])}: a node accepts only those of ROS, after "

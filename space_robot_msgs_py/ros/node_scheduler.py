@@ -7,6 +7,7 @@ import os
 import time
 from collections.abc import Sequence
 from functools import partial
+from operator import attrgetter
 from pathlib import Path
 from typing import Any
 
@@ -26,8 +27,6 @@ UPKEEP_PATIENCE_S = 0.02
 POLL_S = 1e-3
 """Period of polling for messages that are not expected soon, in a process with several nodes."""
 NO_WAIT = Wait(0.0)
-
-
 PERIOD_S = 0.1
 """Period of checks for service calls, which take time of the loop."""
 SERVICE_SHARE = 0.1
@@ -45,14 +44,16 @@ class Upkeep:
         self.node = node
         self._next_call = self._next_report = 0.0
 
-    def run(self, timeout_s: float = 0.0) -> float:
+    @property
+    def due(self) -> float:
+        """Time of the next call of `run`, monotonic clock."""
+        return min(self._next_call, self._next_report)
+
+    def run(self, timeout_s: float = 0.0) -> None:
         """Execute a waiting service call or report the health, if due.
 
         Args:
             timeout_s: time to wait for a call; only without flight.
-
-        Returns:
-            Time of the next call of this method, monotonic clock.
         """
         now = time.monotonic()
         serves_calls = timeout_s > 0.0 or self._next_call <= min(now, self._next_report)
@@ -66,7 +67,6 @@ class Upkeep:
         if now >= self._next_report and (timeout_s or not serves_calls):
             self._next_report = now + PERIOD_S
             self.node.report()
-        return min(self._next_call, self._next_report)
 
 
 class NodeScheduler:
@@ -77,8 +77,6 @@ class NodeScheduler:
         self._nodes = nodes
         self._scheduled = [ScheduledNode(node, is_alone=len(nodes) == 1) for node in nodes]
         self._upkeeps = [Upkeep(node) for node in nodes]
-        self._due = [0.0] * len(nodes)
-        """Time at which each node's upkeep is due, monotonic clock."""
         self._upkeep_at = 0.0
         self._waiter = Waiter(nodes[0])
         self._is_alone = len(nodes) == 1
@@ -109,17 +107,12 @@ class NodeScheduler:
         return not all(node.is_shut_down for node in self._nodes)
 
     def _serve_one(self) -> None:
-        """Run the upkeep that is due first."""
-        first = self._due.index(min(self._due))
-        self._due[first] = self._upkeeps[first].run()
-        self._upkeep_at = max(min(self._due), time.monotonic() + UPKEEP_GAP_S)
+        min(self._upkeeps, key=attrgetter("due")).run()
+        due = min(upkeep.due for upkeep in self._upkeeps)
+        self._upkeep_at = max(due, time.monotonic() + UPKEEP_GAP_S)
 
     def _rest(self, now: float) -> bool:
-        """Run due upkeep, or wait until a node has work.
-
-        Returns:
-            False when the process is to end.
-        """
+        """Run due upkeep, or wait until a node has work; return False at the end."""
         if now >= self._upkeep_at:
             self._serve_one()
             return True
