@@ -18,8 +18,7 @@ from space_robot_model.dynamics.model import Model
 from space_robot_model.dynamics.rho_space import RhoSpaceModel
 from space_robot_model.robot import Robot
 from space_robot_model.robot.kinematics import ToolState, tool_state
-from space_robot_msgs_py.compiled.kept_types import keep_types
-from space_robot_msgs_py.compiled.kernels import RecordFunction
+from space_robot_msgs_py.compiled.kernels import RecordFunction, keep_types
 from space_robot_msgs_py.compiled.records import (
     Block,
     Field,

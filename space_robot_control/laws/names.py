@@ -23,10 +23,9 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-from space_robot_msgs_py.config.choices import choices
-from space_robot_msgs_py.config.text import one_line_of
+from space_robot_msgs_py.config.text import choices, one_line_of
 from space_robot_msgs_py.config.validation import one_of, short
-from space_robot_msgs_py.config.yaml_text import check_file
+from space_robot_msgs_py.config.yaml_text import check_readable
 from space_robot_msgs_py.errors import InputError, explained_by
 
 from .base import ControlLaw
@@ -82,7 +81,7 @@ def law_file(name: str) -> Path | None:
 
 def import_file(path: Path) -> ModuleType:
     """Import a Python file, once per process; its code may raise anything."""
-    check_file(path)
+    check_readable(path)
     digest = hashlib.sha256(str(path.resolve()).encode()).hexdigest()[:12]
     name = f"{path.stem}_{digest}"
     if name not in sys.modules:

@@ -15,7 +15,7 @@ from ..dynamics.kinematics import forward_kinematics, spatial_velocities
 from ..dynamics.model import Data
 from ..dynamics.rho_space import RhoSpaceModel, free_inverse_dynamics_along
 from ..dynamics.rnea import AlongScratch, inverse_dynamics_along, rnea_bias
-from .arguments import check_robot, unit_quaternion, vector
+from .kinematics import check_robot, unit_quaternion, vector
 
 if TYPE_CHECKING:
     from space_robot_msgs_py.compiled.records import Block

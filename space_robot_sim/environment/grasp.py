@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from space_robot_model.elementary.matrices import product, rotate_tensor
 from space_robot_model.robot import Robot
+from space_robot_model.robot.flatten import parallel_axes
 from space_robot_model.robot.inertia import inertia_tensor
-from space_robot_model.robot.tree import parallel_axes
 from space_robot_msgs_py.config.validation import one_of
 
 from .target import Target

@@ -21,10 +21,9 @@ from numpy.typing import NDArray
 
 from space_robot_model.elementary.matrices import product, rotate_tensor, solve
 from space_robot_model.robot import Robot
-from space_robot_model.robot.base_axes import base_axes
 from space_robot_model.robot.dynamics import mass_matrix
-from space_robot_model.robot.frames import BodyFrame, body_frames
 from space_robot_model.robot.gears import rotor_rows
+from space_robot_model.robot.placements import BodyFrame, base_axes, body_frames
 
 from .grasp import Grasp
 from .target import TargetMotion

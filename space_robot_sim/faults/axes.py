@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from enum import Enum
 
-from space_robot_msgs_py.config.choices import choices
+from space_robot_msgs_py.config.text import choices
 from space_robot_msgs_py.config.validation import short
 from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.samples import RobotNames

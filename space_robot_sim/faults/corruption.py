@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from space_robot_msgs_py.samples import PASSIVE_FIELDS, Command, RobotState
+from space_robot_msgs_py.samples import PASSIVE_FIELDS, SENSED_FIELDS, Command, RobotState
 
 from .grammar import PROBABILITY, Kind
 from .schedule import Schedule
@@ -13,15 +13,6 @@ QUATERNION_NORMS = (0.9, 1.1)
 STAMP_BACK_TICKS = 10
 """A stamp goes back by 1 to this many ticks."""
 STAMP_JUMP_TICKS = 1_000_000
-MEASURED = (
-    "base_position",
-    "quaternion",
-    "base_velocity",
-    "omega_base",
-    "joint_positions",
-    "joint_velocities",
-)
-
 NAN_STATE = Kind("nan_state", PROBABILITY, 1.0, "one measured number is NaN")
 INF_STATE = Kind("inf_state", PROBABILITY, 1.0, "one measured number is infinite")
 SCALED_QUATERNION = Kind(
@@ -70,7 +61,7 @@ class Corruption:
                 state.quaternion *= QUATERNION_NORMS[fault.choose(tick, 2)]
         for fault, value in self._states:
             if fault.happens_at(tick):
-                arrays = [getattr(state, name) for name in MEASURED]
+                arrays = [getattr(state, name) for name in SENSED_FIELDS]
                 arrays += [getattr(state, name)[: self._passive] for name in PASSIVE_FIELDS]
                 place = fault.choose(tick, sum(array.size for array in arrays))
                 for array in arrays:

@@ -6,7 +6,7 @@ from enum import Enum
 
 from space_robot_msgs_py.errors import FlightError, InputError
 from space_robot_msgs_py.ros.managed_node import ManagedNode
-from space_robot_msgs_py.ros.restart import restart, until
+from space_robot_msgs_py.ros.service_calls import until
 
 from .loop import PlantLoop
 from .settings import PlantNodeSettings
@@ -84,7 +84,7 @@ class Simulation:
         assert settings is not None
         self._is_resetting = True
         try:
-            await restart(self._node, [name for name in settings.reset_with if name])
+            await self._node.restart([name for name in settings.reset_with if name])
         finally:
             self._is_resetting = False
         if keep:
