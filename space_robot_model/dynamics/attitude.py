@@ -51,15 +51,9 @@ def quaternion_rate(quaternion: Array, omega_inertial: Array, out: Array) -> Non
 def attitude_jacobian(quaternion: Array, out: Array) -> None:
     """Write into ``out`` (3, 3) ``J0 = (eta E + skew(eps)) / 2`` of (1): epsdot = J0 omega_base."""
     w, x, y, z = 0.5 * quaternion[0], 0.5 * quaternion[1], 0.5 * quaternion[2], 0.5 * quaternion[3]
-    out[0, 0] = w
-    out[0, 1] = -z
-    out[0, 2] = y
-    out[1, 0] = z
-    out[1, 1] = w
-    out[1, 2] = -x
-    out[2, 0] = -y
-    out[2, 1] = x
-    out[2, 2] = w
+    out[0, 0], out[0, 1], out[0, 2] = w, -z, y
+    out[1, 0], out[1, 1], out[1, 2] = z, w, -x
+    out[2, 0], out[2, 1], out[2, 2] = -y, x, w
 
 
 @kernel
