@@ -15,7 +15,7 @@ from typing import Annotated, Any, get_args, get_origin
 
 from space_robot.scenario.faults import PROCESS_KINDS
 from space_robot_control.controller.settings import ControllerNodeSettings
-from space_robot_control.guidance.settings import MissionNodeSettings
+from space_robot_control.guidance.mission import MissionNodeSettings
 from space_robot_control.laws import laws
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.bag.recorder_settings import RecorderNodeSettings
@@ -44,6 +44,7 @@ EXAMPLES = {
     "TORQUE": "0.5",
     "JOINT": "3",
     "BASE_AXIS=RATE": "base_x=1e-5",
+    "BASE_AXIS=FIELD": "base_x=1e-6",
     "JOINT=TORQUE": "3=20",
     "SECONDS": "1.5",
     "AXIS=FACTOR": "all=0.99",

@@ -28,10 +28,9 @@ from space_robot_msgs_py.simulated_time import tick_from
 from space_robot_sim.actuators.actuators import ActuatorSettings
 from space_robot_sim.environment.captures import Captures
 from space_robot_sim.environment.disturbance_table import JSON
-from space_robot_sim.environment.environment import EnvironmentSettings
+from space_robot_sim.environment.environment import EnvironmentSettings, with_payload
 from space_robot_sim.environment.events import Event, named_targets, parse_events
-from space_robot_sim.environment.orbit_settings import OrbitSettings
-from space_robot_sim.environment.payload import with_payload
+from space_robot_sim.environment.orbit import OrbitSettings
 from space_robot_sim.plant.settings import PlantNodeSettings
 
 from ..flight.start_step import StartStep
@@ -242,7 +241,7 @@ def _without_told_robot(log: FlightLog, parameters: Mapping[str, Any]) -> dict[s
     """Leave out the files of a robot and a mission all of which the bag tells."""
     files = {
         "robot": isinstance(log.flight.get("robot_file"), dict),
-        "mission": "waypoints_deg" in parameters_of(log, "mission"),
+        "mission": "joints_deg" in parameters_of(log, "mission"),
     }
     return {
         key: value

@@ -25,6 +25,8 @@ from .lanes import WIDTH
 Block = NDArray[Any]
 """An array (1,) of one record; Numba unboxes it ten times faster than the record."""
 Shape = Callable[[int], tuple[int, ...]]
+Origin = str | Callable[[Any, Any], Any]
+"""Path of an attribute, or a function of what there is to fill a record from."""
 DEGREE = 2
 """Highest power of n in the size of a field, as in a matrix."""
 
@@ -123,11 +125,15 @@ class Field:
     """Meaning and unit, for users."""
     uniform: bool = False
     """True if kernels need the same numbers in all lanes, see `lanes`."""
+    origin: Origin | None = None
+    """Where its first numbers are from, for those who fill the record; None: it begins at zero."""
 
 
-def shaped(shape: Shape, description: str = "", *, uniform: bool = False) -> Any:
+def shaped(
+    shape: Shape, description: str = "", *, uniform: bool = False, origin: Origin | None = None
+) -> Any:
     """Declare a `Field`."""
-    return Field(shape, description, uniform)
+    return Field(shape, description, uniform, origin)
 
 
 def nested(record: type[Record]) -> Any:

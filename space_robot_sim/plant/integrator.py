@@ -19,7 +19,7 @@ from ..environment.disturbance import disturbance_torque
 from ..environment.environment import Environment
 from ..environment.friction import friction_torque
 from ..environment.gravity_gradient import add_gravity_gradient
-from ..environment.prescribed_loads import add_loads
+from ..environment.loads import add_loads
 from ..environment.surfaces import add_surface_wrenches
 
 Array = NDArray[np.float64]

@@ -27,19 +27,21 @@ from space_robot_msgs_py.samples import Command
 from space_robot_msgs_py.wire.codecs import CommandCodec, StateCodec
 from space_robot_msgs_py.wire.telemetry import ClockCodec
 
-from .actuator_health import ActuatorHealth
 from .base_output import BaseOutput
-from .command_guard import CommandGuard
-from .description import plant_description
-from .late_listeners import LateListeners
-from .messages import NONE, SentState, exchange_of
-from .own_controller import OwnController
+from .messages import NONE, CommandGuard, SentState, exchange_of
+from .pacing import (
+    PAUSED,
+    SPIN_BEFORE_DEADLINE_S,
+    LateListeners,
+    OwnController,
+    RunControl,
+    WallClock,
+)
 from .plant import Plant
-from .run_control import PAUSED, RunControl
+from .report import ActuatorHealth, plant_description
 from .scene_output import SceneOutput
 from .settings import PlantNodeSettings
 from .truth_output import TruthOutput
-from .wall_clock import SPIN_BEFORE_DEADLINE_S, WallClock
 
 TIMEOUT_S = 0.02
 ASK_AGAIN_S = 0.2

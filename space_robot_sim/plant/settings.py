@@ -16,7 +16,7 @@ from space_robot_msgs_py.config.files import Tree, named_layers
 from space_robot_msgs_py.config.settings import NodeSettings, Texts
 
 from ..environment.disturbance_table import table_text
-from ..environment.orbit_file import orbit_layers
+from ..environment.orbit import orbit_layers
 from .plant import PlantSettings
 
 MOST_TICKS = 10**10

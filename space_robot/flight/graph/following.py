@@ -8,7 +8,7 @@ from functools import partial
 from typing import Any, NamedTuple
 
 from space_robot_msgs_py.errors import FlightError
-from space_robot_sim.plant.run_control import PAUSED
+from space_robot_sim.plant.pacing import PAUSED
 
 from ...console.progress import FlightProgress, flight_progress
 from ...processes.interruption import exit_code

@@ -13,7 +13,6 @@ from typing import Any
 import click
 import yaml
 
-from space_robot_control.allocation.assumed_actuators import OWNER
 from space_robot_model.robot.find import robot_files
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.bag.flight_log import FlightLog
@@ -239,7 +238,7 @@ def with_files(parameters: Parameters, flight: Flight, folder: Path) -> dict[str
             named[node]["robot"] = _write(folder / f"{option}.yaml", numbers[option])
     if named["controller"].get("actuators") == GIVEN or "assumed_actuators" in numbers:
         assumed = flight.scenario.assumed_actuators.model_dump(mode="json")
-        content = {f"{OWNER}_node": {"ros__parameters": assumed}}
+        content = {"plant_node": {"ros__parameters": assumed}}
         named["controller"]["actuators"] = _write(folder / "assumed_actuators.yaml", content)
     return named
 

@@ -19,7 +19,7 @@ from space_robot_msgs_py.config.validation import StrictModel, validate
 from space_robot_msgs_py.errors import InputError, MessageError
 from space_robot_msgs_py.samples import RobotNames, RobotState, Timebase
 from space_robot_msgs_py.wire.telemetry import LawCodec
-from space_robot_sim.environment.orbit_settings import OrbitSettings
+from space_robot_sim.environment.orbit import OrbitSettings
 
 from ...flight.graph.monitor import Event, Monitor
 from ...flight.graph.node_names import PLANT
