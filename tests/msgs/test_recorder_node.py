@@ -169,7 +169,7 @@ def test_what_was_sent_until_it_is_told_to_stop_is_taken_and_no_more(
     node.hear_clock([2], now + 10**12)
     loop._recorder._flush_at = time.monotonic() + 60.0
     loop.deactivate()
-    assert loop._recorder._open_bytes == 0, "the file grows no more"
+    assert loop._recorder._writer.open_bytes == 0, "the file grows no more"
     assert loop._recorder.accounting["/clock"].received == 2
     assert not node.queues[topics.CLOCK]
     until = loop._until_ns
