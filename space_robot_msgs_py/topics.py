@@ -139,7 +139,7 @@ TRANSFORMS_STATIC = Topic(
 )
 ROBOT_DESCRIPTION = _LATCHED._replace(name="robot_description", is_optional=True)
 
-STATES = (JOINT_STATES, WHEELS_STATE, BASE_STATE, THRUSTERS_STATE, MOTORS_STATE, MAGNETOMETER)
+STATES = (*(JOINT_STATES, WHEELS_STATE, BASE_STATE), *(THRUSTERS_STATE, MOTORS_STATE, MAGNETOMETER))
 """The parts of a state, in the order of sending."""
 ALL = (
     JOINT_STATES,
@@ -152,7 +152,7 @@ ALL = (
     CLOCK,
     TRUTH_JOINTS,
     TRUTH_BASE,
-    *(part for part in STATES if part.is_optional),
+    *(part for part in STATES if part not in (JOINT_STATES, BASE_STATE)),
     TRUTH_ORBIT,
 )
 """All that tell of a flight: who reads a bag reads these."""
