@@ -239,9 +239,6 @@ class StateSignals(MeasuredSignals):
         .named(*(f"{source}_torque" for source in SOURCES))
         .sent(topics.TRUTH_ORBIT, "positions")
     )
-    air_temperature: Array = signal(
-        Origin.OTHERS, 1, "K", "", "temperature of the air at the base"
-    ).sent(topics.AIR_TEMPERATURE, "temperature")
 
 
 class State(StateSignals, Record):

@@ -101,7 +101,6 @@ MAGNETOMETER = _state(
     is_optional=True,
     is_controlling=True,
 )
-AIR_TEMPERATURE = _state("air_temperature", "sensor_msgs/msg/Temperature", "body", BASE_FRAME)
 COMMAND = _state("command", _JOINTS, "commanded", BASE_FRAME)
 # Reference and clock are not transient local: a late joiner would receive the past, and that a
 # message was lost if one is pushed out meanwhile; at depth 1 a slow one would lose some. The
@@ -147,7 +146,6 @@ STATES = (
     THRUSTERS_STATE,
     MOTORS_STATE,
     MAGNETOMETER,
-    AIR_TEMPERATURE,
 )
 """The parts of a state, in the order of sending."""
 ALL = (

@@ -28,7 +28,6 @@ def write_truth(model: Model, x: Array, rotation: Array, truth: State) -> None:
     truth.base_position[:] = x[:3]
     truth.quaternion[:] = x[3:7]
     truth.base_velocity[:] = x[7 + n : 10 + n]
-    truth.air_temperature[0] = 293.15 - 0.0065 * x[2]
     rotation_matrix(truth.quaternion, rotation)
     rotate_back(rotation, x[10 + n : 13 + n], truth.omega_base)
     positions, velocities = x[7 : 7 + n], x[13 + n : 13 + 2 * n]

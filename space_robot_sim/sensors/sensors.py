@@ -107,7 +107,6 @@ def sense(sensors: Sensors, truth: State, tick: int, period: float, measured: St
     measured.orbit_velocity[:] = truth.orbit_velocity
     measured.magnetic_field[:] = truth.magnetic_field
     measured.external_torques[:] = truth.external_torques
-    measured.air_temperature[:] = truth.air_temperature
     if uniform(sensors.are_ideal) == 1.0:
         measured.quaternion[:] = truth.quaternion
         measured.omega_base[:] = truth.omega_base
