@@ -18,7 +18,7 @@ from space_robot_control.controller.settings import ControllerNodeSettings
 from space_robot_control.guidance.settings import MissionNodeSettings
 from space_robot_control.laws import laws
 from space_robot_msgs_py import topics
-from space_robot_msgs_py.bag.recorder_settings import RecorderNodeSettings
+from space_robot_msgs_py.bag.recorder import RecorderNodeSettings
 from space_robot_msgs_py.config.settings import NodeSettings, leaves
 from space_robot_msgs_py.config.trees import flatten
 from space_robot_msgs_py.samples import CommandSignals, Reference, State, TelemetrySignals

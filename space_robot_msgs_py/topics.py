@@ -139,14 +139,7 @@ TRANSFORMS_STATIC = Topic(
 )
 ROBOT_DESCRIPTION = _LATCHED._replace(name="robot_description", is_optional=True)
 
-STATES = (
-    JOINT_STATES,
-    WHEELS_STATE,
-    BASE_STATE,
-    THRUSTERS_STATE,
-    MOTORS_STATE,
-    MAGNETOMETER,
-)
+STATES = (JOINT_STATES, WHEELS_STATE, BASE_STATE, THRUSTERS_STATE, MOTORS_STATE, MAGNETOMETER)
 """The parts of a state, in the order of sending."""
 ALL = (
     JOINT_STATES,
