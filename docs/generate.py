@@ -19,8 +19,8 @@ from space_robot_control.guidance.settings import MissionNodeSettings
 from space_robot_control.laws import laws
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.bag.recorder import RecorderNodeSettings
+from space_robot_msgs_py.config.files import flatten
 from space_robot_msgs_py.config.settings import NodeSettings, leaves
-from space_robot_msgs_py.config.trees import flatten
 from space_robot_msgs_py.samples import CommandSignals, Reference, State, TelemetrySignals
 from space_robot_msgs_py.signals import carried_by
 from space_robot_sim.faults.grammar import Kind
@@ -44,6 +44,7 @@ EXAMPLES = {
     "TORQUE": "0.5",
     "JOINT": "3",
     "BASE_AXIS=RATE": "base_x=1e-5",
+    "BASE_AXIS=FIELD": "base_x=1e-6",
     "JOINT=TORQUE": "3=20",
     "SECONDS": "1.5",
     "AXIS=FACTOR": "all=0.99",

@@ -11,7 +11,7 @@ from space_robot_control.guidance.limits import too_fast, too_strong, turn_remar
 from space_robot_control.guidance.mission import Mission, MissionSettings
 from space_robot_control.laws import CompiledLaw, ControlLaw
 from space_robot_control.laws.base import CONSTANT_INERTIA, NO_ESTIMATE
-from space_robot_control.navigation.low_pass import low_pass_weight
+from space_robot_control.navigation.rate_filters import low_pass_weight
 from space_robot_model.robot import Robot
 from space_robot_msgs_py.errors import InputError
 

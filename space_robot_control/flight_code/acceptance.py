@@ -12,8 +12,8 @@ from space_robot_msgs_py.compiled.records import Block
 from space_robot_msgs_py.samples import Command, Reference, RobotState
 
 from ..controller.controller import Controller
-from ..controller.supervision import ANSWERED, NEW
 from ..controller.supervisor import MODES, Supervisor
+from ..controller.tick import ANSWERED, NEW
 from .folder import Exported
 from .library import command_of, fill_measurement, fill_reference, measurement_of
 
@@ -100,10 +100,10 @@ class RecordingSupervisor(Supervisor):
         self._judged = -1
         """Tick that was judged to be new and is not answered yet; -1: none."""
 
-    def judge(self, tick: int) -> int:
+    def judge_stamp(self, tick: int) -> int:
         """Return the standing of a state by its stamp."""
         self.finish()
-        standing = super().judge(tick)
+        standing = super().judge_stamp(tick)
         if standing == NEW:
             self._judged = tick
             return standing

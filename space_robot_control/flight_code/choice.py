@@ -14,8 +14,8 @@ from ..laws import ControlLaw
 
 def supervisor_of(
     controller: Controller, laws: Sequence[ControlLaw], settings: ControllerNodeSettings
-) -> Supervisor | None:
-    """Return the supervisor that the settings ask for; None: the usual one.
+) -> Supervisor:
+    """Return the supervisor that the settings ask for.
 
     Args:
         controller: with the law in force at the start.
@@ -25,8 +25,9 @@ def supervisor_of(
     Raises:
         InputError: a law cannot be exported, or there is no compiler or no flight computer.
     """
+    limits = settings.hold_ticks, settings.longest_jump
     if settings.answers_in_python:
-        return None
+        return Supervisor(controller, *limits)
     if settings.controller_code != "python" and settings.shadow != "none":
         raise InputError(
             f"shadow {settings.shadow} compares C with Python: it needs controller_code python, "
@@ -39,7 +40,6 @@ def supervisor_of(
     from .software import FlightSoftware
     from .supervisors import CodeSupervisor, ShadowSupervisor
 
-    limits = settings.hold_ticks, settings.longest_jump
     exported = Exported(FlightSoftware.of(controller, laws, [], limits, {}), settings.robot)
     if settings.controller_code.startswith("udp:"):
         _, host, port = settings.controller_code.split(":")

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from space_robot_msgs_py.compiled.records import Block
 from space_robot_msgs_py.samples import Reference, RobotState
 
-from ..navigation.quaternions import multiply
+from ..navigation.attitude_filter import multiply
 
 Array = NDArray[np.float64]
 

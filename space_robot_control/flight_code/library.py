@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from space_robot_msgs_py.compiled.records import Block
 from space_robot_msgs_py.samples import Reference, RobotState, State
 
-from ..controller.supervision import STATUSES
+from ..controller.tick import STATUSES
 from ..laws import ControlLaw
 from .compiler import build_library
 from .folder import Exported
@@ -51,7 +51,7 @@ class FlightLibrary:
         function = getattr(self._library, f"space_robot_{name}")
         return int(function(ctypes.c_void_p(self._state.ctypes.data), *pointers) or 0)
 
-    def judge(self, tick: int) -> int:
+    def judge_stamp(self, tick: int) -> int:
         """Return the standing of a state by its stamp."""
         return self._call("judge", ctypes.c_int64(tick))
 

@@ -85,7 +85,7 @@ class FlightComputer:
             raise FlightError("the flight computer answered another request")
         return int(self._answer["result"][0])
 
-    def judge(self, tick: int) -> int:
+    def judge_stamp(self, tick: int) -> int:
         """Return the standing of a state by its stamp."""
         return self._ask(JUDGE, tick)
 

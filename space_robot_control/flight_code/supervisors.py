@@ -11,7 +11,7 @@ from space_robot_msgs_py.compiled.records import Block, assign
 from space_robot_msgs_py.errors import FlightError
 from space_robot_msgs_py.samples import Command, RobotState
 
-from ..allocation.diagnosis import Diagnosis
+from ..allocation.allocation import Diagnosis
 from ..controller.controller import Controller
 from ..controller.settings import ControllerNodeSettings
 from ..controller.supervisor import Supervisor
@@ -56,9 +56,9 @@ class CodeSupervisor(_SupervisorWithCode):
     Its controller only tells which law is in force.
     """
 
-    def judge(self, tick: int) -> int:
+    def judge_stamp(self, tick: int) -> int:
         """Return the standing of a state by its stamp."""
-        standing = self._flight_code.judge(tick)
+        standing = self._flight_code.judge_stamp(tick)
         self._take_condition()
         return standing
 
@@ -77,7 +77,7 @@ class CodeSupervisor(_SupervisorWithCode):
     @property
     def diagnosis(self) -> Diagnosis:
         """Empty: the actuators' health is in the memory of the flight code."""
-        return Diagnosis((), "", {})
+        return Diagnosis()
 
     def _take_condition(self) -> None:
         numbers = self._flight_code.condition
@@ -90,13 +90,13 @@ class CodeSupervisor(_SupervisorWithCode):
 class ShadowSupervisor(_SupervisorWithCode):
     """Supervisor that compares every answer of the kernels with that of the flight code in C."""
 
-    def judge(self, tick: int) -> int:
+    def judge_stamp(self, tick: int) -> int:
         """Return the standing of a state by its stamp.
 
         Raises:
             ShadowError: C judges differently.
         """
-        standing, other = super().judge(tick), self._flight_code.judge(tick)
+        standing, other = super().judge_stamp(tick), self._flight_code.judge_stamp(tick)
         if standing != other:
             raise ShadowError(f"at tick {tick} Python judges the stamp as {standing}, C as {other}")
         return standing

@@ -21,7 +21,7 @@ from space_robot_msgs_py import topics
 from space_robot_msgs_py.errors import InputError, MessageError
 from space_robot_msgs_py.ros.endpoints import PolledCallbackGroup, RawSubscription
 from space_robot_msgs_py.ros.managed_node import ManagedNode
-from space_robot_msgs_py.ros.restart import until
+from space_robot_msgs_py.ros.service_calls import until
 from space_robot_msgs_py.samples import RobotNames
 from space_robot_msgs_py.wire.codecs import CompiledCodec
 from space_robot_msgs_py.wire.messages import describe

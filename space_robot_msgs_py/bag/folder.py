@@ -11,8 +11,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 from mcap.writer import MCAP0_MAGIC
 from pydantic import BaseModel, Field, ValidationError
 
-from ..config.choices import MOST_COMPARED, MOST_NEAR, nearest
-from ..config.text import printable
+from ..config.text import MOST_COMPARED, MOST_NEAR, nearest, printable
 from ..config.validation import read_yaml, validate
 from ..config.yaml_text import parse_yaml
 from ..errors import InputError

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 
 from space_robot_model.robot import Robot
-from space_robot_model.robot.poses import RobotPoses, tool_poses
+from space_robot_model.robot.placements import RobotPoses, tool_poses
 from space_robot_model.robot.urdf_text import urdf_text
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.samples import RobotState, Timebase

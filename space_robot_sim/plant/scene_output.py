@@ -8,7 +8,7 @@ from rclpy.node import Node
 
 from space_robot_model.robot import Robot
 from space_robot_model.robot.markers import RobotMarkers
-from space_robot_model.robot.poses import RobotPoses
+from space_robot_model.robot.placements import RobotPoses
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.ros.endpoints import RawPublisher
 from space_robot_msgs_py.samples import RobotState, Timebase

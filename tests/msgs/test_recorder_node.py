@@ -24,8 +24,7 @@ pytest.importorskip("rclpy")
 from space_robot_msgs_py import recorder_node
 from space_robot_msgs_py.recorder_node import LOOK_PERIOD_S, REPORTS, TIMEOUT_S, TURN, RecorderLoop
 from space_robot_msgs_py.ros.endpoints import Received
-from space_robot_msgs_py.ros.health import SENT, Level
-from space_robot_msgs_py.ros.loop import Wait
+from space_robot_msgs_py.ros.loop import SENT, Level, Wait
 
 OPTIONAL = [topic for topic in topics.RECORDED if topic.is_optional]
 PERIOD_NS = 500_000

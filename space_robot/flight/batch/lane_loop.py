@@ -7,16 +7,22 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from space_robot_control.controller.kernels import apply_transfer
-from space_robot_control.controller.signal_kernels import USABLE, compute_signals
-from space_robot_control.laws.compiled import LawCode
+from space_robot_control.controller.signals import USABLE, compute_signals
+from space_robot_control.controller.tick import apply_transfer
+from space_robot_control.laws.base import LawCode
 from space_robot_model.dynamics.rho_space import force_for
 from space_robot_msgs_py.compiled.kernels import RecordFunction, kernel
-from space_robot_msgs_py.compiled.lane_rows import spread
-from space_robot_msgs_py.compiled.lane_words import as_lanes
-from space_robot_msgs_py.compiled.lanes import WIDTH, any_lane, lane_of, negated, where, with_lane
+from space_robot_msgs_py.compiled.lanes import (
+    WIDTH,
+    any_lane,
+    as_lanes,
+    lane_of,
+    negated,
+    where,
+    with_lane,
+)
 from space_robot_msgs_py.compiled.records import Block
-from space_robot_sim.plant.lanes import advance_lanes
+from space_robot_sim.plant.lanes import advance_lanes, spread
 from space_robot_sim.plant.tick import RATE_LIMIT
 from space_robot_sim.sensors.sensors import sense
 

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from space_robot_msgs_py import topics
-from space_robot_msgs_py.config.namespace import relative
+from space_robot_msgs_py.config.validation import relative
 from space_robot_msgs_py.errors import MessageError
 from space_robot_msgs_py.wire.definitions import decode
 from space_robot_msgs_py.wire.messages import TELEMETRY_ROWS
@@ -21,6 +21,8 @@ from .temporary_node import TemporaryNode
 
 Array = NDArray[np.float64]
 
+MONITOR = "flight_monitor"
+"""Name of the node with which a flight is followed."""
 MOST_AT_ONCE = 1_000
 """Messages of a topic read in one poll, in case of a flood."""
 
@@ -41,11 +43,7 @@ class Monitor:
     """Simulated time from /clock, errors from telemetry, the nodes' modes from /diagnostics."""
 
     def __init__(
-        self,
-        domain: int,
-        namespace: str = topics.ROOT,
-        name: str = "flight_monitor",
-        period: float = 0.0,
+        self, domain: int, namespace: str = topics.ROOT, name: str = MONITOR, period: float = 0.0
     ) -> None:
         """Join the graph.
 

@@ -6,8 +6,8 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
-from space_robot_control.navigation.settings import Mode
-from space_robot_msgs_py.config.directory import config_directory
+from space_robot_control.navigation.settings import NavigationMode
+from space_robot_msgs_py.config.installation import config_directory
 from space_robot_msgs_py.config.validation import read_yaml
 from space_robot_msgs_py.errors import DivergedError, InputError
 
@@ -82,7 +82,7 @@ class Equipment(NamedTuple):
 
     sensors: str = "ideal"
     """Name of a file in config/sensors, or a path."""
-    navigation: Mode = "direct"
+    navigation: NavigationMode = "direct"
     actuators: str = "ideal"
     """Name of a file in config/actuators, or a path."""
 

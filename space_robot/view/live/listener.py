@@ -13,13 +13,13 @@ from space_robot_model.orbit.elements import state_of
 from space_robot_model.robot import Robot
 from space_robot_model.robot.find import find_robot
 from space_robot_msgs_py import topics
+from space_robot_msgs_py.config.files import nest
 from space_robot_msgs_py.config.settings import leaves
-from space_robot_msgs_py.config.trees import nest
 from space_robot_msgs_py.config.validation import StrictModel, validate
 from space_robot_msgs_py.errors import InputError, MessageError
 from space_robot_msgs_py.samples import RobotNames, RobotState, Timebase
 from space_robot_msgs_py.wire.telemetry import LawCodec
-from space_robot_sim.environment.orbit_settings import OrbitSettings
+from space_robot_sim.environment.orbit import OrbitSettings
 
 from ...flight.graph.monitor import Event, Monitor
 from ...flight.graph.node_names import PLANT

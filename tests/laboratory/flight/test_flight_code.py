@@ -65,8 +65,10 @@ def test_a_difference_ends_the_flight_and_is_named(monkeypatch: pytest.MonkeyPat
 
 @needs_compiler
 def test_a_judgement_that_differs_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
-    judge = FlightLibrary.judge
-    monkeypatch.setattr(FlightLibrary, "judge", lambda self, tick: judge(self, tick) + (tick == 9))
+    judge = FlightLibrary.judge_stamp
+    monkeypatch.setattr(
+        FlightLibrary, "judge_stamp", lambda self, tick: judge(self, tick) + (tick == 9)
+    )
     with pytest.raises(ShadowError, match="at tick 9 Python judges the stamp as 1, C as 2"):
         flown(shadow="c")
 
@@ -168,4 +170,4 @@ def test_one_that_falls_silent_ends_the_flight(monkeypatch: pytest.MonkeyPatch) 
         computer = FlightComputer(exported, "127.0.0.1", server.getsockname()[1])
         thread.join()
         with pytest.raises(FlightError, match="the flight computer does not answer"):
-            computer.judge(0)
+            computer.judge_stamp(0)
