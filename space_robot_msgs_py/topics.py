@@ -47,8 +47,9 @@ class Topic(NamedTuple):
     stamp_at: int = 0
     """Bytes of a message before its stamp."""
     carries: Topic | None = None
-    """Its messages are those of this topic as plain bytes (`wire.viewers.wrap`), for the recorder: where
-    the type of those is not installed nobody could send them. A bag has them as this topic's."""
+    """Its messages are those of this topic as plain bytes (`wire.viewers.wrap`), for the recorder:
+    where the type of those is not installed nobody could send them. A bag has them as this topic's.
+    """
 
     @property
     def full_name(self) -> str:

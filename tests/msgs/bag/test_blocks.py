@@ -16,8 +16,7 @@ from space_robot.flight.plan import Flight, FlightPlan, resolve
 from space_robot.flight.replay.run import RecordedLaws
 from space_robot.flight.simulate import fly_blocks, simulate
 from space_robot_msgs_py.bag import blocks
-from space_robot_msgs_py.bag.blocks import blocks_of, joined
-from space_robot_msgs_py.bag.flight_log import REFERENCE, FlightLog
+from space_robot_msgs_py.bag.flight_log import REFERENCE, FlightLog, blocks_of, joined
 from space_robot_msgs_py.bag.law_history import as_data, in_words, same, within
 from space_robot_msgs_py.bag.reader import read_flight
 from space_robot_msgs_py.samples import STATE_FIELDS, LawInForce, Timebase, in_order
