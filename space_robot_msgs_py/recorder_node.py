@@ -11,8 +11,7 @@ from pathlib import Path
 from typing import NoReturn
 
 from . import topics
-from .bag.recorder import BagRecorder
-from .bag.recorder_settings import RecorderNodeSettings
+from .bag.recorder import BagRecorder, RecorderNodeSettings
 from .config.text import parse_json
 from .errors import InputError, MessageError
 from .ros.endpoints import PolledCallbackGroup, RawPublisher, RawSubscription

@@ -14,7 +14,7 @@ import pytest
 from bags import read_accounts
 
 from space_robot_msgs_py import topics
-from space_robot_msgs_py.bag.recorder_settings import RecorderNodeSettings
+from space_robot_msgs_py.bag.recorder import RecorderNodeSettings
 from space_robot_msgs_py.errors import FlightError, InputError
 from space_robot_msgs_py.wire.definitions import jazzy
 from space_robot_msgs_py.wire.telemetry import ClockCodec
