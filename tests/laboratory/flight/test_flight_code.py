@@ -66,7 +66,9 @@ def test_a_difference_ends_the_flight_and_is_named(monkeypatch: pytest.MonkeyPat
 @needs_compiler
 def test_a_judgement_that_differs_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     judge = FlightLibrary.judge_stamp
-    monkeypatch.setattr(FlightLibrary, "judge_stamp", lambda self, tick: judge(self, tick) + (tick == 9))
+    monkeypatch.setattr(
+        FlightLibrary, "judge_stamp", lambda self, tick: judge(self, tick) + (tick == 9)
+    )
     with pytest.raises(ShadowError, match="at tick 9 Python judges the stamp as 1, C as 2"):
         flown(shadow="c")
 
