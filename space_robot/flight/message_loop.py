@@ -18,8 +18,7 @@ from space_robot_msgs_py.errors import MessageError
 from space_robot_msgs_py.samples import RobotState
 from space_robot_msgs_py.wire.codecs import CommandCodec, StateCodec
 from space_robot_msgs_py.wire.stamp_guard import AGREEING
-from space_robot_sim.plant.command_guard import CommandGuard
-from space_robot_sim.plant.messages import NONE, SentState, exchange_of
+from space_robot_sim.plant.messages import NONE, CommandGuard, SentState, exchange_of
 
 from .plan import Flight
 

@@ -21,16 +21,16 @@ from space_robot_model.hardware.base_actuators import BaseActuatorSettings
 from space_robot_model.hardware.capability import actuator_load, carried_momentum
 from space_robot_model.orbit.ephemeris import AssumedOrbit, Ephemeris
 from space_robot_model.robot import Robot
-from space_robot_model.robot.base_axes import base_axes, to_base
 from space_robot_model.robot.momentum import Motion, robot_momentum
+from space_robot_model.robot.placements import base_axes, to_base
 from space_robot_msgs_py.compiled.records import assign
 from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.samples import SOURCES, RobotState
 from space_robot_msgs_py.topics import BASE_AXES
+from space_robot_sim.component import Installation
 from space_robot_sim.environment.environment import Environment, EnvironmentSettings
-from space_robot_sim.environment.orbit_settings import OrbitSettings
-from space_robot_sim.plant.surroundings import REPORT_TICKS
-from space_robot_sim.plant.tick import PlantMemory, update_true_state
+from space_robot_sim.environment.orbit import OrbitSettings
+from space_robot_sim.plant.tick import REPORT_TICKS, PlantMemory, update_true_state
 
 from ..scenario.resolved import ResolvedScenario
 
@@ -149,7 +149,8 @@ class Surroundings:
     def __init__(self, robot: Robot, orbit: OrbitSettings) -> None:
         """Put the robot, whose joints are all actuated, into an orbit."""
         self._robot, self._block = robot, PlantMemory.block(robot.n)
-        environment = Environment.build(robot, EnvironmentSettings(), orbit)
+        world = EnvironmentSettings(**{k: getattr(orbit, k) for k in OrbitSettings.model_fields})
+        environment = Environment.build(world, Installation(robot.n, robot=robot))
         assign(self._block[0], model=robot.model, environment=environment)
         self._truth = RobotState(0, self._block["truth"])
         self._ephemeris = Ephemeris(

@@ -10,8 +10,8 @@ from space_robot_control.controller.supervisor import Supervisor
 from space_robot_control.flight_code.choice import supervisor_of
 from space_robot_control.laws import ControlLaw
 from space_robot_msgs_py.errors import InputError
-from space_robot_sim.plant.description import plant_description
 from space_robot_sim.plant.plant import Plant
+from space_robot_sim.plant.report import plant_description
 
 from ..processes.software import commit, versions
 from ..scenario.options import NO_FRICTION, FlightPlan

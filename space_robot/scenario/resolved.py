@@ -16,22 +16,21 @@ from space_robot_control.controller.settings import DEFAULT, ControllerNodeSetti
 from space_robot_control.guidance.mission import Mission, MissionSettings
 from space_robot_control.guidance.settings import MissionNodeSettings
 from space_robot_control.laws import ControlLaw
-from space_robot_model.hardware.base_actuators import BaseActuatorSettings
-from space_robot_model.hardware.magnetic_torquers import MagneticTorquerSettings
+from space_robot_model.hardware.base_actuators import BaseActuatorSettings, MagneticTorquerSettings
 from space_robot_model.hardware.sensors import SensorSettings
 from space_robot_msgs_py.bag.recorder_settings import RecorderNodeSettings
-from space_robot_msgs_py.config.trees import Tree
+from space_robot_msgs_py.config.files import Tree
 from space_robot_msgs_py.errors import InputError
 from space_robot_sim.actuators.actuators import ActuatorSettings
 from space_robot_sim.environment.disturbance import DisturbanceSettings
 from space_robot_sim.environment.disturbance_table import DisturbanceTable
 from space_robot_sim.environment.environment import EnvironmentSettings
 from space_robot_sim.environment.friction import coefficients
-from space_robot_sim.environment.orbit_settings import OrbitSettings
+from space_robot_sim.environment.orbit import OrbitSettings
 from space_robot_sim.faults.grammar import Fault
-from space_robot_sim.plant.description import actuators, plant_description
 from space_robot_sim.plant.faults import PLANT_KINDS
 from space_robot_sim.plant.plant import Plant
+from space_robot_sim.plant.report import actuators, plant_description
 from space_robot_sim.plant.settings import MOST_TICKS, PlantNodeSettings
 
 from .faults import PROCESS_KINDS

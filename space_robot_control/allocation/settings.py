@@ -8,16 +8,14 @@ from pydantic import Field, model_validator
 from typing_extensions import Self
 
 from space_robot_model.hardware.base_actuators import BaseActuatorSettings
+from space_robot_model.hardware.sheets import read_sheet
 from space_robot_model.robot import Robot
-from space_robot_msgs_py.config.files import named_file, node_parameters
-from space_robot_msgs_py.config.validation import StrictModel, validate
+from space_robot_msgs_py.config.validation import StrictModel
 
 WheelAllocation = Literal["pseudo_inverse", "least_largest"]
 Modulation = Literal["pwm", "sigma_delta", "schmitt"]
 Dump = Literal["all", "thrusters", "magnetic", "none"]
 Share = Annotated[float, Field(ge=0.0, le=1.0)]
-OWNER = "plant"
-"""Node whose parameters are in the actuators' files."""
 
 
 def assumed_actuators(name: str, robot: Robot) -> BaseActuatorSettings:
@@ -29,10 +27,7 @@ def assumed_actuators(name: str, robot: Robot) -> BaseActuatorSettings:
     Raises:
         InputError: there is no such file, or it is wrong for ``robot``.
     """
-    path = named_file("actuators", name)
-    tree = node_parameters(path, OWNER)
-    own = {key: tree[key] for key in BaseActuatorSettings.model_fields if key in tree}
-    actuators = validate(BaseActuatorSettings, own, str(path))
+    actuators = read_sheet(BaseActuatorSettings, "actuators", name)
     actuators.check(robot, name)
     return actuators
 

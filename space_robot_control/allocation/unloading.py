@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from space_robot_model.dynamics.algebra import Vector, add, cross, dot, scale, store, vector
-from space_robot_model.hardware.magnetic_torquers import MagneticTorquerSettings
+from space_robot_model.hardware.base_actuators import MagneticTorquerSettings
 from space_robot_msgs_py.compiled.kernels import kernel
 from space_robot_msgs_py.compiled.records import Record, assign, shaped
 from space_robot_msgs_py.samples import MOST_TORQUERS
@@ -56,7 +56,7 @@ class AssumedTorquers(Record):
         gain = settings.magnetic_gain if settings.torquers_unload else 0.0
         assign(torquers, count=count, gain=gain)
         torquers.axis[:count] = assumed.unit_axes
-        torquers.max_dipole[:count] = assumed.largest
+        torquers.max_dipole[:count] = assumed.values("max_dipole")
         if count:
             torquers.inverse[:count] = np.linalg.pinv(assumed.unit_axes.T)
         return torquers

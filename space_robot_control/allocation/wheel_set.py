@@ -26,7 +26,7 @@ from space_robot_model.dynamics.algebra import (
     subtract,
     vector,
 )
-from space_robot_model.elementary.symmetric import diagonalise
+from space_robot_model.elementary.linear_algebra import diagonalise
 from space_robot_msgs_py.compiled.kernels import kernel, subroutine
 from space_robot_msgs_py.compiled.records import Record, shaped
 from space_robot_msgs_py.samples import MOST_WHEELS

@@ -20,7 +20,7 @@ from space_robot_msgs_py.samples import Command, RobotState
 from ..allocation.allocation import Allocation, Diagnosis, allocation_code, diagnose
 from ..allocation.settings import AllocationSettings
 from ..laws import ControlLaw, Signals
-from ..laws.checked import force_of
+from ..laws.base import force_of
 from ..navigation.navigation import Navigation
 from ..navigation.rate_filters import low_pass_weight
 from ..navigation.settings import NavigationFilterSettings

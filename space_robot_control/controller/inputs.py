@@ -22,7 +22,7 @@ from space_robot_msgs_py.ros.loop import Wait
 from space_robot_msgs_py.samples import RobotNames, RobotState, Timebase
 from space_robot_msgs_py.wire.cdr import header_stamp_ns
 from space_robot_msgs_py.wire.codecs import StateCodec
-from space_robot_msgs_py.wire.reference_codec import ReferenceCodec
+from space_robot_msgs_py.wire.telemetry import ReferenceCodec
 
 from .reference_buffer import ReferenceBuffer
 

@@ -15,12 +15,10 @@ from space_robot_msgs_py.bag.law_history import LawChange
 from space_robot_msgs_py.compiled.records import Block
 from space_robot_msgs_py.config.validation import one_of
 from space_robot_msgs_py.errors import InputError, SpaceRobotError
-from space_robot_msgs_py.ros.endpoints import RawPublisher, flush
-from space_robot_msgs_py.ros.health import Health, Level
-from space_robot_msgs_py.ros.loop import Wait
+from space_robot_msgs_py.ros.endpoints import PausedInput, RawPublisher, flush
+from space_robot_msgs_py.ros.loop import Health, Level, Wait
 from space_robot_msgs_py.ros.managed_node import ManagedNode
 from space_robot_msgs_py.ros.parameters import overrides
-from space_robot_msgs_py.ros.paused import PausedInput
 from space_robot_msgs_py.samples import Reference, RobotState
 from space_robot_msgs_py.wire.stamp_guard import describe_new_time
 

@@ -23,14 +23,11 @@ from space_robot_msgs_py.bag.law_history import LawChange
 from space_robot_msgs_py.compiled.records import Block, assign
 from space_robot_msgs_py.samples import Command, RobotState
 from space_robot_msgs_py.wire.codecs import CommandCodec
-from space_robot_msgs_py.wire.controller_law import NODE, LawCodec
-from space_robot_msgs_py.wire.controller_signals import SignalsCodec
-from space_robot_msgs_py.wire.controller_telemetry import TelemetryCodec
+from space_robot_msgs_py.wire.telemetry import NODE, LawCodec, SignalsCodec, TelemetryCodec
 
 from ..allocation.allocation import Diagnosis
 from ..laws import ControlLaw
-from ..laws.checked import force_of
-from ..laws.compiled import CompiledLaw, LawCode
+from ..laws.base import CompiledLaw, LawCode, force_of
 from .controller import Controller, unusable
 from .law_choice import LawChoice
 from .reference_buffer import ReferenceBuffer

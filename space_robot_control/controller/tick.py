@@ -26,7 +26,7 @@ from space_robot_msgs_py.compiled.records import Block, Record, nested, shaped
 from space_robot_msgs_py.samples import MOST_THRUSTERS, MOST_TORQUERS, MOST_WHEELS, Reference
 from space_robot_msgs_py.wire.stamp_guard import accept
 
-from ..laws.compiled import LawCode
+from ..laws.base import LawCode
 from .signals import (
     LARGEST,
     NORM_TOLERANCE,

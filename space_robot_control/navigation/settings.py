@@ -10,12 +10,10 @@ from pydantic import AfterValidator, Field
 
 from space_robot_model.elementary.matrices import norm
 from space_robot_model.hardware.sensors import SensorSettings
-from space_robot_msgs_py.config.files import named_file, node_parameters
-from space_robot_msgs_py.config.validation import StrictModel, validate
+from space_robot_model.hardware.sheets import read_sheet
+from space_robot_msgs_py.config.validation import StrictModel
 
 NavigationMode = Literal["direct", "filtered"]
-OWNER = "plant"
-"""Node whose parameters are in the sensors' files."""
 AS_THE_SENSORS = -1.0
 """Value that selects the number of the sensors' own settings."""
 
@@ -115,20 +113,8 @@ def completed(
     missing = [name for name, value in settings.model_dump().items() if not _is_given(name, value)]
     if not missing:
         return settings
-    assumed = assumed_numbers(read_sensors(sensors), period)
+    assumed = assumed_numbers(read_sheet(SensorSettings, "sensors", sensors), period)
     return settings.model_copy(update={name: assumed[name] for name in missing})
-
-
-def read_sensors(name: str) -> SensorSettings:
-    """Read the sensors of a file of config/sensors, or at a path.
-
-    Raises:
-        InputError: there is no such file, or it is wrong.
-    """
-    path = named_file("sensors", name)
-    tree = node_parameters(path, OWNER)
-    own = {key: tree[key] for key in SensorSettings.model_fields if key in tree}
-    return validate(SensorSettings, own, str(path))
 
 
 def assumed_numbers(sensors: SensorSettings, period: float) -> Mapping[str, Any]:

@@ -6,11 +6,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from space_robot_control.controller.tick import NEW, answer_state, controller_tick, judge_stamp
-from space_robot_control.laws.compiled import LawCode
+from space_robot_control.laws.base import LawCode
 from space_robot_model.dynamics.aba import aba
 from space_robot_model.dynamics.kinematics import forward_kinematics, spatial_velocities
 from space_robot_msgs_py.compiled.kernels import RecordFunction, kernel
-from space_robot_msgs_py.compiled.lane_words import as_lanes
+from space_robot_msgs_py.compiled.lanes import as_lanes
 from space_robot_msgs_py.compiled.records import Block
 from space_robot_sim.plant.lanes import advance_lanes
 from space_robot_sim.plant.tick import advance

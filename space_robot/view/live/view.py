@@ -14,8 +14,7 @@ from numpy.typing import NDArray
 
 from space_robot_model.hardware.base_actuators import BaseActuatorSettings
 from space_robot_model.robot import Robot
-from space_robot_model.robot.tool import tool_pose
-from space_robot_model.robot.transforms import joint_transforms
+from space_robot_model.robot.placements import joint_transforms, tool_pose
 
 from ...flight.graph.monitor import Event
 from ..base_surface import clearest_side
@@ -29,7 +28,7 @@ from .window import Curves
 if TYPE_CHECKING:
     from viser import LineSegmentsHandle, SceneApi, ViserServer
 
-    from space_robot_sim.environment.orbit_settings import OrbitSettings
+    from space_robot_sim.environment.orbit import OrbitSettings
 
     from .listener import Listener, Sample
 

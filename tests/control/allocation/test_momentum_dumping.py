@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from space_robot_control.allocation.settings import AllocationSettings
 from space_robot_control.allocation.unloading import AssumedTorquers, dump_momentum
-from space_robot_model.hardware.magnetic_torquers import MagneticTorquerSettings
+from space_robot_model.hardware.base_actuators import MagneticTorquerSettings
 from space_robot_msgs_py.samples import MOST_TORQUERS
 
 Array = NDArray[np.float64]

@@ -28,7 +28,7 @@ from space_robot_model.hardware.base_actuators import BaseActuatorSettings
 from space_robot_model.robot import Robot
 from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.samples import SOURCES
-from space_robot_sim.environment.orbit_settings import OrbitSettings
+from space_robot_sim.environment.orbit import OrbitSettings
 
 POSTURE = [0, 90, 200, 20, 30, 10]
 LINE = {"tool": {"xyz": [0.3, 0.0, -0.4]}}

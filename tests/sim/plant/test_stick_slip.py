@@ -20,13 +20,13 @@ from strategies import State, random_quaternion, random_robot, rotor_room, with_
 
 from space_robot_model.dynamics.model import Data
 from space_robot_model.robot import Robot
-from space_robot_model.robot.tree import Gear
+from space_robot_model.robot.parts import Gear
 from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.samples import Command
 from space_robot_sim.environment.disturbance import DisturbanceSettings
 from space_robot_sim.environment.friction import FrictionSettings
-from space_robot_sim.plant.gear_mounting import STABLE, check_rotors, check_springs
 from space_robot_sim.plant.integrator import Stages
+from space_robot_sim.plant.mounting import STABLE, check_rotors, check_springs
 from space_robot_sim.plant.plant import Plant, PlantSettings
 from space_robot_sim.plant.stick_slip import MOST_CUTS, integrate, slip_or_stick
 
