@@ -10,16 +10,18 @@ from numpy.typing import NDArray
 
 from space_robot_control.controller.law_choice import LawChoice
 from space_robot_control.controller.tick import NEW
-from space_robot_control.flight_code.acceptance import CHOOSE, AnswerRecording, RecordingSupervisor
-from space_robot_control.flight_code.folder import Exported
-from space_robot_control.flight_code.hostile import (
+from space_robot_control.flight_code.acceptance import (
+    CHOOSE,
     REFERENCE_SHARE,
     SHARE,
+    AnswerRecording,
+    RecordingSupervisor,
     hostile_ticks,
     shake,
     spoil,
     spoiled_reference,
 )
+from space_robot_control.flight_code.folder import Exported
 from space_robot_msgs_py.errors import FlightError
 from space_robot_msgs_py.samples import RobotState
 

@@ -85,8 +85,7 @@ def _mission(settings: FlightSettings, robot: Robot) -> Mission:
             return Mission(robot, settings.mission, settings.plant.period)
         except InputError as error:
             file, numbers = settings.mission.mission, settings.mission
-            needed = robot.n * len(numbers.waypoint_times)
-            if not file and len(numbers.waypoints_deg) != needed:
+            if not file and len(numbers.joints_deg) != robot.n:
                 own = robot_files(settings.mission.robot).mission
                 raise InputError(f"{own}: {error}{remake_advice(own) if own else ''}") from None
             if not file.endswith((*YAML, *TRAJECTORIES)):

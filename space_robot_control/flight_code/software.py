@@ -199,7 +199,6 @@ def translate(software: FlightSoftware) -> Translated:
 def _program(
     software: FlightSoftware, constants: dict[lang.FieldName, float]
 ) -> tuple[KernelProgram, dict[str, Any]]:
-    """Return a program, and the functions that are called from outside."""
     program = KernelProgram(software.sizes, software.joints)
     program.constants = constants
     supervision, controller, state, reference = (
@@ -237,7 +236,6 @@ def _value(kind: lang.Type) -> lang.Value:
 
 
 def _law(law: CompiledLaw) -> lang.Value:
-    """Return a law as the argument of a kernel: its function bound, gains and memory passed."""
     own = type(law)
     items = {
         "run": lang.Known(own.kernel),
@@ -254,7 +252,6 @@ def _law(law: CompiledLaw) -> lang.Value:
 def _constants(
     software: FlightSoftware, program: KernelProgram, written: set[lang.FieldName]
 ) -> dict[lang.FieldName, float]:
-    """Return the fields that no kernel writes and that have one number, wherever they are."""
     numbers_of_field: dict[lang.FieldName, set[float | None]] = {}
 
     def visit(record: type[Record], numbers: Any) -> None:

@@ -186,7 +186,7 @@ def parameters(flight: Flight) -> dict[str, Any]:
         "plant": flight.plant_settings.model_dump(exclude={"mission", "wait_for"}),
         "gains": flight.scenario.gains_used,
         "mission": {
-            "waypoint_times_s": flight.mission_settings.waypoint_times,
-            "waypoints_deg": flight.mission_settings.waypoints_deg,
+            "start_deg": flight.mission_settings.joints_deg,
+            "segments": flight.mission_settings.segments,
         },
     }

@@ -22,8 +22,13 @@ from space_robot_control.controller.tick import (
     SAFE_BELOW_ETA,
     STATUSES,
 )
+from space_robot_control.flight_code.acceptance import (
+    hostile_ticks,
+    shake,
+    spoil,
+    spoiled_reference,
+)
 from space_robot_control.flight_code.folder import Exported
-from space_robot_control.flight_code.hostile import hostile_ticks, shake, spoil, spoiled_reference
 from space_robot_control.flight_code.library import CONDITION, FlightLibrary
 from space_robot_control.flight_code.supervisors import bits
 from space_robot_msgs_py.samples import Reference, RobotState

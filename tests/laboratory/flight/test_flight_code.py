@@ -19,8 +19,7 @@ from matrix.scenarios import difference
 from paths import ROOT
 
 from space_robot.export.software import export
-from space_robot_control.flight_code.compiler import write_sources
-from space_robot_control.flight_code.library import FlightLibrary
+from space_robot_control.flight_code.library import FlightLibrary, write_sources
 from space_robot_control.flight_code.remote import BEGIN, FlightComputer
 from space_robot_control.flight_code.supervisors import ShadowError, bits
 from space_robot_msgs_py.bag.flight_log import FlightLog

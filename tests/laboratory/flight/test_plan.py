@@ -33,8 +33,7 @@ from space_robot_control.controller.controller import Controller
 from space_robot_control.controller.gains import build_laws, split_gains
 from space_robot_control.controller.law_choice import parse_swaps
 from space_robot_control.controller.settings import ControllerNodeSettings
-from space_robot_control.guidance.mission import Mission
-from space_robot_control.guidance.settings import MissionNodeSettings
+from space_robot_control.guidance.mission import Mission, MissionNodeSettings
 from space_robot_control.laws import laws
 from space_robot_model.robot import Robot
 from space_robot_model.robot.find import find_robot
