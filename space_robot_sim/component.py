@@ -73,12 +73,12 @@ class Component(Record):
                 if issubclass(field, Component):
                     field._fill(record[name], part, at)
                 continue
-            if field.origin is None:
+            if field.source is None:
                 continue
-            if isinstance(field.origin, str):
-                value = attrgetter(field.origin)(sheet)
+            if isinstance(field.source, str):
+                value = attrgetter(field.source)(sheet)
             else:
-                value = field.origin(sheet, at)
+                value = field.source(sheet, at)
             if np.ndim(value):  # what there is room for beyond the last one stays zero
                 record[name][: len(value)] = value
             else:

@@ -38,9 +38,6 @@ def read_sheet(sheet: type[Sheet], folder: str, name: str) -> Sheet:
         sheet: class of the sheet.
         folder: of config/, as "sensors".
         name: of a file in it, or a path.
-
-    Raises:
-        InputError: there is no such file, or it is wrong.
     """
     path = named_file(folder, name)
     tree = node_parameters(path, "plant")

@@ -99,11 +99,7 @@ class ThrusterSettings(MountedSheet):
         return np.round(self.values(name) / period)
 
     def check(self) -> None:
-        """Check that the settings are consistent.
-
-        Raises:
-            InputError: they are inconsistent.
-        """
+        """Check that the settings are consistent."""
         pointed = len(vectors(self.directions))
         if pointed != self.count:
             raise InputError(

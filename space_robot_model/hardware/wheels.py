@@ -68,9 +68,6 @@ class WheelSettings(MountedSheet):
 
         Args:
             base_inertia: (3, 3) of the base with locked wheels about its CoM, kg m2.
-
-        Raises:
-            InputError: they are inconsistent.
         """
         if not self.count:
             return

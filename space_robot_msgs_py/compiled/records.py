@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import KW_ONLY, dataclass
 from functools import cache, lru_cache
 from types import SimpleNamespace
 from typing import Any, ClassVar, cast
@@ -24,7 +24,7 @@ from .layouts import Layout, dimensions_of
 Block = NDArray[Any]
 """An array (1,) of one record; Numba unboxes it ten times faster than the record."""
 Shape = Callable[[int], tuple[int, ...]]
-Origin = str | Callable[[Any, Any], Any]
+Source = str | Callable[[Any, Any], Any]
 """Path of an attribute, or a function of what there is to fill a record from."""
 
 
@@ -38,15 +38,16 @@ class Field:
     """Meaning and unit, for users."""
     uniform: bool = False
     """True if kernels need the same numbers in all lanes, see `lanes`."""
-    origin: Origin | None = None
+    _: KW_ONLY
+    source: Source | None = None
     """Where its first numbers are from, for those who fill the record; None: it begins at zero."""
 
 
 def shaped(
-    shape: Shape, description: str = "", *, uniform: bool = False, origin: Origin | None = None
+    shape: Shape, description: str = "", *, uniform: bool = False, source: Source | None = None
 ) -> Any:
     """Declare a `Field`."""
-    return Field(shape, description, uniform, origin)
+    return Field(shape, description, uniform, source=source)
 
 
 def nested(record: type[Record]) -> Any:

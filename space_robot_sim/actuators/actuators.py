@@ -110,7 +110,7 @@ class Actuators(Component):
     thrusters: Thrusters = nested(Thrusters)
     magnetic_torquers: MagneticTorquers = nested(MagneticTorquers)
     base_is_ideal: float = shaped(
-        lambda n: (), uniform=True, origin=lambda s, at: s.base_actuation == "ideal"
+        lambda n: (), uniform=True, source=lambda s, at: s.base_actuation == "ideal"
     )
     """1 if the base receives the commanded torque; 0 if it has hardware or no actuators."""
     saturated_ticks: float = shaped(lambda n: ())
@@ -118,7 +118,7 @@ class Actuators(Component):
     latency: Array = shaped(
         lambda n: (n + 3 + MOST_WHEELS + MOST_THRUSTERS + MOST_TORQUERS,),
         uniform=True,
-        origin=_latency,
+        source=_latency,
     )
     """Ticks by which each number of a command is late."""
     due: Array = shaped(lambda n: (n + 3 + MOST_WHEELS + MOST_THRUSTERS + MOST_TORQUERS,))

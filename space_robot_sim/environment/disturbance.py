@@ -57,14 +57,14 @@ class Disturbance(Component):
 
     amplitude: Array = shaped(
         lambda n: (3,),
-        origin=lambda s, at: (
+        source=lambda s, at: (
             s.scale * np.array([s.base_amplitude, s.inner_amplitude, s.outer_amplitude])
         ),
     )
     """N m; on the base about inertial axes."""
     angular_frequency: Array = shaped(
         lambda n: (3, 2),
-        origin=lambda s, at: (
+        source=lambda s, at: (
             2.0 * np.pi * np.array([s.base_frequencies, s.inner_frequencies, s.outer_frequencies])
         ),
     )

@@ -86,11 +86,7 @@ class DisturbanceTable(NamedTuple):
 
     @classmethod
     def parse(cls, text: str) -> DisturbanceTable:
-        """Parse the text of a table.
-
-        Raises:
-            InputError: see `of`.
-        """
+        """Parse the text of a table."""
         return _parsed(text)
 
     @property
@@ -146,11 +142,7 @@ def table_text(text: str, folder: Path = Path()) -> str:
 
 
 def check_table_text(text: str) -> str:
-    """Check the text of a table without opening a file, and return it.
-
-    Raises:
-        InputError: see `DisturbanceTable.of`.
-    """
+    """Check the text of a table without opening a file, and return it."""
     if text.startswith(JSON):
         DisturbanceTable.parse(text)
     return text

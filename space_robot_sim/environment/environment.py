@@ -51,11 +51,7 @@ class EnvironmentSettings(OrbitSettings):
 
     @property
     def parsed_events(self) -> list[Event]:
-        """Events in order of time; files of targets are read.
-
-        Raises:
-            InputError: see `parse_events`.
-        """
+        """Events in order of time; files of targets are read."""
         texts = [text for text in self.events if text.strip()]
         return parse_events(texts, self.events_folder) if texts else []
 

@@ -96,9 +96,6 @@ class LoadSchedule:
             time: (K,) s, rising; empty: there are no loads.
             loads: (K, n+6) N and N m, see `PrescribedLoads`.
             period: s.
-
-        Raises:
-            InputError: no tick is within the times.
         """
         self._period = period
         self._first, self._values, self._slopes = np.zeros(0), loads, loads
@@ -128,11 +125,7 @@ class LoadSchedule:
     def of(
         cls, settings: DisturbanceSettings, joint_names: Sequence[str], period: float
     ) -> LoadSchedule:
-        """Return the schedule of the table in the settings; without a table it has no segments.
-
-        Raises:
-            InputError: the table is not for these joints.
-        """
+        """Return the schedule of the table in the settings; without a table it has no segments."""
         if not settings.table:
             return cls(np.zeros(0), np.zeros((0, 6 + len(joint_names))), period)
         table = DisturbanceTable.parse(settings.table)

@@ -52,11 +52,7 @@ AREA, NORMAL, CENTRE, DRAG_COEFFICIENT, SPECULAR, DIFFUSE = 0, 1, 4, 7, 8, 9
 
 
 def _body_plates(settings: OrbitSettings, at: Installation) -> tuple[Array, list[list[float]]]:
-    """Return the first plate of each body, and the plates, body by body.
-
-    Raises:
-        InputError: the robot has too many.
-    """
+    """Return the first plate of each body, and the plates, body by body."""
     robot = at.robot
     plates = plates_of(robot)
     if len(plates) > MOST_PLATES:
@@ -78,13 +74,13 @@ class Surfaces(Component):
     """Plates of a robot, body by body, and the wrenches on its bodies."""
 
     count: float = shaped(
-        lambda n: (), uniform=True, origin=lambda s, at: len(_body_plates(s, at)[1])
+        lambda n: (), uniform=True, source=lambda s, at: len(_body_plates(s, at)[1])
     )
     first: Array = shaped(
-        lambda n: (MOST_JOINTS + 2,), uniform=True, origin=lambda s, at: _body_plates(s, at)[0]
+        lambda n: (MOST_JOINTS + 2,), uniform=True, source=lambda s, at: _body_plates(s, at)[0]
     )
     """First plate of each body; that of the body behind the last is `count`."""
-    plates: Array = shaped(lambda n: (MOST_PLATES, 10), origin=lambda s, at: _body_plates(s, at)[1])
+    plates: Array = shaped(lambda n: (MOST_PLATES, 10), source=lambda s, at: _body_plates(s, at)[1])
     """Area, normal, centre, coefficients, in body axes; see the columns' names."""
     wrench: Array = shaped(lambda n: (MOST_JOINTS + 1, 6))
     """Moment about the base's CoM, N m, and force, N, on each body; inertial axes."""

@@ -187,11 +187,7 @@ class OwnController:
         self._since = self._discovered_at = 0.0
 
     def is_awaited(self) -> bool:
-        """Return whether the first state must wait for the controller.
-
-        Raises:
-            FlightError: none has come in time.
-        """
+        """Return whether the first state must wait for the controller."""
         if not self.is_missing:
             return False
         now = time.monotonic()
@@ -210,9 +206,6 @@ class OwnController:
         Args:
             waited_s: time since it is awaited, s.
             refused: commands that were refused, by reason.
-
-        Raises:
-            FlightError: it is.
         """
         limit = self._settings.join_timeout
         if not limit or waited_s <= limit:
@@ -224,11 +217,7 @@ class OwnController:
         )
 
     def check_silence(self, tick: int) -> None:
-        """Check that a plant may fly on though its controller is silent.
-
-        Raises:
-            FlightError: it may not.
-        """
+        """Check that a plant may fly on though its controller is silent."""
         if self._settings.own_controller:
             raise FlightError(
                 f"no command for {self._settings.silence_timeout:g} s (silence_timeout) at "

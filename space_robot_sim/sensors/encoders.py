@@ -45,23 +45,23 @@ class Encoders(Component):
     is the difference of two measured angles N ticks apart, divided by N periods.
     """
 
-    sigma: Array = shaped(lambda n: (n,), origin="noise")
+    sigma: Array = shaped(lambda n: (n,), source="noise")
     """White noise of each angle, rad."""
-    step: Array = shaped(lambda n: (n,), origin=_steps)
+    step: Array = shaped(lambda n: (n,), source=_steps)
     """Distance of two angles, rad (0: none)."""
-    difference_ticks: float = shaped(lambda n: (), uniform=True, origin="difference_ticks")
+    difference_ticks: float = shaped(lambda n: (), uniform=True, source="difference_ticks")
     """N; 0: rates are measured."""
-    velocity_sigma: Array = shaped(lambda n: (n,), origin="velocity_noise")
+    velocity_sigma: Array = shaped(lambda n: (n,), source="velocity_noise")
     """White noise of each rate, rad/s."""
-    velocity_step: Array = shaped(lambda n: (n,), origin="velocity_step")
+    velocity_step: Array = shaped(lambda n: (n,), source="velocity_step")
     """Distance of two rates, rad/s (0: none)."""
-    motor: Array = shaped(lambda n: (n,), uniform=True, origin=lambda s, at: at.motors)
+    motor: Array = shaped(lambda n: (n,), uniform=True, source=lambda s, at: at.motors)
     """Number from 1 of the motor that a joint's encoder measures; 0: it measures the link."""
     stuck: Array = shaped(lambda n: (n,))
     """1 for each joint with a stuck encoder."""
     draws: Array = shaped(lambda n: (BLOCK_TICKS, 2, n))
     """Standard normal numbers, a row a tick: of the angles, of the rates."""
-    history: Array = shaped(lambda n: (MOST_DIFFERENCED, n), origin=_at_rest)
+    history: Array = shaped(lambda n: (MOST_DIFFERENCED, n), source=_at_rest)
     """The last measured angles, by tick modulo `MOST_DIFFERENCED`, rad."""
 
     FAULTS: ClassVar[tuple[Kind, ...]] = (

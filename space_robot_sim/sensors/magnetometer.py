@@ -25,9 +25,9 @@ BIAS = Argument("FIELD", "T", -1.0, 1.0, About.BASE_AXIS)
 class Magnetometer(Component):
     """A magnetometer that measures ``B + bias + sigma n`` with standard normal n, on base axes."""
 
-    sigma: Array = shaped(lambda n: (3,), origin="noise")
+    sigma: Array = shaped(lambda n: (3,), source="noise")
     """White noise of each sample, T."""
-    bias: Array = shaped(lambda n: (3,), origin="bias")
+    bias: Array = shaped(lambda n: (3,), source="bias")
     """T."""
     draws: Array = shaped(lambda n: (BLOCK_TICKS, 3))
     """Standard normal numbers, a row a tick."""

@@ -38,12 +38,12 @@ class Sensors(Component):
     are_ideal: float = shaped(
         lambda n: (),
         uniform=True,
-        origin=lambda s, at: all(getattr(s, name) == default for name, default in IDEAL),
+        source=lambda s, at: all(getattr(s, name) == default for name, default in IDEAL),
     )
     """1 if all sensors are without error."""
-    seed: float = shaped(lambda n: (), origin=lambda s, at: at.seed)
+    seed: float = shaped(lambda n: (), source=lambda s, at: at.seed)
     """Of the random numbers."""
-    drawn: float = shaped(lambda n: (), uniform=True, origin=lambda s, at: -1.0)
+    drawn: float = shaped(lambda n: (), uniform=True, source=lambda s, at: -1.0)
     """The block of ticks whose random numbers have been drawn; -1: none yet."""
 
 
