@@ -171,13 +171,8 @@ def still_log(
     robot: Robot, ticks: int, actuators: BaseActuatorSettings = IDEAL, period: float = 0.0005
 ) -> FlightLog:
     """A flight in which nothing moves and nothing is asked, described as a bag has it."""
-    log = FlightLog.allocate(
-        ticks,
-        robot.joint_names,
-        Timebase(round(1e9 * period)),
-        actuators.wheel_count,
-        actuators.thruster_count,
-    )
+    names = actuators.robot_names(robot)._replace(passive=(), geared=(), torquers=())
+    log = FlightLog.allocate(ticks, names, Timebase(round(1e9 * period)))
     for column in log.columns.values():
         column[:] = 0.0
     log.quaternion[:, 0] = log.reference_base[:, 0] = 1.0

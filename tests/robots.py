@@ -16,7 +16,7 @@ from strategies import with_gears
 from space_robot_model.dynamics.model import Model
 from space_robot_model.robot import Robot
 from space_robot_model.robot.gears import geared_joints
-from space_robot_model.robot.tree import Gear
+from space_robot_model.robot.parts import Gear
 from space_robot_msgs_py.samples import Command, RobotState
 from space_robot_sim.component import Installation
 from space_robot_sim.environment.friction import Friction, FrictionSettings

@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 
 from space_robot_model.robot import Robot
 from space_robot_model.robot.inertia import inertia_tensor
-from space_robot_model.robot.tree import Body, Gear, Joint, JointFriction, Spring, Tool
+from space_robot_model.robot.parts import Base, Body, Gear, JointFriction, RobotTree, Spring, Tool
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.samples import Timebase
 
@@ -145,46 +145,49 @@ def branched_cases(draw: st.DrawFn, joints: Sequence[int] = JOINTS) -> Case:
     return Case(random_branched_robot(rng, n), random_state(rng, n), rng)
 
 
-def random_joint(rng: np.random.Generator, name: str, kind: str) -> Joint:
-    """A joint of one of `KINDS`, whose friction may be the settings'."""
-    spring, friction = None, JointFriction()
+def random_joint(rng: np.random.Generator, name: str, kind: str) -> dict[str, Any]:
+    """Fields of a link with a joint of one of `KINDS`, whose friction may be the settings'."""
+    spring, friction = None, None
     if kind.startswith("passive"):
         spring = Spring(*rng.uniform((50.0, 0.0, -0.2), (300.0, 3.0, 0.2)).tolist())
     elif kind != "fixed" and rng.random() < 0.5:
         friction = JointFriction(0.0, float(rng.uniform(0.0, 0.5)))
-    return Joint(
-        name,
-        kind.removeprefix("passive "),
-        random_rotation(rng),
-        rng.uniform(-1.0, 1.0, 3),  # type: ignore[arg-type]
-        random_axis(rng),
-        friction=friction,
-        spring=spring,
-    )
+    return {
+        "joint_name": name,
+        "joint": kind.removeprefix("passive "),
+        "rotation": random_rotation(rng),
+        "offset": rng.uniform(-1.0, 1.0, 3),
+        "axis": random_axis(rng),
+        "friction": friction,
+        "passive": spring,
+    }
 
 
-def random_bodies(rng: np.random.Generator, kinds: Sequence[str]) -> list[Body]:
-    """A base and a body for each of ``kinds``, each on any one before it, in any order.
+def random_tree(rng: np.random.Generator, kinds: Sequence[str]) -> RobotTree:
+    """A base and a link for each of ``kinds``, each on any one before it, in any order.
 
-    A body on a fixed joint may have no mass. The joint of body "b3" is "j3".
+    A link on a fixed joint may have no mass. The joint of link "b3" is "j3".
     """
-    bodies = [_body(rng, BASE, 20.0)]
+    base, tool = _part(rng, BASE, 20.0)
+    parts: list[Any] = [Base(**base)]
+    tools = {BASE: tool}
     for number, kind in enumerate(kinds):
-        parent = bodies[rng.integers(len(bodies))].name
+        parent = parts[rng.integers(len(parts))].name
         massless = kind == "fixed" and rng.random() < 0.4
         joint = random_joint(rng, f"j{number}", kind)
-        bodies.append(_body(rng, f"b{number}", 0.0 if massless else 1.0, parent, joint))
-    rng.shuffle(bodies)  # type: ignore[arg-type]
-    return bodies
+        part, tools[f"b{number}"] = _part(rng, f"b{number}", 0.0 if massless else 1.0)
+        parts.append(Body(**part, **joint, parent=parent))
+    rng.shuffle(parts)
+    links = [part for part in parts if part.name != BASE]
+    own = [part for part in parts if part.name == BASE]
+    return RobotTree("tree", own[0], links, tools=[tools[part.name] for part in parts])
 
 
-def _body(
-    rng: np.random.Generator, name: str, size: float, parent: str = "", joint: Joint | None = None
-) -> Body:
+def _part(rng: np.random.Generator, name: str, size: float) -> tuple[dict[str, Any], Tool]:
     inertia = inertia_tensor(random_inertia(rng, size * rng.uniform(0.3, 3.0)))
-    tool = Tool(f"tool of {name}", random_rotation(rng), rng.uniform(-1.0, 1.0, 3))
+    tool = Tool(f"tool of {name}", random_rotation(rng), rng.uniform(-1.0, 1.0, 3), link=name)
     mass, com = size * float(rng.uniform(2.0, 40.0)), size * rng.uniform(-0.5, 0.5, 3)
-    return Body(name, mass, inertia, com, parent, joint, (tool,))
+    return {"name": name, "mass": mass, "inertia": inertia, "com": com}, tool
 
 
 def with_gears(robot: Robot, gears: Sequence[Gear | None]) -> Robot:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from space_robot_model.elementary.matrices import product, unit_rows
 from space_robot_model.hardware.base_actuators import BaseActuatorSettings
-from space_robot_model.robot.base_axes import base_axes, to_base, to_inertial
+from space_robot_model.robot.placements import base_axes, to_base, to_inertial
 from space_robot_msgs_py.bag.flight_log import FlightLog
 
 Array = NDArray[np.float64]

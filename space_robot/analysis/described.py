@@ -19,9 +19,9 @@ from space_robot_model.hardware.base_actuators import BaseActuatorSettings
 from space_robot_model.robot import Robot
 from space_robot_model.robot.find import find_robot
 from space_robot_msgs_py.bag.flight_log import FlightLog
+from space_robot_msgs_py.config.files import nest
 from space_robot_msgs_py.config.settings import leaves
 from space_robot_msgs_py.config.text import shortened
-from space_robot_msgs_py.config.trees import nest
 from space_robot_msgs_py.config.validation import short, validate
 from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.simulated_time import tick_from

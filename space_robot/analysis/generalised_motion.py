@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from space_robot_model.elementary.matrices import unit_rows
-from space_robot_model.robot.base_axes import base_axes, to_base
+from space_robot_model.robot.placements import base_axes, to_base
 from space_robot_msgs_py.bag.flight_log import FlightLog
 
 from .metrics import attitude_error

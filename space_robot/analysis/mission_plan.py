@@ -19,7 +19,7 @@ from space_robot_model.elementary.least_squares import singular_values
 from space_robot_model.elementary.matrices import norms
 from space_robot_model.hardware.base_actuators import BaseActuatorSettings
 from space_robot_model.robot import Robot
-from space_robot_msgs_py.config.directory import config_directory
+from space_robot_msgs_py.config.installation import config_directory
 from space_robot_msgs_py.errors import InputError
 from space_robot_sim.environment.orbit import OrbitSettings
 

@@ -21,9 +21,9 @@ from space_robot_model.elementary.sine import sines_cosines
 from space_robot_model.hardware.base_actuators import BaseActuatorSettings
 from space_robot_model.hardware.wheels import WheelSettings
 from space_robot_model.robot import Robot
-from space_robot_model.robot.base_axes import base_axes, to_inertial
 from space_robot_model.robot.gears import motor_momentum
 from space_robot_model.robot.momentum import Motion, robot_momentum
+from space_robot_model.robot.placements import base_axes, to_inertial
 from space_robot_msgs_py.bag.blocks import Metric, joined, last_rows
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.samples import SOURCES

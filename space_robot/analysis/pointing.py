@@ -1,7 +1,7 @@
 """Pointing of the end effector and of the base, which a mission is flown for.
 
-The tool's pose follows from base attitude and joint angles (`space_robot_model.robot.tool`), once
-with the measured ones and once with the desired ones. The base's position is free in this mission
+The tool's pose follows from base attitude and joint angles (`placements.tool_pose`), once with the
+measured ones and once with the desired ones. The base's position is free in this mission
 ("semi-floating"), so both poses share it and its drift is given separately.
 
 The base's error is the rotation from its desired attitude, as in a pointing budget
@@ -22,8 +22,8 @@ from pydantic import Field, field_validator
 from space_robot_model.elementary.arctangent import arctan2
 from space_robot_model.elementary.matrices import direction_norm, dot_rows, norms, unit_rows
 from space_robot_model.robot import Robot
-from space_robot_model.robot.orientation import Vector
-from space_robot_model.robot.tool import tool_pose
+from space_robot_model.robot.mission_document import Vector
+from space_robot_model.robot.placements import tool_pose
 from space_robot_msgs_py.bag.blocks import Metric
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.config.validation import StrictModel

@@ -89,7 +89,7 @@ def _robot_options(function: Any) -> Any:
     @functools.wraps(function)
     def with_choice_of_urdf(*args: Any, base: str | None, repair: bool, **options: Any) -> Any:
         if base or repair:
-            from space_robot_model.robot.choice import with_choice
+            from space_robot_model.robot.find import with_choice
 
             options["robot"] = with_choice(options["robot"], base, repair)
         return function(*args, **options)
@@ -231,7 +231,7 @@ def remarks_on(flight: Flight) -> list[str]:
     margin (of default gains only where hardware or a fault tries the margin), of joints that are
     asked too much.
     """
-    from space_robot_model.robot.described import unit_remarks
+    from space_robot_model.robot.description import unit_remarks
 
     from ..flight.mission_demand import demand_remark
     from ..tuning.gain_check import pair_corner

@@ -64,7 +64,7 @@ def plan(
 
     from space_robot_control.guidance.limits import turn_remarks
     from space_robot_control.guidance.mission import Mission, MissionSettings
-    from space_robot_model.robot.described import unit_remarks
+    from space_robot_model.robot.description import unit_remarks
     from space_robot_msgs_py.errors import FlightError
 
     from ..analysis.lighter_mission import lightened_mission, mission_text, stretched_mission

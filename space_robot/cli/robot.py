@@ -32,9 +32,8 @@ def robot(robot: str, base: str | None, repair: bool, out: Path | None, as_json:
       space-robot robot seven_joint
     """
     from space_robot_model.robot import Robot
-    from space_robot_model.robot.described import describe
-    from space_robot_model.robot.find import robot_as_path, robot_files
-    from space_robot_model.robot.source import URDF, read_robot_file
+    from space_robot_model.robot.description import describe
+    from space_robot_model.robot.find import URDF, read_robot_file, robot_as_path, robot_files
     from space_robot_model.robot.urdf import read_urdf
     from space_robot_msgs_py.errors import InputError
 

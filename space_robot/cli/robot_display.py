@@ -8,7 +8,7 @@ from typing import Any
 
 from rich.console import Console
 
-from space_robot_model.robot.urdf import Finding
+from space_robot_model.robot.urdf_xml import Finding
 
 from ..console.tables import Column, Group, Table
 from ..console.terminal import say
@@ -16,7 +16,7 @@ from ..console.terminal_tables import print_table
 
 
 def print_robot(description: dict[str, Any], findings: Sequence[Finding], console: Console) -> None:
-    """Print the description made by `space_robot_model.robot.described.describe`."""
+    """Print the description made by `space_robot_model.robot.description.describe`."""
     passive = len(description["passive_names"])
     say(
         console,

@@ -21,8 +21,8 @@ from space_robot_model.hardware.base_actuators import BaseActuatorSettings
 from space_robot_model.hardware.capability import actuator_load, carried_momentum
 from space_robot_model.orbit.ephemeris import AssumedOrbit, Ephemeris
 from space_robot_model.robot import Robot
-from space_robot_model.robot.base_axes import base_axes, to_base
 from space_robot_model.robot.momentum import Motion, robot_momentum
+from space_robot_model.robot.placements import base_axes, to_base
 from space_robot_msgs_py.compiled.records import assign
 from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.samples import SOURCES, RobotState

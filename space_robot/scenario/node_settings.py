@@ -16,9 +16,8 @@ from space_robot_control.laws import ControlLaw
 from space_robot_control.navigation.assumed_sensors import assumed_numbers
 from space_robot_model.orbit.ephemeris import AssumedOrbit, AssumedTarget
 from space_robot_msgs_py.bag.recorder_settings import RecorderNodeSettings
-from space_robot_msgs_py.config.files import GIVEN
+from space_robot_msgs_py.config.files import GIVEN, Tree, flatten, merge, nest
 from space_robot_msgs_py.config.settings import NodeSettings
-from space_robot_msgs_py.config.trees import Tree, flatten, merge, nest
 from space_robot_msgs_py.config.validation import one_of, validate
 from space_robot_msgs_py.errors import InputError, explained_by
 from space_robot_sim.environment.events import Capture

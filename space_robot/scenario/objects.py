@@ -22,8 +22,7 @@ from space_robot_model.hardware.sensors import SensorSettings
 from space_robot_model.robot import Robot
 from space_robot_model.robot.find import ROBOTS, robot_as_path
 from space_robot_model.robot.mission_document import OF_PLANT, document_settings
-from space_robot_msgs_py.config.files import GIVEN, is_named
-from space_robot_msgs_py.config.trees import Tree, nest
+from space_robot_msgs_py.config.files import GIVEN, Tree, is_named, nest
 from space_robot_msgs_py.config.validation import StrictModel, validate
 from space_robot_sim.actuators.actuators import ActuatorSettings
 from space_robot_sim.environment.environment import EnvironmentSettings

@@ -7,9 +7,8 @@ from typing import Annotated, Any, Literal
 from pydantic import AfterValidator, ByteSize, Field
 
 from space_robot_control.navigation.settings import Mode
-from space_robot_msgs_py.bag.mcap_file import Compression
-from space_robot_msgs_py.config.namespace import full_namespace
-from space_robot_msgs_py.config.validation import StrictModel
+from space_robot_msgs_py.bag.writer import Compression
+from space_robot_msgs_py.config.validation import StrictModel, full_namespace
 from space_robot_msgs_py.errors import explained_by
 from space_robot_sim.faults.grammar import Kinds, parse_faults
 from space_robot_sim.plant.faults import PLANT_KINDS

@@ -14,10 +14,8 @@ from space_robot_control.laws import ControlLaw
 from space_robot_control.laws import laws as known_laws
 from space_robot_model.hardware.base_actuators import BaseActuatorSettings
 from space_robot_model.robot import Robot
-from space_robot_model.robot.find import TRAJECTORIES, remake_advice, robot_files
-from space_robot_model.robot.source import YAML
-from space_robot_msgs_py.config.files import GIVEN
-from space_robot_msgs_py.config.trees import flatten, nest
+from space_robot_model.robot.find import TRAJECTORIES, YAML, remake_advice, robot_files
+from space_robot_msgs_py.config.files import GIVEN, flatten, nest
 from space_robot_msgs_py.config.validation import one_of, validate
 from space_robot_msgs_py.errors import InputError, explained_by
 from space_robot_sim.environment.disturbance_table import JSON, DisturbanceTable

@@ -17,8 +17,7 @@ from space_robot_control.controller.gains import PARAMETERS, check_gains
 from space_robot_control.laws import ControlLaw
 from space_robot_model.hardware.sensors import SensorSettings
 from space_robot_model.robot import Robot
-from space_robot_msgs_py.config.files import GIVEN
-from space_robot_msgs_py.config.trees import Tree, merge, nest
+from space_robot_msgs_py.config.files import GIVEN, Tree, merge, nest
 from space_robot_sim.faults.grammar import parse_faults
 from space_robot_sim.plant.faults import PLANT_KINDS
 from space_robot_sim.plant.settings import PlantNodeSettings

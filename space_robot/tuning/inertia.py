@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 from space_robot_control.guidance.courses import FEWEST_KNOTS
 from space_robot_control.guidance.mission import Mission, MissionSettings
 from space_robot_model.robot import Robot
-from space_robot_model.robot.frames import BodyFrame, body_frames
+from space_robot_model.robot.placements import BodyFrame, body_frames
 from space_robot_msgs_py.samples import ReferenceChunk
 
 Array = NDArray[np.float64]

@@ -8,8 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from space_robot_model.robot import Robot
-from space_robot_model.robot.base_axes import base_axes
-from space_robot_model.robot.frames import body_frames
+from space_robot_model.robot.placements import base_axes, body_frames
 from space_robot_model.robot.shapes import BASE_COLOUR
 
 from .horizon import Horizon

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 from space_robot_model.robot import Robot
 from space_robot_model.robot.find import find_robot, robot_as_path
-from space_robot_model.robot.tree import Spring
+from space_robot_model.robot.parts import Spring
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.bag.law_history import as_data, in_words, laws_of
 from space_robot_msgs_py.errors import InputError

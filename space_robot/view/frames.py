@@ -10,8 +10,7 @@ from numpy.typing import NDArray
 
 from space_robot_model.elementary.matrices import unit_rows
 from space_robot_model.robot import Robot
-from space_robot_model.robot.tool import tool_pose
-from space_robot_model.robot.transforms import Transform, joint_transforms
+from space_robot_model.robot.placements import Transform, joint_transforms, tool_pose
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.errors import InputError
 

@@ -11,8 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from space_robot_model.elementary.matrices import unit_rows
 from space_robot_model.robot import Robot
-from space_robot_model.robot.base_axes import base_axes
-from space_robot_model.robot.frames import body_frames
+from space_robot_model.robot.placements import base_axes, body_frames
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.simulated_time import tick_from
 from space_robot_sim.environment.events import Capture

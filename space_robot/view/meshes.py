@@ -6,8 +6,8 @@ from functools import lru_cache
 from typing import NamedTuple
 
 from space_robot_model.robot import Robot
+from space_robot_model.robot.parts import Visual
 from space_robot_model.robot.shapes import drawn_shapes, shapes_of
-from space_robot_model.robot.tree import Visual
 
 from .mesh import Mesh, UnreadableMeshError, check_drawable, read_mesh, simplify
 from .spacecraft import panels_of_plates

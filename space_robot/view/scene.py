@@ -9,9 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from space_robot_model.robot import Robot
-from space_robot_model.robot.frame_names import frame_names
-from space_robot_model.robot.transforms import Transform, joint_transforms, tool_transforms, wxyz
-from space_robot_model.robot.tree import Visual
+from space_robot_model.robot.parts import Visual
+from space_robot_model.robot.placements import (
+    Transform,
+    frame_names,
+    joint_transforms,
+    tool_transforms,
+    wxyz,
+)
 
 from .mesh import Mesh
 from .meshes import shown_shapes

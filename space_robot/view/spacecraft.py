@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from space_robot_model.robot import Robot
-from space_robot_model.robot.shapes import BASE_COLOUR, PANEL_COLOUR, Colour
-from space_robot_model.robot.tree import Plate, Visual
+from space_robot_model.robot.parts import Colour, Plate, Visual
+from space_robot_model.robot.shapes import BASE_COLOUR, PANEL_COLOUR
 
 from .mesh import Mesh
 from .solids import foil, frame, panel

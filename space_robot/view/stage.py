@@ -11,11 +11,9 @@ from scipy.spatial.transform import Rotation
 
 from space_robot_model.elementary.matrices import unit_rows
 from space_robot_model.robot import Robot
-from space_robot_model.robot.base_axes import base_axes
-from space_robot_model.robot.frames import body_frames
-from space_robot_model.robot.transforms import wxyz
-from space_robot_model.robot.tree import Visual
-from space_robot_msgs_py.config.extras import install_command
+from space_robot_model.robot.parts import Visual
+from space_robot_model.robot.placements import base_axes, body_frames, wxyz
+from space_robot_msgs_py.config.installation import install_command
 from space_robot_msgs_py.errors import InputError
 
 from .horizon import Horizon

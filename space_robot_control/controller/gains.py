@@ -12,11 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from space_robot_model.robot.find import new_command, remake_advice, robot_files
-from space_robot_msgs_py.config.files import GIVEN, node_parameters
+from space_robot_msgs_py.config.files import GIVEN, Tree, nest, node_parameters
 from space_robot_msgs_py.config.text import one_line_of
-from space_robot_msgs_py.config.trees import Tree, nest
 from space_robot_msgs_py.config.validation import one_of, read_yaml, short
-from space_robot_msgs_py.config.yaml_text import check_file, is_folder
+from space_robot_msgs_py.config.yaml_text import check_readable, is_folder
 from space_robot_msgs_py.errors import InputError, SpaceRobotError
 
 from ..laws import ControlLaw, find_law, laws
@@ -44,7 +43,7 @@ def gain_files(robot: str, gain_set: str) -> dict[str, Path]:
     """
     path = Path(gain_set)
     if gain_set.endswith((".yaml", ".yml")):
-        check_file(path)
+        check_readable(path)
         return {path.stem: path}
     if "/" in gain_set:
         return _gains_folder(path)

@@ -8,11 +8,9 @@ from collections.abc import Callable, Sequence
 from space_robot_model.robot.find import find_robot
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.compiled.records import Block
-from space_robot_msgs_py.ros.endpoints import RawPublisher, flush
-from space_robot_msgs_py.ros.health import Health, Level
-from space_robot_msgs_py.ros.loop import Wait
+from space_robot_msgs_py.ros.endpoints import PausedInput, RawPublisher, flush
+from space_robot_msgs_py.ros.loop import Health, Level, Wait
 from space_robot_msgs_py.ros.managed_node import ManagedNode
-from space_robot_msgs_py.ros.paused import PausedInput
 from space_robot_msgs_py.wire.stamp_guard import describe_new_time
 
 from ..allocation.assumed_actuators import assumed_actuators

@@ -17,7 +17,7 @@ from space_robot_msgs_py.errors import FlightError, MessageError
 from space_robot_msgs_py.ros.endpoints import PolledCallbackGroup, RawSubscription
 from space_robot_msgs_py.ros.loop import Wait
 from space_robot_msgs_py.samples import Timebase
-from space_robot_msgs_py.wire.reference_codec import ReferenceCodec
+from space_robot_msgs_py.wire.telemetry import ReferenceCodec
 
 from .reference_buffer import ReferenceBuffer
 

@@ -10,9 +10,7 @@ from space_robot_msgs_py.bag.law_history import LawChange
 from space_robot_msgs_py.compiled.records import Block
 from space_robot_msgs_py.samples import Command, RobotState
 from space_robot_msgs_py.wire.codecs import CommandCodec
-from space_robot_msgs_py.wire.controller_law import NODE, LawCodec
-from space_robot_msgs_py.wire.controller_signals import SignalsCodec
-from space_robot_msgs_py.wire.controller_telemetry import TelemetryCodec
+from space_robot_msgs_py.wire.telemetry import NODE, LawCodec, SignalsCodec, TelemetryCodec
 
 from .controller import Controller
 from .law_choice import LawChoice

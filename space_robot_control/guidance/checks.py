@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from space_robot_model.elementary.matrices import norms
 from space_robot_model.robot import Robot
-from space_robot_model.robot.tree import JointLimits
+from space_robot_model.robot.parts import JointLimits
 from space_robot_msgs_py.errors import InputError
 
 from .courses import Piece, sample_times

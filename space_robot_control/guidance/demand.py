@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 
 from space_robot_model.elementary.matrices import norms
 from space_robot_model.robot import Robot
-from space_robot_model.robot.base_axes import base_axes, to_base
 from space_robot_model.robot.dynamics import inverse_dynamics
 from space_robot_model.robot.momentum import Motion, robot_momentum
+from space_robot_model.robot.placements import base_axes, to_base
 from space_robot_msgs_py.samples import ReferenceChunk
 
 from .courses import Course, sample_times

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from space_robot_model.robot import Robot
-from space_robot_model.robot.tree import MANY_TURNS
+from space_robot_model.robot.parts import MANY_TURNS
 from space_robot_msgs_py.config.validation import StrictModel
 from space_robot_msgs_py.errors import InputError
 

@@ -8,13 +8,12 @@ from space_robot_model.robot.find import find_robot
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.errors import MessageError
 from space_robot_msgs_py.ros.endpoints import PolledCallbackGroup, RawPublisher, RawSubscription
-from space_robot_msgs_py.ros.health import Health, Level
-from space_robot_msgs_py.ros.loop import Wait
+from space_robot_msgs_py.ros.loop import Health, Level, Wait
 from space_robot_msgs_py.ros.managed_node import ManagedNode
 from space_robot_msgs_py.samples import RobotNames
 from space_robot_msgs_py.wire.cdr import header_stamp_ns
-from space_robot_msgs_py.wire.reference_codec import ReferenceCodec
 from space_robot_msgs_py.wire.stamp_guard import StampGuard, describe_new_time
+from space_robot_msgs_py.wire.telemetry import ReferenceCodec
 
 from .mission import Mission
 from .mission_changes import MissionChanges

@@ -15,7 +15,7 @@ from pydantic import Field
 from space_robot_model.elementary.matrices import direction_norm
 from space_robot_model.orbit.ephemeris import AssumedOrbit, Ephemeris
 from space_robot_model.robot import Robot
-from space_robot_model.robot.orientation import Rates
+from space_robot_model.robot.mission_document import Rates
 from space_robot_msgs_py.config.settings import Texts
 from space_robot_msgs_py.config.validation import StrictModel
 from space_robot_msgs_py.errors import InputError

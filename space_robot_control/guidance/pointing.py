@@ -17,8 +17,8 @@ from pydantic import Field, field_validator, model_validator
 from space_robot_model.elementary.matrices import direction_norm, dot_rows, norm, product
 from space_robot_model.elementary.rotations import quaternion_of_rotation, rotation_of_rpy
 from space_robot_model.orbit.ephemeris import Ephemeris
-from space_robot_model.robot.orientation import Angles
-from space_robot_msgs_py.config.choices import choices
+from space_robot_model.robot.mission_document import Angles
+from space_robot_msgs_py.config.text import choices
 from space_robot_msgs_py.config.validation import StrictModel, short
 from space_robot_msgs_py.errors import InputError
 

@@ -8,9 +8,8 @@ from typing import Annotated, Any, Literal
 from pydantic import Field, PlainValidator, model_validator
 
 from space_robot_model.elementary.matrices import direction_norm
-from space_robot_model.robot.orientation import Attitude, Degrees, Orientation, Vector
-from space_robot_msgs_py.config.choices import choices
-from space_robot_msgs_py.config.text import printable
+from space_robot_model.robot.mission_document import Attitude, Degrees, Orientation, Vector
+from space_robot_msgs_py.config.text import choices, printable
 from space_robot_msgs_py.config.validation import StrictModel, short, validate
 from space_robot_msgs_py.config.yaml_text import YamlTextError, parse_yaml
 from space_robot_msgs_py.errors import InputError

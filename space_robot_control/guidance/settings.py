@@ -10,8 +10,8 @@ from pydantic import Field
 
 from space_robot_model.robot.find import mission_layers
 from space_robot_model.robot.mission_document import mission_layer
+from space_robot_msgs_py.config.files import Tree
 from space_robot_msgs_py.config.settings import NodeSettings
-from space_robot_msgs_py.config.trees import Tree
 
 from .mission import MissionSettings
 from .trajectory_file import with_columns

@@ -21,10 +21,10 @@ from space_robot_msgs_py import topics
 from space_robot_msgs_py.errors import InputError, MessageError
 from space_robot_msgs_py.ros.endpoints import PolledCallbackGroup, RawSubscription
 from space_robot_msgs_py.ros.managed_node import ManagedNode
-from space_robot_msgs_py.ros.restart import until
+from space_robot_msgs_py.ros.service_calls import until
 from space_robot_msgs_py.samples import RobotNames
-from space_robot_msgs_py.wire.compiled_codec import CompiledCodec
-from space_robot_msgs_py.wire.joint_states import JointStates
+from space_robot_msgs_py.wire.codecs import CompiledCodec
+from space_robot_msgs_py.wire.messages import describe
 
 from .courses import Piece
 from .goal_tolerances import GoalTolerances, GoalVerdict
@@ -86,7 +86,7 @@ class MeasuredJoints:
         """Subscribe."""
         assert node.settings is not None
         self._subscription = RawSubscription(node, topics.JOINT_STATES, PolledCallbackGroup())
-        self._codec = CompiledCodec(JointStates.of_robot(names, node.settings.timebase))
+        self._codec = CompiledCodec(describe(topics.JOINT_STATES, names, node.settings.timebase))
         self._motors, self._all = len(names.joints), len(names.all_joints)
 
     def take(self) -> tuple[Array, Array]:

@@ -13,7 +13,7 @@ from abc import ABCMeta
 from functools import cache
 from inspect import isabstract
 
-from space_robot_msgs_py.config.choices import choices
+from space_robot_msgs_py.config.text import choices
 from space_robot_msgs_py.config.validation import short
 from space_robot_msgs_py.errors import InputError, explained_by
 

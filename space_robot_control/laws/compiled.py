@@ -7,8 +7,7 @@ from collections.abc import Callable
 from functools import cache
 from typing import Any, NamedTuple
 
-from space_robot_msgs_py.compiled.kept_types import keep_types
-from space_robot_msgs_py.compiled.kernels import RecordFunction
+from space_robot_msgs_py.compiled.kernels import RecordFunction, keep_types
 from space_robot_msgs_py.compiled.records import Block, Record, prefix
 
 from .base import ControlLaw, LawMemory

@@ -17,7 +17,7 @@ from typing import Any
 
 from space_robot_msgs_py.config.text import one_line_of
 from space_robot_msgs_py.config.validation import one_of
-from space_robot_msgs_py.config.yaml_text import check_file
+from space_robot_msgs_py.config.yaml_text import check_readable
 from space_robot_msgs_py.errors import InputError
 
 ENDING = ".py"
@@ -40,7 +40,7 @@ def import_file(path: Path) -> ModuleType:
         InputError: there is no such file.
         Exception: whatever its code raises.
     """
-    check_file(path)
+    check_readable(path)
     digest = hashlib.sha256(str(path.resolve()).encode()).hexdigest()[:12]
     name = f"{path.stem}_{digest}"
     if name not in sys.modules:

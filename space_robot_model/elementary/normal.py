@@ -8,8 +8,15 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from space_robot_msgs_py.compiled.kernels import kernel, subroutine
-from space_robot_msgs_py.compiled.lane_words import as_lanes, as_numbers
-from space_robot_msgs_py.compiled.lanes import WIDTH, all_lanes, any_lane, lane_of, where
+from space_robot_msgs_py.compiled.lanes import (
+    WIDTH,
+    all_lanes,
+    any_lane,
+    as_lanes,
+    as_numbers,
+    lane_of,
+    where,
+)
 
 from .exponential import exp, log
 from .random_bits import bits_of, following, pcg64

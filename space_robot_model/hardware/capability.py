@@ -15,7 +15,7 @@ from space_robot_model.elementary.matrices import product, unit_rows
 from space_robot_model.hardware.base_actuators import BaseActuatorSettings
 from space_robot_model.hardware.thrusters import ThrusterSettings
 from space_robot_model.hardware.wheels import WheelSettings
-from space_robot_model.robot.base_axes import to_base, to_inertial
+from space_robot_model.robot.placements import to_base, to_inertial
 from space_robot_msgs_py.errors import InputError
 
 Array = NDArray[np.float64]

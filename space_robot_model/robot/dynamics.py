@@ -17,7 +17,7 @@ from ..dynamics.kinematics import forward_kinematics, spatial_velocities
 from ..dynamics.model import Data
 from ..dynamics.rho_space import RhoSpaceModel
 from ..dynamics.rnea import rnea_bias
-from .arguments import check_robot, unit_quaternion, vector
+from .kinematics import check_robot, unit_quaternion, vector
 
 if TYPE_CHECKING:
     from space_robot_msgs_py.compiled.records import Block

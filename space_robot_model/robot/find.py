@@ -1,7 +1,8 @@
 """Search of a robot by name or path, and of its mission and gains.
 
 A robot is given by a name of ``config/robots``, by a path to a ``.yaml``, ``.urdf`` or ``.xacro``
-(with options, see `space_robot_model.robot.choice`), or by its own folder:
+(with options: ``my.urdf?base=LINK&repair``, so that one text defines a robot in commands, nodes and
+bags), or by its own folder:
 
     robot.yaml (or robot.urdf, robot.xacro)
     mission.yaml
@@ -15,23 +16,28 @@ bags open shipped files only.
 from __future__ import annotations
 
 import os.path
+import re
 import shlex
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property, lru_cache
 from pathlib import Path
+from typing import Any, NamedTuple
+from urllib.parse import quote, unquote
+
+import yaml
 
 from space_robot_msgs_py.config.arguments import path_text
-from space_robot_msgs_py.config.choices import choices
-from space_robot_msgs_py.config.directory import config_directory
 from space_robot_msgs_py.config.files import GIVEN, is_named, named_file
-from space_robot_msgs_py.config.text import printable
-from space_robot_msgs_py.config.validation import short
-from space_robot_msgs_py.config.yaml_text import check_file, is_folder
+from space_robot_msgs_py.config.installation import config_directory
+from space_robot_msgs_py.config.text import choices, printable
+from space_robot_msgs_py.config.validation import read_yaml, short
+from space_robot_msgs_py.config.yaml_text import check_readable, is_folder, parse_yaml, read_file
 from space_robot_msgs_py.errors import InputError, explained_by
 
-from .choice import split_choice
+from .files import document_of, is_urdf
 from .robot import Robot
-from .source import URDF, YAML, RobotSource, read_robot_file
 
+YAML, URDF = (".yaml", ".yml"), (".urdf", ".xacro")
 ROBOTS = "robots"
 """Folder of the shipped robots in the config folder."""
 OWN = "robot"
@@ -39,6 +45,33 @@ OWN = "robot"
 OWN_MISSION, OWN_GAINS = "mission.yaml", "gains"
 TRAJECTORIES = (".csv", ".parquet")
 """Suffixes of missions that are tables of a trajectory."""
+_CHOICE = re.compile(r"\?(?=base=|repair$)(?:base=([^&?./]+))?(?:&?(repair))?$")
+
+
+class RobotChoice(NamedTuple):
+    """A robot's name, split into its parts."""
+
+    name: str
+    """Name without options."""
+    base: str | None
+    """Name of the link that is the satellite; None: the root."""
+    repair: bool
+    """True to repair defects."""
+
+
+def with_choice(robot: str, base: str | None, repair: bool) -> str:
+    """Return the name of a robot with options; `split_choice` is the inverse."""
+    chosen = [f"base={quote(base, safe='').replace('.', '%2E')}"] if base else []
+    chosen += ["repair"] if repair else []
+    return f"{robot}?{'&'.join(chosen)}" if chosen else robot
+
+
+def split_choice(robot: str) -> RobotChoice:
+    """Split a robot's name; any text is accepted."""
+    match = _CHOICE.search(robot)
+    if not match:
+        return RobotChoice(robot, None, False)
+    return RobotChoice(robot[: match.start()], match[1] and unquote(match[1]), bool(match[2]))
 
 
 @dataclass(frozen=True)
@@ -71,7 +104,7 @@ def robot_files(robot: str) -> RobotFiles:
     robot = split_choice(robot).name
     path = Path(robot)
     if robot.endswith((*YAML, *URDF)):
-        check_file(path)
+        check_readable(path)
         return _own_folder(path) if path.stem == OWN else _in_config(path)
     if "/" in robot:
         return _own_folder(_file_of(path))
@@ -119,7 +152,7 @@ def mission_file(robot: str, mission: str = "") -> Path:
         InputError: there is no such mission or robot; with advice.
     """
     if mission.endswith(TRAJECTORIES):
-        check_file(Path(mission))
+        check_readable(Path(mission))
         return Path(mission)
     if mission:
         return named_file("missions", mission)
@@ -218,3 +251,64 @@ def _file_of(folder: Path) -> Path:
         if (folder / name).is_file():
             return folder / name
     raise InputError(f"{folder}: no robot in this folder ({', '.join(names)})")
+
+
+@dataclass(frozen=True)
+class RobotSource:
+    """Content of a robot's file."""
+
+    where: str
+    """Name of the file, for errors."""
+    content: dict[str, Any]
+    """Self-contained mapping for `Robot.from_dict`."""
+    text: str
+    """The same as the text of a YAML file; for a YAML file its own text."""
+    findings: tuple[str, ...] = ()
+    """Defects of a URDF that were repaired."""
+
+    @cached_property
+    def robot(self) -> Robot:
+        """The robot, built from `content`, hence equal to that of a bag with this content."""
+        return replace(Robot.from_dict(self.content, where=self.where), repairs=self.findings)
+
+
+def read_robot_file(file: Path, base: str | None = None, repair: bool = False) -> RobotSource:
+    """Read a robot's file.
+
+    Args:
+        file: YAML or URDF.
+        base: the link that is the satellite, of a URDF (None: its root).
+        repair: whether a URDF's defects are repaired.
+
+    Raises:
+        InputError: the file is invalid, or ``base`` or ``repair`` is set for a YAML.
+    """
+    if file.suffix in URDF:
+        return _of_urdf(file, base, repair)
+    if base or repair:
+        raise InputError(f"{file}: not a URDF, so base and repair cannot be chosen")
+    content = read_yaml(file)
+    if not is_urdf(content):
+        return _of_yaml(str(file), read_file(file))
+    robot = Robot.from_yaml(file)
+    return _of_robot(robot, file, f"From {file.name} and the URDF that it refers to.")
+
+
+@lru_cache(maxsize=16)
+def _of_yaml(where: str, text: str) -> RobotSource:
+    """Return the source of a YAML text; cached, since many flights use the same robot."""
+    return RobotSource(where, parse_yaml(text), text)
+
+
+def _of_urdf(file: Path, base: str | None, repair: bool) -> RobotSource:
+    robot = Robot.from_urdf(file, base, repair)
+    return _of_robot(robot, file, f"From {file.name}{f', base {base}' if base else ''}.")
+
+
+def _of_robot(robot: Robot, file: Path, head: str) -> RobotSource:
+    content = document_of(robot.tree)
+    comments = [head, *(f"Repaired: {text}" for text in robot.repairs)]
+    text = "".join(f"# {line}\n" for line in comments) + yaml.safe_dump(
+        content, sort_keys=False, default_flow_style=None, width=10_000, allow_unicode=True
+    )
+    return RobotSource(str(file), content, text, robot.repairs)

@@ -9,9 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..elementary.matrices import solve
-from .base_axes import base_axes
 from .dynamics import mass_matrix
-from .frames import BodyFrame, body_frames
+from .placements import BodyFrame, base_axes, body_frames
 from .robot import Robot
 
 Array = NDArray[np.float64]

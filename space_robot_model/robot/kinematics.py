@@ -2,21 +2,22 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Literal, NamedTuple, Protocol
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from space_robot_msgs_py.config.validation import one_of
+from space_robot_msgs_py.config.arguments import as_numbers
+from space_robot_msgs_py.config.validation import one_of, short
 from space_robot_msgs_py.errors import InputError
 
 from ..dynamics.tool_kinematics import ToolKinematics, tool_kinematics_into
 from ..elementary.least_squares import null_space, singular_values
-from .arguments import check_robot, unit_quaternion, vector
+from ..elementary.matrices import norm
 
 if TYPE_CHECKING:
     from ..dynamics.model import Model
-    from .tree import Tool
+    from .parts import Tool
 
 Array = NDArray[np.float64]
 Attitude = Literal["held", "free"]
@@ -43,11 +44,7 @@ class ModelledRobot(Protocol):
 
     @property
     def tools(self) -> tuple[Tool, ...]:
-        """All tools."""
-
-    @property
-    def tool(self) -> Tool:
-        """The first tool."""
+        """All tools, the first one first."""
 
 
 class ToolState(NamedTuple):
@@ -178,7 +175,7 @@ def mounted_tool(robot: ModelledRobot, name: str | None) -> MountedTool:
     Raises:
         InputError: there is no tool of that name.
     """
-    tool = robot.tool
+    tool = robot.tools[0]
     if name is not None:
         tools = {tool.name: tool for tool in robot.tools}
         if name not in tools:
@@ -192,3 +189,38 @@ def mounted_tool(robot: ModelledRobot, name: str | None) -> MountedTool:
         np.ascontiguousarray(tool.rotation),
         np.ascontiguousarray(tool.position),
     )
+
+
+def vector(value: ArrayLike, size: int, name: str) -> Array:
+    """Return an argument as an array (size,).
+
+    Raises:
+        InputError: it has another type or shape; names it.
+    """
+    array = np.ascontiguousarray(as_numbers(value, name))
+    if array.shape != (size,):
+        raise InputError(f"{name} must have shape ({size},), got {array.shape}")
+    return array
+
+
+def unit_quaternion(value: ArrayLike) -> Array:
+    """Return the argument ``quaternion_wxyz`` (4,), normalised.
+
+    Raises:
+        InputError: it has another type or shape, or is not unit.
+    """
+    array = vector(value, 4, "quaternion_wxyz")
+    length = norm(array)
+    if not abs(length - 1.0) < 1e-6:
+        raise InputError(f"quaternion_wxyz must have norm 1, got {length}")
+    return array / length
+
+
+def check_robot(robot: Any) -> None:
+    """Check that an argument is a `Robot`.
+
+    Raises:
+        InputError: it is not.
+    """
+    if not hasattr(robot, "joint_count"):
+        raise InputError(f"robot: a Robot was expected, got {short(robot)}")

@@ -6,13 +6,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from space_robot_msgs_py.samples import Timebase
-from space_robot_msgs_py.wire.markers import CUBE, CYLINDER, MESH, SPHERE, Marker, MarkersCodec
+from space_robot_msgs_py.wire.viewers import CUBE, CYLINDER, MESH, SPHERE, Marker, MarkersCodec
 
-from .frame_names import frame_names
+from .parts import Visual
+from .placements import frame_names, wxyz
 from .robot import Robot
 from .shapes import LINK_COLOUR, shapes_of
-from .transforms import wxyz
-from .tree import Visual
 from .urdf_text import mesh_address
 
 Array = NDArray[np.float64]
@@ -49,7 +48,7 @@ class RobotMarkers:
         self._shapes = [(row[shape.body], _pose(shape)) for shape in shapes]
 
     def encode(self, tick: int, poses: Array) -> bytes:
-        """Return the message of a tick for poses of `space_robot_model.robot.poses`."""
+        """Return the message of a tick for poses of `RobotPoses`."""
         return self._codec.encode(tick, self.poses(poses))
 
     def poses(self, poses: Array) -> Array:

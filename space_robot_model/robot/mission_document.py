@@ -18,24 +18,70 @@ import json
 import math
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
+from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
 from space_robot_msgs_py.config.columns import missing_column, read_columns
-from space_robot_msgs_py.config.files import GIVEN, node_parameters
-from space_robot_msgs_py.config.trees import Tree
+from space_robot_msgs_py.config.files import GIVEN, Tree, node_parameters
 from space_robot_msgs_py.config.validation import StrictModel, read_yaml, validate
 from space_robot_msgs_py.errors import InputError, explained_by
 
+from ..elementary.matrices import direction_norm, norm
+from ..elementary.rotations import quaternion_of_rotation, rotation_of_rpy
 from .find import TRAJECTORIES, find_robot
-from .orientation import Orientation, Rates
 
+Vector = Annotated[list[float], Field(min_length=3, max_length=3)]
+Degrees = Annotated[float, Field(ge=-36_000.0, le=36_000.0)]
+"""An angle of at most a hundred turns: of larger ones too few digits are left."""
+Angles = Annotated[list[Degrees], Field(min_length=3, max_length=3)]
+Rate = Annotated[float, Field(ge=-3_600.0, le=3_600.0)]
+"""An angular velocity of at most ten turns a second, degrees/s."""
+Rates = Annotated[list[Rate], Field(min_length=3, max_length=3)]
+Quaternion = Annotated[list[float], Field(min_length=4, max_length=4)]
 KEY = "mission"
 PLANT = "plant"
 QUATERNION = ("q_w", "q_x", "q_y", "q_z")
 """Columns of the base's attitude in a trajectory."""
+
+
+class Orientation(StrictModel):
+    """An orientation, as roll, pitch and yaw about fixed axes or as a quaternion; or none."""
+
+    rpy_deg: Angles | None = Field(None, description="roll, pitch, yaw about fixed axes, degrees")
+    quaternion: Quaternion | None = Field(None, description="w, x, y, z")
+
+    @model_validator(mode="after")
+    def _is_unit(self) -> Orientation:
+        if self.rpy_deg is not None and self.quaternion is not None:
+            raise ValueError("rpy_deg and quaternion were given: give one of them")
+        if self.quaternion is not None:
+            direction_norm(self.quaternion, "quaternion")
+        return self
+
+    @property
+    def is_given(self) -> bool:
+        """Whether there is an orientation."""
+        return self.rpy_deg is not None or self.quaternion is not None
+
+    @property
+    def unit_quaternion(self) -> NDArray[np.float64]:
+        """(4,) ``[w, x, y, z]``; the identity if none is given."""
+        if self.quaternion is not None:
+            return np.array(self.quaternion) / norm(self.quaternion)
+        return quaternion_of_rotation(rotation_of_rpy(np.radians(self.rpy_deg or [0.0] * 3)))
+
+
+class Attitude(Orientation):
+    """An orientation that must be given: that of the base."""
+
+    @model_validator(mode="after")
+    def _must_be_given(self) -> Attitude:
+        if not self.is_given:
+            raise ValueError("give rpy_deg or quaternion")
+        return self
 
 
 class StartBase(Orientation):

@@ -10,8 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..elementary.matrices import product
-from .base_axes import base_axes, cross, to_base, to_inertial
-from .frames import BodyFrame, body_frames
+from .placements import BodyFrame, base_axes, body_frames, cross, to_base, to_inertial
 from .robot import Robot
 
 Array = NDArray[np.float64]

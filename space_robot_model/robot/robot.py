@@ -1,44 +1,131 @@
-"""The robot as data from YAML or URDF, checked for physical consistency."""
+"""The robot as arrays, from YAML, URDF or a program, checked for physical consistency."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import math
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from space_robot_msgs_py.compiled.records import assign
 from space_robot_msgs_py.config.arguments import as_numbers, as_path
-from space_robot_msgs_py.config.validation import read_yaml, short, validate
+from space_robot_msgs_py.config.text import html_table
+from space_robot_msgs_py.config.validation import read_yaml, short
 from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.topics import BASE_AXES
 
 from ..dynamics.model import Model
 from ..elementary.matrices import product
 from ..elementary.series import plain_sin_cos
-from .file import _RobotDocument
+from .files import exact_document, read_content
+from .flatten import Part, arrays_of
 from .inertia import inertia_elements, inertia_tensor
-from .numbers import Document, are_numbers, numbers_of
-from .tree import Joint, Spring, TreeArrays
-
-if TYPE_CHECKING:
-    from .urdf import UrdfRobot
+from .parts import (
+    UNLIMITED,
+    Base,
+    Body,
+    Gear,
+    JointFriction,
+    JointLimits,
+    Plate,
+    RobotTree,
+    Spring,
+    Tool,
+    Visual,
+)
+from .urdf import UrdfRobot, read_urdf
 
 Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
-class Robot(TreeArrays):
-    """A satellite base with arms, panels and booms: a tree of bodies, from a file or a program."""
+class Robot:
+    """A satellite base with arms, panels and booms: a tree of bodies, each moved by one joint.
 
+    Arrays over joints have the n actuated ones first, then the passive ones with springs, N in all;
+    each group branch by branch from the base. Body 0 is the base, body j + 1 is moved by joint j;
+    the z axis of its frame is the joint's axis. The base's frame is at its CoM, but for `nominal`.
+    """
+
+    name: str
+    joint_names: tuple[str, ...]
+    """Names of the n actuated joints, in the order of all arrays of the flight software."""
+    passive_names: tuple[str, ...]
+    body_names: tuple[str, ...]
+    mass: Array
+    """(N+1,) masses, kg, base first."""
+    inertia: Array
+    """(N+1, 3, 3) inertia about each body's CoM, kg m2, in its frame."""
+    com: Array
+    """(N+1, 3) centre of mass, m, in the body's frame."""
+    parent: NDArray[np.int64]
+    """(N,) number of the parent body of each joint."""
+    rotation: Array
+    """(N, 3, 3) axes of each joint's frame at zero, as columns, in parent axes."""
+    offset: Array
+    """(N, 3) from the parent's frame to the joint's, m, in the joint's axes at zero."""
+    is_prismatic: NDArray[np.bool_]
+    """(N,) True for prismatic joints, False for revolute ones."""
+    limits: tuple[JointLimits, ...]
+    """Limits of the n actuated joints."""
+    friction: tuple[JointFriction, ...]
+    """Friction of all N joints; NaN where that of the settings is used."""
+    springs: tuple[Spring, ...]
+    """Springs of the passive joints."""
+    tools: tuple[Tool, ...]
+    """Frames of the end effectors; the first one is *the* tool."""
+    visuals: tuple[Visual, ...] = ()
+    order: tuple[int, ...] = ()
+    """Order of all joints branch by branch: parents before children."""
+    gears: tuple[Gear | None, ...] = ()
+    """Gears of the n actuated joints, None for rigid ones; empty: all are rigid."""
+    plates: tuple[Plate, ...] = ()
     repairs: tuple[str, ...] = ()
     """Repairs of defects in its file, a line each."""
     source: str = ""
     """Name of its file, for errors; empty: it was made by a program."""
+
+    @property
+    def n(self) -> int:
+        """Number of actuated joints."""
+        return len(self.joint_names)
+
+    @property
+    def joint_count(self) -> int:
+        """Number N of all joints."""
+        return len(self.joint_names) + len(self.passive_names)
+
+    @property
+    def branches(self) -> tuple[int, ...]:
+        """Number of actuated joints in each branch with actuated joints, in order."""
+        counts: dict[int, int] = {}
+        for joint in range(self.n):
+            body = joint + 1
+            while self.parent[body - 1]:
+                body = int(self.parent[body - 1])
+            counts[body] = counts.get(body, 0) + 1
+        return tuple(counts.values())
+
+    @property
+    def all_joint_names(self) -> tuple[str, ...]:
+        """Names of all N joints."""
+        return self.joint_names + self.passive_names
+
+    @property
+    def geared_names(self) -> tuple[str, ...]:
+        """Names of the joints with gears."""
+        pairs = zip(self.joint_names, self.gears, strict=False)
+        return tuple(name for name, gear in pairs if gear)
+
+    @property
+    def tool(self) -> Tool:
+        """The end effector."""
+        return self.tools[0]
 
     @property
     def where(self) -> str:
@@ -49,6 +136,15 @@ class Robot(TreeArrays):
     def axis_names(self) -> tuple[str, ...]:
         """Names of the n+3 controlled coordinates: base x, y, z, then the actuated joints."""
         return BASE_AXES + self.joint_names
+
+    @classmethod
+    def of_tree(cls, tree: RobotTree, where: str = "robot") -> Robot:
+        """Build the arrays from the parts of a robot, see `space_robot_model.robot.flatten`.
+
+        Raises:
+            InputError: not a tree, or one that cannot be flown; ``where`` names the file.
+        """
+        return cls(**arrays_of(tree, where))
 
     @classmethod
     def from_yaml(cls, path: str | Path) -> Robot:
@@ -74,20 +170,12 @@ class Robot(TreeArrays):
         Raises:
             InputError: invalid content; names ``where``, key, value and allowed values.
         """
-        from .urdf_file import is_urdf, read_urdf_content
-
         if not isinstance(content, dict):
             raise InputError(f"{where}: a mapping was expected, got {short(content)}")
-        if is_urdf(content):
-            return cls._of_urdf(read_urdf_content(content, folder or Path(), where), where)
-        if are_numbers(content):
-            numbers = validate(Document, content, where).robot
-            bodies = [b.body for b in numbers.bodies]
-            robot = cls.of_tree(numbers.name, bodies, where, base_is_at_com=False)  # bit for bit
-        else:
-            file = validate(_RobotDocument, content, where).robot
-            robot = cls.of_tree(file.name, file.bodies(), where)
-        return replace(robot, source=where)
+        read = read_content(content, folder or Path(), where)
+        if isinstance(read, RobotTree):
+            return replace(cls.of_tree(read, where), source=where)
+        return cls._of_urdf(read, where)
 
     @classmethod
     def from_urdf(cls, path: str | Path, base: str | None = None, repair: bool = False) -> Robot:
@@ -101,26 +189,57 @@ class Robot(TreeArrays):
         Raises:
             InputError: invalid file; names link or joint, line, value and the repair, if any.
         """
-        from .urdf import read_urdf
-
         file = as_path(path, "path")
         return cls._of_urdf(read_urdf(file, base, repair), str(file))
 
     @classmethod
     def _of_urdf(cls, urdf: UrdfRobot, where: str) -> Robot:
-        robot = cls.of_tree(urdf.name, urdf.bodies, where)
-        return replace(robot, repairs=tuple(map(str, urdf.findings)), source=where)
+        repairs = tuple(map(str, urdf.findings))
+        return replace(cls.of_tree(urdf.tree, where), repairs=repairs, source=where)
 
     def _repr_html_(self) -> str:
         """Show bodies, joints and limits in a notebook."""
-        from .html import robot_html
+        return _html(self)
 
-        return robot_html(self)
+    @property
+    def tree(self) -> RobotTree:
+        """The parts from which `of_tree` builds this robot, branch by branch."""
+        base = Base(float(self.mass[0]), self.inertia[0], self.com[0], self.body_names[0])
+        return RobotTree(
+            self.name,
+            base,
+            [self._link(joint) for joint in self.order],
+            tools=self._on_links(self.tools),
+            plates=self._on_links(self.plates),
+            visuals=self._on_links(self.visuals),
+            exact=True,
+        )
+
+    def _link(self, joint: int) -> Body:
+        passive, friction = joint - self.n, self.friction[joint]
+        return Body(
+            name=self.body_names[joint + 1],
+            parent=self.body_names[self.parent[joint]],
+            joint="prismatic" if self.is_prismatic[joint] else "revolute",
+            joint_name=self.all_joint_names[joint],
+            rotation=self.rotation[joint],
+            offset=self.offset[joint],
+            mass=float(self.mass[joint + 1]),
+            inertia=self.inertia[joint + 1],
+            com=self.com[joint + 1],
+            limits=self.limits[joint] if passive < 0 else UNLIMITED,
+            friction=None if np.isnan(friction.coulomb) else friction,
+            passive=self.springs[passive] if passive >= 0 else None,
+            drive=self.gears[joint] if passive < 0 and self.gears else None,
+        )
+
+    def _on_links(self, parts: Sequence[Part]) -> list[Part]:
+        return [replace(part, link=self.body_names[part.body]) for part in parts]
 
     @property
     def content(self) -> dict[str, Any]:
         """All numbers and shapes, as lists and texts; `from_dict` builds the same robot."""
-        return numbers_of(self.name, self.bodies())
+        return exact_document(self.tree)
 
     @cached_property
     def nominal(self) -> Robot:
@@ -131,12 +250,9 @@ class Robot(TreeArrays):
         """
         if not self.springs:
             return self
-        bodies = self.bodies()
-        for number, body in enumerate(bodies):
-            if body.joint and body.joint.spring:
-                bodies[number] = replace(body, joint=_locked(body.joint, body.joint.spring.rest))
-        # the same order of the actuated joints
-        return Robot.of_tree(self.name, bodies, base_is_at_com=False)
+        tree = self.tree  # with the order of the actuated joints
+        links = [_locked(link, link.passive.rest) if link.passive else link for link in tree.links]
+        return Robot.of_tree(replace(tree, links=links))
 
     def with_springs(self, springs: Mapping[str, Spring]) -> Robot:
         """Return the robot with springs instead of motors in those of its joints that are named.
@@ -146,13 +262,14 @@ class Robot(TreeArrays):
         """
         if not springs:
             return self
-        bodies = [
-            replace(body, joint=replace(body.joint, spring=springs[body.joint.name], gear=None))
-            if body.joint and body.joint.name in springs
-            else body
-            for body in self.bodies()
+        tree = self.tree
+        links = [
+            replace(link, passive=springs[link.joint_label], drive=None)
+            if link.joint_label in springs
+            else link
+            for link in tree.links
         ]
-        return replace(Robot.of_tree(self.name, bodies, self.where), source=self.source)
+        return replace(Robot.of_tree(replace(tree, links=links), self.where), source=self.source)
 
     def from_degrees(self, values: ArrayLike) -> Array:
         """Convert positions of the n actuated joints to rad; m of prismatic joints are kept.
@@ -247,19 +364,27 @@ class Robot(TreeArrays):
         return model_of(self)
 
 
-def _locked(joint: Joint, position: float) -> Joint:
-    """Return a fixed joint with the pose of a joint at ``position``, rad or m."""
-    offset, rotation = joint.offset, joint.rotation
-    if joint.kind == "prismatic":
+def _locked(link: Body, position: float) -> Body:
+    """Return a link on a fixed joint with the pose of its joint at ``position``, rad or m."""
+    offset, rotation = link.offset, link.rotation
+    if link.joint == "prismatic":
         offset = offset + np.array([0.0, 0.0, position])
     else:
         s, c = plain_sin_cos(position)
         turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
         offset, rotation = product(turn.T, offset), product(rotation, turn)
-    return Joint(joint.name, "fixed", rotation, offset)
+    return replace(
+        link,
+        joint="fixed",
+        rotation=rotation,
+        offset=offset,
+        limits=UNLIMITED,
+        friction=None,
+        passive=None,
+    )
 
 
-def model_of(robot: TreeArrays) -> Model:
+def model_of(robot: Robot) -> Model:
     """Return the `Model` of a robot, with joints in the order of visits."""
     model, count, order = Model.allocate(robot.n), robot.joint_count, list(robot.order)
     bodies = [0, *(joint + 1 for joint in order)]
@@ -281,3 +406,46 @@ def model_of(robot: TreeArrays) -> Model:
             spring = robot.springs[joint - robot.n]
             model.stiffness[row], model.damping[row], model.rest[row] = spring
     return model
+
+
+HTML_HEADS = ("body", "mass, kg", "moved by", "on", "range", "velocity", "effort")
+
+
+def _html(robot: Robot) -> str:
+    """Return the table of a robot: a row per body, with the joint that moves it."""
+    passive = len(robot.passive_names)
+    words = [
+        f"{robot.name}: {float(robot.mass.sum()):g} kg",
+        f"{robot.n} joints with a motor",
+        *([f"{passive} with a spring"] if passive else []),
+        *([f"tools: {', '.join(tool.name for tool in robot.tools)}"] if robot.tools else []),
+    ]
+    return html_table(HTML_HEADS, _html_rows(robot), ", ".join(words))
+
+
+def _html_rows(robot: Robot) -> Iterator[list[str]]:
+    yield [robot.body_names[0], f"{robot.mass[0]:.6g}", *[""] * 5]
+    for number, joint in enumerate(robot.all_joint_names):
+        yield [
+            robot.body_names[number + 1],
+            f"{robot.mass[number + 1]:.6g}",
+            joint,
+            robot.body_names[robot.parent[number]],
+            *_html_limits(robot, number),
+        ]
+
+
+def _html_limits(robot: Robot, number: int) -> list[str]:
+    """Return range, velocity and effort of a joint; empty where there is no limit."""
+    if number >= robot.n:
+        return ["", "", "passive, with a spring"]
+    factor, unit, force = (
+        (1.0, "m", "N") if robot.is_prismatic[number] else (180.0 / math.pi, "deg", "N m")
+    )
+    limits = robot.limits[number]
+    ends = [factor * limits.lower, factor * limits.upper]
+    return [
+        f"{ends[0]:.5g} to {ends[1]:.5g} {unit}" if any(map(math.isfinite, ends)) else "",
+        f"{factor * limits.velocity:.5g} {unit}/s" if math.isfinite(limits.velocity) else "",
+        f"{limits.effort:.5g} {force}" if math.isfinite(limits.effort) else "",
+    ]

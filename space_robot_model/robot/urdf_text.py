@@ -1,6 +1,6 @@
 """Text of a URDF for any robot, for RViz, Pinocchio and MuJoCo.
 
-Frames of links are those of `space_robot_model.robot.transforms`: the root is the base, at its
+Frames of links are those of `space_robot_model.robot.placements`: the root is the base, at its
 centre of mass, and the z axis of every other frame is the axis of its joint. A tool is a massless
 link on a fixed joint.
 
@@ -22,13 +22,13 @@ from numpy.typing import NDArray
 
 from ..elementary.matrices import product
 from ..elementary.rotations import rpy_of_rotation
-from .frame_names import distinct, frame_names, printable, urdf_joint_names
 from .inertia import inertia_elements
+from .parts import Colour, JointLimits, Visual
+from .placements import distinct, frame_names, printable, urdf_joint_names
 from .robot import Robot
-from .shapes import Colour, shapes_of
-from .tree import JointLimits, Visual
-from .urdf.fields import LARGEST
-from .urdf.links import MOMENTS
+from .shapes import shapes_of
+from .urdf_links import MOMENTS
+from .urdf_xml import LARGEST
 
 Array = NDArray[np.float64]
 Materials = dict[Colour, str]
@@ -145,7 +145,7 @@ def _add_origin(element: Element, rotation: Array, position: Array) -> None:
 
 
 def _bound(limit: float) -> str:
-    """Return a limit as text; infinity as the number that `urdf.fields` reads as infinite."""
+    """Return a limit as text; infinity as the number that `urdf_xml` reads as infinite."""
     return _word(limit if math.isfinite(limit) else math.copysign(LARGEST, limit))
 
 

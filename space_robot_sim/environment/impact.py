@@ -26,12 +26,11 @@ from numpy.typing import NDArray
 
 from space_robot_model.elementary.matrices import product, rotate_tensor, solve
 from space_robot_model.robot import Robot
-from space_robot_model.robot.base_axes import base_axes
 from space_robot_model.robot.dynamics import mass_matrix
-from space_robot_model.robot.frames import BodyFrame, body_frames
+from space_robot_model.robot.flatten import parallel_axes
 from space_robot_model.robot.gears import rotor_rows
 from space_robot_model.robot.inertia import inertia_tensor
-from space_robot_model.robot.tree import parallel_axes
+from space_robot_model.robot.placements import BodyFrame, base_axes, body_frames
 from space_robot_msgs_py.config.validation import one_of
 
 from .target import Target, TargetMotion

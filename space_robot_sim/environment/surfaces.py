@@ -35,8 +35,8 @@ from space_robot_model.dynamics.algebra import (
 )
 from space_robot_model.dynamics.branches import kept_frame
 from space_robot_model.dynamics.model import MOST_JOINTS, Data, Model
-from space_robot_model.robot.plate_file import MOST_PLATES
-from space_robot_model.robot.plates import plates_of
+from space_robot_model.robot.parts import MOST_PLATES
+from space_robot_model.robot.shapes import plates_of
 from space_robot_msgs_py.compiled.kernels import kernel, subroutine
 from space_robot_msgs_py.compiled.lanes import whole
 from space_robot_msgs_py.compiled.records import shaped

@@ -14,7 +14,7 @@ from typing_extensions import Self
 from space_robot_model.dynamics.attitude import rotation_matrix
 from space_robot_model.elementary.matrices import direction_norm, norm
 from space_robot_model.robot.inertia import Inertia, Mass
-from space_robot_model.robot.link_file import Vector
+from space_robot_model.robot.parts import Triple
 from space_robot_msgs_py.config.files import named_file
 from space_robot_msgs_py.config.validation import StrictModel, read_yaml, validate
 
@@ -35,7 +35,7 @@ Name = Annotated[str, Field(min_length=1, max_length=80, pattern=r"^[\w .+-]+$")
 class TargetPlace(StrictModel):
     """``target.place``: where the target is in the frame of the tool that holds it."""
 
-    position: Vector = Field([0.0, 0.0, 0.0])
+    position: Triple = Field([0.0, 0.0, 0.0])
     """Position of the centre of mass, m."""
     quaternion: Quaternion = Field([1.0, 0.0, 0.0, 0.0])
     """``[w, x, y, z]`` of its axes; its norm does not count."""
@@ -55,7 +55,7 @@ class TargetMotion(StrictModel):
     """Velocity of the centre of mass, m/s."""
     angular_velocity: Speeds = Field([0.0, 0.0, 0.0])
     """rad/s; relative to the orbit on the target's own axes, as seen from the inertial frame."""
-    position: Vector = Field([0.0, 0.0, 0.0])
+    position: Triple = Field([0.0, 0.0, 0.0])
     """Position of the centre of mass from the inertial frame's origin at tick 0, m."""
     quaternion: Quaternion = Field([1.0, 0.0, 0.0, 0.0])
     """``[w, x, y, z]`` of the target's axes at tick 0, to the inertial frame."""

@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from space_robot_msgs_py.config.choices import choices
+from space_robot_msgs_py.config.text import choices
 from space_robot_msgs_py.config.validation import one_of, short
 from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.samples import RobotNames

@@ -8,12 +8,11 @@ from importlib.util import find_spec
 import numpy as np
 from rclpy.node import Node
 
-from space_robot_model.robot.base_axes import base_axes, to_base
-from space_robot_model.robot.poses import XYZW
+from space_robot_model.robot.placements import XYZW, base_axes, to_base
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.ros.endpoints import RawPublisher
 from space_robot_msgs_py.samples import RobotState
-from space_robot_msgs_py.wire.base_messages import BaseMessages
+from space_robot_msgs_py.wire.viewers import BaseMessages
 
 from .settings import PlantNodeSettings
 

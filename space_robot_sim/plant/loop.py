@@ -15,18 +15,17 @@ from space_robot_model.robot.find import robot_source
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.errors import MessageError
 from space_robot_msgs_py.ros.endpoints import (
+    PausedOutput,
     PolledCallbackGroup,
     RawPublisher,
     RawSubscription,
     flush,
 )
-from space_robot_msgs_py.ros.health import Health, Level
-from space_robot_msgs_py.ros.loop import Wait
+from space_robot_msgs_py.ros.loop import Health, Level, Wait
 from space_robot_msgs_py.ros.managed_node import ManagedNode
-from space_robot_msgs_py.ros.paused import PausedOutput
 from space_robot_msgs_py.samples import Command
-from space_robot_msgs_py.wire.clock import ClockCodec
 from space_robot_msgs_py.wire.codecs import CommandCodec, StateCodec
+from space_robot_msgs_py.wire.telemetry import ClockCodec
 
 from .base_output import BaseOutput
 from .messages import NONE, CommandGuard, SentState, exchange_of

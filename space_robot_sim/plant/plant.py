@@ -13,9 +13,9 @@ from pydantic import Field
 from space_robot_model.elementary.matrices import direction_norm
 from space_robot_model.hardware.sensors import SensorSettings
 from space_robot_model.robot import Robot
-from space_robot_model.robot.base_axes import base_axes, cross, to_inertial
+from space_robot_model.robot.mission_document import Rates
 from space_robot_model.robot.momentum import Motion, robot_momentum
-from space_robot_model.robot.orientation import Rates
+from space_robot_model.robot.placements import base_axes, cross, to_inertial
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.compiled.records import RecordOwner, assign
 from space_robot_msgs_py.errors import DivergedError, InputError

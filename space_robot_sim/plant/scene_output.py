@@ -8,12 +8,11 @@ from rclpy.node import Node
 
 from space_robot_model.robot import Robot
 from space_robot_model.robot.markers import RobotMarkers
-from space_robot_model.robot.poses import RobotPoses
+from space_robot_model.robot.placements import RobotPoses
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.ros.endpoints import RawPublisher
 from space_robot_msgs_py.samples import RobotState, Timebase
-from space_robot_msgs_py.wire.carrier import unwrap
-from space_robot_msgs_py.wire.markers import no_markers
+from space_robot_msgs_py.wire.viewers import no_markers, unwrap
 
 from .scene import Messages, SceneWriter
 

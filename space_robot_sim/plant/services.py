@@ -17,7 +17,7 @@ from std_srvs.srv import Trigger
 
 from space_robot_msgs_py.errors import FlightError, InputError, SpaceRobotError
 from space_robot_msgs_py.ros.managed_node import ManagedNode
-from space_robot_msgs_py.ros.restart import restart, until
+from space_robot_msgs_py.ros.service_calls import until
 
 from .loop import PlantLoop
 from .settings import MOST_TICKS, PlantNodeSettings
@@ -90,7 +90,7 @@ class Simulation:
         assert settings is not None
         self._is_resetting = True
         try:
-            await restart(self._node, [name for name in settings.reset_with if name])
+            await self._node.restart([name for name in settings.reset_with if name])
         finally:
             self._is_resetting = False
         if keep:

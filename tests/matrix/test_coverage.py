@@ -23,7 +23,7 @@ from space_robot_control.guidance.segments import (
     read_segments,
 )
 from space_robot_control.laws import laws
-from space_robot_model.robot.tree.bodies import Encoder
+from space_robot_model.robot.parts import Encoder
 from space_robot_sim.environment.events import FORMS
 
 NO_FLIGHT_S_OWN = {

@@ -16,7 +16,7 @@ from strategies import State
 
 from space_robot_model.robot import Robot
 from space_robot_model.robot.dynamics import bias_force, forward_dynamics, mass_matrix
-from space_robot_model.robot.tree import Body
+from space_robot_model.robot.parts import Base, Body, RobotTree
 
 Array = NDArray[np.float64]
 
@@ -191,31 +191,29 @@ JOINTS = {
 }
 
 
-def pinocchio_tree(bodies: Sequence[Body]) -> pin.Model:
-    """Bodies in any order in Pinocchio: joints about their own axes, fixed ones joined there.
+def pinocchio_tree(tree: RobotTree) -> pin.Model:
+    """Links in any order in Pinocchio: joints about their own axes, fixed ones joined there.
 
-    Its frames have the names of the bodies.
+    Its frames have the names of the links.
     """
     model = pin.Model()
     model.gravity = pin.Motion.Zero()
-    base = next(body for body in bodies if body.joint is None)
-    waiting = [(base, 0, pin.SE3.Identity())]
+    waiting: list[tuple[Base | Body, int, pin.SE3]] = [(tree.base, 0, pin.SE3.Identity())]
     while waiting:  # down each branch: Pinocchio's algorithms want joints in that order
         body, carrier, place = waiting.pop()
-        if body.joint is None:
+        if isinstance(body, Base):
             carrier = model.addJoint(0, pin.JointModelFreeFlyer(), place, "root")
         else:
-            joint = body.joint
-            place = place * pin.SE3(joint.rotation, joint.rotation @ joint.offset)
-            if joint.kind != "fixed":
-                kind = JOINTS[joint.kind](joint.axis)
-                carrier = model.addJoint(carrier, kind, place, joint.name)
+            place = place * pin.SE3(body.rotation, body.rotation @ body.offset)
+            if body.joint != "fixed":
+                kind = JOINTS[body.joint](body.axis)
+                carrier = model.addJoint(carrier, kind, place, body.joint_label)
                 place = pin.SE3.Identity()
         if body.mass:
             inertia = pin.Inertia(body.mass, body.com, body.inertia)
             model.appendBodyToJoint(carrier, inertia, place)
         model.addBodyFrame(body.name, carrier, place, 0)
-        waiting += [(child, carrier, place) for child in bodies if child.parent == body.name]
+        waiting += [(link, carrier, place) for link in tree.links if link.parent == body.name]
     return model
 
 

@@ -25,7 +25,7 @@ from oracles import (
 from space_robot_model.hardware.wheels import WheelSettings
 from space_robot_model.robot import Robot
 from space_robot_model.robot.gears import geared_joints
-from space_robot_model.robot.tree import Gear
+from space_robot_model.robot.parts import Gear
 from space_robot_msgs_py.compiled.records import assign
 
 Array = NDArray[np.float64]

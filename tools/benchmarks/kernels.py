@@ -11,7 +11,7 @@ from space_robot_control.laws.compiled import LawCode
 from space_robot_model.dynamics.aba import aba
 from space_robot_model.dynamics.kinematics import forward_kinematics, spatial_velocities
 from space_robot_msgs_py.compiled.kernels import RecordFunction, kernel
-from space_robot_msgs_py.compiled.lane_words import as_lanes
+from space_robot_msgs_py.compiled.lanes import as_lanes
 from space_robot_msgs_py.compiled.records import Block
 from space_robot_sim.plant.lanes import advance_lanes
 from space_robot_sim.plant.tick import advance

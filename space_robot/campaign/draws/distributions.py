@@ -12,7 +12,7 @@ from typing_extensions import Self
 
 from space_robot_model.elementary.exponential import exp, log
 from space_robot_model.elementary.normal import normal_cdf, quantile
-from space_robot_msgs_py.config.choices import nearest
+from space_robot_msgs_py.config.text import nearest
 from space_robot_msgs_py.config.validation import StrictModel, short, validate
 from space_robot_msgs_py.errors import InputError
 

@@ -8,7 +8,7 @@ from typing import Any
 
 from space_robot_model.robot import Robot
 from space_robot_model.robot.gears import geared_joints
-from space_robot_model.robot.plates import plates_of
+from space_robot_model.robot.shapes import plates_of
 from space_robot_msgs_py.errors import InputError
 
 from .changes import Changes

@@ -17,9 +17,10 @@ from space_robot_control.controller.settings import DEFAULT_SETS, OF_THE_SET
 from space_robot_control.guidance.mission import MissionSettings
 from space_robot_control.laws import laws
 from space_robot_model.robot import Robot
-from space_robot_model.robot.described import unit_remarks
+from space_robot_model.robot.description import unit_remarks
+from space_robot_model.robot.files import is_urdf, read_content
 from space_robot_model.robot.find import OWN_GAINS, OWN_MISSION
-from space_robot_model.robot.urdf_file import is_urdf, read_urdf_content
+from space_robot_model.robot.urdf import UrdfRobot
 from space_robot_msgs_py.config.validation import read_yaml
 from space_robot_msgs_py.errors import FlightError, InputError
 from space_robot_sim.environment.environment import EnvironmentSettings
@@ -285,14 +286,12 @@ def tool_remark(robot: Robot, folder: Path) -> str:
     content = read_yaml(folder / ROBOT_FILE)
     if not is_urdf(content) or content["robot"].get("tools"):
         return ""
-    bodies = read_urdf_content(content, folder, str(folder)).bodies
+    urdf = read_content(content, folder, str(folder))
+    assert isinstance(urdf, UrdfRobot)
     fixed = [
-        body.name
-        for body in bodies
-        if body.parent == robot.tool.name
-        and body.mass
-        and body.joint
-        and body.joint.kind == "fixed"
+        link.name
+        for link in urdf.tree.links
+        if link.parent == robot.tool.name and link.mass and not link.moves
     ]
     if not fixed:
         return ""

@@ -9,10 +9,10 @@ from typing import Any
 import yaml
 
 from space_robot_model.robot import Robot
-from space_robot_model.robot.find import OWN
-from space_robot_model.robot.source import URDF
-from space_robot_model.robot.urdf.visuals import with_absolute_meshes
-from space_robot_model.robot.urdf_file import is_urdf, read_urdf_content
+from space_robot_model.robot.files import is_urdf, read_content
+from space_robot_model.robot.find import OWN, URDF
+from space_robot_model.robot.urdf import UrdfRobot
+from space_robot_model.robot.urdf_links import with_absolute_meshes
 from space_robot_msgs_py.config.validation import one_of, read_yaml
 from space_robot_msgs_py.config.yaml_text import read_file
 from space_robot_msgs_py.errors import InputError
@@ -96,13 +96,14 @@ def robot_texts(
     if passive:
         robot["passive"] = {**(robot.get("passive") or {}), **passive}
     read = Robot.from_dict(content, str(file), file.parent)
-    text = read_urdf_content(content, file.parent, str(file)).text
+    urdf = read_content(content, file.parent, str(file))
+    assert isinstance(urdf, UrdfRobot)
     source = file.parent / str(robot.pop("urdf", file.name))
     robot.pop("urdf_text", None)
     name = f"{source.stem}.urdf"
     return {
         ROBOT_FILE: head + OF_URDF + _dumped({"robot": {"urdf": name, **robot}}),
-        name: with_absolute_meshes(text, source.absolute().parent),
+        name: with_absolute_meshes(urdf.text, source.absolute().parent),
     }, read
 
 

@@ -19,8 +19,8 @@ from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.bag.folder import open_bag
 from space_robot_msgs_py.bag.reader import read_flight
 from space_robot_msgs_py.bag.selection import Selection
-from space_robot_msgs_py.config.extras import install_command
 from space_robot_msgs_py.config.files import GIVEN
+from space_robot_msgs_py.config.installation import install_command
 from space_robot_msgs_py.errors import FlightError, InputError, SpaceRobotError
 
 from ...processes.interruption import handled_signals
@@ -32,8 +32,10 @@ from .composed import NAME, composed_command, write_parameters
 from .domain import is_quiet, ros_domain
 from .following import follow
 from .listeners import reset_with, wait_for
+from .monitor import MONITOR
 from .node_server import Program
 from .processes import Command, Graph, node_command, node_environment
+from .temporary_node import own_name
 
 COMPOSED_DRAIN_S = 0.002
 """Period of the recorder in one process with the other nodes, which wait while it writes."""
@@ -78,6 +80,8 @@ def fly(
             for remark in remarks:
                 _say(remark)
             parameters = flight_parameters(flight, bag)
+            if flight.scenario.process_faults:  # injected by the clock that the monitor hears
+                parameters["plant"]["wait_for"].append(f"{own_name(MONITOR)}:{topics.CLOCK.name}")
             with ScratchFolder() as scratch:
                 folder = Path(scratch)
                 parameters = with_files(parameters, flight, folder)

@@ -24,7 +24,7 @@ from space_robot_control.laws import ControlLaw, find_law
 from space_robot_control.laws.trust import check_file, check_law, is_plain
 from space_robot_model.robot import Robot
 from space_robot_model.robot.find import OWN, find_robot
-from space_robot_msgs_py.config.trees import Tree, flatten
+from space_robot_msgs_py.config.files import Tree, flatten
 from space_robot_msgs_py.config.validation import one_of
 from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.samples import LawInForce, RobotNames

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 from space_robot_control.navigation.settings import Mode
-from space_robot_msgs_py.config.directory import config_directory
+from space_robot_msgs_py.config.installation import config_directory
 from space_robot_msgs_py.config.validation import read_yaml
 from space_robot_msgs_py.errors import DivergedError, InputError
 

@@ -14,8 +14,7 @@ from numpy.typing import NDArray
 
 from space_robot_model.hardware.base_actuators import BaseActuatorSettings
 from space_robot_model.robot import Robot
-from space_robot_model.robot.tool import tool_pose
-from space_robot_model.robot.transforms import joint_transforms
+from space_robot_model.robot.placements import joint_transforms, tool_pose
 
 from ...flight.graph.monitor import Event
 from ..base_surface import clearest_side

@@ -22,7 +22,7 @@ from space_robot_msgs_py import topics
 from space_robot_msgs_py.errors import FlightError, MessageError
 from space_robot_msgs_py.samples import Reference, ReferenceChunk, RobotNames, RobotState, Timebase
 from space_robot_msgs_py.wire.codecs import StateCodec
-from space_robot_msgs_py.wire.reference_codec import ReferenceCodec
+from space_robot_msgs_py.wire.telemetry import ReferenceCodec
 
 pytest.importorskip("rclpy")
 

@@ -27,7 +27,7 @@ from space_robot_control.laws import ControlLaw, LawGains, find_law, importable_
 from space_robot_control.laws.checked import LawError, force_of
 from space_robot_control.laws.trust import NotTrustedError, is_plain
 from space_robot_msgs_py.bag.reader import read_flight
-from space_robot_msgs_py.config.trees import flatten
+from space_robot_msgs_py.config.files import flatten
 from space_robot_msgs_py.errors import InputError
 
 

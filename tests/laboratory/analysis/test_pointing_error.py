@@ -32,7 +32,7 @@ from space_robot.analysis.tool_error import ToolError, ToolPath, leads_tool
 from space_robot.analysis.words import remarks
 from space_robot_model.robot import Robot
 from space_robot_model.robot.momentum import Motion, robot_momentum
-from space_robot_model.robot.tool import tool_pose
+from space_robot_model.robot.placements import tool_pose
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.samples import Timebase
 from space_robot_sim.environment.captures import Captures

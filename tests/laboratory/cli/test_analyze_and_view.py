@@ -27,7 +27,7 @@ from space_robot.flight.plan import Flight, FlightPlan, resolve
 from space_robot.flight.simulate import simulate
 from space_robot.view.flights import shown_robot
 from space_robot_msgs_py.bag.reader import read_flight
-from space_robot_msgs_py.config.extras import install_command
+from space_robot_msgs_py.config.installation import install_command
 
 LARGEST = 2e6
 """Bytes of a page of a short flight."""

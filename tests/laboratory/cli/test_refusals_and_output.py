@@ -22,7 +22,7 @@ from robots import driven_paper
 from space_robot.console.files import ABANDONED_S, whole_file, whole_folder
 from space_robot.flight.plan import Flight, FlightPlan, resolve
 from space_robot.flight.simulate import simulate
-from space_robot_model.robot.plate_file import MOST_PLATES
+from space_robot_model.robot.parts import MOST_PLATES
 from space_robot_msgs_py.errors import InputError
 from space_robot_sim.environment import surfaces
 from space_robot_sim.plant.mounting import MOST_SUBSTEPS

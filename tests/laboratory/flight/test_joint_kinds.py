@@ -26,7 +26,7 @@ from space_robot.flight.simulate import simulate
 from space_robot_model.robot import Robot
 from space_robot_model.robot.gears import motor_momentum
 from space_robot_model.robot.momentum import Motion, robot_momentum
-from space_robot_model.robot.tree import Encoder
+from space_robot_model.robot.parts import Encoder
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.bag.reader import read_flight
 

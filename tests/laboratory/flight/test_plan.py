@@ -38,12 +38,11 @@ from space_robot_control.guidance.settings import MissionNodeSettings
 from space_robot_control.laws import laws
 from space_robot_model.robot import Robot
 from space_robot_model.robot.find import find_robot
-from space_robot_model.robot.frame_names import frame_names
-from space_robot_model.robot.poses import RobotPoses
+from space_robot_model.robot.placements import RobotPoses, frame_names
 from space_robot_msgs_py import topics
-from space_robot_msgs_py.bag.accounts import noted_accounts
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.bag.folder import open_bag
+from space_robot_msgs_py.bag.message_accounting import noted_accounts
 from space_robot_msgs_py.bag.reader import read_flight
 from space_robot_msgs_py.config.settings import leaves
 from space_robot_msgs_py.config.validation import validate

@@ -35,7 +35,7 @@ from space_robot_control.laws import ControlLaw, find_law
 from space_robot_model.robot import Robot
 from space_robot_model.robot.find import find_robot
 from space_robot_model.robot.gears import geared_joints
-from space_robot_model.robot.tree import Encoder, Gear
+from space_robot_model.robot.parts import Encoder, Gear
 from space_robot_sim.plant.tick import update_true_state
 
 Array = NDArray[np.float64]

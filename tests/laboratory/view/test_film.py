@@ -17,7 +17,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from oracles import pinocchio_tree
 from scene_pages import Scene, moving_log, page_of
-from strategies import random_bodies
+from strategies import random_tree
 
 from space_robot import Scenario
 from space_robot.analysis import excerpt
@@ -28,8 +28,7 @@ from space_robot.view.marks import Mark, marks_of, shared_marks
 from space_robot.view.quantities import quantities_of
 from space_robot.view.trails import DESIRED, PIECES, trails
 from space_robot_model.robot import Robot
-from space_robot_model.robot.frame_names import frame_names
-from space_robot_model.robot.tool import tool_pose
+from space_robot_model.robot.placements import frame_names, tool_pose
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.bag.reader import read_flight
 from space_robot_msgs_py.errors import InputError
@@ -50,7 +49,7 @@ RELEASE = Mark(0.28, 0.28, "release", "event")
 
 def expected(robot: Robot, log: FlightLog, row: int) -> dict[str, pin.SE3]:
     """The frames of all bodies and tools at a row of the bag, by name."""
-    model = pinocchio_tree(robot.bodies())
+    model = pinocchio_tree(robot.tree)
     data, q = model.createData(), pin.neutral(model)
     w, x, y, z = log.quaternion[row]
     q[:7] = [*log.base_position[row], x, y, z, w]
@@ -105,7 +104,7 @@ def test_the_poses_on_the_page_are_the_bags(flown: Flown) -> None:
 def test_the_poses_of_a_tree_with_all_kinds_of_joints() -> None:
     rng = np.random.default_rng(5)
     kinds = ["revolute", "prismatic", "passive revolute", "fixed", "passive prismatic", "revolute"]
-    robot = Robot.of_tree("tree", random_bodies(rng, kinds))
+    robot = Robot.of_tree(random_tree(rng, kinds))
     log = moving_log(robot, 40, period_ns=10_000_000)
     log.base_position[:] = rng.normal(size=(40, 3))
     log.passive_positions[:] = rng.uniform(-0.2, 0.2, log.passive_positions.shape)

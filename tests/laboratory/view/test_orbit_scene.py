@@ -37,7 +37,8 @@ from space_robot.view.marks import Mark, marks_of
 from space_robot.view.orbit_frames import OrbitFrames, shadow_intervals, sun_direction
 from space_robot.view.stage import DIRECTION, FIELD_OF_VIEW, LAMPS, SIDES, set_stage
 from space_robot_model.robot import Robot
-from space_robot_msgs_py.bag.flight_log import ORBIT_WIDTHS, FlightLog
+from space_robot_msgs_py.bag.flight_log import FlightLog
+from space_robot_msgs_py.samples import ORBIT_FIELDS
 
 Array = NDArray[np.float64]
 SECOND = 1_000_000_000
@@ -295,7 +296,7 @@ def test_side_by_side_each_has_its_arrows_and_over_one_another_the_first(
 def test_a_flight_without_orbit_and_gears_has_nothing_of_them(
     paper_robot: Robot, log: FlightLog
 ) -> None:
-    columns: dict[str, Any] = {name: np.empty((log.ticks, 0)) for name in ORBIT_WIDTHS}
+    columns: dict[str, Any] = {name: np.empty((log.ticks, 0)) for name in ORBIT_FIELDS}
     page = page_of(paper_robot, one=replace(log, **columns))
     scene = Scene(page)
     assert not [n for n in scene.names() if "orbit" in n or n in ("/earth", "/sun")]

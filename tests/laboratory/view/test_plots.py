@@ -23,7 +23,7 @@ from space_robot_control.allocation.assumed_actuators import assumed_actuators
 from space_robot_model.hardware.base_actuators import BaseActuatorSettings
 from space_robot_model.robot import Robot
 from space_robot_model.robot.find import find_robot
-from space_robot_model.robot.tree import Gear
+from space_robot_model.robot.parts import Gear
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.samples import Timebase
 

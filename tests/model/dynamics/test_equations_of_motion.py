@@ -37,10 +37,10 @@ from strategies import (
     State,
     branched_cases,
     cases,
-    random_bodies,
     random_gears,
     random_robot,
     random_state,
+    random_tree,
 )
 
 from space_robot_model.dynamics.aba import aba
@@ -233,7 +233,7 @@ def test_wheels_accelerate_like_rotors_on_hinges(n: int, count: int, seed: int) 
 def test_motors_accelerate_like_bodies_on_links(n: int, share: float, seed: int) -> None:
     """In chains of ``n`` joints, or in a tree; each rotor's own acceleration. Some are held."""
     rng = np.random.default_rng(seed)
-    robot = random_robot(rng, n) if n else Robot.of_tree("tree", random_bodies(rng, TREE))
+    robot = random_robot(rng, n) if n else Robot.of_tree(random_tree(rng, TREE))
     robot = random_gears(rng, robot)
     rotors, n, scale = random_motor_rotors(rng, robot), robot.joint_count, turns(robot)
     count, state, model = len(rotors), random_state(rng, n), mounted(robot)

@@ -19,17 +19,19 @@ from space_robot.flight.plan import Flight, FlightPlan, resolve
 from space_robot_control.controller.gains import gain_files
 from space_robot_control.controller.settings import ControllerNodeSettings, set_file
 from space_robot_control.laws import laws
-from space_robot_model.robot.choice import RobotChoice, split_choice, with_choice
 from space_robot_model.robot.find import (
+    RobotChoice,
     find_robot,
     mission_file,
     new_command,
     robot_as_path,
     robot_files,
     robot_names,
+    split_choice,
+    with_choice,
 )
 from space_robot_model.robot.mission_document import mission_layer
-from space_robot_msgs_py.config.trees import Tree
+from space_robot_msgs_py.config.files import Tree
 from space_robot_msgs_py.errors import InputError
 
 ARM = str(DATA / "arm.urdf")

@@ -16,17 +16,14 @@ from strategies import (
     BASE,
     SEEDS,
     TREES,
-    random_bodies,
     random_inertia,
     random_quaternion,
     random_rotation,
+    random_tree,
 )
 
 from space_robot_model.robot import Robot
-from space_robot_model.robot.base_axes import base_axes
 from space_robot_model.robot.find import find_robot, robot_names
-from space_robot_model.robot.frame_names import frame_names
-from space_robot_model.robot.frames import body_frames
 from space_robot_model.robot.inertia import inertia_tensor
 from space_robot_model.robot.kinematics import (
     manipulability,
@@ -35,17 +32,25 @@ from space_robot_model.robot.kinematics import (
     tool_state,
 )
 from space_robot_model.robot.markers import RobotMarkers
-from space_robot_model.robot.poses import RobotPoses, tool_poses
+from space_robot_model.robot.parts import RobotTree, Visual
+from space_robot_model.robot.placements import (
+    RobotPoses,
+    base_axes,
+    body_frames,
+    frame_names,
+    joint_transforms,
+    tool_pose,
+    tool_poses,
+    tool_transforms,
+    wxyz,
+)
 from space_robot_model.robot.shapes import BASE_COLOUR, LINK_COLOUR, even_box, shapes_of
-from space_robot_model.robot.tool import tool_pose
-from space_robot_model.robot.transforms import joint_transforms, tool_transforms, wxyz
-from space_robot_model.robot.tree import Body, Visual
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.samples import RobotState, Timebase
 from space_robot_msgs_py.topics import INERTIAL_FRAME
 from space_robot_msgs_py.wire.definitions import decode
-from space_robot_msgs_py.wire.markers import no_markers
+from space_robot_msgs_py.wire.viewers import no_markers
 
 Array = NDArray[np.float64]
 UPRIGHT = [1.0, 0.0, 0.0, 0.0]
@@ -74,9 +79,9 @@ def assert_same_place(here: pin.SE3, there: pin.SE3) -> None:
 def test_bodies_and_tools_are_where_pinocchio_has_them(seed: int, kinds: list[str]) -> None:
     """For a state of a flight, for tf, and for all ticks of a log; merged bodies too."""
     rng = np.random.default_rng(seed)
-    bodies = random_bodies(rng, kinds)
-    robot, ticks = Robot.of_tree("tree", bodies), 3
-    oracle = TreeOracle(pinocchio_tree(bodies), BASE, robot.all_joint_names, seed)
+    tree = random_tree(rng, kinds)
+    robot, ticks = Robot.of_tree(tree), 3
+    oracle = TreeOracle(pinocchio_tree(tree), BASE, robot.all_joint_names, seed)
     quaternion = np.array([random_quaternion(rng) for _ in range(ticks)])
     theta = rng.uniform(-4.0, 4.0, (ticks, robot.joint_count))
     frames = {f.body: f for f in body_frames(robot, base_axes(quaternion.T), theta.T)}
@@ -100,12 +105,11 @@ def test_bodies_and_tools_are_where_pinocchio_has_them(seed: int, kinds: list[st
             by_tf[t.child] = by_tf[t.parent] * pin.SE3(rotation_of(turn).as_matrix(), at)
         for name, body in zip(frame_names(robot).bodies, robot.body_names, strict=True):
             assert_same_place(by_tf[name], where[name])
-            joint = next(b.joint for b in bodies if b.name == body)
-            if joint and joint.kind != "fixed":
+            for link in (own for own in tree.links if own.name == body and own.moves):
                 frame = frames[robot.body_names.index(body)]
-                axis = there[body].rotation @ joint.axis
+                axis = there[body].rotation @ link.axis
                 np.testing.assert_allclose(frame.z[:, k], axis, atol=1e-13)
-        own = {body.tools[0].name: (body.name, body.tools[0]) for body in bodies}
+        own = {tool.name: (tool.link, tool) for tool in tree.tools}
         for tool, (parent, _), pose in zip(robot.tools, tool_frames, on_bodies, strict=True):
             name, local = own[tool.name]
             expected = there[name] * pin.SE3(local.rotation, local.position)
@@ -147,10 +151,10 @@ def test_of_many_ticks_each_tool_is_that_of_its_own(paper_robot: Robot) -> None:
 class ToolOracle(TreeOracle):
     """Pinocchio's motion of a tree with zero momenta, and of one of its tools."""
 
-    def __init__(self, robot: Robot, bodies: list[Body], tool: str, seed: int) -> None:
-        super().__init__(pinocchio_tree(bodies), BASE, robot.all_joint_names, seed)
+    def __init__(self, robot: Robot, tree: RobotTree, tool: str, seed: int) -> None:
+        super().__init__(pinocchio_tree(tree), BASE, robot.all_joint_names, seed)
         name = tool.removeprefix("tool of ")
-        frame = next(body for body in bodies if body.name == name).tools[0]
+        frame = next(own for own in tree.tools if own.name == tool)
         carrier = self.model.frames[self.model.getFrameId(name, pin.FrameType.BODY)]
         at = carrier.placement * pin.SE3(frame.rotation, frame.position)
         self.tool = self.model.addFrame(
@@ -179,10 +183,10 @@ class ToolOracle(TreeOracle):
 def test_jacobians_of_all_tools_are_pinocchios_at_zero_momentum(
     kinds: list[str], seed: int
 ) -> None:
-    bodies = random_bodies(np.random.default_rng(seed), kinds)
-    robot = Robot.of_tree("tree", bodies)
+    tree = random_tree(np.random.default_rng(seed), kinds)
+    robot = Robot.of_tree(tree)
     for tool in robot.tools:
-        oracle = ToolOracle(robot, bodies, tool.name, seed)
+        oracle = ToolOracle(robot, tree, tool.name, seed)
         posture = oracle.attitude(), oracle.positions
         state, place = tool_state(robot, *posture, tool.name), oracle.data.oMf[oracle.tool]
         com = pin.centerOfMass(oracle.model, oracle.data, oracle.q)
@@ -271,7 +275,7 @@ def random_state(robot: Robot, rng: np.random.Generator) -> RobotState:
 def test_markers_are_where_their_bodies_have_them(seed: int, kinds: list[str]) -> None:
     """Decoded from the message, to 1e-9; the bodies' poses are Pinocchio's, as shown above."""
     rng = np.random.default_rng(seed)
-    robot = Robot.of_tree("tree", random_bodies(rng, kinds))
+    robot = Robot.of_tree(random_tree(rng, kinds))
     state, poses = random_state(robot, rng), RobotPoses(robot)
     found, where = poses.at(state), {INERTIAL_FRAME: pin.SE3.Identity()}
     for (parent, child), pose in zip(poses.frames, found, strict=True):

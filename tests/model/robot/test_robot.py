@@ -15,13 +15,13 @@ from hypothesis import strategies as st
 from oracles import TreeOracle, assert_same_dynamics, pinocchio_tree
 from paths import CONFIG, DATA
 from scipy.spatial.transform import Rotation
-from strategies import random_bodies, random_robot, random_robot_file
+from strategies import random_robot, random_robot_file, random_tree
 
 from space_robot_model.robot import Robot
+from space_robot_model.robot.files import document_of
 from space_robot_model.robot.find import find_robot
 from space_robot_model.robot.inertia import inertia_tensor
-from space_robot_model.robot.source import document_of
-from space_robot_model.robot.tree import Body, Joint, JointLimits
+from space_robot_model.robot.parts import Base, Body, JointLimits, RobotTree
 from space_robot_msgs_py.config.validation import read_yaml
 from space_robot_msgs_py.errors import InputError
 
@@ -118,11 +118,7 @@ def same(one: Robot, other: Robot) -> None:
 
 @given(st.integers(0, 2**32 - 1))
 def test_trees_come_back_to_the_bit(seed: int) -> None:
-    bodies = [  # the tools in another order than their bodies
-        replace(body, tools=tuple(replace(tool, rank=-number) for tool in body.tools))
-        for number, body in enumerate(random_bodies(np.random.default_rng(seed), SOME_KINDS))
-    ]
-    tree = Robot.of_tree("tree", bodies)
+    tree = Robot.of_tree(random_tree(np.random.default_rng(seed), SOME_KINDS))
     for robot in (tree, tree.nominal, random_robot(np.random.default_rng(seed), 3)):
         content = json.loads(json.dumps(robot.content))
         again = Robot.from_dict(content)
@@ -132,7 +128,7 @@ def test_trees_come_back_to_the_bit(seed: int) -> None:
 
 
 @pytest.mark.parametrize(
-    ("key", "value", "said"), [("weight", 1.0, "weight: unknown key"), ("bodies", [], "bodies")]
+    ("key", "value", "said"), [("weight", 1.0, "weight: unknown key"), ("links", [], "links")]
 )
 def test_wrong_numbers_are_refused(paper_robot: Robot, key: str, value: Any, said: str) -> None:
     content = paper_robot.content
@@ -152,7 +148,7 @@ def test_a_robot_file_made_of_a_robot_has_its_limits(paper_robot: Robot) -> None
         *paper_robot.limits[4:],
     ]
     robot = replace(paper_robot, limits=tuple(limits))
-    again = Robot.from_dict(json.loads(json.dumps(document_of(robot))))
+    again = Robot.from_dict(json.loads(json.dumps(document_of(robot.tree))))
     for before, after in zip(robot.limits, again.limits, strict=True):
         assert after == pytest.approx(before)
 
@@ -163,7 +159,7 @@ def test_shapes_are_part_of_the_numbers() -> None:
     assert {shape.shape for shape in robot.visuals} >= {"box", "cylinder", "sphere", "mesh"}
     exact = Robot.from_dict(json.loads(json.dumps(robot.content)))
     assert repr(exact.visuals) == repr(robot.visuals)
-    written = Robot.from_dict(yaml.safe_load(yaml.safe_dump(document_of(robot))))
+    written = Robot.from_dict(yaml.safe_load(yaml.safe_dump(document_of(robot.tree))))
     for before, after in zip(robot.visuals, written.visuals, strict=True):
         assert (after.shape, after.body, after.size) == (before.shape, before.body, before.size)
         assert (after.mesh, after.colour) == (before.mesh, before.colour)
@@ -200,25 +196,30 @@ def test_error_says_where_a_file_is_no_yaml_mapping(
     assert all(part in message for part in said)
 
 
-def bodies_of(content: dict[str, Any]) -> list[Body]:
+def chain_of(content: dict[str, Any]) -> RobotTree:
     """The chain that a file with origins tells of, its angles turned by SciPy."""
-    bodies, parent = [], None
-    for link in [{"name": "base", "com": [0.0] * 3, **content["base"]}, *content["links"]]:
-        tensor, joint = inertia_tensor(link["inertia"]), None
-        if "origin" in link:
-            turn = Rotation.from_euler("xyz", link["origin"].get("rpy_deg", [0.0] * 3), True)
-            offset, axis = turn.inv().apply(link["origin"]["xyz"]), link.get("axis", [0, 0, 1])
-            kind = link.get("joint", "revolute")
-            joint = Joint(link["name"], kind, turn.as_matrix(), offset, np.array(axis, float))
-        bodies.append(
-            Body(link["name"], link["mass"], tensor, np.array(link["com"]), parent, joint)
+    links, parent, base = [], "base", content["base"]
+    for link in content["links"]:
+        turn = Rotation.from_euler("xyz", link["origin"].get("rpy_deg", [0.0] * 3), True)
+        links.append(
+            Body(
+                name=link["name"],
+                parent=parent,
+                joint=link.get("joint", "revolute"),
+                rotation=turn.as_matrix(),
+                offset=turn.inv().apply(link["origin"]["xyz"]),
+                axis=np.array(link.get("axis", [0, 0, 1]), float),
+                mass=link["mass"],
+                inertia=inertia_tensor(link["inertia"]),
+                com=np.array(link["com"]),
+            )
         )
         parent = link["name"]
-    return bodies
+    return RobotTree("chain", Base(base["mass"], inertia_tensor(base["inertia"])), links)
 
 
 @pytest.mark.parametrize("name", ["canadarm", "canadarm2"])
 def test_dynamics_are_pinocchios_of_the_same_file(name: str) -> None:
     robot, content = find_robot(name), read_yaml(CONFIG / f"robots/{name}.yaml")["robot"]
-    oracle = TreeOracle(pinocchio_tree(bodies_of(content)), "base", robot.all_joint_names, 1)
+    oracle = TreeOracle(pinocchio_tree(chain_of(content)), "base", robot.all_joint_names, 1)
     assert_same_dynamics(robot, oracle, 1)

@@ -24,20 +24,21 @@ from strategies import (
     BASE,
     SEEDS,
     TREES,
-    random_bodies,
     random_gears,
     random_quaternion,
     random_robot,
     random_state,
+    random_tree,
     with_gears,
 )
 
 from space_robot_model.robot import Robot
-from space_robot_model.robot.frames import body_frames
 from space_robot_model.robot.gears import flexible_model, geared_joints, motor_momentum, rotor_rows
 from space_robot_model.robot.mission_document import QUATERNION
 from space_robot_model.robot.momentum import Motion, robot_momentum
-from space_robot_model.robot.tree import Body, Gear, Joint, Spring, flatten, other_meaning
+from space_robot_model.robot.names import other_meaning
+from space_robot_model.robot.parts import Base, Body, Gear, RobotTree, Spring
+from space_robot_model.robot.placements import body_frames
 from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.topics import BASE_AXES
 from space_robot_sim.environment.disturbance_table import BASE as BASE_LOADS
@@ -48,9 +49,9 @@ from space_robot_sim.environment.disturbance_table import TIME
 @given(seed=SEEDS, kinds=TREES)
 def test_dynamics_are_pinocchios(seed: int, kinds: list[str]) -> None:
     """Branches, prismatic, fixed and passive joints about any axis, told in any order."""
-    bodies = random_bodies(np.random.default_rng(seed), kinds)
-    robot = Robot.of_tree("tree", bodies)
-    oracle = TreeOracle(pinocchio_tree(bodies), BASE, robot.all_joint_names, seed)
+    tree = random_tree(np.random.default_rng(seed), kinds)
+    robot = Robot.of_tree(tree)
+    oracle = TreeOracle(pinocchio_tree(tree), BASE, robot.all_joint_names, seed)
     assert_same_dynamics(robot, oracle, seed)
 
 
@@ -58,10 +59,10 @@ def test_dynamics_are_pinocchios(seed: int, kinds: list[str]) -> None:
 @given(seed=SEEDS, kinds=TREES)
 def test_nominal_robot_is_locked_at_rest(seed: int, kinds: list[str]) -> None:
     """Pinocchio's tree with fixed joints where the springs are at rest, in the base's own frame."""
-    bodies = random_bodies(np.random.default_rng(seed), kinds)
-    robot = Robot.of_tree("tree", bodies)
-    own = pinocchio_tree(bodies)
-    locked = pinocchio_tree([_locked(body) for body in bodies])
+    tree = random_tree(np.random.default_rng(seed), kinds)
+    robot = Robot.of_tree(tree)
+    own = pinocchio_tree(tree)
+    locked = pinocchio_tree(replace(tree, links=[_locked(link) for link in tree.links]))
     base_com = own.inertias[own.getJointId("root")].lever
     oracle = TreeOracle(locked, BASE, robot.joint_names, seed, base_com)
     assert robot.nominal.joint_names == robot.joint_names
@@ -69,16 +70,15 @@ def test_nominal_robot_is_locked_at_rest(seed: int, kinds: list[str]) -> None:
     assert_same_dynamics(robot.nominal, oracle, seed)
 
 
-def _locked(body: Body) -> Body:
-    joint = body.joint
-    if joint is None or joint.spring is None:
-        return body
-    rest, offset, turn = joint.spring.rest, joint.offset, np.eye(3)
-    if joint.kind == "prismatic":
-        offset = offset + rest * joint.axis
+def _locked(link: Body) -> Body:
+    if link.passive is None:
+        return link
+    rest, offset, turn = link.passive.rest, link.offset, np.eye(3)
+    if link.joint == "prismatic":
+        offset = offset + rest * link.axis
     else:
-        turn = Rotation.from_rotvec(rest * joint.axis).as_matrix()
-    return replace(body, joint=Joint(joint.name, "fixed", joint.rotation @ turn, turn.T @ offset))
+        turn = Rotation.from_rotvec(rest * link.axis).as_matrix()
+    return replace(link, joint="fixed", rotation=link.rotation @ turn, offset=turn.T @ offset)
 
 
 def test_no_joint_has_the_name_of_something_else() -> None:
@@ -90,37 +90,35 @@ def test_no_joint_has_the_name_of_something_else() -> None:
     assert not any(map(other_meaning, ["elbow_rate", "joint_1", "base_yaw", "wheel", "time_1"]))
 
 
-HULL = Body("hull", 5.0, np.eye(3), np.zeros(3))
-ARM = Body("arm", 1.0, np.eye(3), np.zeros(3), "hull", Joint("j"))
+HULL = Base(5.0, np.eye(3), name="hull")
+ARM = Body(name="arm", joint_name="j", parent="hull", mass=1.0, inertia=np.eye(3), com=np.zeros(3))
 
 
 def arms(count: int, spring: Spring | None = None) -> list[Body]:
-    """Bodies on the hull."""
-    return [replace(ARM, name=f"a{k}", joint=Joint(f"j{k}", spring=spring)) for k in range(count)]
+    """Links on the hull."""
+    return [replace(ARM, name=f"a{k}", joint_name=f"j{k}", passive=spring) for k in range(count)]
 
 
 SOFT = Spring(1.0, 0.0)
-LEG = replace(ARM, name="leg", parent="leg", joint=Joint("k"))
+LEG = replace(ARM, name="leg", parent="leg", joint_name="k")
 THIN = replace(ARM, inertia=np.zeros((3, 3)))
 BAD: list[tuple[list[Body], str]] = [
-    ([HULL, ARM, replace(ARM, joint=Joint("k"))], "body names must differ, 'arm' occurs twice"),
-    ([HULL, ARM, replace(ARM, name="leg")], "joint names must differ, 'j' occurs twice"),
-    ([replace(ARM, parent="arm")], "one base, got 0"),
-    ([HULL, replace(HULL, name="moon"), ARM], "one base, got 2"),
-    ([HULL, replace(ARM, parent="x")], "'x' of 'arm' is not a body: choose one of hull, arm"),
-    ([HULL, ARM, LEG], "not connected to the base"),
-    ([HULL, replace(ARM, mass=0.0)], "moving body 'arm' has no mass"),
-    ([HULL, THIN], "the inertia of body 'arm' must be positive definite"),
-    ([HULL, *arms(1, SOFT)], "a robot needs at least one actuated joint"),
-    ([HULL, *arms(65)], "at most 64 moving joints can be flown, got 65"),
-    ([HULL, ARM, *arms(25, SOFT)], "at most 24 passive joints can be flown, got 25"),
+    ([ARM, replace(ARM, joint_name="k")], "body names must differ, 'arm' occurs twice"),
+    ([ARM, replace(ARM, name="leg")], "joint names must differ, 'j' occurs twice"),
+    ([replace(ARM, parent="x")], "'x' of 'arm' is not a body: choose one of hull, arm"),
+    ([ARM, LEG], "not connected to the base"),
+    ([replace(ARM, mass=0.0)], "moving body 'arm' has no mass"),
+    ([THIN], "the inertia of body 'arm' must be positive definite"),
+    (arms(1, SOFT), "a robot needs at least one actuated joint"),
+    (arms(65), "at most 64 moving joints can be flown, got 65"),
+    ([ARM, *arms(25, SOFT)], "at most 24 passive joints can be flown, got 25"),
 ]
 
 
-@pytest.mark.parametrize(("bodies", "said"), BAD, ids=range(len(BAD)))
-def test_what_is_no_tree_is_said_in_one_line(bodies: list[Body], said: str) -> None:
+@pytest.mark.parametrize(("links", "said"), BAD, ids=range(len(BAD)))
+def test_what_is_no_tree_is_said_in_one_line(links: list[Body], said: str) -> None:
     with pytest.raises(InputError) as raised:
-        Robot.of_tree("bad", bodies, "file.yaml")
+        Robot.of_tree(RobotTree("bad", HULL, links), "file.yaml")
     assert str(raised.value).startswith("file.yaml: ")
     assert said in str(raised.value)
     assert "\n" not in str(raised.value)
@@ -132,12 +130,12 @@ def test_many_bodies_in_a_row_are_walked_without_recursion() -> None:
             ARM,
             name=f"b{k}",
             parent=f"b{k - 1}" if k else "hull",
-            joint=Joint(f"j{k}", "fixed" if k else "revolute"),
+            joint_name=f"j{k}",
+            joint="fixed" if k else "revolute",
         )
         for k in range(3000)
     ]
-    walked = flatten([HULL, *chain[::-1]])
-    assert [link.body.mass for link in walked[1:]] == [3000.0]
+    assert Robot.of_tree(RobotTree("long", HULL, chain[::-1])).mass.tolist() == [5.0, 3000.0]
 
 
 def motion_of(states: list) -> Motion:
@@ -186,7 +184,7 @@ TREE = ("revolute", "passive revolute", "prismatic", "revolute", "fixed", "passi
 
 def tree(seed: int) -> tuple[Robot, np.random.Generator]:
     rng = np.random.default_rng(seed)
-    return random_gears(rng, Robot.of_tree("tree", random_bodies(rng, TREE))), rng
+    return random_gears(rng, Robot.of_tree(random_tree(rng, TREE))), rng
 
 
 @given(SEEDS)

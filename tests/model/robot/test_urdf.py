@@ -16,13 +16,10 @@ from paths import DATA
 from urdf_defects import DEFECTS, GOOD
 
 from space_robot_model.robot import Robot
-from space_robot_model.robot.file import MOST_LINKS
-from space_robot_model.robot.tree import JointFriction, JointLimits, Spring
-from space_robot_model.robot.urdf import read_urdf
-from space_robot_model.robot.urdf.inertia import nearest_inertia
-from space_robot_model.robot.urdf.read import MOST_MOVING, parse_urdf
-from space_robot_model.robot.urdf.visuals import mesh_path
-from space_robot_model.robot.urdf_file import complete_content
+from space_robot_model.robot.inertia import nearest_inertia
+from space_robot_model.robot.parts import MOST_LINKS, JointFriction, JointLimits, Spring
+from space_robot_model.robot.urdf import MOST_MOVING, parse_urdf, read_urdf
+from space_robot_model.robot.urdf_links import mesh_path
 from space_robot_msgs_py.errors import InputError
 
 ARM = DATA / "arm.urdf"
@@ -63,7 +60,7 @@ def test_a_defect_is_one_line_with_the_repair_which_leaves_a_robot(name: str, pa
     assert str(first).startswith(f"line {defect.line}: {defect.part}: ")
     assert defect.repair in first.repair
     assert "\n" not in "".join(map(str, found.findings))
-    robot = Robot.of_tree(found.name, found.bodies)
+    robot = Robot.of_tree(found.tree)
     assert robot.n == (1 if "locked" in first.repair else 2)
 
 
@@ -104,7 +101,7 @@ def test_next_to_no_mass_has_no_inertia(path: Path) -> None:
     path.write_text(GOOD.replace('<mass value="10"/>', '<mass value="1e-12"/>'))
     found = read_urdf(path, repair=True)
     assert [finding.repair.split()[-1] for finding in found.findings] == ["'upper'", "ignored"]
-    robot = Robot.of_tree(found.name, found.bodies)
+    robot = Robot.of_tree(found.tree)
     assert_allclose(np.linalg.eigvalsh(robot.inertia[1]), [0.5, 1.9, 2.1])
 
 
@@ -142,7 +139,7 @@ def test_tools_are_ordered_by_the_joints_before_them(path: Path) -> None:
     path.write_text(GOOD.replace('<link name="upper">', camera))
     assert [tool.name for tool in Robot.from_urdf(path).tools] == ["hand", "camera"]
     chosen = read_urdf(path, tools=["upper", "camera"])
-    robot = Robot.of_tree(chosen.name, chosen.bodies)
+    robot = Robot.of_tree(chosen.tree)
     assert [(tool.name, tool.body) for tool in robot.tools] == [("upper", 1), ("camera", 0)]
     with pytest.raises(InputError, match="unknown link 'x' for a tool"):
         read_urdf(path, tools=["x"])
@@ -183,15 +180,11 @@ def test_wrong_keys_of_a_yaml_are_refused(more: dict[str, Any], said: str) -> No
         of_yaml(**more)
 
 
-def test_a_yaml_is_read_in_its_folder_or_complete_in_itself(tmp_path: Path) -> None:
+def test_a_yaml_is_read_in_its_folder_or_has_the_text(tmp_path: Path) -> None:
     shutil.copy(ARM, tmp_path)
     (tmp_path / "robot.yaml").write_text("robot: {urdf: arm.urdf, base: fore, name: mine}\n")
     robot = Robot.from_yaml(tmp_path / "robot.yaml")
     assert (robot.name, robot.mass[0]) == ("mine", 10.0)
-    content = complete_content({"robot": {"urdf": "arm.urdf", "base": "upper"}}, DATA, "given.yaml")
-    robot = Robot.from_dict(content, folder=tmp_path / "elsewhere")
-    assert robot.name == "arm"
-    assert np.array_equal(robot.offset, of_yaml(base="upper").offset)
     text = GOOD.replace('upper="2"', 'upper="-2"')
     repaired = Robot.from_dict({"robot": {"urdf_text": text, "repair": True}})
     assert (len(repaired.repairs), repaired.limits[0].lower) == (1, -2.0)
@@ -302,6 +295,6 @@ def test_links_are_counted_before_one_is_read(
     def read(*_: Any) -> None:
         raise AssertionError("a link was read")
 
-    monkeypatch.setattr("space_robot_model.robot.urdf.read.read_links", read)
+    monkeypatch.setattr("space_robot_model.robot.urdf.read_links", read)
     with pytest.raises(InputError, match=said):
         parse_urdf(text, Path("my.urdf"))

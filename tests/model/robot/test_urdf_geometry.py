@@ -30,11 +30,11 @@ from strategies import (
 from space_robot.cli.main import _run
 from space_robot_model.robot import Robot
 from space_robot_model.robot.find import find_robot
-from space_robot_model.robot.inertia import inertia_tensor
-from space_robot_model.robot.tree import Visual
-from space_robot_model.robot.urdf import read_urdf
-from space_robot_model.robot.urdf.inertia import SLENDER, solid_inertia
-from space_robot_model.robot.urdf.read import UrdfRobot, parse_urdf
+from space_robot_model.robot.flatten import SETTINGS_FRICTION
+from space_robot_model.robot.inertia import SLENDER, inertia_tensor
+from space_robot_model.robot.parts import Base, Body, Visual
+from space_robot_model.robot.urdf import UrdfRobot, parse_urdf, read_urdf
+from space_robot_model.robot.urdf_tree import solid_inertia
 from space_robot_msgs_py.errors import InputError
 
 Array = NDArray[np.float64]
@@ -104,10 +104,10 @@ def test_shapes_and_frames_are_where_pinocchio_has_them(seed: int, count: int) -
         for shape in shapes.geometryObjects
     }
     links = [f"link{k}" for k in range(count + 1)]
-    masses = [body.name for body in parse_urdf(text, FILE).bodies if body.mass]
+    masses = [part.name for part in parts(parse_urdf(text, FILE)) if part.mass]
     for base in ("link0", str(rng.choice(masses))):
         found = parse_urdf(text, FILE, base, tools=links)
-        robot = Robot.of_tree("random", found.bodies)
+        robot = Robot.of_tree(found.tree)
         poses = body_poses(robot, np.array([angles[name] for name in robot.joint_names]))
         tools = [poses[t.body] * pin.SE3(t.rotation, t.position) for t in robot.tools]
         assert [tool.name for tool in robot.tools] == links
@@ -156,8 +156,7 @@ INF = np.inf
 )
 def test_the_numbers_of_limits(given: str, limits: tuple[float, ...], findings: int) -> None:
     found = one_joint(f"<limit {given}/>")
-    (joint,) = (body.joint for body in found.bodies if body.name == "arm")
-    assert joint is not None
+    (joint,) = (link for link in found.tree.links if link.name == "arm")
     assert tuple(joint.limits) == limits
     assert len(found.findings) == findings, found.findings
 
@@ -175,10 +174,13 @@ def test_the_numbers_of_limits(given: str, limits: tuple[float, ...], findings: 
 )
 def test_the_numbers_of_friction(given: str, coulomb: float, viscous: float, findings: int) -> None:
     found = one_joint('<limit lower="-1" upper="1" velocity="1" effort="1"/>', given)
-    (joint,) = (body.joint for body in found.bodies if body.name == "arm")
-    assert joint is not None
-    np.testing.assert_array_equal(joint.friction, (coulomb, viscous))
+    (joint,) = (link for link in found.tree.links if link.name == "arm")
+    np.testing.assert_array_equal(joint.friction or SETTINGS_FRICTION, (coulomb, viscous))
     assert len(found.findings) == findings
+
+
+def parts(urdf: UrdfRobot) -> list[Base | Body]:
+    return [urdf.tree.base, *urdf.tree.links]
 
 
 def mujoco_inertia(shape: str, size: tuple[float, ...], mass: float, turn: Array) -> Array:
@@ -244,13 +246,13 @@ def test_a_fixed_link_that_breaks_the_triangle_is_raised_like_any_other(
     a, b = rng.uniform(0.01, 0.1, 2)
     bad = turn @ np.diag([a, b, share * (a + b)]) @ turn.T
     found = one_joint(LIMIT, inertia=with_inertia(3.0, bad))
-    (plate,) = (body for body in found.bodies if body.name == "plate")
+    (plate,) = (link for link in found.tree.links if link.name == "plate")
     np.testing.assert_allclose(plate.inertia, nearest(bad), atol=1e-12)
     assert [finding.part for finding in found.findings] == ["link 'plate'"]
     good = inertia_tensor(random_inertia(rng, 0.1))
     sound = one_joint(LIMIT, inertia=with_inertia(3.0, good))
     assert not sound.findings
-    np.testing.assert_array_equal(sound.bodies[-1].inertia, good)
+    np.testing.assert_array_equal(sound.tree.links[-1].inertia, good)
 
 
 def test_a_point_may_be_fixed_to_a_solid_body_only() -> None:
@@ -258,13 +260,13 @@ def test_a_point_may_be_fixed_to_a_solid_body_only() -> None:
     point = with_inertia(3.0, np.zeros((3, 3)))
     found = one_joint(LIMIT, inertia=point)
     assert not found.findings
-    assert not found.bodies[-1].inertia.any()
+    assert not found.tree.links[-1].inertia.any()
     moving = one_joint(LIMIT, inertia=point).text.replace('type="fixed"', 'type="continuous"')
     repaired = parse_urdf(moving, FILE, repair=True)
     assert [finding.part for finding in repaired.findings] == ["link 'plate'"]
     radius = (3.0 * 3.0 / (4.0 * np.pi * 1000.0)) ** (1.0 / 3.0)
     np.testing.assert_allclose(
-        repaired.bodies[-1].inertia, 0.4 * 3.0 * radius**2 * np.eye(3), rtol=1e-12
+        repaired.tree.links[-1].inertia, 0.4 * 3.0 * radius**2 * np.eye(3), rtol=1e-12
     )
 
 
@@ -276,7 +278,7 @@ def test_random_trees(tmp_path_factory: pytest.TempPathFactory, seed: int, count
     text = random_urdf(rng, count)
     path = tmp_path_factory.getbasetemp() / "tree.urdf"
     path.write_text(text)
-    heavy = [body.name for body in read_urdf(path).bodies if body.mass]
+    heavy = [part.name for part in parts(read_urdf(path)) if part.mass]
     for base in ("link0", str(rng.choice(heavy))):
         robot = Robot.from_urdf(path, base=base)
         model = pin.buildModelFromXML(text, pin.JointModelFreeFlyer())
@@ -376,7 +378,7 @@ def test_a_robot_or_one_line(path: Path, text: str | bytes, base: str | None) ->
         try:
             with np.errstate(all="raise", under="ignore"):
                 found = read_urdf(path, base, repair)
-                robot = Robot.of_tree(found.name, found.bodies, where=str(path))
+                robot = Robot.of_tree(found.tree, where=str(path))
         except InputError as error:
             said = str(error)
             assert said.isprintable()

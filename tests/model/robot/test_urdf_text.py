@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -16,25 +17,24 @@ from hypothesis import strategies as st
 from oracles import TreeOracle, assert_close, assert_same_dynamics, quaternion_of
 from paths import DATA
 from scipy.spatial.transform import Rotation
-from strategies import SEEDS, TREES, random_bodies
+from strategies import SEEDS, TREES, random_tree
 
 from space_robot_model.robot import Robot
 from space_robot_model.robot.dynamics import bias_force, mass_matrix
 from space_robot_model.robot.find import find_robot, robot_names
-from space_robot_model.robot.frame_names import frame_names
+from space_robot_model.robot.parts import Base, Body, JointLimits, RobotTree, Tool, Visual
+from space_robot_model.robot.placements import frame_names, joint_transforms, tool_transforms
 from space_robot_model.robot.shapes import shapes_of
-from space_robot_model.robot.transforms import joint_transforms, tool_transforms
-from space_robot_model.robot.tree import Body, Joint, JointLimits, Tool, Visual
 from space_robot_model.robot.urdf_text import urdf_text
 from space_robot_msgs_py.topics import INERTIAL_FRAME
 
 ROBOTS = [*robot_names(), str(DATA / "arm.urdf")]
 
 
-def random_tree(seed: int, kinds: list[str]) -> Robot:
+def limited_tree(seed: int, kinds: list[str]) -> Robot:
     """Any tree; limits of its joints are there in part."""
     rng = np.random.default_rng(seed)
-    robot = Robot.of_tree("tree", random_bodies(rng, kinds))
+    robot = Robot.of_tree(random_tree(rng, kinds))
     limits = [_random_limits(rng) for _ in range(robot.n)]
     return replace(robot, limits=tuple(limits))
 
@@ -130,7 +130,7 @@ def assert_mujoco_moves_joints_alike(robot: Robot, model: mujoco.MjModel) -> Non
 @given(seed=SEEDS, kinds=TREES)
 def test_random_trees(seed: int, kinds: list[str]) -> None:
     """Branches, prismatic and passive joints, tools on all bodies, limits in part."""
-    robot = random_tree(seed, kinds)
+    robot = limited_tree(seed, kinds)
     assert_same_robot(read_back(robot), robot)
     oracle = TreeOracle(
         pinocchio_model(urdf_text(robot)), frame_names(robot).bodies[0], robot.all_joint_names, seed
@@ -179,13 +179,19 @@ def test_shapes(name: str, tmp_path: Path) -> None:
         np.testing.assert_allclose(shape.rotation, given_shape.rotation, atol=1e-14)
 
 
-def robot_of(base: str, link: str, tool: str, **more: Any) -> Robot:
-    """A base and a link on a joint called as it is."""
-    tools = (Tool(tool, np.eye(3), np.ones(3)), Tool(tool, np.eye(3), np.zeros(3)))
-    link_body = Body(
-        link, 2.0, np.eye(3), np.zeros(3), base, Joint(link, "revolute"), tools, **more
+def link_of(name: str, parent: str, joint: str) -> Body:
+    return Body(
+        name=name, parent=parent, joint_name=joint, mass=2.0, inertia=np.eye(3), com=np.zeros(3)
     )
-    return Robot.of_tree("two", [Body(base, 9.0, np.eye(3), np.zeros(3)), link_body])
+
+
+def robot_of(base: str, link: str, tool: str, visuals: Sequence[Visual] = ()) -> Robot:
+    """A base and a link on a joint called as it is."""
+    tools = [Tool(tool, position=np.ones(3), link=link), Tool(tool, link=link)]
+    hull, own = Base(9.0, np.eye(3), name=base), [replace(visual, link=link) for visual in visuals]
+    return Robot.of_tree(
+        RobotTree("two", hull, [link_of(link, base, link)], tools=tools, visuals=own)
+    )
 
 
 NAMES = st.sampled_from(
@@ -217,16 +223,12 @@ def test_every_name_of_a_urdf_is_there_once(
     bodies: list[str], joints: list[str], tools: list[str]
 ) -> None:
     """Among links, among joints, and among both; tf knows the same links; others can read it."""
-    numbers = (2.0, np.eye(3), np.zeros(3))
-    base, *moved = (
-        Body(name, *numbers, tools=(Tool(tool, np.eye(3), np.ones(3)),))
-        for name, tool in zip(bodies, tools, strict=True)
-    )
-    carried = [
-        replace(body, parent=parent, joint=Joint(joint, "revolute"))
-        for body, joint, parent in zip(moved, joints, bodies, strict=False)
+    base, *names = bodies
+    links = [link_of(*own) for own in zip(names, bodies, joints, strict=False)]
+    frames = [
+        Tool(tool, position=np.ones(3), link=name) for tool, name in zip(tools, bodies, strict=True)
     ]
-    robot = Robot.of_tree("three", [base, *carried])
+    robot = Robot.of_tree(RobotTree("three", Base(2.0, np.eye(3), name=base), links, tools=frames))
     text, names = urdf_text(robot), frame_names(robot)
     root = ElementTree.fromstring(text)
     links, fixed = ([e.attrib["name"] for e in root.iter(tag)] for tag in ("link", "joint"))
@@ -252,10 +254,8 @@ def test_every_name_of_a_urdf_is_there_once(
 def test_frames_are_named_as_ros_does(
     body: str, joint: str, link: str, base: str, root: str
 ) -> None:
-    numbers = (2.0, np.eye(3), np.zeros(3))
-    moved = Body(body, *numbers, base, Joint(joint, "revolute"))
-    tools = (Tool(body, np.eye(3), np.ones(3)),)
-    robot = Robot.of_tree("two", [Body(base, *numbers), replace(moved, tools=tools)])
+    hull, tool = Base(2.0, np.eye(3), name=base), Tool(body, position=np.ones(3), link=body)
+    robot = Robot.of_tree(RobotTree("two", hull, [link_of(body, base, joint)], tools=[tool]))
     names = frame_names(robot)
     assert names.bodies == (root, link)
     assert names.tools == (f"{body}_tool",)

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from paths import DATA
 from pydantic import ValidationError
-from strategies import KINDS, random_bodies, random_robot
+from strategies import KINDS, random_robot, random_tree
 
 from space_robot_model.dynamics.model import MOST_JOINTS
 from space_robot_model.robot import Robot
@@ -120,8 +120,8 @@ def test_a_robots_own_friction_comes_before_the_settings() -> None:
 @given(st.integers(0, 2**32 - 1), st.lists(st.sampled_from(KINDS), min_size=2, max_size=8))
 def test_a_stuck_joint_is_the_one_named(seed: int, kinds: list[str]) -> None:
     """Of a tree, in which passive joints and other branches come before it; and it comes free."""
-    bodies = random_bodies(np.random.default_rng(seed), ["revolute", *kinds])
-    robot = Robot.of_tree("tree", bodies)
+    tree = random_tree(np.random.default_rng(seed), ["revolute", *kinds])
+    robot = Robot.of_tree(tree)
     names = RobotNames(robot.joint_names, passive=robot.passive_names)
     environment = Environment.build(EnvironmentSettings(), Installation(robot.n, robot=robot))
     friction = environment.friction

@@ -28,7 +28,7 @@ from strategies import (
 )
 
 from space_robot_model.robot import Robot
-from space_robot_model.robot.tree import Tool
+from space_robot_model.robot.parts import Tool
 from space_robot_msgs_py.errors import InputError
 from space_robot_sim.environment.captures import Captures
 from space_robot_sim.environment.events import Capture, Release, named_targets, parse_events

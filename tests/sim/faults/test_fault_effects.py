@@ -15,12 +15,17 @@ from scipy.stats import chisquare
 from strategies import SEEDS, random_quaternion
 
 from space_robot_msgs_py.errors import InputError
-from space_robot_msgs_py.samples import PASSIVE_FIELDS, Command, RobotNames, RobotState
+from space_robot_msgs_py.samples import (
+    PASSIVE_FIELDS,
+    SENSED_FIELDS,
+    Command,
+    RobotNames,
+    RobotState,
+)
 from space_robot_msgs_py.topics import BASE_AXES
 from space_robot_sim.component import TemporaryChange
 from space_robot_sim.faults.grammar import About, axes_of, parse_fault, parse_faults
 from space_robot_sim.faults.messages import (
-    MEASURED,
     STAMP_BACK_TICKS,
     STAMP_JUMP_TICKS,
     DelayedMessage,
@@ -175,7 +180,7 @@ def test_one_measured_number_is_not_finite(
         seen.update(places.tolist())
         assert places.size <= 1
     allowed = RobotState.allocate(N)
-    for name in MEASURED:
+    for name in SENSED_FIELDS:
         getattr(allowed, name)[:] = 1.0
     for name in PASSIVE_FIELDS:
         getattr(allowed, name)[:passive] = 1.0

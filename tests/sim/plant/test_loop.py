@@ -18,15 +18,15 @@ from space_robot_model.robot import Robot
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.errors import FlightError
 from space_robot_msgs_py.samples import Command
-from space_robot_msgs_py.wire.clock import ClockCodec
 from space_robot_msgs_py.wire.codecs import CommandCodec, StateCodec
+from space_robot_msgs_py.wire.telemetry import ClockCodec
 from space_robot_sim.plant.pacing import REMARK_S, SLIP_S, WallClock
 from space_robot_sim.plant.plant import Plant
 from space_robot_sim.plant.settings import PlantNodeSettings
 
 pytest.importorskip("rclpy")
 
-from space_robot_msgs_py.ros.health import Level
+from space_robot_msgs_py.ros.loop import Level
 from space_robot_sim.plant import base_output, loop, pacing, scene_output, truth_output
 from space_robot_sim.plant.loop import ASK_AGAIN_S, PlantLoop
 

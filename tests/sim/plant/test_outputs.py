@@ -16,8 +16,8 @@ from space_robot_model.robot import Robot
 from space_robot_model.robot.urdf_text import urdf_text
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.samples import Command, RobotState, Timebase
-from space_robot_msgs_py.wire.carrier import unwrap
 from space_robot_msgs_py.wire.definitions import decode
+from space_robot_msgs_py.wire.viewers import unwrap
 from space_robot_sim.plant.pacing import REPEAT_EVERY_S, REPEAT_FOR_S, LateListeners
 from space_robot_sim.plant.plant import Plant
 from space_robot_sim.plant.settings import PlantNodeSettings

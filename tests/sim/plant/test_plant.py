@@ -15,7 +15,7 @@ from oracles.momenta import kinetic_energy, momentum, state_of
 from oracles.rotors import RotorEquations, random_motor_rotors, random_rotors, settings_of
 from pydantic import ValidationError
 from robots import ANGLES_DEG, LOCKED, NO_FRICTION, PERIOD, rigid_robot
-from strategies import random_bodies, random_gears, random_quaternion, random_robot, with_gears
+from strategies import random_gears, random_quaternion, random_robot, random_tree, with_gears
 
 from space_robot_model.robot import Robot
 from space_robot_model.robot.gears import geared_joints
@@ -168,7 +168,7 @@ TORQUE = np.array([60.0, -40.0, 50.0, 4.0, 9.0, -6.0])
 
 def tree(rng: np.random.Generator) -> Robot:
     """Turning, sliding and passive joints, some with gears."""
-    robot = random_gears(rng, Robot.of_tree("tree", random_bodies(rng, KINDS)))
+    robot = random_gears(rng, Robot.of_tree(random_tree(rng, KINDS)))
     return with_gears(robot, [gear and gear._replace(ratio=10.0) for gear in robot.gears])
 
 

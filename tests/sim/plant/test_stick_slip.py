@@ -20,7 +20,7 @@ from strategies import State, random_quaternion, random_robot, rotor_room, with_
 
 from space_robot_model.dynamics.model import Data
 from space_robot_model.robot import Robot
-from space_robot_model.robot.tree import Gear
+from space_robot_model.robot.parts import Gear
 from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.samples import Command
 from space_robot_sim.environment.disturbance import DisturbanceSettings

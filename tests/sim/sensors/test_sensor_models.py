@@ -17,7 +17,7 @@ from strategies import SEEDS, random_robot, rotor_room, with_gears
 
 from space_robot_model.hardware.sensors import EncoderSettings
 from space_robot_model.robot import Robot
-from space_robot_model.robot.tree import Encoder, Gear
+from space_robot_model.robot.parts import Encoder, Gear
 from space_robot_msgs_py.samples import ACTUATOR_FIELDS, ALL_FIELDS, PASSIVE_FIELDS, RobotState
 from space_robot_sim.component import Installation
 from space_robot_sim.faults.schedule import BLOCK_TICKS

@@ -15,14 +15,14 @@ from space_robot.flight.graph.listeners import wait_for
 from space_robot.processes.node_modules import MODULES
 from space_robot_model.robot import Robot
 from space_robot_model.robot.markers import RobotMarkers
-from space_robot_model.robot.poses import RobotPoses
+from space_robot_model.robot.placements import RobotPoses
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.bag.folder import open_bag
 from space_robot_msgs_py.bag.reader import read_flight
-from space_robot_msgs_py.ros.process_environment import set_defaults
+from space_robot_msgs_py.ros.process import set_defaults
 from space_robot_msgs_py.samples import Timebase
-from space_robot_msgs_py.wire.clock import ClockCodec
-from space_robot_msgs_py.wire.markers import no_markers
+from space_robot_msgs_py.wire.telemetry import ClockCodec
+from space_robot_msgs_py.wire.viewers import no_markers
 from space_robot_sim.plant.pacing import PAUSED
 
 set_defaults()

@@ -1,0 +1,178 @@
+"""Reading of a robot from a URDF file."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from space_robot_msgs_py.config.installation import install_command
+from space_robot_msgs_py.config.validation import one_of, short
+from space_robot_msgs_py.config.yaml_text import check_readable, read_file
+from space_robot_msgs_py.errors import InputError
+
+from ..dynamics.model import MOST_JOINTS
+from .names import first_repeated, other_meaning
+from .parts import MOST_LINKS, RobotTree
+from .urdf_joints import read_joints
+from .urdf_links import read_colours, read_links
+from .urdf_tree import (
+    Tree,
+    build_tree,
+    check_kinds,
+    end_frames,
+    make_tree,
+    mend_inertias,
+    mend_massless,
+    moved_frames,
+)
+from .urdf_xml import Element, Fields, Finding, Report, UrdfFrame, parse_xml, short_tag
+
+XACRO = ".xacro"
+MOST_MOVING = 4 * MOST_JOINTS
+"""Maximum number of joints that are not fixed; massless ones are locked later."""
+
+
+@dataclass(frozen=True)
+class UrdfRobot:
+    """Content of a URDF."""
+
+    tree: RobotTree
+    """One link for each of the file, in the order of their joints."""
+    findings: tuple[Finding, ...]
+    """Repaired defects."""
+    text: str
+    """Text of the URDF, expanded if it was xacro."""
+    frames: Mapping[str, UrdfFrame]
+    """Frames of bodies relative to their links', where they differ."""
+
+
+def read_urdf(
+    path: str | Path,
+    base: str | None = None,
+    repair: bool = False,
+    tools: Sequence[str] | None = None,
+) -> UrdfRobot:
+    """Read a URDF file, or a xacro file if that package is installed.
+
+    Args:
+        path: of the file; a ``.xacro`` file is expanded first, and line numbers are those of the
+            expanded text.
+        base: the link that is the satellite; the root if None.
+        repair: repair defects where possible, and list them in ``findings``.
+        tools: links whose frames are end effectors, the first one *the* tool; None: the frames at
+            the ends of the branches, those with the most joints to the base first.
+
+    Raises:
+        InputError: the file is not a URDF, or has a defect; names link or joint, line, value and
+            the possible repair.
+    """
+    path = Path(path)
+    text = expand_xacro(path) if path.suffix == XACRO else read_file(path)
+    return parse_urdf(text, path, base, repair, tools)
+
+
+def parse_urdf(
+    text: str,
+    path: Path,
+    base: str | None = None,
+    repair: bool = False,
+    tools: Sequence[str] | None = None,
+) -> UrdfRobot:
+    """Read the text of a URDF as `read_urdf`; ``path`` is its name, for errors and meshes."""
+    report = Report(str(path))
+    root = parse_xml(text, report.where)
+    name = _robot_name(root, path, report)
+    _check_counts(root, report)
+    links = read_links(root, read_colours(root, report), path.absolute().parent, report)
+    joints = read_joints(root, links, report)
+    tree = build_tree(links, joints, base, report.where)
+    mend_massless(links, tree)
+    check_kinds(tree)
+    mend_inertias(links, tree)
+    _check_moving(tree, report)
+    for tool in tools or ():
+        one_of(tool, links, "link", f" for a tool of {report.where}")
+    if (repeated := first_repeated(tools or ())) is not None:
+        raise InputError(f"{report.where}: tools: link {short(repeated)} occurs twice")
+    if not repair:
+        report.refuse_defects()
+    frames = end_frames(links, tree) if tools is None else tools
+    whole = make_tree(name, links, tree, frames)
+    return UrdfRobot(whole, tuple(report.sorted()), text, moved_frames(tree))
+
+
+def _robot_name(root: Element, path: Path, report: Report) -> str:
+    """Return the robot's name, after checking the root element."""
+    if root.tag != "robot":
+        raise Fields(report, f"<{short_tag(root.tag)}>").error(root, "the root must be <robot>")
+    for element in _all_elements(root):
+        if element.tag.startswith("xacro:"):
+            advice = f"xacro must be expanded first: rename the file to end in {XACRO}"
+            raise Fields(report, f"<{short_tag(element.tag)}>").error(element, advice)
+    name = root.attributes.get("name", "").strip()
+    if name and name.isprintable():
+        return name
+    repair = f"named {short(path.stem)}"
+    Fields(report, "robot").repaired(root, "a printable name is required", name, repair)
+    return path.stem
+
+
+def _check_counts(root: Element, report: Report) -> None:
+    """Check the number of links and joints before they are read.
+
+    Some joints may be locked later, so more than can be flown are allowed.
+    """
+    links = len(list(root.all("link")))
+    if links > MOST_LINKS:
+        raise InputError(f"{report.where}: at most {MOST_LINKS} links can be read, got {links}")
+    moving = sum(joint.attributes.get("type") != "fixed" for joint in root.all("joint"))
+    if moving > MOST_MOVING:
+        raise InputError(
+            f"{report.where}: at most {MOST_JOINTS} moving joints can be flown, got {moving}"
+        )
+
+
+def _all_elements(root: Element) -> list[Element]:
+    elements = [root]
+    for element in elements:
+        elements += element.children
+    return elements
+
+
+def _check_moving(tree: Tree, report: Report) -> None:
+    """Check that there are moving joints, with allowed names."""
+    moving = [edge.joint for edge in tree.edges.values() if edge.moves]
+    if not moving:
+        raise InputError(f"{report.where}: no moving joint: a robot needs at least one")
+    names = [joint.name for joint in moving]
+    for joint in moving:
+        if meaning := other_meaning(joint.name, names):
+            raise joint.fields.error(joint.line, f"it needs another name: this is {meaning}")
+
+
+def expand_xacro(path: Path) -> str:
+    """Return the URDF text of a xacro file, with default arguments.
+
+    Raises:
+        InputError: the package is not installed, or cannot expand the file.
+    """
+    check_readable(path)
+    try:
+        import xacro
+    except ImportError:
+        raise InputError(
+            f"{path}: xacro is not installed: `{install_command('xacro')}` or `apt install "
+            "ros-jazzy-xacro`, or expand the file elsewhere to a .urdf"
+        ) from None
+    said = io.StringIO()  # warnings, and the position of an error
+    try:
+        with contextlib.redirect_stderr(said):
+            document = xacro.process_file(str(path))
+        return str(document.toprettyxml(indent="  "))
+    except (Exception, SystemExit) as error:  # expressions in a file may raise anything
+        words, more = (" ".join(text.split()) for text in (str(error), said.getvalue()))
+        words += "" if more in words else f" {more}"
+        raise InputError(f"{path}: xacro cannot expand it ({words[:300]})") from None
