@@ -17,8 +17,7 @@ from space_robot_msgs_py.bag.blocks import Metric
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.samples import SOURCES
 from space_robot_sim.environment.captures import Captures
-from space_robot_sim.environment.disturbance import DisturbanceSettings
-from space_robot_sim.environment.loads import LoadSchedule
+from space_robot_sim.environment.disturbance import DisturbanceSettings, LoadSchedule
 
 from .base_demand import axes_of
 

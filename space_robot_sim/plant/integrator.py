@@ -16,11 +16,10 @@ from space_robot_msgs_py.compiled.lanes import uniform, whole
 from space_robot_msgs_py.compiled.records import Record, nested, shaped
 from space_robot_msgs_py.samples import MOST_WHEELS
 
-from ..environment.disturbance import disturbance_torque
+from ..environment.disturbance import add_loads, disturbance_torque
 from ..environment.environment import Environment
 from ..environment.friction import friction_torque
 from ..environment.gravity_gradient import add_gravity_gradient
-from ..environment.loads import add_loads
 from ..environment.surfaces import add_surface_wrenches
 
 Array = NDArray[np.float64]

@@ -27,8 +27,8 @@ from space_robot_msgs_py.samples import Command
 from space_robot_msgs_py.wire.codecs import CommandCodec, StateCodec
 from space_robot_msgs_py.wire.telemetry import ClockCodec
 
-from .base_output import BaseOutput
 from .messages import NONE, CommandGuard, SentState, exchange_of
+from .outputs import BaseOutput, SceneOutput, TruthOutput
 from .pacing import (
     PAUSED,
     SPIN_BEFORE_DEADLINE_S,
@@ -39,9 +39,7 @@ from .pacing import (
 )
 from .plant import Plant
 from .report import ActuatorHealth, plant_description
-from .scene_output import SceneOutput
 from .settings import PlantNodeSettings
-from .truth_output import TruthOutput
 
 TIMEOUT_S = 0.02
 ASK_AGAIN_S = 0.2

@@ -17,7 +17,7 @@ from space_robot_msgs_py.samples import Command, RobotNames, RobotState
 from space_robot_msgs_py.wire.codecs import StateCodec
 
 from ..faults.messages import MessageFaults, awaited_stamp
-from .faults import FaultSettings
+from .settings import FaultSettings
 
 
 class CommandGuard:

@@ -16,7 +16,6 @@ from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.samples import STATE_FIELDS, Command, RobotNames, RobotState, Timebase
 from space_robot_msgs_py.wire.codecs import StateCodec
 from space_robot_sim.faults.messages import MessageFaults
-from space_robot_sim.plant.faults import FaultSettings
 from space_robot_sim.plant.messages import (
     NONE,
     CommandGuard,
@@ -25,9 +24,9 @@ from space_robot_sim.plant.messages import (
     SentState,
     exchange_of,
 )
-from space_robot_sim.plant.plant import Plant, PlantSettings
+from space_robot_sim.plant.plant import Plant
 from space_robot_sim.plant.report import ActuatorHealth
-from space_robot_sim.plant.settings import PlantNodeSettings
+from space_robot_sim.plant.settings import FaultSettings, PlantNodeSettings, PlantSettings
 
 PERIOD = 5e-4
 TORQUE = np.array([5.0, -4.0, 3.0, 20.0, -30.0, 15.0, 4.0, -3.0, 2.0])
