@@ -83,10 +83,15 @@ class DisturbanceTable(NamedTuple):
                 raise InputError(f"{where}: {TIME} must rise, got {after:g} s after {before:g} s")
         return cls(checked)
 
-    @classmethod
-    def parse(cls, text: str) -> DisturbanceTable:
+    @staticmethod
+    @lru_cache(maxsize=16)
+    def parse(text: str) -> DisturbanceTable:
         """Parse the text of a table."""
-        return _parsed(text)
+        try:
+            columns = parse_json(text)
+        except ValueError as error:
+            raise InputError(f"disturbance: not a table as JSON ({error})") from None
+        return DisturbanceTable.of(columns, "disturbance")
 
     @property
     def text(self) -> str:
@@ -145,15 +150,6 @@ def check_table_text(text: str) -> str:
     if text.startswith(JSON):
         DisturbanceTable.parse(text)
     return text
-
-
-@lru_cache(maxsize=16)
-def _parsed(text: str) -> DisturbanceTable:
-    try:
-        columns = parse_json(text)
-    except ValueError as error:
-        raise InputError(f"disturbance: not a table as JSON ({error})") from None
-    return DisturbanceTable.of(columns, "disturbance")
 
 
 def _numbers(name: str, values: Any, where: str) -> list[float]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING, Any
 
 from space_robot_msgs_py.errors import FlightError, InputError
 
@@ -133,19 +133,11 @@ REPEAT_FOR_S = 2.0
 """Who takes messages as best effort may miss the first ones."""
 
 
-class Output(Protocol):
-    """A publisher, as far as it is needed here."""
-
-    @property
-    def listener_count(self) -> int:
-        """Number of subscriptions that are connected."""
-
-
 class LateListeners:
     """Decision when a paused plant repeats its last messages. Independent of ROS."""
 
-    def __init__(self, outputs: Sequence[Output]) -> None:
-        """``outputs``: their new listeners are those meant."""
+    def __init__(self, outputs: Sequence[Any]) -> None:
+        """``outputs``: publishers, whose new listeners are those meant."""
         self._outputs = outputs
         self._counts: list[int] | None = None
         self._until = self._next = 0.0
