@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from . import topics
 from .compiled.records import Block, Record
 from .errors import MessageError
-from .signals import Each, Origin, signal, signals_of
+from .signals import Each, Reporter, signal, signals_of
 
 Array = NDArray[np.float64]
 
@@ -146,50 +146,52 @@ class MeasuredSignals:
     """Signals of base and joints. Logs may have them twice: true and as measured."""
 
     base_position: Array = (
-        signal(Origin.SENSORS, 3, "m", INERTIAL, "position of the base's centre of mass")
+        signal(Reporter.SENSORS, 3, "m", INERTIAL, "position of the base's centre of mass")
         .sent(topics.BASE_STATE, "transforms[0].translation")
         .sent(topics.TRUTH_BASE, "transforms[0].translation")
     )
     quaternion: Array = (
-        signal(Origin.SENSORS, 4, "", "from base to inertial axes", "base attitude [w, x, y, z]")
+        signal(Reporter.SENSORS, 4, "", "from base to inertial axes", "base attitude [w, x, y, z]")
         .sent(topics.BASE_STATE, "transforms[0].rotation")
         .sent(topics.TRUTH_BASE, "transforms[0].rotation")
         .sent(topics.TRUTH_JOINTS, "positions", first=1)
     )
     base_velocity: Array = (
-        signal(Origin.SENSORS, 3, "m/s", INERTIAL, "velocity of the base's centre of mass")
+        signal(Reporter.SENSORS, 3, "m/s", INERTIAL, "velocity of the base's centre of mass")
         .sent(topics.BASE_STATE, "twist[0].linear")
         .sent(topics.TRUTH_BASE, "velocities[0].linear")
     )
     omega_base: Array = (
-        signal(Origin.SENSORS, 3, "rad/s", BASE, "angular velocity of the base")
+        signal(Reporter.SENSORS, 3, "rad/s", BASE, "angular velocity of the base")
         .sent(topics.BASE_STATE, "twist[0].angular")
         .sent(topics.TRUTH_BASE, "velocities[0].angular")
         .sent(topics.TRUTH_JOINTS, "velocities")
     )
     joint_positions: Array = (
-        signal(Origin.SENSORS, JOINTS, "rad", "", "positions of the joints with motors")
+        signal(Reporter.SENSORS, JOINTS, "rad", "", "positions of the joints with motors")
         .sent(topics.JOINT_STATES, "position")
         .sent(topics.TRUTH_JOINTS, "positions")
     )
     joint_velocities: Array = (
-        signal(Origin.SENSORS, JOINTS, "rad/s", "", "velocities of the joints with motors")
+        signal(Reporter.SENSORS, JOINTS, "rad/s", "", "velocities of the joints with motors")
         .sent(topics.JOINT_STATES, "velocity")
         .sent(topics.TRUTH_JOINTS, "velocities")
     )
     applied_torque: Array = (
-        signal(Origin.ECHO, AXES, "N m", BASE, "torque applied over the last tick, base and joints")
+        signal(
+            Reporter.ECHO, AXES, "N m", BASE, "torque applied over the last tick, base and joints"
+        )
         .sent(topics.JOINT_STATES, "effort", first=3)
         .sent(topics.BASE_STATE, "wrench[0].torque", length=3)
         .sent(topics.TRUTH_JOINTS, "effort")
     )
     passive_positions: Array = (
-        signal(Origin.PASSIVE, PASSIVE, "rad", "", "positions of the joints without motors")
+        signal(Reporter.PASSIVE, PASSIVE, "rad", "", "positions of the joints without motors")
         .sent(topics.JOINT_STATES, "position")
         .sent(topics.TRUTH_JOINTS, "positions")
     )
     passive_velocities: Array = (
-        signal(Origin.PASSIVE, PASSIVE, "rad/s", "", "velocities of the joints without motors")
+        signal(Reporter.PASSIVE, PASSIVE, "rad/s", "", "velocities of the joints without motors")
         .sent(topics.JOINT_STATES, "velocity")
         .sent(topics.TRUTH_JOINTS, "velocities")
     )
@@ -203,39 +205,39 @@ class StateSignals(MeasuredSignals):
     """
 
     wheel_velocities: Array = signal(
-        Origin.ACTUATORS, WHEELS, "rad/s", "", "speeds of the wheels relative to the base"
+        Reporter.ACTUATORS, WHEELS, "rad/s", "", "speeds of the wheels relative to the base"
     ).sent(topics.WHEELS_STATE, "velocity")
     wheel_torques: Array = signal(
-        Origin.ACTUATORS, WHEELS, "N m", "", "torques of the wheels' motors over the last tick"
+        Reporter.ACTUATORS, WHEELS, "N m", "", "torques of the wheels' motors over the last tick"
     ).sent(topics.WHEELS_STATE, "effort")
     thrusts: Array = signal(
-        Origin.ACTUATORS, THRUSTERS, "N", "", "mean forces of the thrusters over the last tick"
+        Reporter.ACTUATORS, THRUSTERS, "N", "", "mean forces of the thrusters over the last tick"
     ).sent(topics.THRUSTERS_STATE, "effort")
     motor_positions: Array = signal(
-        Origin.ACTUATORS, GEARED, "rad", "", "positions of motors, seen through their gears"
+        Reporter.ACTUATORS, GEARED, "rad", "", "positions of motors, seen through their gears"
     ).sent(topics.MOTORS_STATE, "position")
     motor_velocities: Array = signal(
-        Origin.ACTUATORS, GEARED, "rad/s", "", "velocities of motors, seen through their gears"
+        Reporter.ACTUATORS, GEARED, "rad/s", "", "velocities of motors, seen through their gears"
     ).sent(topics.MOTORS_STATE, "velocity")
     orbit_position: Array = (
-        signal(Origin.ORBIT, 3, "m", INERTIAL, "position of the origin from the Earth's centre")
+        signal(Reporter.ORBIT, 3, "m", INERTIAL, "position of the origin from the Earth's centre")
         .named("position")
         .sent(topics.TRUTH_ORBIT, "positions")
     )
     orbit_velocity: Array = (
-        signal(Origin.ORBIT, 3, "m/s", INERTIAL, "velocity of the origin from the Earth's centre")
+        signal(Reporter.ORBIT, 3, "m/s", INERTIAL, "velocity of the origin from the Earth's centre")
         .named("velocity")
         .sent(topics.TRUTH_ORBIT, "positions")
     )
     magnetic_field: Array = (
-        signal(Origin.ORBIT, 3, "T", BASE, "magnetic field of the Earth")
+        signal(Reporter.ORBIT, 3, "T", BASE, "magnetic field of the Earth")
         .named("magnetic_field")
         .sent(topics.TRUTH_ORBIT, "positions")
         .sent(topics.MAGNETOMETER, "magnetic_field")
     )
     # The torque of gravity is computed every 20 ticks.
     external_torques: Array = (
-        signal(Origin.ORBIT, 12, "N m", INERTIAL, "torques by source about the centre of mass")
+        signal(Reporter.ORBIT, 12, "N m", INERTIAL, "torques by source about the centre of mass")
         .named(*(f"{source}_torque" for source in SOURCES))
         .sent(topics.TRUTH_ORBIT, "positions")
     )
@@ -249,34 +251,34 @@ class CommandSignals:
     """The signals of a `Command`."""
 
     commanded_torque: Array = signal(
-        Origin.OTHERS, AXES, "N m", BASE, "torque to apply from this tick on, base and joints"
+        Reporter.OTHERS, AXES, "N m", BASE, "torque to apply from this tick on, base and joints"
     ).sent(topics.COMMAND, "effort")
     actuator_commands: Array = signal(
-        Origin.OTHERS, ACTUATORS, "", "", "wheel torques, N m, thrusts, N, then dipoles, A m2"
+        Reporter.OTHERS, ACTUATORS, "", "", "wheel torques, N m, thrusts, N, then dipoles, A m2"
     ).sent(topics.COMMAND, "effort")
 
 
 class TelemetrySignals:
     """What a control law tells of itself."""
 
-    s: Array = signal(Origin.OTHERS, AXES, "rad/s", "", "sliding variable").sent(
+    s: Array = signal(Reporter.OTHERS, AXES, "rad/s", "", "sliding variable").sent(
         topics.SIGNALS, "velocity"
     )
-    u: Array = signal(Origin.OTHERS, AXES, "rad/s2", "", "pseudo-acceleration")
-    n_hat: Array = signal(Origin.OTHERS, AXES, "N m", "", "time-delay estimate").sent(
+    u: Array = signal(Reporter.OTHERS, AXES, "rad/s2", "", "pseudo-acceleration")
+    n_hat: Array = signal(Reporter.OTHERS, AXES, "N m", "", "time-delay estimate").sent(
         topics.SIGNALS, "effort"
     )
-    e: Array = signal(Origin.OTHERS, AXES, "rad", "", "error").sent(topics.SIGNALS, "position")
+    e: Array = signal(Reporter.OTHERS, AXES, "rad", "", "error").sent(topics.SIGNALS, "position")
 
 
 SIGNALS = signals_of(State)
 ALL_FIELDS = tuple(SIGNALS)
 """Names of all signals of a state, in their order in memory."""
 SENSED_FIELDS, PASSIVE_FIELDS, ACTUATOR_FIELDS, ORBIT_FIELDS = (
-    tuple(name for name, declared in SIGNALS.items() if declared.origin is origin)
-    for origin in (Origin.SENSORS, Origin.PASSIVE, Origin.ACTUATORS, Origin.ORBIT)
+    tuple(name for name, declared in SIGNALS.items() if declared.reporter is reporter)
+    for reporter in (Reporter.SENSORS, Reporter.PASSIVE, Reporter.ACTUATORS, Reporter.ORBIT)
 )
-"""Names of those of some origins."""
+"""Names of the signals of some reporters."""
 STATE_FIELDS = (*SENSED_FIELDS, "applied_torque")
 """Names of those that a flight cannot be without."""
 
@@ -316,32 +318,32 @@ class Reference(Record):
     """The desired motion at a tick, laid out as the two parts of a `ReferenceChunk`'s row."""
 
     joint_positions: Array = (
-        signal(Origin.OTHERS, JOINTS, "rad", "", "desired positions of the joints with motors")
+        signal(Reporter.OTHERS, JOINTS, "rad", "", "desired positions of the joints with motors")
         .within("reference_joints")
         .sent(topics.REFERENCE_JOINTS, "positions")
     )
     joint_velocities: Array = (
-        signal(Origin.OTHERS, JOINTS, "rad/s", "", "desired velocities")
+        signal(Reporter.OTHERS, JOINTS, "rad/s", "", "desired velocities")
         .within("reference_joints")
         .sent(topics.REFERENCE_JOINTS, "velocities")
     )
     joint_accelerations: Array = (
-        signal(Origin.OTHERS, JOINTS, "rad/s2", "", "desired accelerations")
+        signal(Reporter.OTHERS, JOINTS, "rad/s2", "", "desired accelerations")
         .within("reference_joints")
         .sent(topics.REFERENCE_JOINTS, "accelerations")
     )
     quaternion: Array = (
-        signal(Origin.OTHERS, 4, "", "from base to inertial axes", "attitude [w, x, y, z]")
+        signal(Reporter.OTHERS, 4, "", "from base to inertial axes", "attitude [w, x, y, z]")
         .within("reference_base")
         .sent(topics.REFERENCE_BASE, "transforms[0].rotation")
     )
     omega_base: Array = (
-        signal(Origin.OTHERS, 3, "rad/s", BASE, "desired angular velocity of the base")
+        signal(Reporter.OTHERS, 3, "rad/s", BASE, "desired angular velocity of the base")
         .within("reference_base")
         .sent(topics.REFERENCE_BASE, "velocities[0].angular")
     )
     alpha_base: Array = (
-        signal(Origin.OTHERS, 3, "rad/s2", BASE, "desired angular acceleration of the base")
+        signal(Reporter.OTHERS, 3, "rad/s2", BASE, "desired angular acceleration of the base")
         .within("reference_base")
         .sent(topics.REFERENCE_BASE, "accelerations[0].angular")
     )

@@ -15,7 +15,7 @@ from .compiled.records import Field
 from .topics import Topic
 
 
-class Origin(Enum):
+class Reporter(Enum):
     """Who reports a signal, and which robots have it."""
 
     SENSORS = "of base and joints, measured by sensors, which may spoil it"
@@ -55,7 +55,7 @@ class Signal(Field):
     text: str = ""
     unit: str = ""
     frame: str = ""
-    origin: Origin = Origin.OTHERS
+    reporter: Reporter = Reporter.OTHERS
     fields: tuple[MessageField, ...] = ()
     labels: tuple[str, ...] = ()
     """Name of each number, in messages that name their numbers."""
@@ -80,14 +80,14 @@ class Signal(Field):
 
     def column_width(self, names: Any) -> int:
         """Return how many numbers a robot with these `RobotNames` has in a log."""
-        return 0 if self.origin is Origin.ORBIT and not names.in_orbit else self.width(names)
+        return 0 if self.reporter is Reporter.ORBIT and not names.in_orbit else self.width(names)
 
 
-def signal(origin: Origin, size: int | Each, unit: str, frame: str, text: str) -> Any:
+def signal(reporter: Reporter, size: int | Each, unit: str, frame: str, text: str) -> Any:
     """Declare a `Signal`.
 
     Args:
-        origin: who reports it.
+        reporter: who reports it.
         size: how many numbers it has.
         unit: of each; of joints that slide read m for rad, and N for N m.
         frame: whose axes it is on, or what it is relative to; empty: none.
@@ -95,7 +95,7 @@ def signal(origin: Origin, size: int | Each, unit: str, frame: str, text: str) -
     """
     room = size.room if isinstance(size, Each) else lambda n: size
     description = ", ".join(filter(None, (text, unit, frame)))
-    return Signal(lambda n: (room(n),), description, False, size, text, unit, frame, origin)
+    return Signal(lambda n: (room(n),), description, False, size, text, unit, frame, reporter)
 
 
 def signals_of(table: type) -> dict[str, Signal]:

@@ -24,7 +24,7 @@ from space_robot_msgs_py.bag import rows
 from space_robot_msgs_py.bag.folder import open_bag
 from space_robot_msgs_py.bag.recorder import BagRecorder
 from space_robot_msgs_py.samples import CommandSignals, RobotNames
-from space_robot_msgs_py.signals import Origin, signal
+from space_robot_msgs_py.signals import Reporter, signal
 from space_robot_msgs_py.wire.definitions import decode
 from space_robot_msgs_py.wire.messages import Codec, describe
 
@@ -72,7 +72,7 @@ def test_a_signal_is_one_line_and_its_topic_another(
 ) -> None:
     """It is laid out, recorded, counted, and missed, as all others are."""
     newest = topics.Topic("newest", "sensor_msgs/msg/Temperature", 100, per_tick=True)
-    declared = signal(Origin.OTHERS, 1, "K", "", "how warm it is").sent(newest, "temperature")
+    declared = signal(Reporter.OTHERS, 1, "K", "", "how warm it is").sent(newest, "temperature")
     monkeypatch.setattr(CommandSignals, "newest", declared, raising=False)
     monkeypatch.setattr(rows, "NOT_READ", (*rows.NOT_READ, newest))  # a log has no such column
     monkeypatch.setattr(topics, "ALL", (*topics.ALL, newest))

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from space_robot_control.controller.settings import ControllerNodeSettings
-from space_robot_control.laws.trust import check_file, is_plain
+from space_robot_control.laws.names import is_plain, require_shipped_file
 from space_robot_model.hardware.base_actuators import BaseActuatorSettings
 from space_robot_model.robot import Robot
 from space_robot_model.robot.find import find_robot
@@ -188,7 +188,7 @@ def events_of(log: FlightLog) -> list[Event]:
     texts = [str(text) for text in log.flight.get("events", ())]
     if not log.trusted:
         for name in named_targets(texts):
-            check_file("target", name)
+            require_shipped_file("target", name)
     return parse_events(texts)
 
 
@@ -297,9 +297,9 @@ def check_files(log: FlightLog, parameters: Mapping[str, Any]) -> None:
     """Check that nothing but what is shipped is read, unless the bag is trusted."""
     if not log.trusted:
         for what in ("robot", "case", "mission", "gains", "sensors", "actuators", "orbit"):
-            check_file(what, str(parameters.get(what, "")))
+            require_shipped_file(what, str(parameters.get(what, "")))
         if not (table := str(parameters.get("disturbance.table", ""))).startswith(JSON):
-            check_file("disturbance", table)
+            require_shipped_file("disturbance", table)
 
 
 def parameters_of(log: FlightLog, node: str) -> dict[str, Any]:

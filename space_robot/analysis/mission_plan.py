@@ -15,7 +15,6 @@ from space_robot_control.guidance.courses import Piece
 from space_robot_control.guidance.demand import MotionDemand
 from space_robot_control.guidance.mission import Mission
 from space_robot_control.guidance.tool_path import ToolFollower
-from space_robot_model.elementary.least_squares import singular_values
 from space_robot_model.elementary.matrices import norms
 from space_robot_model.hardware.base_actuators import BaseActuatorSettings
 from space_robot_model.robot import Robot
@@ -107,8 +106,7 @@ def _planned(of_piece: PieceDemand, follower: ToolFollower) -> PlannedSegment:
 def _smallest(jacobian: Array, lever: Array) -> float:
     scaled = jacobian.copy()
     scaled[:3] /= max(1e-6, math.sqrt(float(lever @ lever)))
-    values = singular_values(scaled) if jacobian.shape[1] >= 6 else singular_values(scaled.T)
-    return float(values[0])
+    return float(np.linalg.svd(scaled, compute_uv=False)[-1])
 
 
 def feasibility(

@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from space_robot_model.elementary.symmetric import diagonalise
+from space_robot_model.elementary.linear_algebra import diagonalise
 from space_robot_msgs_py.compiled.kernels import kernel, subroutine
 from space_robot_msgs_py.compiled.records import Record, shaped
 from space_robot_msgs_py.samples import MOST_WHEELS

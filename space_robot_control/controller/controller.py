@@ -21,7 +21,7 @@ from ..allocation.allocation import Allocation, allocation_code
 from ..allocation.diagnosis import Diagnosis, diagnose
 from ..allocation.settings import AllocationSettings
 from ..laws import ControlLaw, Signals
-from ..laws.checked import force_of
+from ..laws.base import force_of
 from ..navigation.low_pass import low_pass_weight
 from ..navigation.navigation import Navigation
 from ..navigation.settings import NavigationFilterSettings

@@ -10,7 +10,7 @@ from space_robot_msgs_py.compiled.kernels import RecordFunction, kernel
 from space_robot_msgs_py.compiled.lanes import uniform
 from space_robot_msgs_py.compiled.records import Block
 
-from ..laws.compiled import LawCode
+from ..laws.base import LawCode
 from .signal_kernels import USABLE, compute_signals
 from .tracking import torque_from_force
 

@@ -17,7 +17,7 @@ from space_robot_msgs_py.ros.parameters import overrides
 from space_robot_msgs_py.samples import Reference, RobotState
 
 from ..laws import ControlLaw
-from ..laws.signals import Array
+from ..laws.base import Array
 from .controller import Controller
 from .gains import NOMINAL, build_laws, check_gains, gain_lengths, gain_range, split_gains
 from .law_choice import LawChoice

@@ -14,8 +14,11 @@ from space_robot_model.dynamics.attitude import (
     rotate_back,
     rotation_matrix,
 )
-from space_robot_model.dynamics.free_floating import eliminate_rotation
-from space_robot_model.dynamics.rho_space import semi_floating_into, to_rho_space
+from space_robot_model.dynamics.rho_space import (
+    eliminate_rotation,
+    semi_floating_into,
+    to_rho_space,
+)
 from space_robot_msgs_py.compiled.kernels import kernel
 from space_robot_msgs_py.compiled.lanes import all_lanes, uniform, where, whole
 from space_robot_msgs_py.compiled.records import Block

@@ -16,7 +16,7 @@ from space_robot_msgs_py.compiled.records import Block, Record, nested, shaped
 from space_robot_msgs_py.samples import MOST_THRUSTERS, MOST_TORQUERS, MOST_WHEELS, Reference
 from space_robot_msgs_py.wire.stamp_guard import accept
 
-from ..laws.compiled import LawCode
+from ..laws.base import LawCode
 from .kernels import compute_command
 from .signal_kernels import (
     LARGEST,

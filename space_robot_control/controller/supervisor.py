@@ -22,8 +22,7 @@ from space_robot_msgs_py.samples import Command, RobotState
 
 from ..allocation.diagnosis import Diagnosis
 from ..laws import ControlLaw
-from ..laws.checked import force_of
-from ..laws.compiled import CompiledLaw, LawCode
+from ..laws.base import CompiledLaw, LawCode, force_of
 from .controller import Controller, unusable
 from .signal_kernels import SINGULAR, USABLE
 from .supervision import (

@@ -138,7 +138,7 @@ class BentLeg(NamedTuple):
 
     def at(self, time: Array) -> Array:
         """Return (T, 3, n) at times (T,), s."""
-        from space_robot_model.elementary.sine import sines_cosines  # slow to import
+        from space_robot_model.elementary.functions import sines_cosines  # slow to import
 
         u = np.clip((time - self.begin)[:, np.newaxis] / self.span, 0.0, 1.0)
         share, rate, acceleration = quintic(u)
@@ -226,7 +226,7 @@ def multiplied(first: Array, second: Array) -> Array:
 
 def turned_by(axis: Array, angles: Array) -> Array:
     """Return the quaternions (K, 4) of turns by angles (K,), rad, about a unit axis (3,)."""
-    from space_robot_model.elementary.sine import sines_cosines  # slow to import
+    from space_robot_model.elementary.functions import sines_cosines  # slow to import
 
     sines, cosines = sines_cosines(0.5 * angles)
     return np.column_stack((cosines, sines[:, np.newaxis] * axis))
@@ -234,7 +234,7 @@ def turned_by(axis: Array, angles: Array) -> Array:
 
 def turn_between(first: Array, second: Array) -> tuple[Array, float]:
     """Return axis (3,) in the first frame and angle (rad, 0 to pi) of the shortest turn."""
-    from space_robot_model.elementary.arctangent import arctan2  # slow to import
+    from space_robot_model.elementary.functions import arctan2  # slow to import
 
     turn = multiplied(first * np.array([1.0, -1.0, -1.0, -1.0]), second)
     turn = -turn if turn[0] < 0.0 else turn

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from space_robot_model.dynamics.free_base import FreeBase, free_attitude_into
+from space_robot_model.dynamics.inverse_kinematics import FreeBase, free_attitude_into
 from space_robot_model.elementary.matrices import product
 from space_robot_model.elementary.rotations import quaternion_of_rotation
-from space_robot_model.elementary.spline import CubicSpline
+from space_robot_model.elementary.splines import CubicSpline
 from space_robot_model.robot import Robot
 
 from .courses import Course, quintic, turn_between

@@ -13,8 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from space_robot_model.elementary.quintic_spline import QuinticSpline
-from space_robot_model.elementary.spline import CubicSpline
+from space_robot_model.elementary.splines import CubicSpline, QuinticSpline
 from space_robot_model.robot import Robot
 from space_robot_msgs_py.config.validation import one_of
 from space_robot_msgs_py.errors import InputError

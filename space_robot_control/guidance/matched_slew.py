@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from space_robot_model.elementary.matrices import dot_rows, norm, norms
-from space_robot_model.elementary.quintic_spline import QuinticSpline
+from space_robot_model.elementary.splines import QuinticSpline
 from space_robot_msgs_py.errors import InputError
 
 from .courses import Course

@@ -23,8 +23,7 @@ from space_robot_model.dynamics.algebra import (
     subtract,
     vector,
 )
-from space_robot_model.elementary.arctangent import angle_of
-from space_robot_model.elementary.sine import sin_cos
+from space_robot_model.elementary.functions import angle_of, sin_cos
 from space_robot_msgs_py.compiled.kernels import kernel, subroutine
 
 Array = NDArray[np.float64]

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from space_robot_model.elementary.matrices import norm
-from space_robot_model.elementary.spline import CubicSpline
+from space_robot_model.elementary.splines import CubicSpline
 from space_robot_model.orbit.ephemeris import Ephemeris
 from space_robot_model.robot import Robot
 from space_robot_msgs_py.config.columns import read_columns

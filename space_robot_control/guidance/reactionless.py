@@ -11,12 +11,12 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from space_robot_model.dynamics.free_base import halves
+from space_robot_model.dynamics.inverse_kinematics import half_steps
 from space_robot_model.dynamics.model import Model
 from space_robot_model.dynamics.tool_kinematics import ToolKinematics, tool_kinematics_into
-from space_robot_model.elementary.least_squares import least_squares_into
+from space_robot_model.elementary.linear_algebra import least_squares_into
 from space_robot_model.elementary.matrices import norms
-from space_robot_model.elementary.spline import CubicSpline
+from space_robot_model.elementary.splines import CubicSpline
 from space_robot_model.robot import Robot
 from space_robot_msgs_py.compiled.kernels import kernel
 
@@ -88,7 +88,7 @@ def integrate_into(
     out[0] = start
     for s in range(1, len(out)):
         for stage in range(4):
-            part = 0.5 * STEP * halves(stage)
+            part = 0.5 * STEP * half_steps(stage)
             for j in range(n):
                 posture[j] = out[s - 1, j]
                 if stage:

@@ -8,8 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from space_robot_model.elementary.matrices import dot_rows, norm
-from space_robot_model.elementary.quintic_spline import QuinticSpline
-from space_robot_model.elementary.spline import CubicSpline
+from space_robot_model.elementary.splines import CubicSpline, QuinticSpline
 
 from .courses import Slew, multiplied, turned_by
 

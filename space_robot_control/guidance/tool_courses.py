@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from space_robot_model.dynamics.attitude import rotation_matrix
 from space_robot_model.elementary.matrices import norm, norms, product, unit_rows
 from space_robot_model.elementary.rotations import quaternion_of_rotation
-from space_robot_model.elementary.spline import CubicSpline
+from space_robot_model.elementary.splines import CubicSpline
 from space_robot_model.robot import Robot
 from space_robot_msgs_py.errors import InputError
 
@@ -232,7 +232,7 @@ BACK = np.array([1.0, -1.0, -1.0, -1.0])
 
 def _turns(vectors: Array) -> Array:
     """Return the quaternions (K, 4) of rotation vectors (K, 3), rad."""
-    from space_robot_model.elementary.sine import sines_cosines  # slow to import
+    from space_robot_model.elementary.functions import sines_cosines  # slow to import
 
     angles = norms(vectors)
     sines, cosines = sines_cosines(0.5 * angles)

@@ -7,8 +7,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from space_robot_model.dynamics.free_base import FreeBase, follow_free_path_into
-from space_robot_model.dynamics.inverse_kinematics import follow_path_into
+from space_robot_model.dynamics.inverse_kinematics import (
+    FreeBase,
+    follow_free_path_into,
+    follow_path_into,
+)
 from space_robot_model.dynamics.tool_kinematics import ToolKinematics, tool_kinematics_into
 from space_robot_model.robot import Robot
 from space_robot_model.robot.kinematics import mounted_tool

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from space_robot_model.elementary.matrices import dot_rows, norms, product, unit_rows
-from space_robot_model.elementary.spline import CubicSpline
+from space_robot_model.elementary.splines import CubicSpline
 from space_robot_model.robot.mission_document import QUATERNION
 from space_robot_msgs_py.config.columns import MOST_ROWS, missing_column
 from space_robot_msgs_py.config.validation import short

@@ -12,7 +12,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from space_robot_model.elementary.exponential import exp
+from space_robot_model.elementary.functions import exp
 from space_robot_msgs_py.compiled.kernels import kernel, subroutine
 from space_robot_msgs_py.compiled.lanes import where
 from space_robot_msgs_py.compiled.records import Record, shaped

@@ -12,7 +12,6 @@ from space_robot_msgs_py.config.validation import one_of, short
 from space_robot_msgs_py.errors import InputError
 
 from ..dynamics.tool_kinematics import ToolKinematics, tool_kinematics_into
-from ..elementary.least_squares import null_space, singular_values
 from ..elementary.matrices import norm
 
 if TYPE_CHECKING:
@@ -21,6 +20,9 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 Attitude = Literal["held", "free"]
+
+RANK_TOLERANCE = 1e-7
+"""Singular values below this share of the largest count as zero."""
 
 
 class ModelledRobot(Protocol):
@@ -150,7 +152,11 @@ def reaction_null_space(
     Raises:
         InputError: see `tool_state`.
     """
-    return null_space(tool_state(robot, quaternion_wxyz, joint_positions).coupling)
+    coupling = tool_state(robot, quaternion_wxyz, joint_positions).coupling
+    _, values, axes = np.linalg.svd(coupling)
+    rank = np.count_nonzero(values > RANK_TOLERANCE * values.max(initial=0.0))
+    basis: Array = axes[rank:].T
+    return basis
 
 
 def manipulability(jacobian: Array) -> float:
@@ -158,7 +164,7 @@ def manipulability(jacobian: Array) -> float:
 
     With the generalised Jacobian a posture where it is zero is a dynamic singularity.
     """
-    return float(np.prod(singular_values(jacobian)))
+    return float(np.prod(np.linalg.svd(jacobian, compute_uv=False)))
 
 
 class MountedTool(NamedTuple):

@@ -21,7 +21,7 @@ from space_robot_msgs_py.topics import BASE_AXES
 
 from ..dynamics.model import Model
 from ..elementary.matrices import product
-from ..elementary.series import plain_sin_cos
+from ..elementary.rotations import plain_sin_cos
 from .files import exact_document, read_content
 from .flatten import Part, arrays_of
 from .inertia import inertia_elements, inertia_tensor

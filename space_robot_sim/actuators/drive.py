@@ -31,7 +31,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from space_robot_model.elementary.steps import in_steps
+from space_robot_model.elementary.functions import in_steps
 from space_robot_model.hardware.sheets import per_axis
 from space_robot_msgs_py.compiled.kernels import kernel
 from space_robot_msgs_py.compiled.lanes import all_lanes, any_lane, uniform, where

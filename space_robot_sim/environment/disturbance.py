@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import AfterValidator, Field
 
-from space_robot_model.elementary.sine import sin_cos
+from space_robot_model.elementary.functions import sin_cos
 from space_robot_msgs_py.compiled.kernels import kernel
 from space_robot_msgs_py.compiled.lanes import any_lane, where
 from space_robot_msgs_py.compiled.records import Record, shaped

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from space_robot_model.dynamics.attitude import quaternion_rate, rotation_matrix
 from space_robot_model.elementary.matrices import norm, product, solve
 from space_robot_model.orbit.elements import MU, hill_axes, state_of
-from space_robot_model.orbit.gravity import gravity
+from space_robot_model.orbit.propagation import gravity
 from space_robot_model.robot.inertia import inertia_tensor
 from space_robot_msgs_py.errors import InputError
 

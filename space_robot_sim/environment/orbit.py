@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from space_robot_model.dynamics.algebra import Vector, add, dot, scale, store, subtract, vector
-from space_robot_model.elementary.series import plain_sin_cos
-from space_robot_model.elementary.sine import sin_cos
+from space_robot_model.elementary.functions import sin_cos
+from space_robot_model.elementary.rotations import plain_sin_cos
 from space_robot_model.orbit.elements import (
     EARTH_RADIUS,
     FARTHEST,

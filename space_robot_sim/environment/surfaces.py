@@ -26,6 +26,7 @@ from space_robot_model.dynamics.algebra import (
     add,
     cross,
     dot,
+    load_frame,
     scale,
     store,
     subtract,
@@ -33,7 +34,6 @@ from space_robot_model.dynamics.algebra import (
     transform_transposed,
     vector,
 )
-from space_robot_model.dynamics.branches import kept_frame
 from space_robot_model.dynamics.model import MOST_JOINTS, Data, Model
 from space_robot_model.robot.parts import MOST_PLATES
 from space_robot_model.robot.shapes import plates_of
@@ -121,7 +121,7 @@ def press_on_surfaces(
     air = vector(velocity, 0)
     to_sun = vector(sun, 0)
     for i in range(whole(model.joint_count) + 1):
-        axes, origin = kept_frame(data.frame[i])
+        axes, origin = load_frame(data.frame[i])
         u, s = transform_transposed(axes, air), transform_transposed(axes, to_sun)
         area, arm = 0.0, (0.0, 0.0, 0.0)
         force, moment = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)

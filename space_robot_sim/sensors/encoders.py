@@ -10,7 +10,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from space_robot_model.elementary.steps import in_steps
+from space_robot_model.elementary.functions import in_steps
 from space_robot_model.hardware.sensors import MOST_DIFFERENCED, EncoderSettings
 from space_robot_msgs_py.compiled.kernels import kernel
 from space_robot_msgs_py.compiled.lanes import where, whole

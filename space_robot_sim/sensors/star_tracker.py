@@ -7,10 +7,9 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from space_robot_model.elementary.functions import in_steps, sin_cos
 from space_robot_model.elementary.matrices import norm
-from space_robot_model.elementary.series import plain_sin_cos
-from space_robot_model.elementary.sine import sin_cos
-from space_robot_model.elementary.steps import in_steps
+from space_robot_model.elementary.rotations import plain_sin_cos
 from space_robot_model.hardware.sensors import MOST_UNDER_WAY, StarTrackerSettings
 from space_robot_msgs_py.compiled.kernels import kernel, subroutine
 from space_robot_msgs_py.compiled.lanes import any_lane, where, whole

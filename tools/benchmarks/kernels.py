@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from space_robot_control.controller.kernels import controller_tick
 from space_robot_control.controller.supervision import NEW, answer_state, judge
-from space_robot_control.laws.compiled import LawCode
+from space_robot_control.laws.base import LawCode
 from space_robot_model.dynamics.aba import aba
 from space_robot_model.dynamics.kinematics import forward_kinematics, spatial_velocities
 from space_robot_msgs_py.compiled.kernels import RecordFunction, kernel

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from space_robot_control.controller.kernels import apply_transfer
 from space_robot_control.controller.signal_kernels import USABLE, compute_signals
-from space_robot_control.laws.compiled import LawCode
+from space_robot_control.laws.base import LawCode
 from space_robot_model.dynamics.rho_space import force_for
 from space_robot_msgs_py.compiled.kernels import RecordFunction, kernel
 from space_robot_msgs_py.compiled.lanes import (

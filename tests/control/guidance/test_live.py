@@ -15,7 +15,7 @@ from space_robot_control.guidance.courses import Piece, QuinticLeg, Slew
 from space_robot_control.guidance.goal_tolerances import GoalTolerances
 from space_robot_control.guidance.live import BRAKE_S, TrajectoryPoint
 from space_robot_control.guidance.mission import Mission, MissionSettings
-from space_robot_model.elementary.quintic_spline import QuinticSpline
+from space_robot_model.elementary.splines import QuinticSpline
 from space_robot_model.robot.find import find_robot
 from space_robot_msgs_py.errors import InputError
 

@@ -75,7 +75,7 @@ def direction(known: Ephemeris, name: str | list[float], time: float) -> Array:
     """Return a direction (3,), inertial axes."""
     motion = known.motion(np.array([time]))
     r, v = motion.position[0], motion.velocity[0]
-    target = known.target_motion(np.array([time])).position[0]
+    target = known.motion(np.array([time]), of_target=True).position[0]
     named = {"nadir": -r, "velocity": v, "normal": np.cross(r, v), "sun": known.sun}
     named["target"] = target
     return named[name] if isinstance(name, str) else np.array(name)

@@ -17,7 +17,7 @@ from numba.core.errors import NumbaError
 from numpy.typing import NDArray
 from paths import ROOT
 
-from space_robot_model.elementary.sine import sin_cos
+from space_robot_model.elementary.functions import sin_cos
 from space_robot_msgs_py.compiled.kernels import kernel
 from space_robot_msgs_py.compiled.lanes import (
     WIDTH,

@@ -1,7 +1,11 @@
-"""A user's own code, selected by path and name: ``./my_laws.py:ADRC``, or ``module:ADRC``.
+"""Laws by name: shipped ones, a user's own code, and those that a bag may name.
 
-The file is imported under a unique module name, so that it cannot be confused with a module of
-another folder; its folder is not added to the search path.
+A user's own code is selected by path and name, ``./my_laws.py:ADRC``, or as ``module:ADRC``. The
+file is imported under a unique module name, so that it cannot be confused with a module of another
+folder; its folder is not added to the search path.
+
+Bags and campaign folders may come from anyone. Names of shipped files and laws are always allowed;
+a path to a file, or code to import, is opened only if the user gave it, or trusts the source.
 """
 
 from __future__ import annotations
@@ -9,22 +13,64 @@ from __future__ import annotations
 import hashlib
 import importlib.util
 import os.path
+import pkgutil
 import sys
+from abc import ABCMeta
 from collections.abc import Callable
+from functools import cache
+from inspect import isabstract
 from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-from space_robot_msgs_py.config.text import one_line_of
-from space_robot_msgs_py.config.validation import one_of
+from space_robot_msgs_py.config.text import choices, one_line_of
+from space_robot_msgs_py.config.validation import one_of, short
 from space_robot_msgs_py.config.yaml_text import check_readable
-from space_robot_msgs_py.errors import InputError
+from space_robot_msgs_py.errors import InputError, explained_by
+
+from .base import ControlLaw
 
 ENDING = ".py"
 LONGEST_REASON = 200
 """Maximum length, in characters, of an error of a user's own code in a message."""
+LONGEST_NAME = 100
+FILES = (".yaml", ".yml", ".urdf", ".xacro", ".csv", ".parquet")
 _NAMES: dict[str, str] = {}
 """Path of each module imported here, by the module's name."""
+
+
+@cache
+def laws() -> dict[str, type[ControlLaw]]:
+    """Return every law of this folder by name."""
+    laws: dict[str, type[ControlLaw]] = {}
+    for module in pkgutil.iter_modules([str(Path(__file__).parent)]):
+        for value in vars(importlib.import_module(f"{__package__}.{module.name}")).values():
+            if _is_law(value):
+                laws[value.name] = value
+    return laws
+
+
+@explained_by("own-law")
+def find_law(name: str) -> type[ControlLaw]:
+    """Return the law class by name, by ``path/file.py:Class``, or by ``module:Class``."""
+    if name in laws():
+        return laws()[name]
+    if name.endswith(ENDING):
+        raise InputError(f"controller {short(name)}: name the class as well, {name}:CLASS")
+    advice = choices(name, sorted(laws()), ", or file.py:Class or module:Class of your own")
+    if ":" not in name:
+        raise InputError(f"unknown controller {short(name)}: {advice}")
+    law = import_named(
+        name, f"controller {short(name)}", "class", _is_law, advice, " derived from ControlLaw"
+    )
+    if not _is_law(law):
+        raise InputError(f"controller {short(name)} is not a ControlLaw: {advice}")
+    law_class: type[ControlLaw] = law
+    return law_class
+
+
+def _is_law(value: object) -> bool:
+    return isinstance(value, ABCMeta) and issubclass(value, ControlLaw) and not isabstract(value)
 
 
 def law_file(name: str) -> Path | None:
@@ -34,12 +80,7 @@ def law_file(name: str) -> Path | None:
 
 
 def import_file(path: Path) -> ModuleType:
-    """Import a Python file, once per process.
-
-    Raises:
-        InputError: there is no such file.
-        Exception: whatever its code raises.
-    """
+    """Import a Python file, once per process; its code may raise anything."""
     check_readable(path)
     digest = hashlib.sha256(str(path.resolve()).encode()).hexdigest()[:12]
     name = f"{path.stem}_{digest}"
@@ -100,7 +141,6 @@ def import_named(
 
 
 def _advice(module: str, attribute: str, error: BaseException) -> str:
-    """Return advice for a module that was not found; empty for any other error."""
     if not isinstance(error, ModuleNotFoundError):
         return ""
     own = f"{module.replace('.', '/')}{ENDING}"
@@ -115,3 +155,30 @@ def importable_name(own: Any) -> str:
     It is ``module:NAME``, or has the path of a file that `import_file` has imported.
     """
     return f"{_NAMES.get(own.__module__, own.__module__)}:{own.__qualname__}"
+
+
+class NotTrustedError(InputError):
+    """A bag or campaign that is not trusted refers to a file or module."""
+
+
+def is_plain(name: str) -> bool:
+    """Return True if a name can only be that of a shipped file, and False for a path."""
+    is_path = "/" in name or name.endswith(FILES) or name in (".", "..")
+    return name.isprintable() and not is_path and len(name) <= LONGEST_NAME
+
+
+def require_shipped_file(what: str, name: str, where: str = "bag") -> None:
+    """Raise `NotTrustedError` for a file's name that is a path; ``what`` is the kind of file."""
+    if not is_plain(name):
+        raise NotTrustedError(
+            f"the {where} refers to a file as its {what}, {short(name)}: read only with --trust"
+        )
+
+
+def require_shipped_law(name: str, where: str = "bag") -> None:
+    """Raise `NotTrustedError` for a law's name that is not that of a shipped law."""
+    if name not in laws():
+        raise NotTrustedError(
+            f"the {where} uses the law {short(name)}, which is not a shipped one: --trust "
+            "imports a module:Class or file.py:Class, which runs its code"
+        )
