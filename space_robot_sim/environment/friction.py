@@ -2,7 +2,7 @@
 
 By Coulomb's law the friction torque of a moving joint is ``f_C sign(thetadot)``. At rest it is the
 torque between ``-f_C`` and ``f_C`` that holds the joint (Filippov 1988). Which joints are at rest
-is determined in `space_robot_sim.plant.stick_slip`; this module computes the friction then.
+is determined in `space_robot_sim.plant.integrator`; this module computes the friction then.
 """
 
 from __future__ import annotations

@@ -245,7 +245,7 @@ def axes_of(name: str, about: About, names: RobotNames) -> tuple[int, ...]:
     return axes
 
 
-def add_in_quadrature(sigma: Any, value: float) -> Any:
+def add_noise(sigma: Any, value: float) -> Any:
     """Add white noise to a standard deviation."""
     return np.sqrt(sigma * sigma + value * value)
 

@@ -18,10 +18,13 @@ from space_robot_msgs_py.compiled.records import shaped
 from space_robot_msgs_py.samples import State
 
 from ..component import Component, Installation
-from ..faults.grammar import About, Argument, Kind, add_in_quadrature, switch_on
+from ..faults.grammar import About, Argument, Kind, add_noise, switch_on
 from ..faults.schedule import BLOCK_TICKS
 
 Array = NDArray[np.float64]
+
+SIGMA, RATE_SIGMA = (Argument("SIGMA", unit, 0.0, 1e3) for unit in ("rad", "rad/s"))
+STEP, RATE_STEP = (Argument("STEP", unit, 1e-12, 1e3) for unit in ("rad", "rad/s"))
 
 
 def _steps(sheet: EncoderSettings, at: Installation) -> Array:
@@ -66,18 +69,14 @@ class Encoders(Component):
 
     FAULTS: ClassVar[tuple[Kind, ...]] = (
         Kind(
-            "noise_joint_position",
-            Argument("SIGMA", "rad", 0.0, 1e3),
-            "noise on the measured joint angles",
-            "sigma",
-            add_in_quadrature,
+            "noise_joint_position", SIGMA, "noise on the measured joint angles", "sigma", add_noise
         ),
         Kind(
             "noise_joint_velocity",
-            Argument("SIGMA", "rad/s", 0.0, 1e3),
+            RATE_SIGMA,
             "noise on the measured joint velocities",
             "velocity_sigma",
-            add_in_quadrature,
+            add_noise,
         ),
         Kind(
             "encoder_stuck",
@@ -88,14 +87,14 @@ class Encoders(Component):
         ),
         Kind(
             "quantise_joint_position",
-            Argument("STEP", "rad", 1e-12, 1e3),
+            STEP,
             "the measured joint angles are quantised",
             "step",
             np.maximum,
         ),
         Kind(
             "quantise_joint_velocity",
-            Argument("STEP", "rad/s", 1e-12, 1e3),
+            RATE_STEP,
             "the measured joint velocities are quantised",
             "velocity_step",
             np.maximum,

@@ -13,7 +13,7 @@ from space_robot_msgs_py.compiled.records import shaped
 from space_robot_msgs_py.samples import State
 
 from ..component import Component
-from ..faults.grammar import About, Argument, Kind, add_in_quadrature
+from ..faults.grammar import About, Argument, Kind, add_noise
 from ..faults.schedule import BLOCK_TICKS
 
 Array = NDArray[np.float64]
@@ -54,7 +54,7 @@ class Gyro(Component):
     """Standard normal numbers, a row a tick: n_v (3), n_u (3)."""
 
     FAULTS: ClassVar[tuple[Kind, ...]] = (
-        Kind("noise_gyro", SIGMA, "noise on the measured base rate", "sigma", add_in_quadrature),
+        Kind("noise_gyro", SIGMA, "noise on the measured base rate", "sigma", add_noise),
         Kind("gyro_bias", BIAS, "RATE is added to the measured base rate about an axis", "offset"),
         Kind("quantise_gyro", STEP, "the measured base rate is quantised", "step", np.maximum),
     )

@@ -13,7 +13,7 @@ from space_robot_msgs_py.compiled.records import shaped
 from space_robot_msgs_py.samples import State
 
 from ..component import Component
-from ..faults.grammar import About, Argument, Kind, add_in_quadrature
+from ..faults.grammar import About, Argument, Kind, add_noise
 from ..faults.schedule import BLOCK_TICKS
 
 Array = NDArray[np.float64]
@@ -33,9 +33,7 @@ class Magnetometer(Component):
     """Standard normal numbers, a row a tick."""
 
     FAULTS: ClassVar[tuple[Kind, ...]] = (
-        Kind(
-            "noise_magnetometer", SIGMA, "noise on the measured field", "sigma", add_in_quadrature
-        ),
+        Kind("noise_magnetometer", SIGMA, "noise on the measured field", "sigma", add_noise),
         Kind("magnetometer_bias", BIAS, "FIELD is added to the measured field on an axis", "bias"),
     )
 

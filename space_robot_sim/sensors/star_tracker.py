@@ -17,7 +17,7 @@ from space_robot_msgs_py.compiled.records import shaped
 from space_robot_msgs_py.samples import State
 
 from ..component import Component, Installation
-from ..faults.grammar import Argument, Kind, add_in_quadrature, switch_on
+from ..faults.grammar import Argument, Kind, add_noise, switch_on
 from ..faults.schedule import BLOCK_TICKS
 
 Array = NDArray[np.float64]
@@ -79,7 +79,7 @@ class StarTracker(Component):
             Argument("SIGMA", "rad", 0.0, 1e3),
             "noise of standard deviation SIGMA about each axis of the measured attitude",
             "sigma",
-            add_in_quadrature,
+            add_noise,
         ),
         Kind(
             "tracker_blind",
