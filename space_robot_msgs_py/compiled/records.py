@@ -157,14 +157,8 @@ class Record:
     @classmethod
     def fields(cls) -> dict[str, Field | type[Record]]:
         """Return the fields by name, in memory order."""
-        fields: dict[str, Field | type[Record]] = {}
-        for base in reversed(cls.__mro__):
-            for name, value in vars(base).items():
-                if isinstance(value, Field) or (
-                    isinstance(value, type) and issubclass(value, Record)
-                ):
-                    fields[name] = value
-        return fields
+        record: Any = cls
+        return _fields(record)
 
     @classmethod
     def layout(cls) -> Layout:
@@ -315,6 +309,16 @@ def assign(record: Record, **values: Any) -> None:
     """Copy arrays or records into fields of ``record``."""
     for name, value in values.items():
         cast(Any, record)[name] = value
+
+
+@cache
+def _fields(record: type) -> dict[str, Field | type[Record]]:
+    return {
+        name: value
+        for base in reversed(record.__mro__)
+        for name, value in vars(base).items()
+        if isinstance(value, Field) or (isinstance(value, type) and issubclass(value, Record))
+    }
 
 
 @cache
