@@ -15,7 +15,7 @@ from typing import Annotated, Any, get_args, get_origin
 
 from space_robot.scenario.faults import PROCESS_KINDS
 from space_robot_control.controller.settings import ControllerNodeSettings
-from space_robot_control.guidance.settings import MissionNodeSettings
+from space_robot_control.guidance.mission import MissionNodeSettings
 from space_robot_control.laws import laws
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.bag.recorder_settings import RecorderNodeSettings

@@ -241,7 +241,7 @@ def _without_told_robot(log: FlightLog, parameters: Mapping[str, Any]) -> dict[s
     """Leave out the files of a robot and a mission all of which the bag tells."""
     files = {
         "robot": isinstance(log.flight.get("robot_file"), dict),
-        "mission": "waypoints_deg" in parameters_of(log, "mission"),
+        "mission": "joints_deg" in parameters_of(log, "mission"),
     }
     return {
         key: value

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from space_robot_control.controller.gains import build_law, split_gains
 from space_robot_control.controller.settings import ControllerNodeSettings
 from space_robot_control.laws.names import require_shipped_law
-from space_robot_control.navigation.low_pass import low_pass_weight
+from space_robot_control.navigation.rate_filters import low_pass_weight
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.bag.law_history import laws_of
 from space_robot_msgs_py.errors import InputError

@@ -10,11 +10,11 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from space_robot_control.allocation.assumed_actuators import assumed_actuators
+from space_robot_control.allocation.settings import assumed_actuators
 from space_robot_control.guidance.courses import Piece
 from space_robot_control.guidance.demand import MotionDemand
 from space_robot_control.guidance.mission import Mission
-from space_robot_control.guidance.tool_path import ToolFollower
+from space_robot_control.guidance.tool_paths import ToolFollower
 from space_robot_model.elementary.matrices import norms
 from space_robot_model.hardware.base_actuators import BaseActuatorSettings
 from space_robot_model.robot import Robot
@@ -83,10 +83,10 @@ def planned_segments(
         start_rate: see `mission_demand`.
 
     Raises:
-        InputError: it has a single waypoint.
+        InputError: it has no segments.
     """
     if not mission.duration:
-        raise InputError("the mission has no motion to plan: a single waypoint")
+        raise InputError("the mission has no motion to plan: no segments")
     follower = ToolFollower(robot.nominal, None)
     demands = mission_demand(robot, mission.pieces, orbit or OrbitSettings(), start_rate)
     return [_planned(asked, follower) for asked in demands]

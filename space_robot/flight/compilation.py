@@ -111,7 +111,7 @@ def _answer_and_exchange(flight: Flight) -> None:
     reference = Reference.at_rest(flight.robot.n)
     flight.controller.update(state, reference)
     supervisor = Supervisor(flight.controller, hold_ticks=0)
-    supervisor.judge(0)
+    supervisor.judge_stamp(0)
     command = supervisor.answer(state, reference)
     commands.decode(commands.encode(command), command)
 

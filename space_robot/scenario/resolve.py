@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from space_robot_control.allocation.assumed_actuators import assumed_actuators
+from space_robot_control.allocation.settings import assumed_actuators
 from space_robot_control.controller.gains import build_laws
-from space_robot_control.controller.plain_laws import NoLaw
+from space_robot_control.controller.law_choice import NoLaw, parse_swaps
 from space_robot_control.controller.settings import OF_THE_SET
-from space_robot_control.controller.swaps import parse_swaps
 from space_robot_control.guidance.mission import Mission
 from space_robot_control.laws import ControlLaw
 from space_robot_control.laws import laws as known_laws
@@ -86,8 +85,7 @@ def _mission(settings: FlightSettings, robot: Robot) -> Mission:
             return Mission(robot, settings.mission, settings.plant.period)
         except InputError as error:
             file, numbers = settings.mission.mission, settings.mission
-            needed = robot.n * len(numbers.waypoint_times)
-            if not file and len(numbers.waypoints_deg) != needed:
+            if not file and len(numbers.joints_deg) != robot.n:
                 own = robot_files(settings.mission.robot).mission
                 raise InputError(f"{own}: {error}{remake_advice(own) if own else ''}") from None
             if not file.endswith((*YAML, *TRAJECTORIES)):

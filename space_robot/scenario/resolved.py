@@ -11,10 +11,9 @@ from typing import Any
 from pydantic import BaseModel
 
 from space_robot_control.allocation.settings import AllocationSettings
-from space_robot_control.controller.plain_laws import NoLaw
+from space_robot_control.controller.law_choice import NoLaw
 from space_robot_control.controller.settings import DEFAULT, ControllerNodeSettings
-from space_robot_control.guidance.mission import Mission, MissionSettings
-from space_robot_control.guidance.settings import MissionNodeSettings
+from space_robot_control.guidance.mission import Mission, MissionNodeSettings, MissionSettings
 from space_robot_control.laws import ControlLaw
 from space_robot_model.hardware.base_actuators import BaseActuatorSettings, MagneticTorquerSettings
 from space_robot_model.hardware.sensors import SensorSettings
@@ -141,13 +140,13 @@ class ResolvedScenario:
         """Number of ticks of the flight.
 
         Raises:
-            InputError: the flight is too long, or the mission defines no duration.
+            InputError: the flight is too long, or the mission has no segments.
         """
         duration, period = self.options.duration, self.plant.period
         if duration is None:
             duration = self.reference.duration
         if duration <= 0.0:
-            raise InputError("the mission has a single waypoint: give a duration")
+            raise InputError("the mission has no segments: give a duration")
         ticks = max(1, math.floor(duration / period + 1e-6))
         if ticks > MOST_TICKS:
             raise InputError(

@@ -7,9 +7,8 @@ from typing import Any
 import numpy as np
 from numba import types
 
-from space_robot_control.controller.kernels import apply_transfer
-from space_robot_control.controller.memory import ControllerMemory
-from space_robot_control.controller.signal_kernels import compute_signals
+from space_robot_control.controller.signals import ControllerMemory, compute_signals
+from space_robot_control.controller.tick import apply_transfer
 from space_robot_control.laws import CompiledLaw, laws
 from space_robot_msgs_py.compiled.lane_type import MASK, array_of_lanes
 from space_robot_msgs_py.compiled.lanes import WIDTH

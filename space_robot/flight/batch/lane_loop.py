@@ -7,8 +7,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from space_robot_control.controller.kernels import apply_transfer
-from space_robot_control.controller.signal_kernels import USABLE, compute_signals
+from space_robot_control.controller.signals import USABLE, compute_signals
+from space_robot_control.controller.tick import apply_transfer
 from space_robot_control.laws.base import LawCode
 from space_robot_model.dynamics.rho_space import force_for
 from space_robot_msgs_py.compiled.kernels import RecordFunction, kernel

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from space_robot_control.controller.controller import Controller
-from space_robot_control.controller.memory import ControllerMemory
+from space_robot_control.controller.signals import ControllerMemory
 from space_robot_control.laws import ControlLaw
 from space_robot_control.laws.base import CompiledLaw, LawCode, LawMemory, SomeGains
 from space_robot_msgs_py.compiled.lanes import WIDTH

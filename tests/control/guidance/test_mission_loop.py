@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from space_robot_control.guidance.settings import MissionNodeSettings
+from space_robot_control.guidance.mission import MissionNodeSettings
 from space_robot_model.robot import Robot
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.ros.loop import Level

@@ -13,8 +13,9 @@ from oracles.orbit import EARTH_RADIUS, MU
 from scipy.spatial.transform import Rotation
 
 from space_robot_control.guidance.courses import Course, Slew, turn_between
+from space_robot_control.guidance.goals import PointingGoal
 from space_robot_control.guidance.matched_slew import MatchedSlew
-from space_robot_control.guidance.pointing import PointingCourse, PointingGoal
+from space_robot_control.guidance.pointing import PointingCourse
 from space_robot_model.orbit.ephemeris import AssumedOrbit, Ephemeris
 from space_robot_msgs_py.config.validation import validate
 from space_robot_msgs_py.errors import InputError

@@ -168,7 +168,7 @@ def test_a_free_base_under_a_mission_that_holds_it_is_remarked(
             sr.Scenario(**{**flown.scenario.tree, "duration": 0.01}).fly()
 
 
-def test_waypoints_beyond_the_wheels_are_warned_of_if_they_are_flown() -> None:
+def test_missions_that_are_not_refused_are_warned_of_if_they_are_flown() -> None:
     remarks = [
         demand_remark(resolve(FlightPlan(actuators=actuators, duration=duration)))
         for actuators, duration in (("small_wheels", None), ("small_wheels", 0.1), ("wheels", None))

@@ -34,7 +34,7 @@ from space_robot.view.wheels import (
     slowdown_of,
     wheel_places,
 )
-from space_robot_control.allocation.assumed_actuators import assumed_actuators
+from space_robot_control.allocation.settings import assumed_actuators
 from space_robot_model.hardware.wheels import WheelSettings
 from space_robot_model.robot import Robot
 from space_robot_model.robot.parts import Plate, Visual

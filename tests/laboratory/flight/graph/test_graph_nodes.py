@@ -205,7 +205,7 @@ def test_a_late_listener_of_the_mission_is_told_what_is_needed(
 BAD: tuple[tuple[str, dict[str, object], str], ...] = (
     ("plant", {"comand_latency_ticks": 1}, "unknown parameter 'comand_latency_ticks'"),
     ("controller", {"tde_stc__k_1": "[1.0, 2.0]"}, "9 values (base x, y, z and the joints)"),
-    ("mission", {"waypoint_times": "[0.0]"}, "waypoints_deg has 18 values"),
+    ("mission", {"joints_deg": "[0.0]"}, "the start has 1 joints"),
     ("recorder", {"bag": "/proc/no/bag"}, "no bag can be written there"),
 )
 

@@ -1,10 +1,18 @@
-"""Steady-state Kalman filter of each joint's angle, rate and acceleration.
+"""Filters of rates: a low-pass of the base's, a Kalman filter of the joints' angles and rates.
 
-The joint's jerk is taken for white noise (Singer's model without a time constant), angle and, if
-it is measured by itself, rate are observed: with the angle alone this is the alpha-beta-gamma
-filter (Bar-Shalom, Li & Kirubarajan, Estimation with Applications to Tracking and Navigation,
-6.5). The ratio of jerk to measurement noise is given as a bandwidth ``w``: with the continuous
-noise densities ``r = sigma^2 period``, the filter's poles are the stable roots of
+The time-delay estimate differences a rate and takes the force that made it. So each filter passes
+the torque through the same lag as the rate: lagging alike, the two stay a pair (see
+`space_robot_control.controller.time_delay_estimation`).
+
+The low-pass has two first-order stages in a row: one alone would leave the noise of a differenced
+rate as it is in the highest frequencies.
+
+The joints' filter is a steady-state Kalman filter of angle, rate and acceleration. The jerk is
+taken for white noise (Singer's model without a time constant), angle and, if it is measured by
+itself, rate are observed: with the angle alone this is the alpha-beta-gamma filter (Bar-Shalom, Li
+& Kirubarajan, Estimation with Applications to Tracking and Navigation, 6.5). The ratio of jerk to
+measurement noise is given as a bandwidth ``w``: with the continuous noise densities
+``r = sigma^2 period``, the filter's poles are the stable roots of
 
     -s^6 + q (1/r_angle - s^2/r_rate) = 0,     q = w^6 / (1/r_angle + w^2/r_rate),
 
@@ -19,14 +27,55 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from space_robot_msgs_py.compiled.kernels import kernel
-from space_robot_msgs_py.compiled.lanes import uniform
+from space_robot_model.elementary.functions import exp
+from space_robot_msgs_py.compiled.kernels import kernel, subroutine
+from space_robot_msgs_py.compiled.lanes import uniform, where
 from space_robot_msgs_py.compiled.records import Record, shaped
 
 Array = NDArray[np.float64]
 
 MOST_STEPS = 1_000_000
 """Steps of the Riccati equation; 500 s at 2 kHz."""
+
+
+def low_pass_weight(corner_hz: float, period: float) -> float:
+    """Return the weight of a new sample in a first-order low-pass; 0 without one."""
+    return 1.0 - exp(-2.0 * math.pi * corner_hz * period)
+
+
+class LowPass(Record):
+    """Both stages of rate and torque of three axes."""
+
+    weight: float = shaped(lambda n: ())
+    """Of a new sample in each stage, see `low_pass_weight`; 0: no low-pass."""
+    rate_stage: Array = shaped(lambda n: (3,))
+    rate: Array = shaped(lambda n: (3,), "rad/s")
+    torque_stage: Array = shaped(lambda n: (3,))
+    torque: Array = shaped(lambda n: (3,), "N m")
+
+
+@kernel
+def begin_low_pass(low_pass: LowPass, rate: Array, torque: Array) -> None:
+    """Begin in steady state at these values."""
+    low_pass.rate_stage[:] = low_pass.rate[:] = rate
+    low_pass.torque_stage[:] = low_pass.torque[:] = torque[:3]
+
+
+@kernel
+def pass_low(low_pass: LowPass, rate: Array, torque: Array) -> None:
+    """Filter rate and torque (at least 3,) of one tick."""
+    weight = where(low_pass.weight > 0.0, low_pass.weight, 1.0)
+    for i in range(3):
+        low_pass.rate_stage[i] = _stepped(low_pass.rate_stage[i], rate[i], weight)
+        low_pass.rate[i] = _stepped(low_pass.rate[i], low_pass.rate_stage[i], weight)
+        low_pass.torque_stage[i] = _stepped(low_pass.torque_stage[i], torque[i], weight)
+        low_pass.torque[i] = _stepped(low_pass.torque[i], low_pass.torque_stage[i], weight)
+
+
+@subroutine
+def _stepped(last: float, new: float, weight: float) -> float:
+    """Return a stage's next value; with a weight of 1 the new sample itself."""
+    return where(weight == 1.0, new, last + weight * (new - last))
 
 
 class JointFilter(Record):
@@ -38,20 +87,15 @@ class JointFilter(Record):
     """Of an angle's innovation on angle, rate and acceleration: 1, 1/s, 1/s2."""
     rate_gain: Array = shaped(lambda n: (3,))
     """Of a rate's innovation, taken after the angle's: s, 1, 1/s; zero if there is none."""
-    angle: Array = shaped(lambda n: (n,))
-    """rad."""
-    rate: Array = shaped(lambda n: (n,))
-    """rad/s."""
-    acceleration: Array = shaped(lambda n: (n,))
-    """rad/s2."""
+    angle: Array = shaped(lambda n: (n,), "rad")
+    rate: Array = shaped(lambda n: (n,), "rad/s")
+    acceleration: Array = shaped(lambda n: (n,), "rad/s2")
     angle_lag: Array = shaped(lambda n: (n,))
-    """Of the same filter on a unit inertia under the torque: by how much its angle lags, and..."""
-    rate_lag: Array = shaped(lambda n: (n,))
-    """...its rate, and..."""
+    """Lag of the angle of the same filter on a unit inertia that the torque accelerates, rad."""
+    rate_lag: Array = shaped(lambda n: (n,), "Lag of that filter's rate, rad/s")
     torque_assumed: Array = shaped(lambda n: (n,))
-    """...what it takes the acceleration for: N m."""
-    torque: Array = shaped(lambda n: (n,))
-    """The torque that lags as the rate does, N m."""
+    """Acceleration that this filter estimates of the unit inertia: N m."""
+    torque: Array = shaped(lambda n: (n,), "The torque that lags as the rate does, N m")
 
 
 def jerk_density(bandwidth: float, angle_noise: float, rate_noise: float, period: float) -> float:
@@ -65,7 +109,7 @@ def jerk_density(bandwidth: float, angle_noise: float, rate_noise: float, period
 def tune(
     filter: JointFilter, bandwidth_hz: float, angle_noise: float, rate_noise: float, period: float
 ) -> None:
-    """Give ``filter`` the gains of the steady state; see the module."""
+    """Write the gains of the steady state into ``filter``, or turn it off (bandwidth 0)."""
     filter.is_on = 1.0 if bandwidth_hz > 0.0 else 0.0
     if not filter.is_on:
         return

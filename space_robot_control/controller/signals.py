@@ -1,4 +1,10 @@
-"""Compiled kernels of a tick's signals: navigation, errors, nominal model and estimate."""
+"""Signals of a tick in the coordinates ``rho = [eps_e, theta]`` of the laws.
+
+A state is checked, passed through navigation and compared with its reference; estimate and nominal
+model are added for laws that use them. eps_e is the vector part of the rotation from the desired
+attitude, ``q_e = q_d* q``, so that no flight depends on the choice of the inertial frame, and 180
+degrees are singular only as an error.
+"""
 
 from __future__ import annotations
 
@@ -21,14 +27,20 @@ from space_robot_model.dynamics.rho_space import (
 )
 from space_robot_msgs_py.compiled.kernels import kernel
 from space_robot_msgs_py.compiled.lanes import all_lanes, uniform, where, whole
-from space_robot_msgs_py.compiled.records import Block
+from space_robot_msgs_py.compiled.records import Block, Record, nested, shaped
 from space_robot_msgs_py.samples import MOST_WHEELS, Reference, State
 
+from ..allocation.allocation import Allocation
+from ..laws import Signals
 from ..laws.base import CONSTANT_INERTIA, NOMINAL_INERTIA
-from ..navigation.navigation import navigate
-from .memory import ControllerMemory
-from .time_delay_estimation import follows, nominal_estimate, observe, time_delay_estimate
-from .tracking import force_from_torque, leave_base_out, relative_rate, show_state, tracking_errors
+from ..navigation.navigation import Navigation, navigate
+from .time_delay_estimation import (
+    TimeDelayPair,
+    follows,
+    nominal_estimate,
+    observe,
+    time_delay_estimate,
+)
 
 Array = NDArray[np.float64]
 
@@ -40,6 +52,40 @@ such numbers overflow."""
 
 USABLE, NOT_FINITE, TOO_LARGE, NOT_UNIT, SINGULAR = range(5)
 """The status of a state."""
+
+
+class ControllerMemory(Record):
+    """Memory of the controller, without its law."""
+
+    controls_base: float = shaped(lambda n: (), uniform=True)
+    """1; 0: nothing turns the base, so its axes have no signals and no force."""
+    signals: Signals = nested(Signals)
+    """Signals of the last tick."""
+    pair: TimeDelayPair = nested(TimeDelayPair)
+    jacobian: Array = shaped(lambda n: (3, 3), "J0 of q_e")
+    last_jacobian_inverse: Array = shaped(lambda n: (3, 3), "J0^-1 of the last tick")
+    rotation: Array = shaped(lambda n: (3, 3))
+    """Scratch: rotation from the base to the desired frame."""
+    omega_desired: Array = shaped(lambda n: (3,))
+    """Desired angular velocity on the base's axes, rad/s; zero if that is not controlled."""
+    error: Array = shaped(lambda n: (4,))
+    """Scratch: q_e of the last tick, had the reference moved as it does now."""
+    turn: Array = shaped(lambda n: (4,), "Scratch: the desired frame's turn back to the last tick")
+    turned_jacobian: Array = shaped(lambda n: (3, 3), "Scratch: J0 of ``error``")
+    pair_is_as_measured: float = shaped(lambda n: ())
+    """1 if the time-delay pair has rates as they were measured, 0 if as navigation has them."""
+    rate_as_measured: Array = shaped(lambda n: (n + 3,))
+    """Scratch: rhodot without the navigation's low-pass."""
+    force_as_measured: Array = shaped(lambda n: (n + 3,), "Scratch: F_S without the same")
+    omega: Array = shaped(lambda n: (3,), "Scratch")
+    force: Array = shaped(lambda n: (n + 3,), "F_S commanded")
+    transfer: Array = shaped(lambda n: (n + 3,))
+    """Applied force minus force of the law in force when it took over."""
+    transfer_ticks: float = shaped(lambda n: (), "Length of a transfer", uniform=True)
+    transfer_left: float = shaped(lambda n: ())
+    """Ticks until ``transfer`` has faded; -1: the law takes over at this tick."""
+    navigation: Navigation = nested(Navigation)
+    allocation: Allocation = nested(Allocation)
 
 
 @kernel
@@ -57,32 +103,34 @@ def compute_signals(
 
     Without a base to control all of them are zero on its axes, and none asks for J0^-1.
 
-    Args: see `controller_tick` and `LawCode`.
+    ``block`` is of the `ControllerMemory`; ``state`` and ``reference`` are of a `State` and a
+    `Reference`; ``h_bar``, ``estimate`` and ``uses_model`` are those of a `LawCode`.
 
     Returns:
         `USABLE`, or why the state is not: then nothing was done, but that navigation may have taken
         a measured state that was usable.
     """
-    status: int = compute_signals_for(
-        block, tick, state, reference[0], h_bar, estimate, uses_model, period
+    copy_reference(reference[0], block[0].signals.reference)
+    status: int = compute_signals_as_desired(
+        block, tick, state, h_bar, estimate, uses_model, period
     )
     return status
 
 
 @kernel
-def compute_signals_for(
+def compute_signals_as_desired(
     block: Block,
     tick: int,
     state: Block,
-    reference: Reference,
     h_bar: Array,
     estimate: int,
     uses_model: bool,
     period: float,
 ) -> int:
-    """Compute the signals as `compute_signals`, for a record; that of the signals may be it."""
+    """Compute the signals as `compute_signals`, for the reference that is in them."""
     memory, measured = block[0], state[0]
     signals, controls_base = memory.signals, uniform(memory.controls_base) == 1.0
+    reference = signals.reference
     is_filtered, desired = uniform(memory.navigation.is_filtered) == 1.0, reference.quaternion
     status: int = status_of(measured, desired, controls_base)
     if all_lanes(status != USABLE):
@@ -100,7 +148,7 @@ def compute_signals_for(
     if controls_base:
         attitude_error_into(desired, measured.quaternion, near)
         attitude_jacobian(near, memory.jacobian)
-        steps_of_reference(memory, tick, reference, period)
+        _find_steps_of_reference(memory, tick, period)
         rotation_matrix(near, memory.rotation)
         rotate_back(memory.rotation, reference.omega_base, memory.omega_desired)
         if not follows(memory.pair, tick):  # whatever J0 was, this one's is nearer
@@ -112,7 +160,7 @@ def compute_signals_for(
     else:
         near[:] = measured.quaternion
         signals.applied_force[:] = measured.applied_torque
-    relative_rate(
+    _relative_rate(
         measured.omega_base,
         measured.joint_velocities,
         memory.omega_desired,
@@ -122,11 +170,11 @@ def compute_signals_for(
     )
     signals.tick = tick
     signals.time = tick * period
-    show_state(measured, reference, signals)
-    tracking_errors(measured, reference, signals)
+    _show_state(measured, signals)
+    _compute_errors(measured, signals)
     if not controls_base:
-        leave_base_out(signals)
-    observe_pair(memory, tick, state[0], estimate, period)
+        _leave_base_out(signals)
+    _observe_pair(memory, tick, state[0], estimate, period)
     if controls_base:
         attitude_jacobian_inverse(near, memory.last_jacobian_inverse)
     if uses_model:
@@ -150,17 +198,16 @@ def compute_signals_for(
 
 
 @kernel
-def steps_of_reference(
-    memory: ControllerMemory, tick: int, reference: Reference, period: float
-) -> None:
+def _find_steps_of_reference(memory: ControllerMemory, tick: int, period: float) -> None:
     """Write the steps of rho and rhodot since the last tick that the base's reference makes.
 
     A reference that is held, comes back or comes in steps does not go on where it was. That is no
     motion of the robot, so whoever compares with the last tick leaves it out: it is what rho and
     rhodot would have been then, had the reference already moved as it does now, less what they
-    were. The signals but ``attitude_error`` are still those of the last tick.
+    were. The signals but ``attitude_error`` and the reference are still those of the last tick.
     """
     signals, error, turn, omega = memory.signals, memory.error, memory.turn, memory.omega
+    reference = signals.reference
     is_known, elapsed = follows(memory.pair, tick), (tick - whole(memory.pair.tick)) * period
     squared = 0.0
     for k in range(3):
@@ -188,7 +235,7 @@ def steps_of_reference(
 
 
 @kernel
-def observe_pair(
+def _observe_pair(
     memory: ControllerMemory, tick: int, measured: State, estimate: int, period: float
 ) -> None:
     """Observe force and acceleration of the interval that ended at ``tick``, after the signals.
@@ -210,7 +257,7 @@ def observe_pair(
         rate, force, omega = memory.rate_as_measured, memory.force_as_measured, memory.omega
         for k in range(3):
             omega[k] = measured.omega_base[k] - memory.navigation.attitude.bias[k]
-        relative_rate(
+        _relative_rate(
             omega, measured.joint_velocities, memory.omega_desired, memory.jacobian, omega, rate
         )
         force_from_torque(memory.last_jacobian_inverse, measured.applied_torque, force)
@@ -259,3 +306,85 @@ def error_eta(desired: Array, actual: Array) -> float:
     for k in range(4):
         eta += desired[k] * actual[k]
     return eta
+
+
+@kernel
+def _relative_rate(
+    omega_base: Array,
+    joint_velocities: Array,
+    omega_desired: Array,
+    jacobian: Array,
+    omega: Array,
+    rate: Array,
+) -> None:
+    """Write rhodot (m,) of (22) into ``rate``; ``jacobian`` is J0 of q_e, ``omega`` scratch."""
+    for k in range(3):
+        omega[k] = omega_base[k] - omega_desired[k]
+    rotate(jacobian, omega, rate[:3])
+    rate[3:] = joint_velocities
+
+
+@kernel
+def _compute_errors(state: State, signals: Signals) -> None:
+    """Write e, edot and rhodd_d into ``signals``, which has rho and rhodot of the base."""
+    error, error_rate, reference = signals.error, signals.error_rate, signals.reference
+    for k in range(3):
+        error[k] = 0.0 - signals.rho[k]
+        error_rate[k] = 0.0 - signals.rho_rate[k]
+        signals.acceleration_desired[k] = 0.0
+    for i in range(state.joint_positions.size):
+        error[3 + i] = reference.joint_positions[i] - state.joint_positions[i]
+        error_rate[3 + i] = reference.joint_velocities[i] - signals.rho_rate[3 + i]
+        signals.acceleration_desired[3 + i] = reference.joint_accelerations[i]
+
+
+@kernel
+def _show_state(state: State, signals: Signals) -> None:
+    for k in range(4):  # one loop for several arrays: each copy of a slice costs 1 % of a tick
+        signals.quaternion[k] = state.quaternion[k]
+    for k in range(3):
+        signals.omega_base[k] = state.omega_base[k]
+        signals.rho[k] = signals.attitude_error[1 + k]
+    for i in range(state.joint_positions.size):
+        signals.joint_positions[i] = state.joint_positions[i]
+        signals.joint_velocities[i] = state.joint_velocities[i]
+        signals.rho[3 + i] = state.joint_positions[i]
+
+
+@kernel
+def copy_reference(reference: Reference, desired: Reference) -> None:
+    """Copy a reference into another record."""
+    for k in range(4):
+        desired.quaternion[k] = reference.quaternion[k]
+    for k in range(3):
+        desired.omega_base[k] = reference.omega_base[k]
+        desired.alpha_base[k] = reference.alpha_base[k]
+    for i in range(reference.joint_positions.size):
+        desired.joint_positions[i] = reference.joint_positions[i]
+        desired.joint_velocities[i] = reference.joint_velocities[i]
+        desired.joint_accelerations[i] = reference.joint_accelerations[i]
+
+
+@kernel
+def _leave_base_out(signals: Signals) -> None:
+    """Zero the base's axes in all signals of m axes."""
+    for k in range(3):
+        signals.error[k] = signals.error_rate[k] = signals.acceleration_desired[k] = 0.0
+        signals.rho[k] = signals.rho_rate[k] = signals.applied_force[k] = 0.0
+
+
+@kernel
+def torque_from_force(jacobian: Array, force: Array, torque: Array) -> None:
+    """Compute ``tau = J^T F_S``: base and joint torque from the generalised force.
+
+    What ``torque`` has behind them, for actuators of the base, is left alone.
+    """
+    rotate_back(jacobian, force[:3], torque[:3])
+    torque[3 : force.size] = force[3:]
+
+
+@kernel
+def force_from_torque(jacobian_inverse: Array, torque: Array, force: Array) -> None:
+    """Compute ``F_S = J^-T tau``, the inverse of `torque_from_force`."""
+    rotate_back(jacobian_inverse, torque[:3], force[:3])
+    force[3:] = torque[3:]

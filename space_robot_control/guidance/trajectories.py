@@ -1,4 +1,9 @@
-"""Courses along a trajectory that is given as columns, see `trajectory_file`."""
+"""Courses along trajectories that are given as columns of a CSV or Parquet file.
+
+Columns are ``time`` (s, rising), every joint with a motor by its name (rad, or m of prismatic
+joints), and, if the base turns, its quaternion ``q_w, q_x, q_y, q_z``. Columns ``<joint>_rate``
+(rad/s or m/s) are optional: they must belong to the positions. Other columns are not read.
+"""
 
 from __future__ import annotations
 
@@ -14,9 +19,8 @@ from space_robot_msgs_py.config.columns import MOST_ROWS, missing_column
 from space_robot_msgs_py.config.validation import short
 from space_robot_msgs_py.errors import InputError
 
-from .checks import FARTHEST, SHORTEST_S
-from .courses import BaseMotion, Course, multiplied
-from .spline_courses import AttitudeCourse, SplineCourse
+from .courses import AttitudeCourse, BaseMotion, Course, SplineCourse, multiplied
+from .limits import FARTHEST, SHORTEST_S
 
 Array = NDArray[np.float64]
 Columns = Mapping[str, Sequence[float]]
@@ -117,7 +121,6 @@ class TrajectoryTable:
 
 
 def _quaternions(columns: Columns) -> Array:
-    """Return unit quaternions (K, 4), each in the hemisphere of the one before."""
     rows = np.column_stack([np.array(columns[name], float) for name in QUATERNION])
     lengths = norms(rows)
     is_unit = np.abs(lengths - 1.0) <= 1e-3

@@ -1,7 +1,15 @@
-"""Supervision of a controller in one record: kernels that answer every state, good or bad.
+"""The tick of a controller: every state is answered, by the law or by a safe command.
 
-They call nothing of Python and know no ROS, so they are what flies, compiled here or as C.
-`.supervisor` explains the modes.
+    stamp --> judge_stamp --> admit_state --> compute_command --> conclude --> command
+                              checks, navigation,   law, transfer,     hold, then
+                              signals               allocation         safe mode
+
+`controller_tick` is the same without the supervision, for loops whose flight ends with a state that
+is not usable. Kernels have these arguments in common:
+
+- ``block``: of the `Supervision`, or of the `ControllerMemory` where ``controller`` is not given,
+- ``law``: a `CompiledLaw.code`; ``allocate``: an `allocation_code`,
+- ``tick``: of the state; ``state``, ``reference``: of a `State` and a `Reference`; ``period``: s.
 """
 
 from __future__ import annotations
@@ -11,20 +19,24 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from space_robot_model.dynamics.rho_space import force_for
 from space_robot_msgs_py.compiled.kernels import RecordFunction, kernel
+from space_robot_msgs_py.compiled.lanes import uniform
 from space_robot_msgs_py.compiled.records import Block, Record, nested, shaped
 from space_robot_msgs_py.samples import MOST_THRUSTERS, MOST_TORQUERS, MOST_WHEELS, Reference
 from space_robot_msgs_py.wire.stamp_guard import accept
 
 from ..laws.base import LawCode
-from .kernels import compute_command
-from .signal_kernels import (
+from .signals import (
     LARGEST,
     NORM_TOLERANCE,
     SINGULAR,
     USABLE,
-    compute_signals_for,
+    compute_signals,
+    compute_signals_as_desired,
+    copy_reference,
     error_eta,
+    torque_from_force,
 )
 from .time_delay_estimation import LONGEST_GAP
 
@@ -52,14 +64,11 @@ NOMINAL_FROM_ETA = 0.05
 class Stamps(Record):
     """Check of the stamps of states, see `StampGuard`."""
 
-    longest_jump: float = shaped(lambda n: ())
-    """Largest accepted step, ticks."""
-    last: float = shaped(lambda n: ())
-    """Last accepted tick; -1 before the first."""
+    longest_jump: float = shaped(lambda n: (), "Largest accepted step, ticks")
+    last: float = shaped(lambda n: (), "Last accepted tick; -1 before the first")
     is_new_time: float = shaped(lambda n: ())
     """1 if the last accepted tick started a new time, else 0."""
-    other: float = shaped(lambda n: ())
-    """Last rejected tick."""
+    other: float = shaped(lambda n: (), "Last rejected tick")
     agreeing: float = shaped(lambda n: ())
     """Number of consistent ticks that were rejected one after the other."""
 
@@ -67,23 +76,16 @@ class Stamps(Record):
 class Supervision(Record):
     """Settings and memory of a supervisor."""
 
-    hold_ticks: float = shaped(lambda n: ())
-    """Invalid states for which the last torque is held."""
-    first_valve: float = shaped(lambda n: ())
-    """Index of the first thruster in ``command``."""
+    hold_ticks: float = shaped(lambda n: (), "Invalid states for which the last torque is held")
+    first_valve: float = shaped(lambda n: (), "Index of the first thruster in ``command``")
     stamps: Stamps = nested(Stamps)
-    answered: float = shaped(lambda n: ())
-    """Last tick answered; -1: none."""
-    mode: float = shaped(lambda n: ())
-    """`NOMINAL`, `HOLDING` or `SAFE`."""
+    answered: float = shaped(lambda n: (), "Last tick answered; -1: none")
+    mode: float = shaped(lambda n: (), "`NOMINAL`, `HOLDING` or `SAFE`")
     reason: float = shaped(lambda n: ())
     """Status of the last state; in nominal mode `USABLE` or `REFERENCE_HELD`."""
-    last_tick: float = shaped(lambda n: ())
-    """Last tick answered by the law; -1: none."""
-    has_reference: float = shaped(lambda n: ())
-    """1 once a reference has been usable, else 0."""
-    held_since: float = shaped(lambda n: ())
-    """Tick at which holding began."""
+    last_tick: float = shaped(lambda n: (), "Last tick answered by the law; -1: none")
+    has_reference: float = shaped(lambda n: (), "1 once a reference has been usable, else 0")
+    held_since: float = shaped(lambda n: (), "Tick at which holding began")
     rejected: Array = shaped(lambda n: (STATUSES,))
     """Number of states not used, or whose reference was not, by status."""
     command: Array = shaped(lambda n: (n + 3 + MOST_WHEELS + MOST_THRUSTERS + MOST_TORQUERS,))
@@ -91,12 +93,87 @@ class Supervision(Record):
     base's actuators, N m and N."""
 
 
+@kernel
+def controller_tick(
+    block: Block,
+    law: LawCode,
+    allocate: RecordFunction,
+    tick: int,
+    state: Block,
+    reference: Block,
+    torque: Array,
+    period: float,
+) -> int:
+    """Run a whole tick of the controller with a compiled law; return the status of the state.
+
+    If that is `USABLE`, the command is written into ``torque`` (m+A,): torque of every axis, N m,
+    then what is asked of each of the base's actuators.
+    """
+    status: int = compute_signals(
+        block, tick, state, reference, law.h_bar, law.estimate, law.uses_model, period
+    )
+    if status == USABLE:
+        compute_command(block, law, allocate, tick, torque, period)
+    return status
+
+
+@kernel
+def compute_command(
+    block: Block, law: LawCode, allocate: RecordFunction, tick: int, torque: Array, period: float
+) -> None:
+    """Compute the command of a tick from its signals, see `controller_tick`."""
+    signals, memory = block[0].signals, law.memory[0]
+    law.run(signals, law.gains[0], memory, period)
+    if law.adds_inertia:
+        force_for(signals.nominal, memory.u, memory.force, memory.force)
+    apply_transfer(block, tick, memory.force, torque)
+    allocation, axes = block[0].allocation, memory.force.size
+    allocate(allocation, float(tick))
+    for k in range(axes, torque.size):
+        torque[k] = allocation.command[k - axes]
+
+
+@kernel
+def engage(block: Block) -> None:
+    """Let a law, whose memory has been cleared, take over from the applied force."""
+    memory = block[0]
+    memory.signals.n_hat[:] = 0.0
+    memory.transfer_left = -1.0
+
+
+@kernel
+def apply_transfer(block: Block, tick: int, force: Array, torque: Array) -> None:
+    """Write the ``torque`` of a law's ``force`` (m,), which takes over from the one applied before.
+
+    ``F_S + (F_applied - F_S at the takeover) fade``, the fade falling from 1 to 0. At tick 0
+    nothing has been applied, so nothing is taken over. A base that is not controlled gets none.
+    The base's part is what its actuators are asked for.
+    """
+    memory = block[0]
+    if uniform(memory.transfer_left) < 0.0:
+        memory.transfer_left = uniform(memory.transfer_ticks) if tick > 0 else 0.0
+        for i in range(force.size):
+            memory.transfer[i] = memory.signals.applied_force[i] - force[i]
+    fade = uniform(memory.transfer_left) / uniform(memory.transfer_ticks)
+    for i in range(force.size):
+        memory.force[i] = force[i]
+        if fade > 0.0:
+            memory.force[i] += fade * memory.transfer[i]
+    if fade > 0.0:
+        memory.transfer_left -= 1.0
+    torque_from_force(memory.jacobian, memory.force, torque)
+    if uniform(memory.controls_base) == 0.0:
+        for k in range(3):
+            memory.force[k] = torque[k] = 0.0
+    memory.allocation.demand[:] = torque[:3]
+
+
 accept_stamp = kernel(accept)
 """`accept`, compiled."""
 
 
 @kernel
-def judge(block: Block, tick: int) -> int:
+def judge_stamp(block: Block, tick: int) -> int:
     """Return `ANSWERED`, `NEW` or `REFUSED` for a state of ``tick``."""
     supervision = block[0]
     if tick < 0 or tick > LAST_TICK:
@@ -110,13 +187,7 @@ def judge(block: Block, tick: int) -> int:
 
 @kernel
 def swaps_due(ticks: Array, made: int, tick: int) -> int:
-    """Return how many swaps are due at ``tick``; ``made`` have been.
-
-    Args:
-        ticks: (k,) of the swaps, increasing.
-        made: number of those already made.
-        tick: that is to be answered.
-    """
+    """Return how many swaps at the increasing ``ticks`` (k,) are due; ``made`` have been."""
     due = made
     while due < ticks.size and ticks[due] <= tick:
         due += 1
@@ -144,16 +215,6 @@ def answer_state(
 ) -> int:
     """Write the command for a state, from the law or safe, into ``command`` of the supervision.
 
-    Args:
-        block: of the `Supervision`.
-        controller: of the `ControllerMemory`.
-        law: a `CompiledLaw.code`.
-        allocate: an `allocation_code`.
-        tick: of the state.
-        state: of a `State`.
-        reference: of a `Reference`.
-        period: s.
-
     Returns:
         The status of the state.
     """
@@ -180,8 +241,6 @@ def admit_state(
 ) -> int:
     """Compute the signals of a state that is usable, and not too near to an error of 180 degrees.
 
-    Args: see `compute_signals`.
-
     Returns:
         The status of the state.
     """
@@ -192,8 +251,8 @@ def admit_state(
     is_near = abs(error_eta(desired.quaternion, quaternion)) < least
     if is_near and is_unit(quaternion) and controller[0].controls_base == 1.0:
         return SINGULAR
-    status: int = compute_signals_for(
-        controller, tick, state, desired, h_bar, estimate, uses_model, period
+    status: int = compute_signals_as_desired(
+        controller, tick, state, h_bar, estimate, uses_model, period
     )
     return status_with_reference if status == USABLE else status
 
@@ -220,12 +279,7 @@ def take_reference(
         is_usable = is_usable and abs(reference.joint_velocities[i]) <= LARGEST
         is_usable = is_usable and abs(reference.joint_accelerations[i]) <= LARGEST
     if is_usable:
-        desired.joint_positions[:] = reference.joint_positions
-        desired.joint_velocities[:] = reference.joint_velocities
-        desired.joint_accelerations[:] = reference.joint_accelerations
-        desired.quaternion[:] = reference.quaternion
-        desired.omega_base[:] = reference.omega_base
-        desired.alpha_base[:] = reference.alpha_base
+        copy_reference(reference, desired)
         supervision.has_reference = 1.0
         return USABLE
     desired.joint_velocities[:] = desired.joint_accelerations[:] = 0.0
