@@ -67,11 +67,6 @@ class ThrusterSettings(MountedSheet):
     )
 
     @property
-    def count(self) -> int:
-        """Number of thrusters."""
-        return len(vectors(self.positions))
-
-    @property
     def places(self) -> Array:
         """(T, 3) positions relative to the base's CoM, m, base frame."""
         return vectors(self.positions)

@@ -50,11 +50,6 @@ class WheelSettings(MountedSheet):
     )
 
     @property
-    def count(self) -> int:
-        """Number of wheels."""
-        return len(directions(self.axes))
-
-    @property
     def unit_axes(self) -> Array:
         """(W, 3) spin axes as unit vectors in the base frame."""
         return directions(self.axes)
