@@ -24,8 +24,7 @@ from space_robot_msgs_py.config.settings import NodeSettings, leaves
 from space_robot_msgs_py.samples import CommandSignals, Reference, State, TelemetrySignals
 from space_robot_msgs_py.signals import carried_by
 from space_robot_sim.faults.grammar import Kind
-from space_robot_sim.plant.faults import PLANT_KINDS
-from space_robot_sim.plant.settings import MOST_TICKS, PlantNodeSettings
+from space_robot_sim.plant.settings import MOST_TICKS, PLANT_KINDS, PlantNodeSettings
 
 REFERENCE = Path(__file__).parent / "reference"
 OVERRIDES = REFERENCE.parents[1] / "config/qos/record_overrides.yaml"

@@ -95,7 +95,7 @@ def signal(reporter: Reporter, size: int | Each, unit: str, frame: str, text: st
     """
     room = size.room if isinstance(size, Each) else lambda n: size
     description = ", ".join(filter(None, (text, unit, frame)))
-    return Signal(lambda n: (room(n),), description, False, None, size, text, unit, frame, reporter)
+    return Signal(lambda n: (room(n),), description, False, size, text, unit, frame, reporter)
 
 
 def signals_of(table: type) -> dict[str, Signal]:

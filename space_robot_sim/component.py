@@ -7,7 +7,7 @@ from, ``FAULTS`` what can become of them in flight; its kernels stand below it.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from functools import cache
 from operator import attrgetter
 from typing import Any, ClassVar, NamedTuple
 
@@ -73,12 +73,12 @@ class Component(Record):
                 if issubclass(field, Component):
                     field._fill(record[name], part, at)
                 continue
-            if field.origin is None:
+            if field.source is None:
                 continue
-            if isinstance(field.origin, str):
-                value = attrgetter(field.origin)(sheet)
+            if isinstance(field.source, str):
+                value = attrgetter(field.source)(sheet)
             else:
-                value = field.origin(sheet, at)
+                value = field.source(sheet, at)
             if np.ndim(value):  # what there is room for beyond the last one stays zero
                 record[name][: len(value)] = value
             else:
@@ -95,16 +95,19 @@ class Component(Record):
         """Update the fields that follow from others, after these have changed."""
 
 
-def components(record: type[Record], path: str = "") -> Iterator[tuple[str, type[Component]]]:
-    """Yield the components in a record, with their paths in it, as ``actuators.drive``."""
+@cache
+def components(record: Any, path: str = "") -> tuple[tuple[str, type[Component]], ...]:
+    """Return the components in a record, with their paths in it, as ``actuators.drive``."""
+    parts: list[tuple[str, type[Component]]] = []
     for name, field in record.fields().items():
         if isinstance(field, type):
-            if issubclass(field, Component):
-                yield path + name, field
-            yield from components(field, f"{path}{name}.")
+            own = [(path + name, field)] if issubclass(field, Component) else []
+            parts += [*own, *components(field, f"{path}{name}.")]
+    return tuple(parts)
 
 
-def kinds_of(record: type[Record]) -> tuple[Kind, ...]:
+@cache
+def kinds_of(record: Any) -> tuple[Kind, ...]:
     """Return the kinds of faults of all components in a record."""
     return tuple(kind for _, component in components(record) for kind in component.FAULTS)
 
@@ -150,11 +153,12 @@ def _places(fault: ScheduledFault, record: Any) -> Any:
 class ComponentFaults:
     """The faults of the components in a record, of one flight."""
 
-    def __init__(self, schedule: Schedule, record: type[Record]) -> None:
-        """Prepare those that ``schedule`` has."""
+    def __init__(self, schedule: Schedule, record: Any) -> None:
+        """Prepare those that ``schedule`` has; ``record``: class of the record."""
         self._changes = [
             (path, component, TemporaryChange(field, faults))
             for path, component in components(record)
+            if schedule.faults
             for field in dict.fromkeys(kind.field for kind in component.FAULTS)
             if (faults := schedule.of(*(k.name for k in component.FAULTS if k.field == field)))
         ]

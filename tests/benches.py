@@ -26,7 +26,7 @@ from space_robot_sim.actuators.actuators import (
 from space_robot_sim.component import ComponentFaults, Installation
 from space_robot_sim.faults.grammar import parse_faults
 from space_robot_sim.faults.schedule import Schedule
-from space_robot_sim.plant.faults import PLANT_KINDS
+from space_robot_sim.plant.settings import PLANT_KINDS
 from space_robot_sim.sensors.sensors import Sensors, sense
 
 Array = NDArray[np.float64]

@@ -13,7 +13,8 @@ from space_robot_control.guidance.mission import Mission, MissionSettings
 from space_robot_control.laws import ControlLaw, find_law
 from space_robot_control.navigation.settings import NavigationFilterSettings
 from space_robot_model.robot import Robot
-from space_robot_sim.plant.plant import Plant, PlantSettings
+from space_robot_sim.plant.plant import Plant
+from space_robot_sim.plant.settings import PlantSettings
 
 Array = NDArray[np.float64]
 

@@ -24,7 +24,8 @@ from space_robot_sim.environment.neighbouring_orbit import meet
 from space_robot_sim.environment.orbit import OrbitSettings
 from space_robot_sim.environment.target import Target
 from space_robot_sim.plant.mounting import mount_gears
-from space_robot_sim.plant.plant import Plant, PlantSettings
+from space_robot_sim.plant.plant import Plant
+from space_robot_sim.plant.settings import PlantSettings
 from space_robot_sim.plant.tick import update_true_state
 
 Array = NDArray[np.float64]

@@ -15,8 +15,7 @@ from space_robot_model.robot.placements import cross, to_inertial
 from space_robot_msgs_py.bag.flight_log import FlightLog, Metric
 from space_robot_msgs_py.samples import SOURCES
 from space_robot_sim.environment.captures import Captures
-from space_robot_sim.environment.disturbance import DisturbanceSettings
-from space_robot_sim.environment.loads import LoadSchedule
+from space_robot_sim.environment.disturbance import DisturbanceSettings, LoadSchedule
 
 from .base_demand import axes_of
 

@@ -23,7 +23,8 @@ from space_robot_msgs_py.config.files import Tree
 from space_robot_msgs_py.config.validation import short
 from space_robot_msgs_py.errors import FlightError, InputError
 from space_robot_msgs_py.samples import Command, Reference, RobotState
-from space_robot_sim.plant.plant import Plant, PlantSettings, PlantSnapshot
+from space_robot_sim.plant.plant import Plant, PlantSnapshot
+from space_robot_sim.plant.settings import PlantSettings
 
 from ..scenario.comparison import differences
 from .bench_history import BenchHistory

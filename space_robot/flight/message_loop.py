@@ -18,7 +18,7 @@ from space_robot_msgs_py.errors import MessageError
 from space_robot_msgs_py.samples import RobotState
 from space_robot_msgs_py.wire.codecs import CommandCodec, StateCodec
 from space_robot_msgs_py.wire.stamp_guard import AGREEING
-from space_robot_sim.plant.messages import NONE, CommandGuard, SentState, exchange_of
+from space_robot_sim.plant.messages import NONE, CommandGuard, PlantMessages, SentState
 
 from .plan import Flight
 
@@ -50,7 +50,7 @@ class MessageLoop:
         self._guard = CommandGuard(len(names.commanded), settings.hold_ticks)
         self._states = StateCodec(names, flight.timebase)
         self._commands = CommandCodec(names.commanded, flight.timebase)
-        self._exchange = exchange_of(settings, names, flight.period, self._states, self._guard)
+        self._exchange = PlantMessages(settings, names, flight.period, self._states, self._guard)
         self._references = ReferenceBuffer(robot.n)
         self._answering = StateResponder(
             supervisor or flight.supervisor,

@@ -20,7 +20,8 @@ from space_robot_model.robot import Robot
 from space_robot_model.robot.dynamics import free_inverse_dynamics, inverse_dynamics
 from space_robot_msgs_py.errors import FlightError
 from space_robot_sim.environment.friction import coefficients
-from space_robot_sim.plant.plant import Plant, PlantSettings
+from space_robot_sim.plant.plant import Plant
+from space_robot_sim.plant.settings import PlantSettings
 
 Array = NDArray[np.float64]
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 
 from space_robot_sim.faults.grammar import Argument, Kind, by_name
-from space_robot_sim.plant.faults import PLANT_KINDS
+from space_robot_sim.plant.settings import PLANT_KINDS
 
 _SECONDS = Argument("SECONDS", "s of the wall clock", 0.0, 1e6, default=math.inf)
 _NODES = ("controller", "recorder", "mission")

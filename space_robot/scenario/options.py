@@ -11,7 +11,7 @@ from space_robot_msgs_py.bag.writer import Compression
 from space_robot_msgs_py.config.validation import StrictModel, full_namespace
 from space_robot_msgs_py.errors import explained_by
 from space_robot_sim.faults.grammar import Kinds, parse_faults
-from space_robot_sim.plant.faults import PLANT_KINDS
+from space_robot_sim.plant.settings import PLANT_KINDS
 
 from .disturbances import table_parameters
 from .faults import KINDS

@@ -27,10 +27,9 @@ from space_robot_sim.environment.environment import EnvironmentSettings
 from space_robot_sim.environment.friction import coefficients
 from space_robot_sim.environment.orbit import OrbitSettings
 from space_robot_sim.faults.grammar import Fault
-from space_robot_sim.plant.faults import PLANT_KINDS
 from space_robot_sim.plant.plant import Plant
 from space_robot_sim.plant.report import actuators, plant_description
-from space_robot_sim.plant.settings import MOST_TICKS, PlantNodeSettings
+from space_robot_sim.plant.settings import MOST_TICKS, PLANT_KINDS, PlantNodeSettings
 
 from .faults import PROCESS_KINDS
 from .node_settings import NODES, NOT_TO_BE_SET, FlightSettings

@@ -19,8 +19,7 @@ from space_robot_model.hardware.sensors import SensorSettings
 from space_robot_model.robot import Robot
 from space_robot_msgs_py.config.files import GIVEN, Tree, merge, nest
 from space_robot_sim.faults.grammar import parse_faults
-from space_robot_sim.plant.faults import PLANT_KINDS
-from space_robot_sim.plant.settings import PlantNodeSettings
+from space_robot_sim.plant.settings import PLANT_KINDS, PlantNodeSettings
 
 from .faults import KINDS, PROCESS_KINDS
 from .resolved import ResolvedScenario

@@ -19,7 +19,8 @@ from space_robot_control.navigation.settings import NavigationFilterSettings
 from space_robot_model.robot import Robot
 from space_robot_msgs_py.samples import Command
 from space_robot_sim.environment.disturbance import DisturbanceSettings
-from space_robot_sim.plant.plant import Plant, PlantSettings
+from space_robot_sim.plant.plant import Plant
+from space_robot_sim.plant.settings import PlantSettings
 
 Array = NDArray[np.float64]
 

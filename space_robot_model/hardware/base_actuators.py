@@ -45,11 +45,6 @@ class MagneticTorquerSettings(MountedSheet):
     )
 
     @property
-    def count(self) -> int:
-        """Number of torquers."""
-        return len(directions(self.axes))
-
-    @property
     def unit_axes(self) -> Array:
         """(M, 3) directions of the dipoles as unit vectors in the base frame."""
         return directions(self.axes)
@@ -90,12 +85,9 @@ class BaseActuatorSettings(StrictModel):
     @property
     def names(self) -> tuple[str, ...]:
         """Names of the individually commanded actuators: wheels, thrusters, magnetic torquers."""
-        counts = (
-            ("wheel", self.wheel_count),
-            ("thruster", self.thruster_count),
-            ("torquer", self.torquer_count),
-        )
-        return tuple(f"{kind}_{i + 1}" for kind, count in counts for i in range(count))
+        counts = (self.wheel_count, self.thruster_count, self.torquer_count)
+        kinds = zip(("wheel", "thruster", "torquer"), counts, strict=True)
+        return tuple(f"{kind}_{i + 1}" for kind, count in kinds for i in range(count))
 
     def robot_names(self, robot: Robot) -> RobotNames:
         """Return the names of all measured and commanded quantities of ``robot``."""

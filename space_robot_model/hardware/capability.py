@@ -54,8 +54,7 @@ class ActuatorLoad(NamedTuple):
     """What a motion asks of actuators, at K times; a share of 1 is all that they have."""
 
     torque: Array
-    """(K, 3) N m, base axes: what is asked of them, the turning of the wheels' momentum included.
-    """
+    """(K, 3) N m, base axes: asked of them, with the turning of the wheels' momentum."""
     torque_share: Array
     """(K,) of the torque that they can give in that direction."""
     momentum_share: Array

@@ -38,9 +38,6 @@ def read_sheet(sheet: type[Sheet], folder: str, name: str) -> Sheet:
         sheet: class of the sheet.
         folder: of config/, as "sensors".
         name: of a file in it, or a path.
-
-    Raises:
-        InputError: there is no such file, or it is wrong.
     """
     path = named_file(folder, name)
     tree = node_parameters(path, "plant")
@@ -49,7 +46,10 @@ def read_sheet(sheet: type[Sheet], folder: str, name: str) -> Sheet:
 
 
 class MountedSheet(StrictModel):
-    """Base class of the sheets of several like actuators on the base."""
+    """Base class of the sheets of several like actuators on the base.
+
+    Its first field has x, y, z of each of them.
+    """
 
     section: ClassVar[str]
     """Name of the section in the actuators' file; without its last letter the name of one."""
@@ -57,7 +57,7 @@ class MountedSheet(StrictModel):
     @property
     def count(self) -> int:
         """Number of actuators."""
-        raise NotImplementedError
+        return len(vectors(getattr(self, next(iter(type(self).model_fields)))))
 
     def values(self, name: str) -> Array:
         """Return the values (count,) of the setting ``name``, one per actuator.

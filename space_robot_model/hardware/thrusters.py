@@ -67,11 +67,6 @@ class ThrusterSettings(MountedSheet):
     )
 
     @property
-    def count(self) -> int:
-        """Number of thrusters."""
-        return len(vectors(self.positions))
-
-    @property
     def places(self) -> Array:
         """(T, 3) positions relative to the base's CoM, m, base frame."""
         return vectors(self.positions)
@@ -99,11 +94,7 @@ class ThrusterSettings(MountedSheet):
         return np.round(self.values(name) / period)
 
     def check(self) -> None:
-        """Check that the settings are consistent.
-
-        Raises:
-            InputError: they are inconsistent.
-        """
+        """Check that the settings are consistent."""
         pointed = len(vectors(self.directions))
         if pointed != self.count:
             raise InputError(

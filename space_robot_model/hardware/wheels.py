@@ -50,11 +50,6 @@ class WheelSettings(MountedSheet):
     )
 
     @property
-    def count(self) -> int:
-        """Number of wheels."""
-        return len(directions(self.axes))
-
-    @property
     def unit_axes(self) -> Array:
         """(W, 3) spin axes as unit vectors in the base frame."""
         return directions(self.axes)
@@ -68,9 +63,6 @@ class WheelSettings(MountedSheet):
 
         Args:
             base_inertia: (3, 3) of the base with locked wheels about its CoM, kg m2.
-
-        Raises:
-            InputError: they are inconsistent.
         """
         if not self.count:
             return

@@ -14,6 +14,8 @@ from ..compiled.records import Block
 from ..samples import (
     ALL_FIELDS,
     ORBIT_FIELDS,
+    PASSIVE_FIELDS,
+    STATE_FIELDS,
     LawInForce,
     MeasuredSignals,
     ReferenceChunk,
@@ -23,7 +25,6 @@ from ..samples import (
     StateSignals,
     Timebase,
 )
-from ..signals import signals_of
 
 Array = NDArray[np.float64]
 
@@ -31,7 +32,7 @@ BLOCK_TICKS = 60_000
 """Rows of a block but the last: 30 s at 2 kHz, the paper's whole mission."""
 REFERENCE = ("reference_joints", "reference_base")
 """The columns the desired motion fills."""
-MEASURED_COLUMNS = tuple(signals_of(MeasuredSignals))
+MEASURED_COLUMNS = (*STATE_FIELDS, *PASSIVE_FIELDS, "magnetic_field")
 """Columns that `FlightLog` and `MeasuredStates` have in common."""
 
 
@@ -43,6 +44,10 @@ def of_nan(shape: tuple[int, ...]) -> Array:
 @dataclass(eq=False, repr=False)
 class MeasuredStates(MeasuredSignals):
     """Measured states: columns (N, ...) of a `FlightLog` as the sensors report them."""
+
+    magnetic_field: Array = StateSignals.magnetic_field
+    """(N, 3) T, base frame; (N, 0) of a robot without magnetic torquers, which has no magnetometer.
+    """
 
     @classmethod
     def of(cls, log: FlightLog) -> MeasuredStates:
@@ -192,7 +197,7 @@ class FlightLog(StateSignals):
     @property
     def whole(self) -> NDArray[np.bool_]:
         """(N,) whether state and reference of a row are there and finite."""
-        return self.finite(MEASURED_COLUMNS) & self.finite(REFERENCE)
+        return self.finite(STATE_FIELDS + PASSIVE_FIELDS) & self.finite(REFERENCE)
 
     def finite(self, columns: Iterable[str]) -> NDArray[np.bool_]:
         """(N,) whether a row has no NaN in some of the columns."""
@@ -258,9 +263,13 @@ class FlightLog(StateSignals):
         self.commanded_torque[rows] = torques[:, : self.axes]
         self.actuator_commands[rows] = torques[:, self.axes :]
 
-    def record_measured(self, new: Callable[[tuple[int, ...]], Array] = of_nan) -> None:
+    def record_measured(
+        self, new: Callable[[tuple[int, ...]], Array] = of_nan, has_magnetometer: bool = False
+    ) -> None:
         """Allocate columns of NaN for measured states and the law's error."""
         self.measured = MeasuredStates.unknown(self, new)
+        if not has_magnetometer:
+            self.measured.magnetic_field = np.empty((self.ticks, 0))
         self.assumed_error = np.full_like(self.applied_torque, np.nan)
 
     def as_measured(self) -> FlightLog:
@@ -268,6 +277,8 @@ class FlightLog(StateSignals):
         if self.measured is None:
             return self
         columns: dict[str, Any] = self.measured.columns
+        if not self.measured.magnetic_field.size:
+            del columns["magnetic_field"]
         return replace(self, **columns, measured=None, assumed_error=None)
 
     def state(self, tick: int) -> RobotState:

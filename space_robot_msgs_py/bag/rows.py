@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -12,9 +13,10 @@ from numpy.typing import NDArray
 from .. import topics
 from ..errors import MessageError
 from ..samples import (
+    PASSIVE_FIELDS,
+    STATE_FIELDS,
     CommandSignals,
     LawInForce,
-    MeasuredSignals,
     RobotNames,
     StateSignals,
     Timebase,
@@ -34,8 +36,8 @@ _TICKS_A_MESSAGE = 20
 LAST_TICK = 2**53
 """A tick in a float64 is exact below."""
 _NEVER = np.iinfo(np.int64).min
-NOT_READ = (topics.LAW, topics.MAGNETOMETER)
-"""Topics without columns; /truth/orbit has the numbers of /magnetometer."""
+NOT_READ = (topics.LAW,)
+"""Topics without columns."""
 NAMING = (topics.WHEELS_STATE, topics.THRUSTERS_STATE, topics.MOTORS_STATE, topics.COMMAND)
 """Topics whose messages tell which actuators and gears the robot has."""
 
@@ -71,6 +73,8 @@ class Rows:
         self._unnamed = set(NAMING)
         self._true: MeasuredStates | None = None
         """True states, once one has arrived; after `split_truth` the measured states."""
+        self._magnetometer = SimpleNamespace(magnetic_field=np.empty((0, 0)))
+        """The field as measured; the true one is in the log."""
         self._errors: list[tuple[Integers, Array]] = []
         """Ticks and e of the telemetry."""
         self._laws: list[LawInForce] = []
@@ -111,7 +115,8 @@ class Rows:
         reader = self._readers.get(topic)
         if not reader or not reader.description.columns:
             return
-        self._widen(reader.description.columns)
+        is_field = topic is topics.MAGNETOMETER
+        self._widen(self._magnetometer if is_field else self.log, reader.description.columns)
         if topic.per_tick:
             near = ticks < self._rows
             if not near.all():
@@ -152,12 +157,12 @@ class Rows:
         robot = self._names._replace(**named)
         self._readers[topic] = FieldReader(describe(topic, robot, log.timebase))
 
-    def _widen(self, columns: tuple[SampleColumn, ...]) -> None:
+    def _widen(self, target: Any, columns: tuple[SampleColumn, ...]) -> None:
         """Make room for what some robots have only: columns that are not as wide yet."""
         for name, first, length in columns:
-            column = getattr(self.log, name)
+            column = getattr(target, name)
             if column.ndim == 2 and column.shape[1] < first + length:
-                setattr(self.log, name, np.full((self._rows, first + length), np.nan))
+                setattr(target, name, np.full((self._rows, first + length), np.nan))
 
     def split_truth(self) -> None:
         """Make the true states those of the log, if both their halves came; call it at the end."""
@@ -166,8 +171,9 @@ class Rows:
         if self._true is None:
             return
         measured = MeasuredStates.of(self.log)
-        for name, column in self._true.columns.items():
-            setattr(self.log, name, column)
+        measured.magnetic_field = self._magnetometer.magnetic_field
+        for name in STATE_FIELDS + PASSIVE_FIELDS:
+            setattr(self.log, name, getattr(self._true, name))
         self.log.measured = self._true = measured
 
     def finish(self, ticks: int) -> FlightLog:
@@ -213,7 +219,7 @@ class Rows:
             self._believed += length * len(ticks)
             self._grow(int(ticks.max()) + length)
         places, rows = _by_place(ticks, rows, self._rows)
-        target: MeasuredSignals = self.log
+        target: Any = self._magnetometer if topic is topics.MAGNETOMETER else self.log
         if topic in topics.TRUTH:
             target = self._true = self._true or MeasuredStates.unknown(self.log)
         start = 0
@@ -240,7 +246,8 @@ class Rows:
 
     def _columns(self) -> list[NDArray[Any]]:
         true = {} if self._true is None else self._true.columns
-        return [*self.log.columns.values(), *true.values(), *self._sent_ns.values()]
+        field = self._magnetometer.magnetic_field
+        return [*self.log.columns.values(), *true.values(), *self._sent_ns.values(), field]
 
     def _grow(self, ticks: int) -> None:
         """Make room, within what can be believed; memory that is not touched costs nothing."""

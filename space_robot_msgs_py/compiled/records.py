@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import KW_ONLY, dataclass
 from functools import cache, lru_cache
 from types import SimpleNamespace
 from typing import Any, ClassVar, NamedTuple, cast
@@ -25,7 +25,7 @@ from .lanes import WIDTH
 Block = NDArray[Any]
 """An array (1,) of one record; Numba unboxes it ten times faster than the record."""
 Shape = Callable[[int], tuple[int, ...]]
-Origin = str | Callable[[Any, Any], Any]
+Source = str | Callable[[Any, Any], Any]
 """Path of an attribute, or a function of what there is to fill a record from."""
 DEGREE = 2
 """Highest power of n in the size of a field, as in a matrix."""
@@ -125,15 +125,16 @@ class Field:
     """Meaning and unit, for users."""
     uniform: bool = False
     """True if kernels need the same numbers in all lanes, see `lanes`."""
-    origin: Origin | None = None
+    _: KW_ONLY
+    source: Source | None = None
     """Where its first numbers are from, for those who fill the record; None: it begins at zero."""
 
 
 def shaped(
-    shape: Shape, description: str = "", *, uniform: bool = False, origin: Origin | None = None
+    shape: Shape, description: str = "", *, uniform: bool = False, source: Source | None = None
 ) -> Any:
     """Declare a `Field`."""
-    return Field(shape, description, uniform, origin)
+    return Field(shape, description, uniform, source=source)
 
 
 def nested(record: type[Record]) -> Any:
@@ -156,14 +157,8 @@ class Record:
     @classmethod
     def fields(cls) -> dict[str, Field | type[Record]]:
         """Return the fields by name, in memory order."""
-        fields: dict[str, Field | type[Record]] = {}
-        for base in reversed(cls.__mro__):
-            for name, value in vars(base).items():
-                if isinstance(value, Field) or (
-                    isinstance(value, type) and issubclass(value, Record)
-                ):
-                    fields[name] = value
-        return fields
+        record: Any = cls
+        return _fields(record)
 
     @classmethod
     def layout(cls) -> Layout:
@@ -314,6 +309,16 @@ def assign(record: Record, **values: Any) -> None:
     """Copy arrays or records into fields of ``record``."""
     for name, value in values.items():
         cast(Any, record)[name] = value
+
+
+@cache
+def _fields(record: type) -> dict[str, Field | type[Record]]:
+    return {
+        name: value
+        for base in reversed(record.__mro__)
+        for name, value in vars(base).items()
+        if isinstance(value, Field) or (isinstance(value, type) and issubclass(value, Record))
+    }
 
 
 @cache

@@ -23,12 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from space_robot_model.hardware.base_actuators import BaseActuatorSettings
-from space_robot_model.hardware.drives import (
-    CommandDelaySettings,
-    DriveSettings,
-    TorqueEchoSettings,
-    TorqueLimitSettings,
-)
+from space_robot_model.hardware.drives import DriveSettings
 from space_robot_model.robot import Robot
 from space_robot_msgs_py.compiled.kernels import kernel
 from space_robot_msgs_py.compiled.lanes import uniform, whole
@@ -46,16 +41,6 @@ from .wheels import Wheels, drive_wheels
 Array = NDArray[np.float64]
 
 
-def ring_of(latency: Array) -> Array:
-    """Return a ring buffer (ticks, c) of commands in transit, filled with zeros.
-
-    Args:
-        latency: (c,) ticks by which each number of a command is late.
-    """
-    longest = int(latency.max(initial=0.0))
-    return np.zeros((longest + 1 if longest else 0, latency.size))
-
-
 @kernel
 def delay_command(latency: Array, ring: Array, command: Array, tick: int, out: Array) -> None:
     """Store ``command`` (c,) in the ring at ``tick``; write the command due into ``out``.
@@ -71,13 +56,7 @@ def delay_command(latency: Array, ring: Array, command: Array, tick: int, out: A
         out[i] = due
 
 
-class ActuatorSettings(
-    BaseActuatorSettings,
-    TorqueEchoSettings,
-    DriveSettings,
-    TorqueLimitSettings,
-    CommandDelaySettings,
-):
+class ActuatorSettings(BaseActuatorSettings, DriveSettings):
     """Settings of the actuators."""
 
     def check(self, robot: Robot, file: str) -> None:
@@ -110,7 +89,7 @@ class Actuators(Component):
     thrusters: Thrusters = nested(Thrusters)
     magnetic_torquers: MagneticTorquers = nested(MagneticTorquers)
     base_is_ideal: float = shaped(
-        lambda n: (), uniform=True, origin=lambda s, at: s.base_actuation == "ideal"
+        lambda n: (), uniform=True, source=lambda s, at: s.base_actuation == "ideal"
     )
     """1 if the base receives the commanded torque; 0 if it has hardware or no actuators."""
     saturated_ticks: float = shaped(lambda n: ())
@@ -118,7 +97,7 @@ class Actuators(Component):
     latency: Array = shaped(
         lambda n: (n + 3 + MOST_WHEELS + MOST_THRUSTERS + MOST_TORQUERS,),
         uniform=True,
-        origin=_latency,
+        source=_latency,
     )
     """Ticks by which each number of a command is late."""
     due: Array = shaped(lambda n: (n + 3 + MOST_WHEELS + MOST_THRUSTERS + MOST_TORQUERS,))
@@ -147,8 +126,9 @@ def reports_given(actuators: Actuators) -> bool:
 
 
 def command_delay_buffer(actuators: Actuators, names: int) -> Array:
-    """Return the ring buffer (ticks, names) of commands in transit."""
-    return ring_of(actuators.latency[:names])
+    """Return the ring buffer (ticks, names) of commands in transit, filled with zeros."""
+    longest = int(actuators.latency[:names].max(initial=0.0))
+    return np.zeros((longest + 1 if longest else 0, names))
 
 
 @kernel

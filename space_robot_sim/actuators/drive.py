@@ -35,7 +35,7 @@ from space_robot_model.elementary.functions import in_steps
 from space_robot_model.hardware.sheets import per_axis
 from space_robot_msgs_py.compiled.kernels import kernel
 from space_robot_msgs_py.compiled.lanes import all_lanes, any_lane, uniform, where
-from space_robot_msgs_py.compiled.records import Origin, assign, shaped
+from space_robot_msgs_py.compiled.records import Source, assign, shaped
 
 from ..component import Component
 from ..faults.grammar import About, Argument, Kind
@@ -46,7 +46,7 @@ LIMIT = Argument("TORQUE", "N m", 0.0, 1e6)
 TORQUE = Argument("TORQUE", "N m", -1e6, 1e6, About.AXIS)
 
 
-def _axes(name: str) -> Origin:
+def _axes(name: str) -> Source:
     return lambda sheet, at: per_axis(sheet, name, at.n)
 
 
@@ -55,7 +55,7 @@ class TorqueLimit(Component):
 
     limit: Array = shaped(
         lambda n: (n + 3,),
-        origin=lambda s, at: np.array(
+        source=lambda s, at: np.array(
             3 * [s.base_torque_limit or np.inf] + at.n * [s.joint_torque_limit or np.inf]
         ),
     )
@@ -108,7 +108,7 @@ def lag_decays(lag: float, period: float) -> tuple[float, float]:
     return float(decay), float((1 - decay) / ratio)
 
 
-def _decays(which: int) -> Origin:
+def _decays(which: int) -> Source:
     def decays(sheet: Any, at: Any) -> list[float]:
         return [lag_decays(lag, at.period)[which] for lag in per_axis(sheet, "drive_lag", at.n)]
 
@@ -118,17 +118,17 @@ def _decays(which: int) -> Origin:
 class Drive(Component):
     """The drives of one robot, an axis each: base x, y, z (base frame), then joints."""
 
-    scale: Array = shaped(lambda n: (n + 3,), origin=_axes("drive_scale"))
+    scale: Array = shaped(lambda n: (n + 3,), source=_axes("drive_scale"))
     """Torque given per torque commanded."""
-    bias: Array = shaped(lambda n: (n + 3,), origin=_axes("drive_bias"))
+    bias: Array = shaped(lambda n: (n + 3,), source=_axes("drive_bias"))
     """N m."""
-    step: Array = shaped(lambda n: (n + 3,), origin=_axes("drive_step"))
+    step: Array = shaped(lambda n: (n + 3,), source=_axes("drive_step"))
     """N m; 0: any torque can be given."""
-    dead_band: Array = shaped(lambda n: (n + 3,), origin=_axes("drive_dead_band"))
+    dead_band: Array = shaped(lambda n: (n + 3,), source=_axes("drive_dead_band"))
     """N m."""
-    decay: Array = shaped(lambda n: (n + 3,), origin=_decays(0))
+    decay: Array = shaped(lambda n: (n + 3,), source=_decays(0))
     """``exp(-T / tau)`` of the lag; 0 without one."""
-    mean_decay: Array = shaped(lambda n: (n + 3,), origin=_decays(1))
+    mean_decay: Array = shaped(lambda n: (n + 3,), source=_decays(1))
     """``tau / T (1 - exp(-T / tau))``; 0 without a lag."""
     lagging: Array = shaped(lambda n: (n + 3,))
     """The lag's output at the current tick, N m."""
@@ -177,12 +177,12 @@ class TorqueEcho(Component):
     """Report of torques, one per axis: base x, y, z (base frame), then joints."""
 
     is_of_given: float = shaped(
-        lambda n: (), uniform=True, origin=lambda s, at: s.torque_echo == "given"
+        lambda n: (), uniform=True, source=lambda s, at: s.torque_echo == "given"
     )
     """1 if the torque given is reported, 0 if the command within its limits is."""
-    scale: Array = shaped(lambda n: (n + 3,), origin=_axes("echo_scale"))
+    scale: Array = shaped(lambda n: (n + 3,), source=_axes("echo_scale"))
     """Reported torque per torque of the source."""
-    bias: Array = shaped(lambda n: (n + 3,), origin=_axes("echo_bias"))
+    bias: Array = shaped(lambda n: (n + 3,), source=_axes("echo_bias"))
     """N m."""
     is_exact: float = shaped(lambda n: ())
     """1 if the source itself is reported, so that the kernel is skipped."""

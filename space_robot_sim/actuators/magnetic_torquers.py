@@ -22,11 +22,11 @@ Array = NDArray[np.float64]
 class MagneticTorquers(Component):
     """Magnetic torquers of one base; entries beyond the last one are zero."""
 
-    count: float = shaped(lambda n: (), uniform=True, origin="count")
-    axis: Array = shaped(lambda n: (MOST_TORQUERS, 3), origin="unit_axes")
+    count: float = shaped(lambda n: (), uniform=True, source="count")
+    axis: Array = shaped(lambda n: (MOST_TORQUERS, 3), source="unit_axes")
     """Unit vectors of the dipoles, base frame."""
     max_dipole: Array = shaped(
-        lambda n: (MOST_TORQUERS,), origin=lambda s, at: s.values("max_dipole")
+        lambda n: (MOST_TORQUERS,), source=lambda s, at: s.values("max_dipole")
     )
     """A m2."""
 

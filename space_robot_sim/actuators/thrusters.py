@@ -28,20 +28,20 @@ ONE = Argument(about=About.THRUSTER)
 class Thrusters(Component):
     """Thrusters of one base; entries beyond the last thruster are zero."""
 
-    count: float = shaped(lambda n: (), uniform=True, origin="count")
-    force: Array = shaped(lambda n: (MOST_THRUSTERS,), origin=lambda s, at: s.values("force"))
+    count: float = shaped(lambda n: (), uniform=True, source="count")
+    force: Array = shaped(lambda n: (MOST_THRUSTERS,), source=lambda s, at: s.values("force"))
     """Force of an open thruster, N."""
-    direction: Array = shaped(lambda n: (MOST_THRUSTERS, 3), origin="unit_directions")
+    direction: Array = shaped(lambda n: (MOST_THRUSTERS, 3), source="unit_directions")
     """Unit vectors of the force on the base, base frame."""
     lever: Array = shaped(
-        lambda n: (MOST_THRUSTERS, 3), origin=lambda s, at: s.torques / s.values("force")[:, None]
+        lambda n: (MOST_THRUSTERS, 3), source=lambda s, at: s.torques / s.values("force")[:, None]
     )
     """Torque about the base's CoM by force, m, base frame: position x direction."""
-    flow: Array = shaped(lambda n: (MOST_THRUSTERS,), origin="mass_flow")
+    flow: Array = shaped(lambda n: (MOST_THRUSTERS,), source="mass_flow")
     """Propellant that an open thruster burns, kg/s."""
     shortest_pulse: Array = shaped(
         lambda n: (MOST_THRUSTERS,),
-        origin=lambda s, at: np.maximum(1.0, s.ticks("shortest_pulse", at.period)),
+        source=lambda s, at: np.maximum(1.0, s.ticks("shortest_pulse", at.period)),
     )
     """Ticks, at least one."""
     stuck_on: Array = shaped(lambda n: (MOST_THRUSTERS,))
@@ -54,7 +54,7 @@ class Thrusters(Component):
     """Ticks for which a valve must stay open."""
     pulses: Array = shaped(lambda n: (MOST_THRUSTERS,))
     """Number of times that a valve has opened."""
-    propellant: float = shaped(lambda n: (), origin=lambda s, at: s.propellant or np.inf)
+    propellant: float = shaped(lambda n: (), source=lambda s, at: s.propellant or np.inf)
     """Propellant in the tank, kg; inf: unlimited."""
     burnt: float = shaped(lambda n: ())
     """Propellant used so far, kg."""

@@ -31,19 +31,19 @@ Array = NDArray[np.float64]
 class Wheels(Component):
     """Wheel motors of one base; entries beyond the last wheel are zero."""
 
-    count: float = shaped(lambda n: (), uniform=True, origin="count")
-    axis: Array = shaped(lambda n: (MOST_WHEELS, 3), origin="unit_axes")
+    count: float = shaped(lambda n: (), uniform=True, source="count")
+    axis: Array = shaped(lambda n: (MOST_WHEELS, 3), source="unit_axes")
     """Unit vectors in the base frame."""
     inertia: Array = shaped(
-        lambda n: (MOST_WHEELS,), origin=lambda s, at: s.values("rotor_inertia")
+        lambda n: (MOST_WHEELS,), source=lambda s, at: s.values("rotor_inertia")
     )
     """J of each rotor about its axis, kg m2."""
     max_torque: Array = shaped(
-        lambda n: (MOST_WHEELS,), origin=lambda s, at: s.limits("max_torque")
+        lambda n: (MOST_WHEELS,), source=lambda s, at: s.limits("max_torque")
     )
     """N m."""
     max_momentum: Array = shaped(
-        lambda n: (MOST_WHEELS,), origin=lambda s, at: s.limits("max_momentum")
+        lambda n: (MOST_WHEELS,), source=lambda s, at: s.limits("max_momentum")
     )
     """h, N m s."""
     failed: Array = shaped(lambda n: (MOST_WHEELS,))

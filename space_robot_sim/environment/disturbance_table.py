@@ -83,14 +83,15 @@ class DisturbanceTable(NamedTuple):
                 raise InputError(f"{where}: {TIME} must rise, got {after:g} s after {before:g} s")
         return cls(checked)
 
-    @classmethod
-    def parse(cls, text: str) -> DisturbanceTable:
-        """Parse the text of a table.
-
-        Raises:
-            InputError: see `of`.
-        """
-        return _parsed(text)
+    @staticmethod
+    @lru_cache(maxsize=16)
+    def parse(text: str) -> DisturbanceTable:
+        """Parse the text of a table."""
+        try:
+            columns = parse_json(text)
+        except ValueError as error:
+            raise InputError(f"disturbance: not a table as JSON ({error})") from None
+        return DisturbanceTable.of(columns, "disturbance")
 
     @property
     def text(self) -> str:
@@ -145,23 +146,10 @@ def table_text(text: str, folder: Path = Path()) -> str:
 
 
 def check_table_text(text: str) -> str:
-    """Check the text of a table without opening a file, and return it.
-
-    Raises:
-        InputError: see `DisturbanceTable.of`.
-    """
+    """Check the text of a table without opening a file, and return it."""
     if text.startswith(JSON):
         DisturbanceTable.parse(text)
     return text
-
-
-@lru_cache(maxsize=16)
-def _parsed(text: str) -> DisturbanceTable:
-    try:
-        columns = parse_json(text)
-    except ValueError as error:
-        raise InputError(f"disturbance: not a table as JSON ({error})") from None
-    return DisturbanceTable.of(columns, "disturbance")
 
 
 def _numbers(name: str, values: Any, where: str) -> list[float]:

@@ -13,10 +13,9 @@ from space_robot_msgs_py.compiled.records import nested
 from space_robot_msgs_py.config.validation import StrictModel
 
 from ..component import Component
-from .disturbance import Disturbance, DisturbanceSettings
+from .disturbance import Disturbance, DisturbanceSettings, PrescribedLoads
 from .events import Event, EventTexts, parse_events
 from .friction import Friction, FrictionSettings
-from .loads import PrescribedLoads
 from .orbit import Orbit, OrbitSettings
 from .surfaces import Surfaces
 
@@ -51,11 +50,7 @@ class EnvironmentSettings(OrbitSettings):
 
     @property
     def parsed_events(self) -> list[Event]:
-        """Events in order of time; files of targets are read.
-
-        Raises:
-            InputError: see `parse_events`.
-        """
+        """Events in order of time; files of targets are read."""
         texts = [text for text in self.events if text.strip()]
         return parse_events(texts, self.events_folder) if texts else []
 

@@ -110,11 +110,7 @@ def in_order(events: Sequence[Event]) -> list[Event]:
 
 
 def check_events(texts: list[str]) -> list[str]:
-    """Check texts of events without opening files, and return them.
-
-    Raises:
-        InputError: see `parse_events`.
-    """
+    """Check texts of events without opening files, and return them."""
     for text in texts:
         if text.strip():
             _split(text)
@@ -122,11 +118,7 @@ def check_events(texts: list[str]) -> list[str]:
 
 
 def named_targets(texts: Iterable[str]) -> list[str]:
-    """Return the names and paths of targets in texts of events: what `parse_events` would open.
-
-    Raises:
-        InputError: a text is not a valid event.
-    """
+    """Return the names and paths of targets in texts of events: what `parse_events` would open."""
     arguments = [_split(text)[1] for text in texts if text.strip()]
     return [argument for argument in arguments if isinstance(argument, str)]
 

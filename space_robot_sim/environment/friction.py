@@ -2,7 +2,7 @@
 
 By Coulomb's law the friction torque of a moving joint is ``f_C sign(thetadot)``. At rest it is the
 torque between ``-f_C`` and ``f_C`` that holds the joint (Filippov 1988). Which joints are at rest
-is determined in `space_robot_sim.plant.stick_slip`; this module computes the friction then.
+is determined in `space_robot_sim.plant.integrator`; this module computes the friction then.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from space_robot_model.dynamics.model import MOST_JOINTS, MOST_MOVING
 from space_robot_model.robot import Robot
 from space_robot_msgs_py.compiled.kernels import kernel
 from space_robot_msgs_py.compiled.lanes import uniform, whole
-from space_robot_msgs_py.compiled.records import Origin, shaped
+from space_robot_msgs_py.compiled.records import Source, shaped
 from space_robot_msgs_py.config.validation import StrictModel
 
 from ..component import Component, Installation
@@ -52,7 +52,7 @@ def coefficients(robot: Robot, settings: FrictionSettings) -> Array:
     return np.where(np.isnan(own), usual, own)
 
 
-def _in_model_order(column: int) -> Origin:
+def _in_model_order(column: int) -> Source:
     def values(settings: FrictionSettings, at: Installation) -> Array:
         return np.asarray(coefficients(at.robot, settings)[list(at.robot.order), column])
 
@@ -62,15 +62,15 @@ def _in_model_order(column: int) -> Origin:
 class Friction(Component):
     """Friction of a robot's joints, then of its wheels."""
 
-    count: float = shaped(lambda n: (), uniform=True, origin=lambda s, at: at.robot.joint_count)
+    count: float = shaped(lambda n: (), uniform=True, source=lambda s, at: at.robot.joint_count)
     """Number of joints and wheels; the rest of the arrays is unused."""
-    row: Array = shaped(lambda n: (MOST_JOINTS,), origin=lambda s, at: np.argsort(at.robot.order))
+    row: Array = shaped(lambda n: (MOST_JOINTS,), source=lambda s, at: np.argsort(at.robot.order))
     """Row of each joint in the other arrays, which are in the order of `Model`."""
-    coulomb: Array = shaped(lambda n: (MOST_MOVING,), origin=_in_model_order(0))
+    coulomb: Array = shaped(lambda n: (MOST_MOVING,), source=_in_model_order(0))
     """f_C, N m."""
-    viscous: Array = shaped(lambda n: (MOST_MOVING,), origin=_in_model_order(1))
+    viscous: Array = shaped(lambda n: (MOST_MOVING,), source=_in_model_order(1))
     """f_V, N m s/rad."""
-    set_valued: float = shaped(lambda n: (), uniform=True, origin="set_valued")
+    set_valued: float = shaped(lambda n: (), uniform=True, source="set_valued")
     """0 for the sign alone, 1 for friction that holds joints at rest."""
 
     FAULTS: ClassVar[tuple[Kind, ...]] = (

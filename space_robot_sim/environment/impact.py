@@ -54,11 +54,7 @@ class Grasp(NamedTuple):
 
     @classmethod
     def of(cls, robot: Robot, target: Target) -> Grasp:
-        """Place ``target`` in the tool that it names, or in the robot's first one.
-
-        Raises:
-            InputError: the robot has no such tool.
-        """
+        """Place ``target`` in the tool that it names, or in the robot's first one."""
         tools = {tool.name: tool for tool in robot.tools}
         tool = robot.tool
         if target.tool:

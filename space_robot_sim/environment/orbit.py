@@ -178,33 +178,33 @@ def read_orbit(path: Path) -> OrbitSettings:
 class Orbit(Component):
     """The orbital environment of a robot."""
 
-    is_on: float = shaped(lambda n: (), uniform=True, origin="has_orbit")
+    is_on: float = shaped(lambda n: (), uniform=True, source="has_orbit")
     """1 in an orbit; 0: nothing of this acts."""
-    has_gradient: float = shaped(lambda n: (), uniform=True, origin="gravity.gradient")
-    has_j2: float = shaped(lambda n: (), uniform=True, origin="gravity.j2")
-    position: Array = shaped(lambda n: (3,), origin=lambda s, at: state_of(s.orbital_elements)[0])
+    has_gradient: float = shaped(lambda n: (), uniform=True, source="gravity.gradient")
+    has_j2: float = shaped(lambda n: (), uniform=True, source="gravity.j2")
+    position: Array = shaped(lambda n: (3,), source=lambda s, at: state_of(s.orbital_elements)[0])
     """Position of the reference point at tick 0 from the Earth's centre, m, inertial axes."""
-    velocity: Array = shaped(lambda n: (3,), origin=lambda s, at: state_of(s.orbital_elements)[1])
+    velocity: Array = shaped(lambda n: (3,), source=lambda s, at: state_of(s.orbital_elements)[1])
     """Its velocity then, m/s."""
-    density: float = shaped(lambda n: (), origin="atmosphere.density")
+    density: float = shaped(lambda n: (), source="atmosphere.density")
     """kg/m3 at ``at_height``."""
-    at_height: float = shaped(lambda n: (), origin="atmosphere.at_height")
+    at_height: float = shaped(lambda n: (), source="atmosphere.at_height")
     """m."""
-    scale_height: float = shaped(lambda n: (), origin="atmosphere.scale_height")
+    scale_height: float = shaped(lambda n: (), source="atmosphere.scale_height")
     """m."""
-    sun: Array = shaped(lambda n: (3,), origin="sun")
+    sun: Array = shaped(lambda n: (3,), source="sun")
     """Unit vector to the Sun."""
-    pressure: float = shaped(lambda n: (), origin="sunlight.pressure")
+    pressure: float = shaped(lambda n: (), source="sunlight.pressure")
     """N/m2."""
-    strength: float = shaped(lambda n: (), origin="magnetism.strength")
+    strength: float = shaped(lambda n: (), source="magnetism.strength")
     """Magnetic field on the surface at the magnetic equator, T."""
     tilt: Array = shaped(
-        lambda n: (2,), origin=lambda s, at: plain_sin_cos(s.magnetism.tilt_deg * TO_RAD)
+        lambda n: (2,), source=lambda s, at: plain_sin_cos(s.magnetism.tilt_deg * TO_RAD)
     )
     """Sine and cosine of the dipole's tilt."""
-    pole: float = shaped(lambda n: (), origin=lambda s, at: s.magnetism.pole_deg * TO_RAD)
+    pole: float = shaped(lambda n: (), source=lambda s, at: s.magnetism.pole_deg * TO_RAD)
     """Right ascension of the northern magnetic pole at tick 0, rad."""
-    residual_dipole: Array = shaped(lambda n: (3,), origin="magnetism.residual_dipole")
+    residual_dipole: Array = shaped(lambda n: (3,), source="magnetism.residual_dipole")
     """A m2, base axes."""
     wind: Array = shaped(lambda n: (3,))
     """Velocity of the base against the air at the present tick, m/s, inertial axes."""

@@ -17,6 +17,8 @@ are.
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -39,7 +41,7 @@ from space_robot_model.robot.parts import MOST_PLATES
 from space_robot_model.robot.shapes import plates_of
 from space_robot_msgs_py.compiled.kernels import kernel, subroutine
 from space_robot_msgs_py.compiled.lanes import whole
-from space_robot_msgs_py.compiled.records import shaped
+from space_robot_msgs_py.compiled.records import assign, shaped
 from space_robot_msgs_py.errors import InputError
 
 from ..component import Component, Installation
@@ -47,16 +49,11 @@ from .orbit import OrbitSettings
 
 Array = NDArray[np.float64]
 
-AREA, NORMAL, CENTRE, DRAG_COEFFICIENT, SPECULAR, DIFFUSE = 0, 1, 4, 7, 8, 9
+AREA, NORMAL, CENTRE, DRAG_COEFFICIENT, SPECULAR, DIFFUSE, BODY = 0, 1, 4, 7, 8, 9, 10
 """Columns of `Surfaces.plates`."""
 
 
-def _body_plates(settings: OrbitSettings, at: Installation) -> tuple[Array, list[list[float]]]:
-    """Return the first plate of each body, and the plates, body by body.
-
-    Raises:
-        InputError: the robot has too many.
-    """
+def _plates(settings: OrbitSettings, at: Installation) -> list[list[float]]:
     robot = at.robot
     plates = plates_of(robot)
     if len(plates) > MOST_PLATES:
@@ -64,28 +61,24 @@ def _body_plates(settings: OrbitSettings, at: Installation) -> tuple[Array, list
             f"robot {robot.name!r}: its shapes have {len(plates)} plates for drag and "
             f"sunlight, at most {MOST_PLATES} are allowed: give it its own (robot.plates)"
         )
-    first, rows = np.zeros(MOST_JOINTS + 2), []
-    for place, body in enumerate([0, *(joint + 1 for joint in robot.order)]):
+    rows = []
+    for number, body in enumerate([0, *(joint + 1 for joint in robot.order)], 1):
         for plate in plates:
             if plate.body == body:
                 coefficients = plate.drag_coefficient, plate.specular, plate.diffuse
-                rows.append([plate.area, *plate.normal, *plate.centre, *coefficients])
-        first[place + 1 :] = len(rows)
-    return first, rows
+                rows.append([plate.area, *plate.normal, *plate.centre, *coefficients, number])
+    return rows
 
 
 class Surfaces(Component):
     """Plates of a robot, body by body, and the wrenches on its bodies."""
 
-    count: float = shaped(
-        lambda n: (), uniform=True, origin=lambda s, at: len(_body_plates(s, at)[1])
-    )
-    first: Array = shaped(
-        lambda n: (MOST_JOINTS + 2,), uniform=True, origin=lambda s, at: _body_plates(s, at)[0]
-    )
+    count: float = shaped(lambda n: (), uniform=True)
+    first: Array = shaped(lambda n: (MOST_JOINTS + 2,), uniform=True)
     """First plate of each body; that of the body behind the last is `count`."""
-    plates: Array = shaped(lambda n: (MOST_PLATES, 10), origin=lambda s, at: _body_plates(s, at)[1])
-    """Area, normal, centre, coefficients, in body axes; see the columns' names."""
+    plates: Array = shaped(lambda n: (MOST_PLATES, 11), source=_plates)
+    """Area, normal, centre, coefficients, in body axes, and number of the body from 1, as `Model`
+    orders them; see the columns' names."""
     wrench: Array = shaped(lambda n: (MOST_JOINTS + 1, 6))
     """Moment about the base's CoM, N m, and force, N, on each body; inertial axes."""
     drag: Array = shaped(lambda n: (6,))
@@ -97,6 +90,14 @@ class Surfaces(Component):
     def is_fitted(sheet: OrbitSettings) -> bool:
         """Return whether there is air or sunlight."""
         return sheet.has_surfaces
+
+    @staticmethod
+    def refresh(record: Any) -> None:
+        """Update ``count`` and ``first``."""
+        count = np.count_nonzero(record.plates[:, BODY])
+        numbers = np.arange(1, MOST_JOINTS + 3)
+        first = np.searchsorted(record.plates[:count, BODY], numbers)
+        assign(record, count=count, first=first)
 
 
 @kernel

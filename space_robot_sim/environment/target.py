@@ -125,9 +125,6 @@ def find_target(name: str, folder: Path) -> Target:
 
     A path that is not absolute begins where the program was started or, if nothing is there, in
     ``folder``, which is that of the mission's file.
-
-    Raises:
-        InputError: there is no such file, or it is wrong.
     """
     path = Path(name)
     if path.suffix in (".yaml", ".yml") and not _is_there(path) and _is_there(folder / path):

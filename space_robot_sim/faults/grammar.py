@@ -202,11 +202,7 @@ def parse_fault(text: str, kinds: Kinds) -> Fault:
 
 
 def parse_faults(texts: Iterable[str], kinds: Kinds) -> list[Fault]:
-    """Parse faults; empty texts are ignored (ROS has no empty list of strings).
-
-    Raises:
-        InputError: see `parse_fault`.
-    """
+    """Parse faults; empty texts are ignored (ROS has no empty list of strings)."""
     return [parse_fault(text, kinds) for text in texts if text.strip()]
 
 
@@ -249,7 +245,7 @@ def axes_of(name: str, about: About, names: RobotNames) -> tuple[int, ...]:
     return axes
 
 
-def add_in_quadrature(sigma: Any, value: float) -> Any:
+def add_noise(sigma: Any, value: float) -> Any:
     """Add white noise to a standard deviation."""
     return np.sqrt(sigma * sigma + value * value)
 

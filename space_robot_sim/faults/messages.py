@@ -9,7 +9,7 @@ from typing import Any, Generic, TypeVar
 
 import numpy as np
 
-from space_robot_msgs_py.samples import PASSIVE_FIELDS, Command, RobotState
+from space_robot_msgs_py.samples import PASSIVE_FIELDS, SENSED_FIELDS, Command, RobotState
 
 from .grammar import Argument, Kind, by_name
 from .schedule import Schedule
@@ -45,15 +45,6 @@ QUATERNION_NORMS = (0.9, 1.1)
 STAMP_BACK_TICKS = 10
 """A stamp goes back by 1 to this many ticks."""
 STAMP_JUMP_TICKS = 1_000_000
-MEASURED = (
-    "base_position",
-    "quaternion",
-    "base_velocity",
-    "omega_base",
-    "joint_positions",
-    "joint_velocities",
-)
-"""Fields of a state that can be corrupted, beside those of joints without motors."""
 
 
 @dataclass(frozen=True, slots=True, order=True)
@@ -159,7 +150,7 @@ class MessageFaults:
         for kind, value in (("nan_state", np.nan), ("inf_state", np.inf)):
             for fault in self._schedule.of(kind):
                 if fault.happens_at(tick):
-                    arrays = [getattr(state, name) for name in MEASURED]
+                    arrays = [getattr(state, name) for name in SENSED_FIELDS]
                     arrays += [getattr(state, name)[: self._passive] for name in PASSIVE_FIELDS]
                     place = fault.choose(tick, sum(array.size for array in arrays))
                     for array in arrays:

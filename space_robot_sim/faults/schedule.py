@@ -84,11 +84,7 @@ class Schedule:
     def __init__(
         self, faults: Sequence[Fault], seed: int, period: float, names: RobotNames = NO_NAMES
     ) -> None:
-        """Place all faults; ``names``: of what the robot has, for faults that name one.
-
-        Raises:
-            InputError: see `ScheduledFault`.
-        """
+        """Place all faults; ``names``: of what the robot has, for faults that name one."""
         self.faults = [
             ScheduledFault(fault, index, seed, period, names) for index, fault in enumerate(faults)
         ]

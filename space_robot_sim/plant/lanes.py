@@ -1,7 +1,7 @@
 """Plants of eight flights, stepped together.
 
 Over most steps every joint slides or stands all through, so that all flights take the same course
-(`stick_slip.glide`). A flight in which a joint stops or breaks away is integrated by itself over
+(`integrator.glide`). A flight in which a joint stops or breaks away is integrated by itself over
 that step.
 """
 
@@ -24,8 +24,7 @@ from space_robot_msgs_py.compiled.lanes import (
 from space_robot_msgs_py.compiled.records import Block
 
 from ..environment.environment import Environment
-from .integrator import state_size
-from .stick_slip import glide, integrate
+from .integrator import glide, integrate, state_size
 from .tick import PlantMemory, begin_interval, end_interval
 
 Array = NDArray[np.float64]

@@ -27,8 +27,8 @@ from space_robot_msgs_py.samples import Command
 from space_robot_msgs_py.wire.codecs import CommandCodec, StateCodec
 from space_robot_msgs_py.wire.telemetry import ClockCodec
 
-from .base_output import BaseOutput
-from .messages import NONE, CommandGuard, SentState, exchange_of
+from .messages import NONE, CommandGuard, PlantMessages, SentState
+from .outputs import BaseOutput, SceneOutput, TruthOutput
 from .pacing import (
     PAUSED,
     SPIN_BEFORE_DEADLINE_S,
@@ -39,9 +39,7 @@ from .pacing import (
 )
 from .plant import Plant
 from .report import ActuatorHealth, plant_description
-from .scene_output import SceneOutput
 from .settings import PlantNodeSettings
-from .truth_output import TruthOutput
 
 TIMEOUT_S = 0.02
 ASK_AGAIN_S = 0.2
@@ -84,7 +82,7 @@ class PlantLoop:
         self._commands = CommandCodec(names.commanded, timebase)
         self._clock = ClockCodec()
         self._guard = CommandGuard(len(names.commanded), settings.hold_ticks)
-        self._exchange = exchange_of(settings, names, settings.period, self._states, self._guard)
+        self._exchange = PlantMessages(settings, names, settings.period, self._states, self._guard)
         self._state_out = tuple(RawPublisher(node, topic) for topic in self._states.topics)
         self._clock_out = RawPublisher(node, topics.CLOCK)
         self._command_in = RawSubscription(node, topics.COMMAND, PolledCallbackGroup())

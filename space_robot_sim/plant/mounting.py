@@ -87,11 +87,7 @@ def mount_gears(robot: Robot, model: Model, friction: Friction, x: Array) -> Non
 
 
 def check_rotors(robot: Robot) -> None:
-    """Check that bodies have more inertia than the rotors that are part of them.
-
-    Raises:
-        InputError: one has not.
-    """
+    """Check that bodies have more inertia than the rotors that are part of them."""
     for body, name in enumerate(robot.body_names):
         carried = [
             (joint, gear)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING, Any
 
 from space_robot_msgs_py.errors import FlightError, InputError
 
@@ -133,19 +133,11 @@ REPEAT_FOR_S = 2.0
 """Who takes messages as best effort may miss the first ones."""
 
 
-class Output(Protocol):
-    """A publisher, as far as it is needed here."""
-
-    @property
-    def listener_count(self) -> int:
-        """Number of subscriptions that are connected."""
-
-
 class LateListeners:
     """Decision when a paused plant repeats its last messages. Independent of ROS."""
 
-    def __init__(self, outputs: Sequence[Output]) -> None:
-        """``outputs``: their new listeners are those meant."""
+    def __init__(self, outputs: Sequence[Any]) -> None:
+        """``outputs``: publishers, whose new listeners are those meant."""
         self._outputs = outputs
         self._counts: list[int] | None = None
         self._until = self._next = 0.0
@@ -187,11 +179,7 @@ class OwnController:
         self._since = self._discovered_at = 0.0
 
     def is_awaited(self) -> bool:
-        """Return whether the first state must wait for the controller.
-
-        Raises:
-            FlightError: none has come in time.
-        """
+        """Return whether the first state must wait for the controller."""
         if not self.is_missing:
             return False
         now = time.monotonic()
@@ -210,9 +198,6 @@ class OwnController:
         Args:
             waited_s: time since it is awaited, s.
             refused: commands that were refused, by reason.
-
-        Raises:
-            FlightError: it is.
         """
         limit = self._settings.join_timeout
         if not limit or waited_s <= limit:
@@ -224,11 +209,7 @@ class OwnController:
         )
 
     def check_silence(self, tick: int) -> None:
-        """Check that a plant may fly on though its controller is silent.
-
-        Raises:
-            FlightError: it may not.
-        """
+        """Check that a plant may fly on though its controller is silent."""
         if self._settings.own_controller:
             raise FlightError(
                 f"no command for {self._settings.silence_timeout:g} s (silence_timeout) at "

@@ -4,16 +4,13 @@ from __future__ import annotations
 
 import copy
 import math
-from typing import Annotated, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field
 
 from space_robot_model.elementary.matrices import direction_norm
-from space_robot_model.hardware.sensors import SensorSettings
 from space_robot_model.robot import Robot
-from space_robot_model.robot.mission_document import Rates
 from space_robot_model.robot.momentum import Motion, robot_momentum
 from space_robot_model.robot.placements import base_axes, cross, to_inertial
 from space_robot_msgs_py import topics
@@ -21,53 +18,18 @@ from space_robot_msgs_py.compiled.records import RecordOwner, assign
 from space_robot_msgs_py.errors import DivergedError, InputError
 from space_robot_msgs_py.samples import MOST_WHEELS, Command, RobotState
 
-from ..actuators.actuators import (
-    Actuators,
-    ActuatorSettings,
-    check_faults,
-    command_delay_buffer,
-    reports_given,
-)
+from ..actuators.actuators import Actuators, check_faults, command_delay_buffer, reports_given
 from ..component import ComponentFaults, Installation, kinds_of
 from ..environment.captures import Captures
-from ..environment.environment import Environment, EnvironmentSettings, with_payload
-from ..environment.loads import LoadSchedule
+from ..environment.disturbance import LoadSchedule
+from ..environment.environment import Environment, with_payload
 from ..sensors.sensors import Sensors
-from .faults import FaultSettings
-from .mounting import MOST_SUBSTEPS, check_springs, measured_motors, mount_gears, mount_wheels
+from .mounting import check_springs, measured_motors, mount_gears, mount_wheels
+from .settings import PlantSettings
 from .tick import RATE_LIMIT, PlantMemory, measure, step, update_true_state
 
 Array = NDArray[np.float64]
 Block = NDArray[Any]
-
-
-class PlantSettings(ActuatorSettings, EnvironmentSettings, SensorSettings, FaultSettings):
-    """Settings of the plant's world, beside the robot's own file."""
-
-    initial_joints_deg: list[float] = Field(
-        [0.0],
-        description="positions of the actuated joints at tick 0, degrees (prismatic joints: m)",
-    )
-    initial_quaternion: Annotated[list[float], Field(min_length=4, max_length=4)] = Field(
-        [1.0, 0.0, 0.0, 0.0], description="base attitude at tick 0: w, x, y, z"
-    )
-    initial_rate_deg_s: Rates = Field(
-        [0.0, 0.0, 0.0],
-        description="angular velocity of the base at tick 0, degrees/s, base axes; the robot turns "
-        "as one body about its centre of mass, which is at rest",
-    )
-    substeps: Annotated[int, Field(ge=1, le=MOST_SUBSTEPS)] = Field(
-        1, description="integration steps per tick; the command is held over all of them"
-    )
-
-    def check(self, robot: Robot, file: str) -> None:
-        """Check the actuators and what they need, see `ActuatorSettings.check`."""
-        super().check(robot, file)
-        if self.torquer_count and not (self.has_orbit and self.magnetism.strength):
-            raise InputError(
-                f"actuators {file}: magnetic_torquers need an orbit with a magnetic field: "
-                "--orbit NAME, with magnetism.strength above 0"
-            )
 
 
 class PlantSnapshot(NamedTuple):

@@ -70,7 +70,7 @@ class ActuatorHealth:
 
     def __init__(self, plant: Plant) -> None:
         self._plant = plant
-        self._before = [0] * len(plant.names.wheels)
+        self._before: dict[str, int] = {}
 
     @property
     def values(self) -> Values:
@@ -79,34 +79,22 @@ class ActuatorHealth:
 
     def saturated(self) -> str:
         """Return the names of wheels that were at a limit since the last call."""
-        now = self._saturated_ticks
-        names = [
-            name
-            for name, ticks, before in zip(self._names, now, self._before, strict=True)
-            if ticks > before
-        ]
+        ticks = self._plant.memory.actuators.wheels.saturated_ticks
+        now = {name: int(ticks[k]) for k, name in enumerate(self._plant.names.wheels)}
+        names = [name for name, count in now.items() if count > self._before.get(name, 0)]
         self._before = now
         return ", ".join(names)
 
-    @property
-    def _names(self) -> tuple[str, ...]:
-        return self._plant.names.wheels
-
-    @property
-    def _saturated_ticks(self) -> list[int]:
-        ticks = self._plant.memory.actuators.wheels.saturated_ticks
-        return [int(count) for count in ticks[: len(self._names)]]
-
     def _of_wheels(self) -> Values:
         wheels, speeds = self._plant.memory.actuators.wheels, self._plant.truth.wheel_velocities
-        values: Values = {}
-        for k, name in enumerate(self._names):
+        names, values = self._plant.names.wheels, Values()
+        for k, name in enumerate(names):
             if np.isfinite(wheels.max_momentum[k]):
                 share = wheels.inertia[k] * speeds[k] / wheels.max_momentum[k]
                 values[f"momentum_percent: {name}"] = float(100.0 * share)
             if wheels.saturated_ticks[k]:
                 values[f"saturated_ticks: {name}"] = int(wheels.saturated_ticks[k])
-        failed = [name for k, name in enumerate(self._names) if wheels.failed[k]]
+        failed = [name for k, name in enumerate(names) if wheels.failed[k]]
         return {**values, **({"failed": ", ".join(failed)} if failed else {})}
 
     def _of_thrusters(self) -> Values:

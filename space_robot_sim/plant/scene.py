@@ -7,19 +7,18 @@ inertial frame.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 
 from space_robot_model.robot import Robot
 from space_robot_model.robot.placements import RobotPoses, tool_poses
 from space_robot_model.robot.urdf_text import urdf_text
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.samples import RobotState, Timebase
+from space_robot_msgs_py.wire.telemetry import Messages
 from space_robot_msgs_py.wire.viewers import Frame, TransformsCodec, robot_description, wrap
 
 PERIOD_NS = 10_000_000
 """Least time between two messages on /tf: 100 Hz."""
-
-Messages = Iterable[tuple[topics.Topic, bytes]]
 
 
 class SceneWriter:

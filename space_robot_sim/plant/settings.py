@@ -1,4 +1,4 @@
-"""Settings of the plant node: the plant's own, and how it is paced."""
+"""Settings of the plant, of its faults, and of its node: how it is paced."""
 
 from __future__ import annotations
 
@@ -6,18 +6,100 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, ClassVar
 
-from pydantic import Field
+from pydantic import AfterValidator, Field
 from typing_extensions import Self
 
+from space_robot_model.hardware.sensors import SensorSettings
+from space_robot_model.robot import Robot
 from space_robot_model.robot.find import mission_layers
-from space_robot_model.robot.mission_document import mission_layer
+from space_robot_model.robot.mission_document import Rates, mission_layer
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.config.files import Tree, named_layers
 from space_robot_msgs_py.config.settings import NodeSettings, Texts
+from space_robot_msgs_py.config.validation import StrictModel
+from space_robot_msgs_py.errors import InputError
+from space_robot_msgs_py.samples import RobotNames
 
+from ..actuators.actuators import Actuators, ActuatorSettings
+from ..component import kinds_of
 from ..environment.disturbance_table import table_text
+from ..environment.environment import Environment, EnvironmentSettings
 from ..environment.orbit import orbit_layers
-from .plant import PlantSettings
+from ..faults.grammar import Fault, by_name, parse_faults
+from ..faults.messages import MESSAGE_KINDS
+from ..faults.schedule import Schedule
+from ..sensors.sensors import Sensors
+from .mounting import MOST_SUBSTEPS
+
+PLANT_KINDS = by_name(
+    *MESSAGE_KINDS.values(),
+    *(kind for record in (Sensors, Actuators, Environment) for kind in kinds_of(record)),
+)
+"""All kinds of faults caused by the plant."""
+
+
+def _readable(texts: list[str]) -> list[str]:
+    parse_faults(texts, PLANT_KINDS)
+    return texts
+
+
+class FaultSettings(StrictModel):
+    """Settings of the faults of the plant."""
+
+    faults: Annotated[Texts, AfterValidator(_readable)] = Field(
+        [""], description="faults of the flight, each `KIND@T[-END][:ARGUMENT]`, see docs/manual"
+    )
+    fault_seed: Annotated[int, Field(ge=0, le=2**31 - 1)] = Field(
+        0, description="seed of the random numbers of faults and sensors"
+    )
+
+    @property
+    def parsed_faults(self) -> list[Fault]:
+        """The faults, without the empty texts."""
+        return parse_faults(self.faults, PLANT_KINDS)
+
+    @property
+    def has_message_faults(self) -> bool:
+        """True if messages between plant and controller have faults."""
+        return any(fault.kind.name in MESSAGE_KINDS for fault in self.parsed_faults)
+
+    def schedule(self, names: RobotNames, period: float) -> Schedule:
+        """Place the faults in a flight of a robot with these names in ticks of ``period`` seconds.
+
+        Raises:
+            InputError: a fault names what is not there, or its time holds no tick.
+        """
+        return Schedule(self.parsed_faults, self.fault_seed, period, names)
+
+
+class PlantSettings(ActuatorSettings, EnvironmentSettings, SensorSettings, FaultSettings):
+    """Settings of the plant's world, beside the robot's own file."""
+
+    initial_joints_deg: list[float] = Field(
+        [0.0],
+        description="positions of the actuated joints at tick 0, degrees (prismatic joints: m)",
+    )
+    initial_quaternion: Annotated[list[float], Field(min_length=4, max_length=4)] = Field(
+        [1.0, 0.0, 0.0, 0.0], description="base attitude at tick 0: w, x, y, z"
+    )
+    initial_rate_deg_s: Rates = Field(
+        [0.0, 0.0, 0.0],
+        description="angular velocity of the base at tick 0, degrees/s, base axes; the robot turns "
+        "as one body about its centre of mass, which is at rest",
+    )
+    substeps: Annotated[int, Field(ge=1, le=MOST_SUBSTEPS)] = Field(
+        1, description="integration steps per tick; the command is held over all of them"
+    )
+
+    def check(self, robot: Robot, file: str) -> None:
+        """Check the actuators and what they need, see `ActuatorSettings.check`."""
+        super().check(robot, file)
+        if self.torquer_count and not (self.has_orbit and self.magnetism.strength):
+            raise InputError(
+                f"actuators {file}: magnetic_torquers need an orbit with a magnetic field: "
+                "--orbit NAME, with magnetism.strength above 0"
+            )
+
 
 MOST_TICKS = 10**10
 """Largest number of ticks of a flight."""

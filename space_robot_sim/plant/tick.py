@@ -26,14 +26,13 @@ from space_robot_msgs_py.compiled.records import Record, nested, shaped
 from space_robot_msgs_py.samples import State
 
 from ..actuators.actuators import Actuators, actuate
+from ..environment.disturbance import begin_loads
 from ..environment.environment import Environment
 from ..environment.gravity_gradient import add_gravity_gradient
-from ..environment.loads import begin_loads
 from ..environment.orbit import density_at, light, magnetic_field, wind
 from ..environment.surfaces import press_on_surfaces
 from ..sensors.sensors import Sensors, sense
-from .integrator import MOST_NUMBERS, Stages, first_motor_angle, first_orbit_number
-from .stick_slip import integrate
+from .integrator import MOST_NUMBERS, Stages, first_motor_angle, first_orbit_number, integrate
 
 Array = NDArray[np.float64]
 Block = NDArray[Any]

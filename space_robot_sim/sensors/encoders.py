@@ -18,10 +18,13 @@ from space_robot_msgs_py.compiled.records import shaped
 from space_robot_msgs_py.samples import State
 
 from ..component import Component, Installation
-from ..faults.grammar import About, Argument, Kind, add_in_quadrature, switch_on
+from ..faults.grammar import About, Argument, Kind, add_noise, switch_on
 from ..faults.schedule import BLOCK_TICKS
 
 Array = NDArray[np.float64]
+
+SIGMA, RATE_SIGMA = (Argument("SIGMA", unit, 0.0, 1e3) for unit in ("rad", "rad/s"))
+STEP, RATE_STEP = (Argument("STEP", unit, 1e-12, 1e3) for unit in ("rad", "rad/s"))
 
 
 def _steps(sheet: EncoderSettings, at: Installation) -> Array:
@@ -45,39 +48,35 @@ class Encoders(Component):
     is the difference of two measured angles N ticks apart, divided by N periods.
     """
 
-    sigma: Array = shaped(lambda n: (n,), origin="noise")
+    sigma: Array = shaped(lambda n: (n,), source="noise")
     """White noise of each angle, rad."""
-    step: Array = shaped(lambda n: (n,), origin=_steps)
+    step: Array = shaped(lambda n: (n,), source=_steps)
     """Distance of two angles, rad (0: none)."""
-    difference_ticks: float = shaped(lambda n: (), uniform=True, origin="difference_ticks")
+    difference_ticks: float = shaped(lambda n: (), uniform=True, source="difference_ticks")
     """N; 0: rates are measured."""
-    velocity_sigma: Array = shaped(lambda n: (n,), origin="velocity_noise")
+    velocity_sigma: Array = shaped(lambda n: (n,), source="velocity_noise")
     """White noise of each rate, rad/s."""
-    velocity_step: Array = shaped(lambda n: (n,), origin="velocity_step")
+    velocity_step: Array = shaped(lambda n: (n,), source="velocity_step")
     """Distance of two rates, rad/s (0: none)."""
-    motor: Array = shaped(lambda n: (n,), uniform=True, origin=lambda s, at: at.motors)
+    motor: Array = shaped(lambda n: (n,), uniform=True, source=lambda s, at: at.motors)
     """Number from 1 of the motor that a joint's encoder measures; 0: it measures the link."""
     stuck: Array = shaped(lambda n: (n,))
     """1 for each joint with a stuck encoder."""
     draws: Array = shaped(lambda n: (BLOCK_TICKS, 2, n))
     """Standard normal numbers, a row a tick: of the angles, of the rates."""
-    history: Array = shaped(lambda n: (MOST_DIFFERENCED, n), origin=_at_rest)
+    history: Array = shaped(lambda n: (MOST_DIFFERENCED, n), source=_at_rest)
     """The last measured angles, by tick modulo `MOST_DIFFERENCED`, rad."""
 
     FAULTS: ClassVar[tuple[Kind, ...]] = (
         Kind(
-            "noise_joint_position",
-            Argument("SIGMA", "rad", 0.0, 1e3),
-            "noise on the measured joint angles",
-            "sigma",
-            add_in_quadrature,
+            "noise_joint_position", SIGMA, "noise on the measured joint angles", "sigma", add_noise
         ),
         Kind(
             "noise_joint_velocity",
-            Argument("SIGMA", "rad/s", 0.0, 1e3),
+            RATE_SIGMA,
             "noise on the measured joint velocities",
             "velocity_sigma",
-            add_in_quadrature,
+            add_noise,
         ),
         Kind(
             "encoder_stuck",
@@ -88,14 +87,14 @@ class Encoders(Component):
         ),
         Kind(
             "quantise_joint_position",
-            Argument("STEP", "rad", 1e-12, 1e3),
+            STEP,
             "the measured joint angles are quantised",
             "step",
             np.maximum,
         ),
         Kind(
             "quantise_joint_velocity",
-            Argument("STEP", "rad/s", 1e-12, 1e3),
+            RATE_STEP,
             "the measured joint velocities are quantised",
             "velocity_step",
             np.maximum,

@@ -13,7 +13,7 @@ from space_robot_msgs_py.compiled.records import shaped
 from space_robot_msgs_py.samples import State
 
 from ..component import Component
-from ..faults.grammar import About, Argument, Kind, add_in_quadrature
+from ..faults.grammar import About, Argument, Kind, add_noise
 from ..faults.schedule import BLOCK_TICKS
 
 Array = NDArray[np.float64]
@@ -36,25 +36,25 @@ class Gyro(Component):
     with standard normal n_u, n_v. The noise of each sample adds to this sigma in quadrature.
     """
 
-    sigma: Array = shaped(lambda n: (3,), origin="noise")
+    sigma: Array = shaped(lambda n: (3,), source="noise")
     """White noise of each sample, rad/s."""
-    angle_random_walk: float = shaped(lambda n: (), origin="angle_random_walk")
+    angle_random_walk: float = shaped(lambda n: (), source="angle_random_walk")
     """sigma_v, rad/s^1/2."""
-    rate_random_walk: float = shaped(lambda n: (), origin="rate_random_walk")
+    rate_random_walk: float = shaped(lambda n: (), source="rate_random_walk")
     """sigma_u, rad/s^3/2."""
-    offset: Array = shaped(lambda n: (3,), origin="initial_bias")
+    offset: Array = shaped(lambda n: (3,), source="initial_bias")
     """Constant bias, rad/s."""
     bias: Array = shaped(lambda n: (3,))
     """Random-walk bias, rad/s: b without the offset."""
-    scale: Array = shaped(lambda n: (3,), origin=lambda s, at: 1.0 + np.array(s.scale_factor_error))
+    scale: Array = shaped(lambda n: (3,), source=lambda s, at: 1.0 + np.array(s.scale_factor_error))
     """1 + e."""
-    step: Array = shaped(lambda n: (1,), origin="step")
+    step: Array = shaped(lambda n: (1,), source="step")
     """rad/s (0: none)."""
     draws: Array = shaped(lambda n: (BLOCK_TICKS, 6))
     """Standard normal numbers, a row a tick: n_v (3), n_u (3)."""
 
     FAULTS: ClassVar[tuple[Kind, ...]] = (
-        Kind("noise_gyro", SIGMA, "noise on the measured base rate", "sigma", add_in_quadrature),
+        Kind("noise_gyro", SIGMA, "noise on the measured base rate", "sigma", add_noise),
         Kind("gyro_bias", BIAS, "RATE is added to the measured base rate about an axis", "offset"),
         Kind("quantise_gyro", STEP, "the measured base rate is quantised", "step", np.maximum),
     )

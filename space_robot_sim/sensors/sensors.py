@@ -38,17 +38,17 @@ class Sensors(Component):
     are_ideal: float = shaped(
         lambda n: (),
         uniform=True,
-        origin=lambda s, at: all(getattr(s, name) == default for name, default in IDEAL),
+        source=lambda s, at: all(getattr(s, name) == default for name, default in IDEAL),
     )
     """1 if all sensors are without error."""
-    seed: float = shaped(lambda n: (), origin=lambda s, at: at.seed)
+    seed: float = shaped(lambda n: (), source=lambda s, at: at.seed)
     """Of the random numbers."""
-    drawn: float = shaped(lambda n: (), uniform=True, origin=lambda s, at: -1.0)
+    drawn: float = shaped(lambda n: (), uniform=True, source=lambda s, at: -1.0)
     """The block of ticks whose random numbers have been drawn; -1: none yet."""
 
 
-STAR_TRACKER, GYRO, ENCODERS, MAGNETOMETER = (
-    zlib.crc32(name.encode()) for name in SensorSettings.model_fields
+STAR_TRACKER, GYRO, ENCODERS = (
+    zlib.crc32(name.encode()) for name in ("star_tracker", "gyro", "encoders")
 )
 """Keys of the sensors' random numbers."""
 
@@ -83,7 +83,7 @@ def sense(sensors: Sensors, truth: State, tick: int, period: float, measured: St
         track_stars(sensors.star_tracker, truth, tick, measured)
         read_gyro(sensors.gyro, truth, tick, period, measured)
         read_encoders(sensors.encoders, truth, tick, period, measured)
-        read_magnetometer(sensors.magnetometer, truth, tick, measured)
+        read_magnetometer(sensors.magnetometer, sensors.seed, truth, tick, measured)
 
 
 @kernel
@@ -100,4 +100,3 @@ def _draw(sensors: Sensors, tick: int) -> None:
     normal_numbers(sensors.star_tracker.draws, sensors.seed, STAR_TRACKER, block)
     normal_numbers(sensors.gyro.draws, sensors.seed, GYRO, block)
     normal_numbers(sensors.encoders.draws, sensors.seed, ENCODERS, block)
-    normal_numbers(sensors.magnetometer.draws, sensors.seed, MAGNETOMETER, block)

@@ -17,7 +17,7 @@ from space_robot_msgs_py.compiled.records import shaped
 from space_robot_msgs_py.samples import State
 
 from ..component import Component, Installation
-from ..faults.grammar import Argument, Kind, add_in_quadrature, switch_on
+from ..faults.grammar import Argument, Kind, add_noise, switch_on
 from ..faults.schedule import BLOCK_TICKS
 
 Array = NDArray[np.float64]
@@ -50,17 +50,17 @@ class StarTracker(Component):
     standard deviation ``sigma_about`` about ``b`` and ``sigma_across`` about all axes across it.
     """
 
-    sigma: Array = shaped(lambda n: (2,), origin=lambda s, at: [s.noise_across, s.noise_about])
+    sigma: Array = shaped(lambda n: (2,), source=lambda s, at: [s.noise_across, s.noise_about])
     """rad: across the boresight, about it."""
     boresight: Array = shaped(
-        lambda n: (3,), origin=lambda s, at: np.array(s.boresight) / norm(s.boresight)
+        lambda n: (3,), source=lambda s, at: np.array(s.boresight) / norm(s.boresight)
     )
     """Unit vector on base axes."""
-    interval: float = shaped(lambda n: (), uniform=True, origin=lambda s, at: s.ticks(at.period)[0])
+    interval: float = shaped(lambda n: (), uniform=True, source=lambda s, at: s.ticks(at.period)[0])
     """Ticks between two measurements; the first is taken at tick 0."""
-    delay: float = shaped(lambda n: (), uniform=True, origin=lambda s, at: s.ticks(at.period)[1])
+    delay: float = shaped(lambda n: (), uniform=True, source=lambda s, at: s.ticks(at.period)[1])
     """Ticks from a measurement to its release."""
-    step: Array = shaped(lambda n: (1,), origin="step")
+    step: Array = shaped(lambda n: (1,), source="step")
     """The quaternion's numbers come in steps of half of it, rad (0: none)."""
     blind: Array = shaped(lambda n: (1,))
     """1 while no measurement can be taken."""
@@ -70,7 +70,7 @@ class StarTracker(Component):
     """1 for each measurement under way that could be taken."""
     under_way: Array = shaped(lambda n: (MOST_UNDER_WAY, 4))
     """Measurements in transit, by number modulo `MOST_UNDER_WAY`."""
-    held: Array = shaped(lambda n: (4,), origin=_before)
+    held: Array = shaped(lambda n: (4,), source=_before)
     """The measurement released last."""
 
     FAULTS: ClassVar[tuple[Kind, ...]] = (
@@ -79,7 +79,7 @@ class StarTracker(Component):
             Argument("SIGMA", "rad", 0.0, 1e3),
             "noise of standard deviation SIGMA about each axis of the measured attitude",
             "sigma",
-            add_in_quadrature,
+            add_noise,
         ),
         Kind(
             "tracker_blind",

@@ -114,7 +114,11 @@ def columns_of(log: FlightLog) -> dict[str, NDArray[np.float64]]:
     columns = {name: c for name, c in log.columns.items() if name not in OF_THE_CLOCK}
     columns = {name: columns[name] for name in dict.fromkeys([*ORDER, *columns])}
     if log.measured is not None:
-        columns |= {f"measured.{name}": c for name, c in log.measured.columns.items()}
+        measured = log.measured.columns
+        field = measured.pop("magnetic_field")
+        if field.size and not np.array_equal(field, columns["magnetic_field"]):
+            measured["magnetic_field"] = field  # of a magnetometer with errors
+        columns |= {f"measured.{name}": c for name, c in measured.items()}
     return columns
 
 

@@ -29,7 +29,8 @@ from space_robot_msgs_py.config.files import named_file
 from space_robot_msgs_py.config.validation import read_yaml
 from space_robot_sim.environment.disturbance import DisturbanceSettings
 from space_robot_sim.environment.friction import FrictionSettings
-from space_robot_sim.plant.plant import Plant, PlantSettings
+from space_robot_sim.plant.plant import Plant
+from space_robot_sim.plant.settings import PlantSettings
 
 PERIOD = 5e-4
 BATCH = 64

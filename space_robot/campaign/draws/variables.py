@@ -13,7 +13,7 @@ from space_robot_msgs_py.config.validation import one_of, short
 from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.samples import RobotNames
 from space_robot_sim.faults.grammar import About, Kind, axes_of
-from space_robot_sim.plant.faults import PLANT_KINDS
+from space_robot_sim.plant.settings import PLANT_KINDS
 
 from ..study import Study
 from .changes import Changes, Nominal

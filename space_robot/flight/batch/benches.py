@@ -20,7 +20,8 @@ from space_robot_msgs_py.compiled.records import Block
 from space_robot_msgs_py.config.arguments import as_numbers, as_whole_number
 from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.samples import RobotState, State
-from space_robot_sim.plant.plant import Plant, PlantSettings
+from space_robot_sim.plant.plant import Plant
+from space_robot_sim.plant.settings import PlantSettings
 from space_robot_sim.plant.tick import PlantMemory
 
 from ..bench import LARGEST_SEED, check_for_bench, seeded

@@ -26,7 +26,7 @@ from space_robot_model.robot.parts import MOST_PLATES
 from space_robot_msgs_py.errors import InputError
 from space_robot_sim.environment import surfaces
 from space_robot_sim.plant.mounting import MOST_SUBSTEPS
-from space_robot_sim.plant.plant import PlantSettings
+from space_robot_sim.plant.settings import PlantSettings
 
 TABLE = DATA / "refusals/commands.yaml"
 URDF = (DATA / "docs.urdf").read_text("utf-8")

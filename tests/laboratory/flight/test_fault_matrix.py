@@ -27,7 +27,7 @@ from space_robot.scenario.faults import KINDS
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_sim.faults.grammar import parse_faults
 from space_robot_sim.faults.schedule import Schedule, ScheduledFault
-from space_robot_sim.plant.faults import PLANT_KINDS
+from space_robot_sim.plant.settings import PLANT_KINDS
 
 PERIOD = 0.0005
 SEED = 7

@@ -13,7 +13,7 @@ from paths import DOCS
 from space_robot.scenario.faults import KINDS, PROCESS_KINDS
 from space_robot_msgs_py.errors import InputError
 from space_robot_sim.faults.grammar import Fault, Kind, help_lines, parse_fault, parse_faults
-from space_robot_sim.plant.faults import PLANT_KINDS
+from space_robot_sim.plant.settings import PLANT_KINDS
 
 TIMES = st.floats(0.0, 1e9)
 

@@ -16,7 +16,8 @@ from strategies import SEEDS
 from space_robot_model.robot import Robot
 from space_robot_msgs_py.errors import InputError
 from space_robot_sim.actuators.drive import Drive
-from space_robot_sim.plant.plant import Plant, PlantSettings
+from space_robot_sim.plant.plant import Plant
+from space_robot_sim.plant.settings import PlantSettings
 
 Array = NDArray[np.float64]
 

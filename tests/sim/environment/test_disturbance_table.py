@@ -24,6 +24,10 @@ from space_robot_sim.component import ComponentFaults, Installation
 from space_robot_sim.environment.disturbance import (
     Disturbance,
     DisturbanceSettings,
+    LoadSchedule,
+    PrescribedLoads,
+    add_loads,
+    begin_loads,
     disturbance_torque,
 )
 from space_robot_sim.environment.disturbance_table import DisturbanceTable, table_text
@@ -39,10 +43,9 @@ from space_robot_sim.environment.friction import (
     coefficients,
     friction_torque,
 )
-from space_robot_sim.environment.loads import LoadSchedule, PrescribedLoads, add_loads, begin_loads
 from space_robot_sim.faults.grammar import parse_faults
 from space_robot_sim.faults.schedule import Schedule
-from space_robot_sim.plant.faults import PLANT_KINDS
+from space_robot_sim.plant.settings import PLANT_KINDS
 
 Array = NDArray[np.float64]
 REFUSALS = yaml.safe_load((DATA / "refusals/environment.yaml").read_text("utf-8"))

@@ -34,7 +34,7 @@ from space_robot_sim.faults.messages import (
     awaited_stamp,
 )
 from space_robot_sim.faults.schedule import BLOCK_TICKS, Schedule, ScheduledFault
-from space_robot_sim.plant.faults import PLANT_KINDS
+from space_robot_sim.plant.settings import PLANT_KINDS
 
 JOINTS = st.lists(st.text(min_size=1, max_size=5), min_size=1, max_size=9, unique=True)
 PAPER = RobotNames(

@@ -27,7 +27,7 @@ from space_robot_sim.plant.settings import PlantNodeSettings
 pytest.importorskip("rclpy")
 
 from space_robot_msgs_py.ros.loop import Level
-from space_robot_sim.plant import base_output, loop, pacing, scene_output, truth_output
+from space_robot_sim.plant import loop, outputs, pacing
 from space_robot_sim.plant.loop import ASK_AGAIN_S, PlantLoop
 
 Array = NDArray[np.float64]
@@ -80,11 +80,11 @@ class Bench:
         self.states: list[tuple[int, float]] = []
         """Tick and time of each state that was sent."""
         patch.setattr(time, "monotonic", lambda: self.now)
-        for module in (loop, base_output, scene_output, truth_output):
+        for module in (loop, outputs):
             patch.setattr(module, "RawPublisher", Topic)
         patch.setattr(loop, "RawSubscription", Topic)
         patch.setattr(loop, "PausedOutput", lambda node: Topic(node, topics.SIMULATION_PAUSED))
-        patch.setattr(scene_output, "find_spec", lambda name: None)
+        patch.setattr(outputs, "find_spec", lambda name: None)
         self.settings = PlantNodeSettings.resolve(
             {
                 "hold_ticks": HOLD,

@@ -24,8 +24,8 @@ from space_robot_sim.plant.settings import PlantNodeSettings
 
 pytest.importorskip("rclpy")
 
-from space_robot_sim.plant import base_output, scene_output
-from space_robot_sim.plant.base_output import BaseOutput
+from space_robot_sim.plant import outputs
+from space_robot_sim.plant.outputs import BaseOutput
 
 Array = NDArray[np.float64]
 PERIOD, LOOK_S = 5e-4, 0.02
@@ -43,7 +43,7 @@ class Node:
                 listener_count=listeners, publish=lambda data: sent.append(decode(data, topic.type))
             )
 
-        patch.setattr(base_output, "RawPublisher", publisher)
+        patch.setattr(outputs, "RawPublisher", publisher)
 
     def get_namespace(self) -> str:
         return "/fleet/sat1"
@@ -165,11 +165,11 @@ def test_viewers_are_sent_what_they_can_show(
             show=lambda truth: marked.append(f"shown {truth.tick}"),
         )
 
-    monkeypatch.setattr(scene_output, "RawPublisher", publisher)
-    monkeypatch.setattr(scene_output, "MarkerOutput", markers)
-    monkeypatch.setattr(scene_output, "find_spec", lambda name: name in installed or None)
+    monkeypatch.setattr(outputs, "RawPublisher", publisher)
+    monkeypatch.setattr(outputs, "MarkerOutput", markers)
+    monkeypatch.setattr(outputs, "find_spec", lambda name: name in installed or None)
     node: Any = SimpleNamespace(get_namespace=lambda: topics.ROOT)
-    output = scene_output.SceneOutput(node, paper_robot, Timebase(500_000))
+    output = outputs.SceneOutput(node, paper_robot, Timebase(500_000))
     has_tf, has_markers = "tf2_msgs" in installed, "visualization_msgs" in installed
     assert (len(output.outputs), len(output.viewed)) == (3, 2 * has_tf + has_markers)
     for _ in range(2):

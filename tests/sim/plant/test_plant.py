@@ -26,7 +26,8 @@ from space_robot_sim.environment.disturbance import DisturbanceSettings
 from space_robot_sim.environment.disturbance_table import DisturbanceTable
 from space_robot_sim.environment.friction import FrictionSettings
 from space_robot_sim.environment.target import Target
-from space_robot_sim.plant.plant import Plant, PlantSettings
+from space_robot_sim.plant.plant import Plant
+from space_robot_sim.plant.settings import PlantSettings
 from space_robot_sim.plant.tick import fastest_rate
 
 Array = NDArray[np.float64]

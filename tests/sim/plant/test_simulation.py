@@ -54,8 +54,9 @@ class Node:
         self.loop.tell_paused = lambda: self.told.append(self.control.is_paused)  # type: ignore[method-assign]
         self.is_active, self.starts = True, self.starts + 1
 
-    def stop(self) -> None:
+    async def restart(self, others: list[str]) -> None:
         self.is_active = False
+        self.start()
 
     def log(self, text: str) -> None:
         self.logged.append(text)
@@ -175,7 +176,7 @@ def test_it_announces_what_it_does_and_tells_the_other_nodes_of_pauses() -> None
 
 def test_a_plant_that_is_not_active_is_stopped_and_can_do_nothing() -> None:
     caller = Caller()
-    caller.node.stop()
+    caller.node.is_active = False
     assert caller.state() == STOPPED
     for call, argument, answer in (
         ("set", PLAYING, WRONG),

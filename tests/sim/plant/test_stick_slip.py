@@ -25,10 +25,10 @@ from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.samples import Command
 from space_robot_sim.environment.disturbance import DisturbanceSettings
 from space_robot_sim.environment.friction import FrictionSettings
-from space_robot_sim.plant.integrator import Stages
+from space_robot_sim.plant.integrator import MOST_CUTS, Stages, integrate, slip_or_stick
 from space_robot_sim.plant.mounting import STABLE, check_rotors, check_springs
-from space_robot_sim.plant.plant import Plant, PlantSettings
-from space_robot_sim.plant.stick_slip import MOST_CUTS, integrate, slip_or_stick
+from space_robot_sim.plant.plant import Plant
+from space_robot_sim.plant.settings import PlantSettings
 
 Array = NDArray[np.float64]
 COULOMB = 0.7
