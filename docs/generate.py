@@ -15,12 +15,14 @@ from typing import Annotated, Any, get_args, get_origin
 
 from space_robot.scenario.faults import PROCESS_KINDS
 from space_robot_control.controller.settings import ControllerNodeSettings
-from space_robot_control.guidance.settings import MissionNodeSettings
+from space_robot_control.guidance.mission import MissionNodeSettings
 from space_robot_control.laws import laws
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.bag.recorder_settings import RecorderNodeSettings
+from space_robot_msgs_py.config.files import flatten
 from space_robot_msgs_py.config.settings import NodeSettings, leaves
-from space_robot_msgs_py.config.trees import flatten
+from space_robot_msgs_py.samples import CommandSignals, Reference, State, TelemetrySignals
+from space_robot_msgs_py.signals import carried_by
 from space_robot_sim.faults.grammar import Kind
 from space_robot_sim.plant.faults import PLANT_KINDS
 from space_robot_sim.plant.settings import MOST_TICKS, PlantNodeSettings
@@ -42,6 +44,7 @@ EXAMPLES = {
     "TORQUE": "0.5",
     "JOINT": "3",
     "BASE_AXIS=RATE": "base_x=1e-5",
+    "BASE_AXIS=FIELD": "base_x=1e-6",
     "JOINT=TORQUE": "3=20",
     "SECONDS": "1.5",
     "AXIS=FACTOR": "all=0.99",
@@ -52,41 +55,28 @@ EXAMPLES = {
 """An argument as it may be given, by the form of the kind."""
 
 FIELDS = {
-    "/joint_states": "`name`: n actuated joints, then passive ones; `position` (rad), `velocity` "
-    "(rad/s), `effort` (N m): torque *applied* over the tick that just ended, without friction; "
-    "passive joints 0",
-    "/base/state": "`joint_names` = `[base]`; `transforms[0].translation` (m; `inertial`): centre "
-    "of mass; `transforms[0].rotation`: from `base_link` to `inertial`, x, y, z, w; "
-    "`twist[0].linear` (m/s; `inertial`), `twist[0].angular` (rad/s; `base_link`); "
-    "`wrench[0].torque` (N m; `base_link`): *applied* over the tick that just ended",
+    "/joint_states": "`name`: n actuated joints, then passive ones, whose `effort` is 0",
+    "/base/state": "`joint_names` = `[base]`; rotations are sent as x, y, z, w",
     "/command": "`name` = `base_x`, `base_y`, `base_z`, the joints, then wheels, thrusters and "
-    "magnetic torquers of the base; `effort`: torque (N m; base: `base_link`), thruster force (N) "
-    "or dipole (A m²) to apply from this stamp on",
-    "/reference/joints": "100 `points`, point i is i ticks after the stamp: `positions` (rad), "
-    "`velocities` (rad/s), `accelerations` (rad/s²)",
-    "/reference/base": "the same for the base: `transforms[0].rotation` (`inertial`), "
-    "`velocities[0].angular`, `accelerations[0].angular` (rad/s, rad/s²; `base_link`)",
+    "magnetic torquers of the base",
+    "/reference/joints": "100 `points`, point i is i ticks after the stamp",
+    "/reference/base": "as many `points`, of `joint_names` = `[base]`",
     "/controller/telemetry": "`data`: the tick, then four rows of n + 3, axes as in `/command`, in"
     " rho-space: sliding variable s (rad/s), pseudo-acceleration u (rad/s²), time-delay estimate "
     "N̂ (N m), error e (rad)",
-    "/controller/signals": "telemetry for plots: `position` e, `velocity` s, `effort` N̂",
+    "/controller/signals": "telemetry for plots, axes as in `/command`",
     "/controller/law": "`stamp`: of the first tick answered by this law and these gains; "
     "parameters `controller` and `<law>.<gain>`, n + 3 values each in rho-space, units as in "
     "[control laws](../manual/control_laws.md): `new_parameters` when a controller starts, "
     "`changed_parameters` later",
     "/clock": "`clock`: simulated time",
     "/truth/joints": "true motion, 20 `points`, one tick apart, the first at the stamp; axes as in"
-    " `/command`: `positions` (base: vector part of the quaternion), `velocities` (base: angular "
-    "velocity), `effort` (N m) as *applied*",
-    "/truth/base": "the same for the base: `transforms`, `velocities`, frames as `/base/state`",
-    "/wheels/state": "`velocity` (rad/s) relative to the base, `effort` (N m) of the motor over "
-    "the tick that just ended, about each wheel's axis",
-    "/thrusters/state": "`effort` (N): mean force of each thruster over the tick that just ended",
-    "/motors/state": "of joints with gears: `position`, `velocity` of the motor, seen through the "
-    "gear (units of the joint)",
-    "/magnetometer": "with magnetic torquers: `magnetic_field` (T) at the base, base frame",
-    "/truth/orbit": "in an orbit, a point per tick: position and velocity of the origin (m, m/s; "
-    "inertial), magnetic field (T; base), torques by source (N m); `joint_names` names the numbers",
+    " `/command`, of the quaternion its vector part",
+    "/truth/base": "the same for the base, rotations as in `/base/state`",
+    "/wheels/state": "`name`: the wheels",
+    "/thrusters/state": "`name`: the thrusters",
+    "/motors/state": "`name`: joints with gears",
+    "/truth/orbit": "a point per tick; `joint_names` names the numbers",
     "/tf": "true poses, `inertial` → `base_link` → each body relative to its parent: `translation`"
     " (m), `rotation` from `child_frame_id` to `header.frame_id`",
     "/tf_static": "the same for the tools, which are fixed to their bodies",
@@ -98,7 +88,7 @@ FIELDS = {
     "/base/wrench": "on `base_link`, about its origin, as *applied* over the tick that just ended: "
     "`force` of the thrusters (N), `torque` (N m)",
 }
-"""Fields of each topic's messages, with units and frames."""
+"""What the messages of a topic are, beside the fields with signals."""
 
 
 def pages() -> dict[str, str]:
@@ -251,8 +241,8 @@ def topic_page() -> str:
         )
     )
     fields = (
-        (f"`{name}`", FIELDS[name])
-        for name in (t.recorded.full_name for t in (*topics.RECORDED, *topics.STANDARD))
+        (f"`{topic.full_name}`", _fields(topic))
+        for topic in (t.recorded for t in (*topics.RECORDED, *topics.STANDARD))
     )
     return (
         "\n\n".join(
@@ -286,6 +276,17 @@ def topic_page() -> str:
         )
         + "\n"
     )
+
+
+def _fields(topic: topics.Topic) -> str:
+    """What a topic's messages are, and each field with its signals."""
+    said: dict[str, list[str]] = {}
+    for _, signal, field in carried_by(topic, State, Reference, CommandSignals, TelemetrySignals):
+        about = "; ".join(filter(None, (signal.unit, signal.frame)))
+        text = f"{signal.text} ({about})" if about else signal.text
+        said.setdefault(field.path, []).append(text)
+    parts = [f"`{path}`: {', '.join(texts)}" for path, texts in said.items()]
+    return "; ".join([*filter(None, [FIELDS.get(topic.full_name, "")]), *parts])
 
 
 def _type(topic: topics.Topic) -> str:

@@ -90,8 +90,10 @@ def with_wrong_masses(rng: np.random.Generator, content: dict[str, Any]) -> dict
 def mission_of(joints: int) -> dict[str, Any]:
     """Return a mission's content: from rest to rest, 30 degrees and back beyond the start."""
     there = [30.0 * (-1.0) ** joint for joint in range(joints)]
-    waypoints = [0.0] * joints + there + [-0.5 * angle for angle in there]
-    return {"waypoint_times": [0.0, 0.5 * DURATION, DURATION], "waypoints_deg": waypoints}
+    goals = there, [-0.5 * angle for angle in there]
+    segments = [{"joints_deg": goal, "duration": 0.5 * DURATION} for goal in goals]
+    limits = {"check_actuators": False}
+    return {"start": {"joints_deg": [0.0] * joints}, "segments": segments, "limits": limits}
 
 
 def made(number: int) -> tuple[list[Scenario], dict[str, Tuned]]:

@@ -26,7 +26,7 @@ from rclpy.context import Context
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
 from space_robot import load_bag
-from space_robot_msgs_py.ros.process_environment import set_defaults
+from space_robot_msgs_py.ros.process import set_defaults
 
 GOAL = np.radians([2.0, 118.0, 221.0, -2.0, -12.0, 1.0])
 NAMES = [f"joint{k}" for k in range(1, 7)]

@@ -26,7 +26,8 @@ REACHED_OUT = [30.0, 100.0, 150.0, 90.0, 30.0, -50.0]
 
 def fly_in(seconds: float) -> FlownFlight:
     """Fly from one posture to the other in the specified time."""
-    mission = {"waypoint_times": [0.0, seconds], "waypoints_deg": FOLDED + REACHED_OUT}
+    segment = {"joints_deg": REACHED_OUT, "duration": seconds}
+    mission = {"start": {"joints_deg": FOLDED}, "segments": [segment]}
     return Scenario(mission=mission, friction=False).fly().check()
 
 

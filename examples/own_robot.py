@@ -32,7 +32,10 @@ def main() -> None:
     )
     scenario = Scenario(
         robot=robot,
-        mission={"waypoint_times": [0, 10], "waypoints_deg": [0, 0, 0, 40, -30, 60]},
+        mission={
+            "start": {"joints_deg": [0, 0, 0]},
+            "segments": [{"joints_deg": [40, -30, 60], "duration": 10}],
+        },
         controller="ctc",
         gains={"k_p": 100.0, "k_d": 20.0},
         friction=False,

@@ -35,7 +35,7 @@ from space_robot.cli.launch_arguments import (
 )
 from space_robot.flight.graph.launched import LaunchedGraph, launched_parameters, report_failure
 from space_robot.flight.graph.node_names import started_nodes
-from space_robot_msgs_py.ros.process_environment import defaults
+from space_robot_msgs_py.ros.process import defaults
 
 AUTOSTART, SHUTDOWN = "autostart", "shutdown"
 GRAPHS = "space_robot_graphs"

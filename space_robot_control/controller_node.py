@@ -9,7 +9,7 @@ from space_robot_msgs_py.ros.node_host import NodeKind, run_nodes
 
 from .controller.loop import ControllerLoop
 from .controller.settings import ControllerNodeSettings
-from .flight_code.choice import supervisor_of
+from .flight_code.supervisors import supervisor_of
 
 NODE = NodeKind(
     ControllerNodeSettings,

@@ -7,7 +7,7 @@ from typing import NoReturn
 from space_robot_msgs_py.ros.node_host import NodeKind, run_nodes
 
 from .guidance.loop import MissionLoop
-from .guidance.settings import MissionNodeSettings
+from .guidance.mission import MissionNodeSettings
 
 NODE = NodeKind(MissionNodeSettings, MissionLoop, changeable=("goto",))
 

@@ -1,7 +1,8 @@
-"""recorder_node: every message of the graph into a bag."""
+"""recorder_node: writes every message of the graph into a bag."""
 
 from __future__ import annotations
 
+import itertools
 import os
 import time
 from contextlib import suppress
@@ -12,36 +13,34 @@ from typing import NoReturn
 from . import topics
 from .bag.recorder import BagRecorder
 from .bag.recorder_settings import RecorderNodeSettings
-from .bag.set_aside import set_aside
 from .config.text import parse_json
 from .errors import InputError, MessageError
 from .ros.endpoints import PolledCallbackGroup, RawPublisher, RawSubscription
-from .ros.health import SENT, Health, Level
-from .ros.loop import Wait
+from .ros.loop import SENT, Health, Level, Wait
 from .ros.managed_node import ManagedNode
 from .ros.node_host import NodeKind, run_nodes
 from .wire.definitions import decode
 
 SILENCE_S = 0.3
-"""Told to stop, the recorder leaves when nothing sent before has come for this long, or when nobody
-is left who could have sent something."""
+"""A deactivated recorder stops when nothing that was sent before has come for this long, or when no
+publisher is left."""
 DRAIN_S = 8.0
-"""But it leaves after this long in any case, whatever still comes."""
+"""Maximum time that a deactivated recorder takes messages."""
 QUEUE_DEPTH = 20_000
 TURN = 100
-"""Messages taken of one topic before the next has its turn."""
+"""Maximum number of messages taken of a topic before the next one has its turn."""
 REPORTS = 5
-"""Reports of nodes looked at in a round: to read one takes a tenth of a millisecond."""
+"""Maximum number of reports read in a round: each takes a tenth of a millisecond."""
 LOOK_PERIOD_S = 0.02
-"""Between two looks for publishers of topics that only some flights have."""
+"""Period of checks for publishers of topics that only some flights have."""
 AHEAD_OF_NEED = (topics.REFERENCE_JOINTS, topics.REFERENCE_BASE)
-"""Topics of which messages that came while nothing was recorded are of the time after it, too."""
+"""Topics sent ahead of need: messages that came during a pause belong to the time after it, too."""
 TIMEOUT_S = 0.002
-"""For which messages may wait longer, in a process of several nodes, until those rest. In ten times
-as long so much would queue up that the middleware handed it out at half the speed."""
+"""Extra time that messages may wait while other nodes of the process are busy. After ten times as
+long the middleware would have queued so many that it hands them out at half the speed."""
 NEVER_NS = 1 << 63
 NICENESS = 5
-"""The niceness of the recorder's process: plant and controller go first where cores are short; the
+"""Niceness of the recorder's process: plant and controller go first where cores are short, and the
 queues hold seconds of traffic."""
 
 
@@ -57,15 +56,15 @@ class RecorderLoop:
         settings: RecorderNodeSettings,
         gives_way: bool = False,
     ) -> None:
-        """Open the bag and listen to the topics that every flight has.
+        """Open the bag and subscribe to the topics that every flight has.
 
         Args:
             node: its node.
             settings: its parameters.
-            gives_way: whether other processes go first.
+            gives_way: True to yield to other processes after each message.
 
         Raises:
-            InputError: the flight is no JSON, or the bag cannot be made.
+            InputError: the flight is not JSON, or the bag cannot be created.
         """
         self._node, self._settings, self._gives_way = node, settings, gives_way
         try:
@@ -81,9 +80,9 @@ class RecorderLoop:
             self._listen_to(topic) for topic in topics.RECORDED if not topic.is_optional
         ]
         self._unsent = [topic for topic in topics.RECORDED if topic.is_optional]
-        """Topics that nobody publishes yet: a flight need not have them."""
+        """Optional topics without publisher so far."""
         self._look_at = 0.0
-        """When to look for their publishers, by the monotonic clock."""
+        """Time of the next check for their publishers, monotonic clock."""
         self._recorder = BagRecorder(
             path,
             {"period": settings.period, **flight},
@@ -95,13 +94,13 @@ class RecorderLoop:
         )
         self.outputs: tuple[RawPublisher, ...] = ()
         self._ours = {name: topic.full_name for topic, name in self._names.items()}
-        """Names in the root namespace by those that are heard."""
+        """Names in the root namespace by names in the graph."""
         self._pause = Wait(settings.drain_period, patience_s=TIMEOUT_S)
         self._diagnostics = RawSubscription(node, topics.DIAGNOSTICS, self._group)
         self._description = RawSubscription(node, topics.PLANT_DESCRIPTION, self._group)
-        self._told = False
+        self._is_failure_logged = False
         self._from_ns = 0
-        """When recording was taken up again, by the senders' clock; 0: it never paused."""
+        """Time since which it records again, by the senders' clock; 0: it never paused."""
         self._until_ns: int | None = None
         """Time when this recorder was requested to stop; None while it records."""
         of_whom = "" if namespace == topics.ROOT else f" the topics in {namespace}"
@@ -109,26 +108,26 @@ class RecorderLoop:
 
     @property
     def failure(self) -> str:
-        """Reason why the bag is no longer written (empty: all is well)."""
+        """Reason why the bag is no longer written; empty if it is."""
         return self._recorder.failure
 
     def begin(self) -> None:
-        """Record from now on."""
+        """Record, again after a pause."""
         if self._until_ns is not None:  # active again
             self._from_ns, self._until_ns = time.time_ns(), None
             self._recorder.pause()
 
     def step(self) -> Wait | None:
-        """End a chunk, or take what has come: both at once would last longer than a tick."""
+        """End a chunk or take messages: both at once would last longer than a tick."""
         if self._recorder.flush_if_due():
             return self._pause
         if self._unsent:
-            self._look_for_publishers()
+            self._subscribe_to_optional()
         _, is_busy = self._take_round()
         return None if is_busy else self._pause
 
     def deactivate(self) -> None:
-        """Take what was sent until now, and no more: an inactive recorder's file does not grow."""
+        """Take what was sent until now: the file of an inactive recorder does not grow."""
         if self._until_ns is not None:
             return
         self._until_ns = time.time_ns()
@@ -145,7 +144,7 @@ class RecorderLoop:
         self._recorder.flush()
 
     def health(self) -> Health:
-        """Tell what has come, and whether it is kept."""
+        """Return the number of received messages, and whether they are written."""
         recorder = self._recorder
         tick = recorder.accounting[topics.JOINT_STATES.full_name].last
         values = {"tick": max(0, tick), "received": recorder.received}
@@ -154,11 +153,7 @@ class RecorderLoop:
         return Health("nominal", values=values)
 
     def close(self) -> None:
-        """Close the bag.
-
-        Raises:
-            FlightError: the bag could not be written to its end.
-        """
+        """Close the bag; a `FlightError` says why it could not be written to its end."""
         lost = {name: count for name, count in self._recorder.lost.items() if count}
         self._node.log(f"{self._recorder.received} messages received, missing: {lost or 0}")
         self._recorder.close()
@@ -166,8 +161,8 @@ class RecorderLoop:
     def _listen_to(self, topic: topics.Topic) -> RawSubscription:
         return RawSubscription(self._node, topic, self._group, QUEUE_DEPTH)
 
-    def _look_for_publishers(self) -> None:
-        """Listen to the optional topics that are published by now; a plant waits for it."""
+    def _subscribe_to_optional(self) -> None:
+        # a plant that publishes them waits for this subscription
         if (now := time.monotonic()) < self._look_at:
             return
         self._look_at = now + LOOK_PERIOD_S
@@ -179,25 +174,19 @@ class RecorderLoop:
         return any(map(self._node.count_publishers, self._names.values()))
 
     def _take_round(self) -> tuple[bool, bool]:
-        """Give each topic its turn; whether something was sent in time, whether more waits.
-
-        In turns: a backlog of one topic must not hold up the others.
-        """
-        is_timely = waiting = False
+        """Take some messages of each topic; return if any was timely, and if more wait."""
+        is_timely = waiting = False  # in turns: a backlog of one topic must not delay the others
         for entry in self._inputs:
             taken, timely = self._take_some(entry)
             is_timely, waiting = is_timely or timely > 0, waiting or taken == TURN
         self._take_description()
         self._take_counts()
-        self._tell_failure()
+        self._log_failure()
         return is_timely, waiting
 
     def _take_some(self, entry: RawSubscription) -> tuple[int, int]:
-        """Take one topic's turn: messages taken, and those of them that were sent before the end.
-
-        Those of a pause count, too: behind them in the queue are some to be recorded.
-        """
-        timely = 0
+        """Return the numbers of messages taken, and of those sent before the end."""
+        timely = 0  # with those of a pause: behind them in the queue are some to be recorded
         begin_ns = 0 if entry.topic in AHEAD_OF_NEED else self._from_ns
         until_ns = self._end_ns
         for count in range(TURN):
@@ -212,14 +201,12 @@ class RecorderLoop:
         return TURN, timely
 
     def _take_description(self) -> None:
-        """Note what the plant says that it flies."""
         if (taken := self._description.take_with_info()) is not None:
             with suppress(MessageError, ValueError):
                 flown = parse_json(decode(taken.data, topics.PLANT_DESCRIPTION.type).data)
                 self._recorder.describe(flown)
 
     def _take_counts(self) -> None:
-        """Hear from the nodes how much they have sent."""
         for _ in range(REPORTS):
             if (taken := self._diagnostics.take_with_info()) is None:
                 return
@@ -234,13 +221,26 @@ class RecorderLoop:
 
     @property
     def _end_ns(self) -> int:
-        """Time by the senders' clocks after which nothing is recorded."""
         return NEVER_NS if self._until_ns is None else self._until_ns
 
-    def _tell_failure(self) -> None:
-        if self.failure and not self._told:
-            self._told = True
+    def _log_failure(self) -> None:
+        if self.failure and not self._is_failure_logged:
+            self._is_failure_logged = True
             self._node.log(f"the bag is no longer written: {self.failure}; the flight goes on")
+
+
+def set_aside(bag: Path) -> Path:
+    """Rename a bag that is closed to ``<bag>_before_reset_<number>``, the first free; return that.
+
+    Raises:
+        InputError: it cannot be renamed.
+    """
+    names = (bag.with_name(f"{bag.name}_before_reset_{number}") for number in itertools.count(1))
+    free = next(name for name in names if not name.exists())
+    try:
+        return bag.rename(free)
+    except OSError as error:
+        raise InputError(f"{bag}: cannot be renamed to {free.name} ({error.strerror})") from None
 
 
 NODE = NodeKind(RecorderNodeSettings, RecorderLoop)

@@ -1,4 +1,5 @@
-"""Samples: states, commands and references, free of any wire format.
+# ruff: noqa: RUF009 (declarations of signals are immutable)
+"""Samples: states, commands and references, and the table of their signals.
 
 Time is an integer tick everywhere; a stamp is tick times period (`Timebase`). Arrays are
 float64, allocated once by the owner and overwritten in place.
@@ -13,9 +14,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from .compiled.records import Block, Record, shaped
+from . import topics
+from .compiled.records import Block, Record
 from .errors import MessageError
-from .topics import BASE_AXES
+from .signals import Each, Reporter, signal, signals_of
 
 Array = NDArray[np.float64]
 
@@ -68,12 +70,22 @@ class RobotNames(NamedTuple):
     @property
     def axes(self) -> tuple[str, ...]:
         """Those of the controlled axes: base x, y, z, then joints."""
-        return (*BASE_AXES, *self.joints)
+        return (*topics.BASE_AXES, *self.joints)
 
     @property
     def all_joints(self) -> tuple[str, ...]:
         """Those of all joints: with motors, then without."""
         return (*self.joints, *self.passive)
+
+    @property
+    def all_axes(self) -> tuple[str, ...]:
+        """Those of the controlled axes, then of the joints without motors."""
+        return (*self.axes, *self.passive)
+
+    @property
+    def body(self) -> tuple[str, ...]:
+        """That of the base in messages of bodies."""
+        return (topics.BASE_JOINT,)
 
     @property
     def actuators(self) -> tuple[str, ...]:
@@ -116,105 +128,173 @@ class Timebase(NamedTuple):
         return tick
 
 
-class State(Record):
-    """The numbers of a `RobotState`, in one block for compiled code."""
-
-    base_position: Array = shaped(lambda n: (3,))
-    """Position of the base's CoM in the inertial frame, m."""
-    quaternion: Array = shaped(lambda n: (4,))
-    """Base attitude ``[w, x, y, z]``, from the base frame to the inertial frame."""
-    base_velocity: Array = shaped(lambda n: (3,))
-    """Velocity of the base's CoM on inertial axes, m/s."""
-    omega_base: Array = shaped(lambda n: (3,))
-    """Base angular velocity in the *base* frame, as a gyro measures it, rad/s."""
-    joint_positions: Array = shaped(lambda n: (n,))
-    """Positions of the joints with motors: rad of those that turn, m of prismatic ones."""
-    joint_velocities: Array = shaped(lambda n: (n,))
-    """Their velocities, rad/s or m/s."""
-    applied_torque: Array = shaped(lambda n: (n + 3,))
-    """Torque applied over the last interval, N m: base x, y, z in the base frame, then joints; the
-    force, N, of a prismatic one."""
-    wheel_velocities: Array = shaped(lambda n: (MOST_WHEELS,))
-    """Speeds of the reaction wheels about their axes relative to the base, rad/s; 0 where the base
-    has no wheel."""
-    wheel_torques: Array = shaped(lambda n: (MOST_WHEELS,))
-    """Torques that the motors gave the wheels over the last interval, N m."""
-    thrusts: Array = shaped(lambda n: (MOST_THRUSTERS,))
-    """Forces of the thrusters, means over the last interval, N."""
-    passive_positions: Array = shaped(lambda n: (MOST_PASSIVE,))
-    """Positions of the joints without motors, rad or m; 0 where the robot has none."""
-    passive_velocities: Array = shaped(lambda n: (MOST_PASSIVE,))
-    """Their velocities, rad/s or m/s."""
-    motor_positions: Array = shaped(lambda n: (n,))
-    """Positions of the motors of joints with gears, seen through the gears, rad or m, one after the
-    other; the rest is 0."""
-    motor_velocities: Array = shaped(lambda n: (n,))
-    """Their velocities, rad/s or m/s."""
-    orbit_position: Array = shaped(lambda n: (3,))
-    """Position of the inertial frame's origin from the Earth's centre, m; 0 without an orbit."""
-    orbit_velocity: Array = shaped(lambda n: (3,))
-    """Its velocity, m/s."""
-    magnetic_field: Array = shaped(lambda n: (3,))
-    """Magnetic field of the Earth on base axes, T."""
-    external_torques: Array = shaped(lambda n: (12,))
-    """Torques about the robot's centre of mass, inertial axes, N m, by `SOURCES`; that of gravity
-    is computed every 20 ticks."""
-
-
+JOINTS = Each("joints", lambda n: n)
+AXES = Each("axes", lambda n: n + 3)
+WHEELS = Each("wheels", lambda n: MOST_WHEELS)
+THRUSTERS = Each("thrusters", lambda n: MOST_THRUSTERS)
+PASSIVE = Each("passive", lambda n: MOST_PASSIVE)
+GEARED = Each("geared", lambda n: n)
+ACTUATORS = Each("actuators", lambda n: MOST_WHEELS + MOST_THRUSTERS + MOST_TORQUERS)
+INERTIAL, BASE = "inertial axes", "base axes"
 SOURCES = ("gravity_gradient", "drag", "sunlight", "magnetic")
 """Sources of the external torques of a state; magnetic is the torque of the base's residual dipole,
 not of magnetic torquers."""
-ALL_FIELDS = tuple(State.__annotations__)
-"""Names of all numbers of a state, in their order in memory."""
-ACTUATOR_FIELDS = (
-    "wheel_velocities",
-    "wheel_torques",
-    "thrusts",
-    "motor_positions",
-    "motor_velocities",
-)
-"""Names of those that are of the base's actuators and of joints' motors; no sensor spoils them."""
-PASSIVE_FIELDS = ("passive_positions", "passive_velocities")
-"""Names of those of the joints without motors; no sensor spoils and no controller reads them."""
-ORBIT_FIELDS = ("orbit_position", "orbit_velocity", "magnetic_field", "external_torques")
-"""Names of those that a robot in orbit has."""
-STATE_FIELDS = tuple(
-    n for n in ALL_FIELDS if n not in ACTUATOR_FIELDS + PASSIVE_FIELDS + ORBIT_FIELDS
-)
-"""Names of the others, which come first in memory."""
 
 
-class RobotState:
-    """What the plant measures at a tick, and what it applied over the interval just ended.
+@dataclass(eq=False, repr=False)
+class MeasuredSignals:
+    """Signals of base and joints. Logs may have them twice: true and as measured."""
 
-    Each field of `State` is an attribute, a view of ``block``, which compiled code reads whole.
+    base_position: Array = (
+        signal(Reporter.SENSORS, 3, "m", INERTIAL, "position of the base's centre of mass")
+        .sent(topics.BASE_STATE, "transforms[0].translation")
+        .sent(topics.TRUTH_BASE, "transforms[0].translation")
+    )
+    quaternion: Array = (
+        signal(Reporter.SENSORS, 4, "", "from base to inertial axes", "base attitude [w, x, y, z]")
+        .sent(topics.BASE_STATE, "transforms[0].rotation")
+        .sent(topics.TRUTH_BASE, "transforms[0].rotation")
+        .sent(topics.TRUTH_JOINTS, "positions", first=1)
+    )
+    base_velocity: Array = (
+        signal(Reporter.SENSORS, 3, "m/s", INERTIAL, "velocity of the base's centre of mass")
+        .sent(topics.BASE_STATE, "twist[0].linear")
+        .sent(topics.TRUTH_BASE, "velocities[0].linear")
+    )
+    omega_base: Array = (
+        signal(Reporter.SENSORS, 3, "rad/s", BASE, "angular velocity of the base")
+        .sent(topics.BASE_STATE, "twist[0].angular")
+        .sent(topics.TRUTH_BASE, "velocities[0].angular")
+        .sent(topics.TRUTH_JOINTS, "velocities")
+    )
+    joint_positions: Array = (
+        signal(Reporter.SENSORS, JOINTS, "rad", "", "positions of the joints with motors")
+        .sent(topics.JOINT_STATES, "position")
+        .sent(topics.TRUTH_JOINTS, "positions")
+    )
+    joint_velocities: Array = (
+        signal(Reporter.SENSORS, JOINTS, "rad/s", "", "velocities of the joints with motors")
+        .sent(topics.JOINT_STATES, "velocity")
+        .sent(topics.TRUTH_JOINTS, "velocities")
+    )
+    applied_torque: Array = (
+        signal(
+            Reporter.ECHO, AXES, "N m", BASE, "torque applied over the last tick, base and joints"
+        )
+        .sent(topics.JOINT_STATES, "effort", first=3)
+        .sent(topics.BASE_STATE, "wrench[0].torque", length=3)
+        .sent(topics.TRUTH_JOINTS, "effort")
+    )
+    passive_positions: Array = (
+        signal(Reporter.PASSIVE, PASSIVE, "rad", "", "positions of the joints without motors")
+        .sent(topics.JOINT_STATES, "position")
+        .sent(topics.TRUTH_JOINTS, "positions")
+    )
+    passive_velocities: Array = (
+        signal(Reporter.PASSIVE, PASSIVE, "rad/s", "", "velocities of the joints without motors")
+        .sent(topics.JOINT_STATES, "velocity")
+        .sent(topics.TRUTH_JOINTS, "velocities")
+    )
+
+
+@dataclass(eq=False, repr=False)
+class StateSignals(MeasuredSignals):
+    """All signals of a state; those that follow are only of robots that have such a part.
+
+    A new one is a line here and the kernel that computes it; its topic is one in `topics`.
     """
 
-    __slots__ = ("block", "numbers", "tick", *ALL_FIELDS)
-    base_position: Array
-    quaternion: Array
-    base_velocity: Array
-    omega_base: Array
-    joint_positions: Array
-    joint_velocities: Array
-    applied_torque: Array
-    wheel_velocities: Array
-    wheel_torques: Array
-    thrusts: Array
-    passive_positions: Array
-    passive_velocities: Array
-    motor_positions: Array
-    motor_velocities: Array
-    orbit_position: Array
-    orbit_velocity: Array
-    magnetic_field: Array
-    external_torques: Array
+    wheel_velocities: Array = signal(
+        Reporter.ACTUATORS, WHEELS, "rad/s", "", "speeds of the wheels relative to the base"
+    ).sent(topics.WHEELS_STATE, "velocity")
+    wheel_torques: Array = signal(
+        Reporter.ACTUATORS, WHEELS, "N m", "", "torques of the wheels' motors over the last tick"
+    ).sent(topics.WHEELS_STATE, "effort")
+    thrusts: Array = signal(
+        Reporter.ACTUATORS, THRUSTERS, "N", "", "mean forces of the thrusters over the last tick"
+    ).sent(topics.THRUSTERS_STATE, "effort")
+    motor_positions: Array = signal(
+        Reporter.ACTUATORS, GEARED, "rad", "", "positions of motors, seen through their gears"
+    ).sent(topics.MOTORS_STATE, "position")
+    motor_velocities: Array = signal(
+        Reporter.ACTUATORS, GEARED, "rad/s", "", "velocities of motors, seen through their gears"
+    ).sent(topics.MOTORS_STATE, "velocity")
+    orbit_position: Array = (
+        signal(Reporter.ORBIT, 3, "m", INERTIAL, "position of the origin from the Earth's centre")
+        .named("position")
+        .sent(topics.TRUTH_ORBIT, "positions")
+    )
+    orbit_velocity: Array = (
+        signal(Reporter.ORBIT, 3, "m/s", INERTIAL, "velocity of the origin from the Earth's centre")
+        .named("velocity")
+        .sent(topics.TRUTH_ORBIT, "positions")
+    )
+    magnetic_field: Array = (
+        signal(Reporter.ORBIT, 3, "T", BASE, "magnetic field of the Earth")
+        .named("magnetic_field")
+        .sent(topics.TRUTH_ORBIT, "positions")
+        .sent(topics.MAGNETOMETER, "magnetic_field")
+    )
+    # The torque of gravity is computed every 20 ticks.
+    external_torques: Array = (
+        signal(Reporter.ORBIT, 12, "N m", INERTIAL, "torques by source about the centre of mass")
+        .named(*(f"{source}_torque" for source in SOURCES))
+        .sent(topics.TRUTH_ORBIT, "positions")
+    )
+
+
+class State(StateSignals, Record):
+    """The signals of a `RobotState`, in one block for compiled code."""
+
+
+class CommandSignals:
+    """The signals of a `Command`."""
+
+    commanded_torque: Array = signal(
+        Reporter.OTHERS, AXES, "N m", BASE, "torque to apply from this tick on, base and joints"
+    ).sent(topics.COMMAND, "effort")
+    actuator_commands: Array = signal(
+        Reporter.OTHERS, ACTUATORS, "", "", "wheel torques, N m, thrusts, N, then dipoles, A m2"
+    ).sent(topics.COMMAND, "effort")
+
+
+class TelemetrySignals:
+    """What a control law tells of itself."""
+
+    s: Array = signal(Reporter.OTHERS, AXES, "rad/s", "", "sliding variable").sent(
+        topics.SIGNALS, "velocity"
+    )
+    u: Array = signal(Reporter.OTHERS, AXES, "rad/s2", "", "pseudo-acceleration")
+    n_hat: Array = signal(Reporter.OTHERS, AXES, "N m", "", "time-delay estimate").sent(
+        topics.SIGNALS, "effort"
+    )
+    e: Array = signal(Reporter.OTHERS, AXES, "rad", "", "error").sent(topics.SIGNALS, "position")
+
+
+SIGNALS = signals_of(State)
+ALL_FIELDS = tuple(SIGNALS)
+"""Names of all signals of a state, in their order in memory."""
+SENSED_FIELDS, PASSIVE_FIELDS, ACTUATOR_FIELDS, ORBIT_FIELDS = (
+    tuple(name for name, declared in SIGNALS.items() if declared.reporter is reporter)
+    for reporter in (Reporter.SENSORS, Reporter.PASSIVE, Reporter.ACTUATORS, Reporter.ORBIT)
+)
+"""Names of the signals of some reporters."""
+STATE_FIELDS = (*SENSED_FIELDS, "applied_torque")
+"""Names of those that a flight cannot be without."""
+
+
+class RobotState(StateSignals):
+    """What the plant measures at a tick, and what it applied over the interval just ended.
+
+    Each signal of `StateSignals` is an attribute, a view of ``block``, which compiled code reads
+    whole.
+    """
 
     def __init__(self, tick: int, block: Block) -> None:
         """``block``: (1,) array of a `State`."""
         self.tick, self.block = tick, block
         self.numbers: Array = block.view(np.float64)
-        """All fields one behind the other, the same memory."""
+        """All signals one behind the other, the same memory."""
         for name in ALL_FIELDS:
             setattr(self, name, block[name][0])  # faster than block[0][name], see `Record.view`
 
@@ -237,18 +317,36 @@ class RobotState:
 class Reference(Record):
     """The desired motion at a tick, laid out as the two parts of a `ReferenceChunk`'s row."""
 
-    joint_positions: Array = shaped(lambda n: (n,))
-    """rad."""
-    joint_velocities: Array = shaped(lambda n: (n,))
-    """rad/s."""
-    joint_accelerations: Array = shaped(lambda n: (n,))
-    """rad/s2."""
-    quaternion: Array = shaped(lambda n: (4,))
-    """Base attitude ``[w, x, y, z]``, from the base frame to the inertial frame."""
-    omega_base: Array = shaped(lambda n: (3,))
-    """Angular velocity of the base in the base frame, rad/s."""
-    alpha_base: Array = shaped(lambda n: (3,))
-    """Angular acceleration of the base in the base frame, rad/s2."""
+    joint_positions: Array = (
+        signal(Reporter.OTHERS, JOINTS, "rad", "", "desired positions of the joints with motors")
+        .within("reference_joints")
+        .sent(topics.REFERENCE_JOINTS, "positions")
+    )
+    joint_velocities: Array = (
+        signal(Reporter.OTHERS, JOINTS, "rad/s", "", "desired velocities")
+        .within("reference_joints")
+        .sent(topics.REFERENCE_JOINTS, "velocities")
+    )
+    joint_accelerations: Array = (
+        signal(Reporter.OTHERS, JOINTS, "rad/s2", "", "desired accelerations")
+        .within("reference_joints")
+        .sent(topics.REFERENCE_JOINTS, "accelerations")
+    )
+    quaternion: Array = (
+        signal(Reporter.OTHERS, 4, "", "from base to inertial axes", "attitude [w, x, y, z]")
+        .within("reference_base")
+        .sent(topics.REFERENCE_BASE, "transforms[0].rotation")
+    )
+    omega_base: Array = (
+        signal(Reporter.OTHERS, 3, "rad/s", BASE, "desired angular velocity of the base")
+        .within("reference_base")
+        .sent(topics.REFERENCE_BASE, "velocities[0].angular")
+    )
+    alpha_base: Array = (
+        signal(Reporter.OTHERS, 3, "rad/s2", BASE, "desired angular acceleration of the base")
+        .within("reference_base")
+        .sent(topics.REFERENCE_BASE, "accelerations[0].angular")
+    )
 
     @staticmethod
     def parts(references: Block) -> tuple[Array, Array]:

@@ -12,8 +12,6 @@ ROOT = "/"
 INERTIAL_FRAME = "inertial"
 BASE_FRAME = "base_link"
 """Frame of the base, as REP 105 has it."""
-FORMER_BASE_FRAME = "base"
-"""The same in bags of releases up to 0.7."""
 BASE_JOINT = "base"
 """Name of the base's six degrees of freedom in messages that have one a joint."""
 BASE_AXES = ("base_x", "base_y", "base_z")
@@ -21,7 +19,7 @@ BASE_AXES = ("base_x", "base_y", "base_z")
 
 
 class Topic(NamedTuple):
-    """One topic of the graph. What its messages say stands in the module of `wire` of its name."""
+    """One topic of the graph. What its messages say stands with the signals in `samples`."""
 
     name: str
     """Relative, as nodes give it to rclpy."""
@@ -39,6 +37,13 @@ class Topic(NamedTuple):
     the whole flight (`is_latched`)."""
     is_optional: bool = False
     """Sent in some flights only, so that silence is no loss."""
+    frame: str = ""
+    """``frame_id`` of its messages."""
+    of: str = ""
+    """Attribute of `RobotNames`: its messages name these; an optional one is sent if there are any.
+    """
+    is_controlling: bool = False
+    """The controller waits for it, as a part of a state."""
     stamp_at: int = 0
     """Bytes of a message before its stamp."""
     carries: Topic | None = None
@@ -67,42 +72,114 @@ class Topic(NamedTuple):
         return f"/{self.name}" if namespace == ROOT else f"{namespace}/{self.name}"
 
 
-JOINT_STATES = Topic("joint_states", "sensor_msgs/msg/JointState", 10_000, per_tick=True)
-BASE_STATE = Topic("base/state", "sensor_msgs/msg/MultiDOFJointState", 10_000, per_tick=True)
+JOINT_STATES = Topic(
+    "joint_states",
+    "sensor_msgs/msg/JointState",
+    10_000,
+    per_tick=True,
+    of="all_joints",
+    is_controlling=True,
+)
+BASE_STATE = Topic(
+    "base/state",
+    "sensor_msgs/msg/MultiDOFJointState",
+    10_000,
+    per_tick=True,
+    frame=INERTIAL_FRAME,
+    of="body",
+    is_controlling=True,
+)
 # What the base's actuators tell of themselves; sent where there are any.
 WHEELS_STATE = Topic(
-    "wheels/state", "sensor_msgs/msg/JointState", 10_000, per_tick=True, is_optional=True
+    "wheels/state",
+    "sensor_msgs/msg/JointState",
+    10_000,
+    per_tick=True,
+    is_optional=True,
+    frame=BASE_FRAME,
+    of="wheels",
+    is_controlling=True,
 )
 THRUSTERS_STATE = Topic(
-    "thrusters/state", "sensor_msgs/msg/JointState", 10_000, per_tick=True, is_optional=True
+    "thrusters/state",
+    "sensor_msgs/msg/JointState",
+    10_000,
+    per_tick=True,
+    is_optional=True,
+    frame=BASE_FRAME,
+    of="thrusters",
 )
 # Motors of joints with gears, seen through them; sent where a robot has any.
 MOTORS_STATE = Topic(
-    "motors/state", "sensor_msgs/msg/JointState", 10_000, per_tick=True, is_optional=True
+    "motors/state",
+    "sensor_msgs/msg/JointState",
+    10_000,
+    per_tick=True,
+    is_optional=True,
+    of="geared",
 )
-# The magnetic field on base axes; sent where the base has magnetic torquers.
+# The magnetic field; sent where the base has magnetic torquers, whose controller needs it.
 MAGNETOMETER = Topic(
-    "magnetometer", "sensor_msgs/msg/MagneticField", 10_000, per_tick=True, is_optional=True
+    "magnetometer",
+    "sensor_msgs/msg/MagneticField",
+    10_000,
+    per_tick=True,
+    is_optional=True,
+    frame=BASE_FRAME,
+    of="torquers",
+    is_controlling=True,
 )
-COMMAND = Topic("command", "sensor_msgs/msg/JointState", 10_000, per_tick=True)
+COMMAND = Topic(
+    "command", "sensor_msgs/msg/JointState", 10_000, per_tick=True, frame=BASE_FRAME, of="commanded"
+)
 # Reference and clock are not transient local: a late joiner would receive the past, and that a
 # message was lost if one is pushed out meanwhile; at depth 1 a slow one would lose some. The
 # mission says again what is still needed when somebody joins, a plant that waits its time.
-REFERENCE_JOINTS = Topic("reference/joints", "trajectory_msgs/msg/JointTrajectory", 200)
-REFERENCE_BASE = Topic("reference/base", "trajectory_msgs/msg/MultiDOFJointTrajectory", 200)
-TELEMETRY = Topic("controller/telemetry", "std_msgs/msg/Float64MultiArray", 1_000, has_stamp=False)
+REFERENCE_JOINTS = Topic(
+    "reference/joints", "trajectory_msgs/msg/JointTrajectory", 200, of="joints"
+)
+REFERENCE_BASE = Topic(
+    "reference/base",
+    "trajectory_msgs/msg/MultiDOFJointTrajectory",
+    200,
+    frame=INERTIAL_FRAME,
+    of="body",
+)
+TELEMETRY = Topic(
+    "controller/telemetry", "std_msgs/msg/Float64MultiArray", 1_000, has_stamp=False, of="axes"
+)
 # The telemetry once more, by name: what viewers plot; nobody here reads it.
-SIGNALS = Topic("controller/signals", "sensor_msgs/msg/JointState", 1_000, is_optional=True)
+SIGNALS = Topic(
+    "controller/signals",
+    "sensor_msgs/msg/JointState",
+    1_000,
+    is_optional=True,
+    frame=BASE_FRAME,
+    of="axes",
+)
 LAW = Topic(
     "controller/law", "rcl_interfaces/msg/ParameterEvent", 100, transient_local=True, is_event=True
 )
 CLOCK = Topic("clock", "rosgraph_msgs/msg/Clock", 1_000)
 # The truth is sent where what the sensors tell may differ from it; no flight software listens.
-TRUTH_JOINTS = Topic("truth/joints", "trajectory_msgs/msg/JointTrajectory", 1_000, is_optional=True)
-TRUTH_BASE = Topic(
-    "truth/base", "trajectory_msgs/msg/MultiDOFJointTrajectory", 1_000, is_optional=True
+TRUTH_JOINTS = Topic(
+    "truth/joints", "trajectory_msgs/msg/JointTrajectory", 1_000, is_optional=True, of="all_axes"
 )
-TRUTH_ORBIT = Topic("truth/orbit", "trajectory_msgs/msg/JointTrajectory", 1_000, is_optional=True)
+TRUTH_BASE = Topic(
+    "truth/base",
+    "trajectory_msgs/msg/MultiDOFJointTrajectory",
+    1_000,
+    is_optional=True,
+    frame=INERTIAL_FRAME,
+    of="body",
+)
+TRUTH_ORBIT = Topic(
+    "truth/orbit",
+    "trajectory_msgs/msg/JointTrajectory",
+    1_000,
+    is_optional=True,
+    frame=INERTIAL_FRAME,
+)
 
 # What viewers need of the robot. ROS has one /tf for all robots: their frames bear the namespace.
 TF = Topic("/tf", "tf2_msgs/msg/TFMessage", 100, stamp_at=4)
@@ -129,6 +206,8 @@ ROBOT_DESCRIPTION = Topic(
     is_optional=True,
 )
 
+STATES = (JOINT_STATES, WHEELS_STATE, BASE_STATE, THRUSTERS_STATE, MOTORS_STATE, MAGNETOMETER)
+"""The parts of a state, in the order of sending."""
 ALL = (
     JOINT_STATES,
     BASE_STATE,
@@ -140,10 +219,7 @@ ALL = (
     CLOCK,
     TRUTH_JOINTS,
     TRUTH_BASE,
-    WHEELS_STATE,
-    THRUSTERS_STATE,
-    MOTORS_STATE,
-    MAGNETOMETER,
+    *(part for part in STATES if part.is_optional),
     TRUTH_ORBIT,
 )
 """All that tell of a flight: who reads a bag reads these."""
@@ -151,8 +227,6 @@ SCENE = (TRANSFORMS, TRANSFORMS_STATIC, ROBOT_DESCRIPTION)
 """What viewers show of it; nobody here reads them again."""
 RECORDED = (*ALL, SIGNALS, *SCENE)
 """All that the recorder listens to."""
-STATES = (JOINT_STATES, BASE_STATE, WHEELS_STATE, THRUSTERS_STATE, MOTORS_STATE, MAGNETOMETER)
-"""The parts of a state."""
 TRUTH = (TRUTH_JOINTS, TRUTH_BASE)
 BY_NAME = {topic.full_name: topic for topic in ALL}
 """By their full names in the root namespace."""

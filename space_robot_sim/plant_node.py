@@ -7,8 +7,8 @@ from typing import NoReturn
 from space_robot_msgs_py.ros.node_host import NodeKind, run_nodes
 
 from .plant.loop import PlantLoop
+from .plant.services import offer_services
 from .plant.settings import PlantNodeSettings
-from .plant.simulation_services import offer_services
 
 NODE = NodeKind(PlantNodeSettings, PlantLoop, offer_services=offer_services)
 

@@ -16,15 +16,15 @@ from rosbags.rosbag2 import StoragePlugin, Writer
 from space_robot.flight.plan import Flight, FlightPlan, resolve
 from space_robot.flight.simulate import simulate
 from space_robot_msgs_py import topics
-from space_robot_msgs_py.bag.accounts import noted_accounts
+from space_robot_msgs_py.bag.contents import read_information
 from space_robot_msgs_py.bag.flight_log import REFERENCE, FlightLog
-from space_robot_msgs_py.bag.mcap_file import Compression
-from space_robot_msgs_py.bag.metadata import read_information
+from space_robot_msgs_py.bag.message_accounting import noted_accounts
 from space_robot_msgs_py.bag.reader import read_flight
 from space_robot_msgs_py.bag.recorder import FLIGHT_KEY, BagRecorder
+from space_robot_msgs_py.bag.writer import Compression
 from space_robot_msgs_py.samples import STATE_FIELDS, Timebase
-from space_robot_msgs_py.wire.carrier import wrap
 from space_robot_msgs_py.wire.definitions import definition, jazzy
+from space_robot_msgs_py.wire.viewers import wrap
 
 TIMEBASE = Timebase(500_000)
 FLIGHT = {"controller": "tde_stc", "case": "1", "period": 0.0005}

@@ -17,17 +17,16 @@ from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.compiled.kernels import kernel
 from space_robot_msgs_py.compiled.records import Block
 from space_robot_msgs_py.samples import MOST_WHEELS, RobotNames, RobotState, Timebase
-from space_robot_sim.actuators import actuators
 from space_robot_sim.actuators.actuators import (
     Actuators,
     ActuatorSettings,
     actuate,
     command_delay_buffer,
 )
+from space_robot_sim.component import ComponentFaults, Installation
 from space_robot_sim.faults.grammar import parse_faults
 from space_robot_sim.faults.schedule import Schedule
 from space_robot_sim.plant.faults import PLANT_KINDS
-from space_robot_sim.sensors import sensors
 from space_robot_sim.sensors.sensors import Sensors, sense
 
 Array = NDArray[np.float64]
@@ -59,10 +58,8 @@ class ActuatorBench:
         names = RobotNames.of(NAMES.joints, self.settings.names, self.settings.wheel_count)
         schedule = Schedule(parse_faults(faults, PLANT_KINDS), 0, period, names)
         self.block = Actuators.block(N)
-        self.block[0] = Actuators.build(N, self.settings, period)
-        self.faults = [
-            (part, fault(schedule)) for part, fault in actuators.FAULTS.items() if faults
-        ]
+        self.block[0] = Actuators.build(self.settings, Installation(N, period))
+        self.faults = ComponentFaults(schedule, Actuators)
         self.ring = command_delay_buffer(self.record, len(names.commanded))
         self.truth, self.measured = RobotState.allocate(N), RobotState.allocate(N)
         self.tick, self.period = 0, period
@@ -73,8 +70,7 @@ class ActuatorBench:
 
     def act(self, command: Array) -> tuple[Array, Array]:
         """Torque reported and torque given over a tick."""
-        for part, fault in self.faults:
-            fault.apply(self.tick, getattr(self.record, part))
+        self.faults.apply(self.tick, self.record)
         actuate_blocks(
             self.block,
             self.ring,
@@ -120,17 +116,15 @@ class SensorBench:
         start = a_state() if truth is None else truth
         schedule = Schedule(parse_faults(faults, PLANT_KINDS), seed, period, NAMES)
         self.block = Sensors.block(N)
-        self.block[0] = Sensors.build(
-            N, SensorSettings.model_validate(settings), period, start.block[0], seed=seed
-        )
+        at = Installation(N, period, start.block[0], seed=seed)
+        self.block[0] = Sensors.build(SensorSettings.model_validate(settings), at)
         self.block["are_ideal"] = False
-        self.faults = [(part, fault(schedule)) for part, fault in sensors.FAULTS.items() if faults]
+        self.faults = ComponentFaults(schedule, Sensors)
         self.period, self.measured = period, RobotState.allocate(N)
 
     def measure(self, truth: RobotState) -> RobotState:
         """What is told of ``truth``; reused."""
-        for part, fault in self.faults:
-            fault.apply(truth.tick, getattr(self.block[0], part))
+        self.faults.apply(truth.tick, self.block[0])
         self.measured.tick = truth.tick
         sense_blocks(self.block, truth.block, truth.tick, self.period, self.measured.block)
         return self.measured
@@ -177,13 +171,8 @@ def still_log(
     robot: Robot, ticks: int, actuators: BaseActuatorSettings = IDEAL, period: float = 0.0005
 ) -> FlightLog:
     """A flight in which nothing moves and nothing is asked, described as a bag has it."""
-    log = FlightLog.allocate(
-        ticks,
-        robot.joint_names,
-        Timebase(round(1e9 * period)),
-        actuators.wheel_count,
-        actuators.thruster_count,
-    )
+    names = actuators.robot_names(robot)._replace(passive=(), geared=(), torquers=())
+    log = FlightLog.allocate(ticks, names, Timebase(round(1e9 * period)))
     for column in log.columns.values():
         column[:] = 0.0
     log.quaternion[:, 0] = log.reference_base[:, 0] = 1.0

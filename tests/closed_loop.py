@@ -68,9 +68,10 @@ class Loop:
         navigation: NavigationFilterSettings | None = None,
         **plant: Any,
     ) -> None:
-        flat = np.ravel(PAPER_DEG).astype(float).tolist()
-        plant = {"initial_joints_deg": flat[: robot.n], **plant}
-        mission = MissionSettings(waypoint_times=[0.0, 15.0, 30.0], waypoints_deg=flat)
+        start, *goals = np.asarray(PAPER_DEG, float).tolist()
+        plant = {"initial_joints_deg": start, **plant}
+        segments = [f"{{joints_deg: {goal}, duration: 15}}" for goal in goals]
+        mission = MissionSettings(joints_deg=start, segments=segments)
         self.plant = Plant(robot, PlantSettings(**plant), PERIOD)
         self.controller = Controller(robot, law, PERIOD, navigation=navigation)
         self.mission = Mission(robot, mission, PERIOD)

@@ -17,7 +17,7 @@ import pytest
 from forked import END_S, SPACE_ROBOT, Forked
 
 from space_robot_msgs_py.ros.locks import nodes_in
-from space_robot_msgs_py.ros.process_environment import DEFAULTS
+from space_robot_msgs_py.ros.process import DEFAULTS
 
 if TYPE_CHECKING:
     import psutil

@@ -9,7 +9,7 @@ import time
 from collections.abc import Callable
 from typing import Any
 
-from space_robot_msgs_py.ros.process_environment import set_defaults
+from space_robot_msgs_py.ros.process import set_defaults
 
 set_defaults()
 

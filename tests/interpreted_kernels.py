@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from space_robot_msgs_py.compiled import kernels, lane_words, lanes
+from space_robot_msgs_py.compiled import kernels, lanes
 from space_robot_msgs_py.compiled.records import Record
 
 
@@ -101,7 +101,7 @@ WORDS = {
 }
 for name, word in WORDS.items():
     setattr(lanes, name, word)
-lane_words.as_numbers, lane_words.as_lanes = _as_numbers, _as_lanes
+lanes.as_numbers, lanes.as_lanes = _as_numbers, _as_lanes
 
 kernels.kernel = kernels.subroutine = _as_it_is  # type: ignore[assignment]
 kernels.RecordFunction = _PlainFunction  # type: ignore[assignment,misc]

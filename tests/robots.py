@@ -18,11 +18,12 @@ from space_robot_model.robot import Robot
 from space_robot_model.robot.gears import geared_joints
 from space_robot_model.robot.parts import Gear
 from space_robot_msgs_py.samples import Command, RobotState
+from space_robot_sim.component import Installation
 from space_robot_sim.environment.friction import Friction, FrictionSettings
 from space_robot_sim.environment.neighbouring_orbit import meet
-from space_robot_sim.environment.orbit_settings import OrbitSettings
+from space_robot_sim.environment.orbit import OrbitSettings
 from space_robot_sim.environment.target import Target
-from space_robot_sim.plant.gear_mounting import mount_gears
+from space_robot_sim.plant.mounting import mount_gears
 from space_robot_sim.plant.plant import Plant, PlantSettings
 from space_robot_sim.plant.tick import update_true_state
 
@@ -98,7 +99,7 @@ def geared_paper_arm(paper_robot: Robot, **changes: Any) -> Robot:
 def mounted(robot: Robot) -> Model:
     """Return the model of a robot with its gears, as the plant has it; without wheels."""
     model = robot.model.copy()
-    friction = Friction.build(robot, FrictionSettings())
+    friction = Friction.build(FrictionSettings(), Installation(robot.n, robot=robot))
     mount_gears(robot, model, friction, np.zeros(13 + 4 * robot.joint_count))
     return model
 

@@ -17,7 +17,7 @@ from scipy.spatial.transform import Rotation
 from space_robot.view.flights import ViewOptions, flights_page
 from space_robot_model.robot import Robot
 from space_robot_msgs_py.bag.flight_log import FlightLog
-from space_robot_msgs_py.samples import Timebase
+from space_robot_msgs_py.samples import RobotNames, Timebase
 
 Array = NDArray[np.float64]
 Message = dict[str, Any]
@@ -116,9 +116,8 @@ def moving_log(
     robot: Robot, ticks: int, first_tick: int = 0, period_ns: int = 500_000
 ) -> FlightLog:
     """A log whose rows all differ, and tell their numbers: x of the base is the row."""
-    log = FlightLog.allocate(
-        ticks, robot.joint_names, Timebase(period_ns), passive_names=robot.passive_names
-    )
+    names = RobotNames(robot.joint_names, passive=robot.passive_names)
+    log = FlightLog.allocate(ticks, names, Timebase(period_ns))
     log.first_tick = first_tick
     rng = np.random.default_rng(ticks + first_tick)
     log.base_position[:] = np.column_stack([np.arange(ticks), np.zeros((ticks, 2))])

@@ -13,10 +13,10 @@ from paths import ROOT, TESTS
 from space_robot.scenario.faults import KINDS
 
 ROOMS = {
-    "space_robot_msgs_py": "errors simulated_time topics compiled samples config wire bag ros "
-    "recorder_node",
+    "space_robot_msgs_py": "errors simulated_time topics compiled signals samples config wire bag "
+    "ros recorder_node",
     "space_robot_model": "elementary dynamics robot hardware orbit",
-    "space_robot_sim": "faults environment actuators sensors plant plant_node",
+    "space_robot_sim": "faults component environment actuators sensors plant plant_node",
     "space_robot_control": "laws navigation allocation controller flight_code controller_node "
     "guidance mission_node",
     "space_robot": "console processes scenario tuning flight export analysis view api learning "

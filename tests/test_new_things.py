@@ -14,19 +14,19 @@ from paths import CONFIG, ROOT
 
 import space_robot.cli as room_of_commands
 import space_robot_control.laws as room_of_laws
-import space_robot_msgs_py.wire as room_of_messages
 from space_robot import load_bag
 from space_robot.cli.main import cli, commands
 from space_robot.flight.plan import Flight, FlightPlan, resolve
 from space_robot.flight.simulate import simulate
 from space_robot_control.laws import laws
 from space_robot_msgs_py import topics
+from space_robot_msgs_py.bag import rows
 from space_robot_msgs_py.bag.folder import open_bag
 from space_robot_msgs_py.bag.recorder import BagRecorder
-from space_robot_msgs_py.samples import RobotNames
-from space_robot_msgs_py.wire.codec import Codec
+from space_robot_msgs_py.samples import CommandSignals, RobotNames
+from space_robot_msgs_py.signals import Reporter, signal
 from space_robot_msgs_py.wire.definitions import decode
-from space_robot_msgs_py.wire.message import description
+from space_robot_msgs_py.wire.messages import Codec, describe
 
 MODEL = "tde_stc"
 """The law that the new one is a copy of."""
@@ -67,39 +67,20 @@ def test_a_law_stands_in_one_file_of_its_name() -> None:
         assert importlib.import_module(law.__module__).__doc__
 
 
-NEWEST = '''"""/newest: how warm it is."""
-
-from .. import topics
-from .message import MessageDescription, Run
-
-
-class Newest(MessageDescription):
-    topic = topics.NEWEST
-
-    def content(self, rows=1):
-        return {"header": {"frame_id": "base"}}
-
-    def runs(self, message):
-        return (Run("temperature", (0,)),)
-'''
-
-
-def test_a_message_is_one_file_in_wire_and_one_line_in_topics(
+def test_a_signal_is_one_line_and_its_topic_another(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """It is laid out, recorded, counted, and missed, as all others are."""
     newest = topics.Topic("newest", "sensor_msgs/msg/Temperature", 100, per_tick=True)
-    monkeypatch.setattr(topics, "NEWEST", newest, raising=False)
+    declared = signal(Reporter.OTHERS, 1, "K", "", "how warm it is").sent(newest, "temperature")
+    monkeypatch.setattr(CommandSignals, "newest", declared, raising=False)
+    monkeypatch.setattr(rows, "NOT_READ", (*rows.NOT_READ, newest))  # a log has no such column
     monkeypatch.setattr(topics, "ALL", (*topics.ALL, newest))
     monkeypatch.setattr(topics, "RECORDED", (*topics.RECORDED, newest))
     monkeypatch.setitem(topics.BY_NAME, newest.full_name, newest)
-    monkeypatch.setattr(room_of_messages, "__path__", [*room_of_messages.__path__, str(tmp_path)])
-    (tmp_path / "newest.py").write_text(NEWEST)
     flight = Flight(resolve(FlightPlan(duration=0.01)))
-    described = description(newest)
-    sys.modules.pop(f"{room_of_messages.__name__}.newest")
-    assert described is not None
-    codec = Codec(described.of_robot(RobotNames(flight.robot.joint_names), flight.timebase))
+    names = RobotNames(flight.robot.joint_names)
+    codec = Codec(describe(newest, names, flight.timebase))
     simulate(flight, tmp_path / "flown")
     recorder = BagRecorder(tmp_path / "bag", flight.description, flight.timebase)
     for name, data in open_bag(tmp_path / "flown").messages(*topics.ALL):

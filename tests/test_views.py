@@ -17,7 +17,7 @@ from space_robot.flight.plan import Flight, FlightPlan, resolve
 from space_robot.flight.simulate import simulate
 from space_robot_model.robot import Robot
 from space_robot_msgs_py import topics
-from space_robot_msgs_py.wire.controller_telemetry import SIGNALS
+from space_robot_msgs_py.wire.messages import TELEMETRY_ROWS
 
 VIEWS = CONFIG / "views"
 SHOWN = {topic.full_name: topic for topic in (topics.ROBOT_DESCRIPTION, topics.MARKERS)}
@@ -74,7 +74,9 @@ def test_errors_are_those_of_the_law_by_the_names_of_the_axes(
     assert list(signals.name) == names
     stamp = signals.header.stamp
     assert stamp.sec * 2000 + stamp.nanosec / 500_000 == telemetry.data[0]
-    rows = dict(zip(SIGNALS, telemetry.data[1:].reshape(len(SIGNALS), -1), strict=True))
+    rows = dict(
+        zip(TELEMETRY_ROWS, telemetry.data[1:].reshape(len(TELEMETRY_ROWS), -1), strict=True)
+    )
     for field, signal in (("position", "e"), ("velocity", "s"), ("effort", "n_hat")):
         assert getattr(signals, field).tolist() == rows[signal].tolist()
     plotted, layout = "/controller/signals", (VIEWS / "foxglove.json").read_text("utf-8")

@@ -24,7 +24,13 @@ IDEAL: Options = {}
 STC_ON_SMALL_WHEELS: Options = {"actuators": "small_wheels", "controller": "tde_stc"}
 SLOW: Options = {
     "actuators": "small_wheels",
-    "parameters": {"mission": {"waypoint_times": [0.0, 50.0, 100.0]}},
+    "mission": {
+        "start": {"joints_deg": [0, 120, 220, 0, -10, 0]},
+        "segments": [
+            {"joints_deg": [15, 110, 185, 45, 10, -25], "duration": 50},
+            {"joints_deg": [30, 100, 150, 90, 30, -50], "duration": 50},
+        ],
+    },
 }
 COMES_BACK: Options = {
     "actuators": "small_wheels",

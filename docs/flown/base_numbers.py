@@ -11,7 +11,7 @@ from space_robot.analysis.described import robot_of
 from space_robot.analysis.metrics import tracking_error
 from space_robot.analysis.sizing import ActuatorSet
 from space_robot.api.flown_flight import FlownFlight
-from space_robot_control.allocation.assumed_actuators import assumed_actuators
+from space_robot_control.allocation.settings import assumed_actuators
 
 ATTITUDE = "rms.mean_axis.attitude"
 JOINTS_1_3 = "rms.mean_axis.joints_1_3"

@@ -9,10 +9,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from space_robot_model.elementary.arctangent import arctan2
-from space_robot_model.elementary.matrices import product
 from space_robot_msgs_py.bag.blocks import Metric
 from space_robot_msgs_py.bag.flight_log import FlightLog
+
+from .metrics import relative_attitude, rotation_vectors
 
 Array = NDArray[np.float64]
 
@@ -54,13 +54,7 @@ def attitude_drift(log: FlightLog, start: Array | None = None) -> Array:
 
     ``start``: (4,) the attitude to count from (None: that of the first row).
     """
-    q = log.quaternion
-    w, x, y, z = q[0] if start is None else start
-    # the vector and scalar parts of start^-1 * Q
-    back = np.array([[-x, w, z, -y], [-y, -z, w, x], [-z, y, -x, w], [w, x, y, z]])
-    turned = product(q, back.T)
-    sine = np.linalg.norm(turned[:, :3], axis=1)
-    angle = 2.0 * np.degrees(arctan2(sine, np.abs(turned[:, 3])))
-    along = np.copysign(1.0, turned[:, 3]) / np.where(sine > 0.0, sine, 1.0)
-    drift: Array = (angle * along)[:, np.newaxis] * turned[:, :3]
+    first = log.quaternion[0] if start is None else start
+    turned = relative_attitude(np.broadcast_to(first, log.quaternion.shape), log.quaternion)
+    drift: Array = np.degrees(rotation_vectors(turned))
     return drift

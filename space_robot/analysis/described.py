@@ -14,24 +14,23 @@ import numpy as np
 from numpy.typing import NDArray
 
 from space_robot_control.controller.settings import ControllerNodeSettings
-from space_robot_control.laws.trust import check_file, is_plain
+from space_robot_control.laws.names import is_plain, require_shipped_file
 from space_robot_model.hardware.base_actuators import BaseActuatorSettings
 from space_robot_model.robot import Robot
 from space_robot_model.robot.find import find_robot
 from space_robot_msgs_py.bag.flight_log import FlightLog
+from space_robot_msgs_py.config.files import nest
 from space_robot_msgs_py.config.settings import leaves
 from space_robot_msgs_py.config.text import shortened
-from space_robot_msgs_py.config.trees import nest
 from space_robot_msgs_py.config.validation import short, validate
 from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.simulated_time import tick_from
 from space_robot_sim.actuators.actuators import ActuatorSettings
 from space_robot_sim.environment.captures import Captures
 from space_robot_sim.environment.disturbance_table import JSON
-from space_robot_sim.environment.environment import EnvironmentSettings
+from space_robot_sim.environment.environment import EnvironmentSettings, with_payload
 from space_robot_sim.environment.events import Event, named_targets, parse_events
-from space_robot_sim.environment.orbit_settings import OrbitSettings
-from space_robot_sim.environment.payload import with_payload
+from space_robot_sim.environment.orbit import OrbitSettings
 from space_robot_sim.plant.settings import PlantNodeSettings
 
 from ..flight.start_step import StartStep
@@ -189,7 +188,7 @@ def events_of(log: FlightLog) -> list[Event]:
     texts = [str(text) for text in log.flight.get("events", ())]
     if not log.trusted:
         for name in named_targets(texts):
-            check_file("target", name)
+            require_shipped_file("target", name)
     return parse_events(texts)
 
 
@@ -242,7 +241,7 @@ def _without_told_robot(log: FlightLog, parameters: Mapping[str, Any]) -> dict[s
     """Leave out the files of a robot and a mission all of which the bag tells."""
     files = {
         "robot": isinstance(log.flight.get("robot_file"), dict),
-        "mission": "waypoints_deg" in parameters_of(log, "mission"),
+        "mission": "joints_deg" in parameters_of(log, "mission"),
     }
     return {
         key: value
@@ -298,9 +297,9 @@ def check_files(log: FlightLog, parameters: Mapping[str, Any]) -> None:
     """Check that nothing but what is shipped is read, unless the bag is trusted."""
     if not log.trusted:
         for what in ("robot", "case", "mission", "gains", "sensors", "actuators", "orbit"):
-            check_file(what, str(parameters.get(what, "")))
+            require_shipped_file(what, str(parameters.get(what, "")))
         if not (table := str(parameters.get("disturbance.table", ""))).startswith(JSON):
-            check_file("disturbance", table)
+            require_shipped_file("disturbance", table)
 
 
 def parameters_of(log: FlightLog, node: str) -> dict[str, Any]:

@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from space_robot_control.controller.gains import build_law, split_gains
 from space_robot_control.controller.settings import ControllerNodeSettings
-from space_robot_control.laws.trust import check_law
-from space_robot_control.navigation.low_pass import low_pass_weight
+from space_robot_control.laws.names import require_shipped_law
+from space_robot_control.navigation.rate_filters import low_pass_weight
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.bag.law_history import laws_of
 from space_robot_msgs_py.errors import InputError
@@ -73,7 +73,7 @@ def _described_h_bar(log: FlightLog) -> Array:
         chosen |= {**recorded, "controller": name}
         check_files(log, chosen)
         if not log.trusted:
-            check_law(str(name))
+            require_shipped_law(str(name))
         h_bar = build_law(str(name), ControllerNodeSettings.resolve(chosen), log.axes).h_bar
     if not h_bar.any():
         raise NotDescribedError(f"{name} has no time-delay estimate with a constant h_bar")

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from space_robot_msgs_py.bag.flight_log import FlightLog
-from space_robot_msgs_py.config.extras import install_command
+from space_robot_msgs_py.config.installation import install_command
 from space_robot_msgs_py.errors import InputError
 
 from ..console.files import csv_rows, csv_writer, whole_file

@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from space_robot_model.elementary.matrices import unit_rows
-from space_robot_model.elementary.sine import sines_cosines
 from space_robot_model.robot import Robot
 from space_robot_model.robot.momentum import Motion, robot_momentum
 from space_robot_model.robot.placements import cross, to_inertial
@@ -18,7 +17,7 @@ from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.samples import SOURCES
 from space_robot_sim.environment.captures import Captures
 from space_robot_sim.environment.disturbance import DisturbanceSettings
-from space_robot_sim.environment.load_schedule import LoadSchedule
+from space_robot_sim.environment.loads import LoadSchedule
 
 from .base_demand import axes_of
 
@@ -91,7 +90,7 @@ def torques_by_source(
     }
     if disturbance.scale:
         waves = np.array(disturbance.base_frequencies)[:, np.newaxis] * (2.0 * np.pi * log.time)
-        sine = -disturbance.scale * disturbance.base_amplitude * sines_cosines(waves)[0].sum(axis=0)
+        sine = -disturbance.scale * disturbance.base_amplitude * np.sin(waves).sum(axis=0)
         torques[SINES] = np.repeat(sine[:, np.newaxis], 3, axis=1)
     if disturbance.table and captures is not None:
         torques[OWN] = _own_torque(log, disturbance, captures)

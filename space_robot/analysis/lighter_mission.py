@@ -1,23 +1,22 @@
 """A mission that asks less of the base: bent legs, tools with the least momentum, longer segments.
 
 With k times the duration a segment from rest to rest asks for 1/k of the momentum and 1/k^2 of the
-torque: see `space_robot_control.guidance.durations`.
+torque: see `space_robot_control.guidance.demand`.
 """
 
 from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
 import yaml
 
-from space_robot_control.guidance.checks import check_piece
 from space_robot_control.guidance.courses import BentLeg, Piece, QuinticLeg
+from space_robot_control.guidance.limits import check_piece
 from space_robot_control.guidance.mission import Mission, MissionSettings
-from space_robot_control.guidance.segments import read_segments
+from space_robot_control.guidance.segments import HoldSegment, read_segments
 from space_robot_model.robot import Robot
 from space_robot_msgs_py.config.yaml_text import parse_yaml
 from space_robot_msgs_py.errors import InputError
@@ -58,19 +57,14 @@ def stretched_mission(
             factor = max(factor, motion["momentum"] / momentum)
         span = segment["duration_s"] * (factor if factor == 1.0 else factor * BETWEEN_SAMPLES)
         spans.append(span if factor == 1.0 else float(np.ceil(span * 10**DIGITS) / 10**DIGITS))
-    legs = len(settings.waypoint_times) - 1
-    times = [0.0, *np.cumsum(spans[:legs]).tolist()]
-    segments = [
-        _of_duration(text, span)
-        for text, span in zip(settings.written_segments, spans[legs:], strict=True)
-    ]
-    return settings.model_copy(update={"waypoint_times": times, "segments": segments or [""]})
+    pairs = zip(settings.written_segments, spans, strict=True)
+    return settings.model_copy(update={"segments": [_of_duration(*pair) for pair in pairs]})
 
 
 def lightened_mission(
     robot: Robot, mission: Mission, settings: MissionSettings, of_torque: bool
 ) -> MissionSettings:
-    """Return a mission of segments alone that asks less of the base in the same time.
+    """Return a mission that asks less of the base in the same time.
 
     Legs of the joints get the bends of `best_bends`, tools are led with ``least: momentum``.
 
@@ -81,10 +75,9 @@ def lightened_mission(
         of_torque: whether the largest torque is to fall; else the largest momentum.
     """
     segments = []
-    for content, piece in zip(_segments(settings), mission.pieces, strict=True):
-        segments.append(json.dumps(_lightened(robot, piece, content, of_torque)))
-    first = {"waypoint_times": [0.0], "waypoints_deg": settings.waypoints_deg[: robot.n]}
-    return settings.model_copy(update={**first, "segments": segments or [""]})
+    for text, piece in zip(settings.written_segments, mission.pieces, strict=True):
+        segments.append(json.dumps(_lightened(robot, piece, parse_yaml(text), of_torque)))
+    return settings.model_copy(update={"segments": segments})
 
 
 def _lightened(
@@ -106,32 +99,22 @@ def _lightened(
     return {**content, "bends_deg": bends} if share < WORTHWHILE else content
 
 
-def _segments(settings: MissionSettings) -> list[dict[str, Any]]:
-    """Return all parts of a mission as segments are written in a document."""
-    n = len(settings.waypoints_deg) // len(settings.waypoint_times)
-    rows = [settings.waypoints_deg[k : k + n] for k in range(0, len(settings.waypoints_deg), n)]
-    spans = [round(end - begin, 9) for begin, end in pairwise(settings.waypoint_times)]
-    legs = [{"joints_deg": row, "duration": s} for row, s in zip(rows[1:], spans, strict=True)]
-    return [*legs, *(parse_yaml(text) for text in settings.written_segments)]
-
-
 def _of_duration(text: str, span: float) -> str:
     content = parse_yaml(text)
     (segment,) = read_segments([text])
-    if segment.hold is None:
-        content.pop("fast", None)
+    if not isinstance(segment, HoldSegment):
         content["duration"] = span
     return json.dumps(content)
 
 
 def mission_text(settings: MissionSettings) -> str:
     """Return a mission as a document in YAML."""
-    n = len(settings.waypoints_deg) // len(settings.waypoint_times)
     base: dict[str, Any] = {"quaternion": settings.base_quaternion}
     if any(settings.base_rate_deg_s):
         base["rate_deg_s"] = settings.base_rate_deg_s
     if settings.base_point.strip():
         base = parse_yaml(settings.base_point)
-    start = {"joints_deg": settings.waypoints_deg[:n], "base": base}
-    document = {"mission": {"start": start, "segments": _segments(settings)}}
+    start = {"joints_deg": settings.joints_deg, "base": base}
+    segments = [parse_yaml(text) for text in settings.written_segments]
+    document = {"mission": {"start": start, "segments": segments}}
     return yaml.safe_dump(document, sort_keys=False, default_flow_style=None, width=100)

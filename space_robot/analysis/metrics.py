@@ -6,7 +6,6 @@ RMS values instead. Both are given, named ``eq64`` and ``mean_axis``.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Sequence
 from functools import reduce
 from typing import Any
@@ -15,7 +14,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from space_robot_model.dynamics.attitude import attitude_error_into
-from space_robot_model.elementary.arctangent import angle_of
 from space_robot_model.elementary.matrices import dot_rows, norm
 from space_robot_msgs_py.bag.blocks import Metric, blocks_of
 from space_robot_msgs_py.bag.flight_log import FlightLog
@@ -164,29 +162,11 @@ def quaternions_of(eps: Array) -> Array:
 
 def rotation_vectors(quaternions: Array) -> Array:
     """Compute the rotation vectors (N, 3), rad, of quaternions (N, 4) with eta >= 0."""
-    vectors = np.empty((len(quaternions), 3))
-    _rotation_vectors(np.ascontiguousarray(quaternions), vectors)
-    return vectors
-
-
-@kernel
-def _rotation_vectors(quaternions: Array, out: Array) -> None:
-    for i in range(len(out)):
-        w, x, y, z = quaternions[i]
-        sine = math.sqrt(x * x + y * y + z * z)
-        factor = 2.0 * angle_of(sine, w) / sine if sine > 0.0 else 2.0
-        out[i, 0], out[i, 1], out[i, 2] = factor * x, factor * y, factor * z
-
-
-@kernel
-def _add_squares(values: Array, squares: Array) -> None:
-    """Add the sum over the rows of each column's squares."""
-    sums = np.zeros(squares.size)
-    for i in range(len(values)):
-        for k in range(squares.size):
-            sums[k] += values[i, k] * values[i, k]
-    for k in range(squares.size):
-        squares[k] += sums[k]
+    vectors = quaternions[:, 1:]
+    sine = np.linalg.norm(vectors, axis=1)
+    angle, is_turned = 2.0 * np.arctan2(sine, quaternions[:, 0]), sine > 0.0
+    rotations: Array = np.divide(angle, sine, out=np.full_like(sine, 2.0), where=is_turned)
+    return rotations[:, np.newaxis] * vectors
 
 
 def largest_of_columns(values: Array) -> Array:
@@ -204,7 +184,7 @@ class AxisRms:
     def add(self, values: Array) -> None:
         """Take further rows."""
         self.rows += len(values)
-        _add_squares(np.ascontiguousarray(values), self._squares)
+        self._squares += np.einsum("ij,ij->j", values, values)
 
     @property
     def value(self) -> Array:

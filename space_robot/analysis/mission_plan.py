@@ -10,18 +10,17 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from space_robot_control.allocation.assumed_actuators import assumed_actuators
+from space_robot_control.allocation.settings import assumed_actuators
 from space_robot_control.guidance.courses import Piece
 from space_robot_control.guidance.demand import MotionDemand
 from space_robot_control.guidance.mission import Mission
-from space_robot_control.guidance.tool_path import ToolFollower
-from space_robot_model.elementary.least_squares import singular_values
+from space_robot_control.guidance.tool_paths import ToolFollower
 from space_robot_model.elementary.matrices import norms
 from space_robot_model.hardware.base_actuators import BaseActuatorSettings
 from space_robot_model.robot import Robot
-from space_robot_msgs_py.config.directory import config_directory
+from space_robot_msgs_py.config.installation import config_directory
 from space_robot_msgs_py.errors import InputError
-from space_robot_sim.environment.orbit_settings import OrbitSettings
+from space_robot_sim.environment.orbit import OrbitSettings
 
 from ..flight.mission_demand import PieceDemand, SourceDemand, excess, mission_demand
 from .joint_margins import joint_margins
@@ -84,10 +83,10 @@ def planned_segments(
         start_rate: see `mission_demand`.
 
     Raises:
-        InputError: it has a single waypoint.
+        InputError: it has no segments.
     """
     if not mission.duration:
-        raise InputError("the mission has no motion to plan: a single waypoint")
+        raise InputError("the mission has no motion to plan: no segments")
     follower = ToolFollower(robot.nominal, None)
     demands = mission_demand(robot, mission.pieces, orbit or OrbitSettings(), start_rate)
     return [_planned(asked, follower) for asked in demands]
@@ -107,8 +106,7 @@ def _planned(of_piece: PieceDemand, follower: ToolFollower) -> PlannedSegment:
 def _smallest(jacobian: Array, lever: Array) -> float:
     scaled = jacobian.copy()
     scaled[:3] /= max(1e-6, math.sqrt(float(lever @ lever)))
-    values = singular_values(scaled) if jacobian.shape[1] >= 6 else singular_values(scaled.T)
-    return float(values[0])
+    return float(np.linalg.svd(scaled, compute_uv=False)[-1])
 
 
 def feasibility(

@@ -17,7 +17,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from space_robot_model.elementary.matrices import norm, product, unit_rows
-from space_robot_model.elementary.sine import sines_cosines
 from space_robot_model.hardware.base_actuators import BaseActuatorSettings
 from space_robot_model.hardware.wheels import WheelSettings
 from space_robot_model.robot import Robot
@@ -286,7 +285,7 @@ def disturbance_impulse(disturbance: DisturbanceSettings, time: Array) -> Array:
     for frequency in disturbance.base_frequencies:
         if frequency:
             omega = 2.0 * np.pi * frequency
-            integral += (sines_cosines(omega * time)[1] - 1.0) / omega
+            integral += (np.cos(omega * time) - 1.0) / omega
     impulse: Array = disturbance.scale * disturbance.base_amplitude * integral
     return impulse
 

@@ -18,7 +18,7 @@ from inspect import isclass
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from space_robot_control.laws.law_file import ENDING, import_named, importable_name
+from space_robot_control.laws.names import ENDING, import_named, importable_name
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.config.text import one_line_of
 from space_robot_msgs_py.config.validation import short

@@ -19,7 +19,6 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, field_validator
 
-from space_robot_model.elementary.arctangent import arctan2
 from space_robot_model.elementary.matrices import direction_norm, dot_rows, norms, unit_rows
 from space_robot_model.robot import Robot
 from space_robot_model.robot.mission_document import Vector
@@ -149,8 +148,8 @@ def base_pointing_error(log: FlightLog, axis: Array) -> BasePointingError:
     vector = rotation_vectors(error)
     across, rest = eps - about * axis, np.hstack([error[:, :1], about])
     return BasePointingError(
-        half_cone=2.0 * arctan2(norms(across), norms(rest)),
-        about=2.0 * arctan2(np.abs(about[:, 0]), error[:, 0]),
+        half_cone=2.0 * np.arctan2(norms(across), norms(rest)),
+        about=2.0 * np.arctan2(np.abs(about[:, 0]), error[:, 0]),
         rotation=norms(vector),
         vector=vector,
     )
@@ -294,7 +293,8 @@ def pointing_error(log: FlightLog, robot: Robot, start: Array | None = None) -> 
 def angle_between(first: Array, second: Array) -> Array:
     """(N,) rad between unit vectors (N, 3), as exact for small angles as for large ones."""
     across = np.linalg.norm(np.cross(first, second), axis=1)
-    return arctan2(across, np.sum(first * second, axis=1))
+    angle: Array = np.arctan2(across, np.sum(first * second, axis=1))
+    return angle
 
 
 def rotation_angle(first: Array, second: Array) -> Array:
@@ -306,4 +306,5 @@ def rotation_angle(first: Array, second: Array) -> Array:
     # vee(a b^T - b a^T) = b x a for each pair of columns; trace(R) is the sum of their products
     sine = 0.5 * np.linalg.norm(sum(np.cross(b, a) for a, b in axes), axis=1)
     cosine = 0.5 * (sum(np.sum(a * b, axis=1) for a, b in axes) - 1.0)
-    return arctan2(sine, cosine)
+    angle: Array = np.arctan2(sine, cosine)
+    return angle

@@ -3,23 +3,19 @@
 They are those of segments under a Hann window that overlap, the last one moved back so that it is
 whole (IEEE Trans. Audio Electroacoust. 15, 1967).
 
-SciPy's Welch takes segments that do not reach the end, of all rows at once, and importing it costs
-every `simulate` more time than its report.
+SciPy's Welch leaves out a segment that does not reach the end, takes all rows at once, and costs
+every `simulate` more time to import than its report.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
-from space_robot_model.elementary.fourier import squared_spectrum
-from space_robot_model.elementary.sine import sines_cosines
 from space_robot_msgs_py.bag.blocks import BLOCK_TICKS
-from space_robot_msgs_py.compiled.kernels import kernel
 
 Array = NDArray[np.float64]
 
@@ -170,37 +166,17 @@ class PowerSpectrum:
     def _mean_squares(self, rows: Array) -> Array:
         """(F, axes) of one segment."""
         size = len(rows)
-        window, time = _window_and_time(size)
-        steady = np.empty(rows.shape)
-        _without_trend(rows, window, time, float(np.sum(time * time)), steady)
-        _, power = one_sided_power(steady, self._period)
+        window, time = hann(size, size), np.arange(size) - 0.5 * (size - 1)
+        slope = time @ rows / np.sum(time * time)
+        steady = rows - np.mean(rows, axis=0) - time[:, np.newaxis] * slope
+        _, power = one_sided_power(window[:, np.newaxis] * steady, self._period)
         return power / (size * np.sum(window**2))
-
-
-@kernel
-def _without_trend(rows: Array, window: Array, time: Array, square: float, out: Array) -> None:
-    """Write rows without mean and trend, under a window; ``square`` is the sum of time squared."""
-    size, axes = rows.shape
-    sums, slopes = np.zeros(axes), np.zeros(axes)
-    for i in range(size):
-        for k in range(axes):
-            sums[k] += rows[i, k]
-            slopes[k] += time[i] * rows[i, k]
-    for i in range(size):
-        for k in range(axes):
-            steady = rows[i, k] - sums[k] / size - time[i] * (slopes[k] / square)
-            out[i, k] = window[i] * steady
-
-
-@lru_cache(maxsize=4)
-def _window_and_time(size: int) -> tuple[Array, Array]:
-    """Return Hann's window and the time from the middle, in rows, of a segment."""
-    return hann(size, size), np.arange(size, dtype=np.float64) - 0.5 * (size - 1)
 
 
 def hann(rows: int, period: int) -> Array:
     """Return ``rows`` numbers of Hann's window of a ``period`` in rows."""
-    return 0.5 - 0.5 * sines_cosines(2.0 * np.pi * np.arange(rows) / period)[1]
+    window: Array = 0.5 - 0.5 * np.cos(2.0 * np.pi * np.arange(rows) / period)
+    return window
 
 
 def one_sided_power(rows: Array, period: float) -> tuple[Array, Array]:
@@ -208,7 +184,7 @@ def one_sided_power(rows: Array, period: float) -> tuple[Array, Array]:
 
     That of the negative frequencies is added to that of the positive ones.
     """
-    power = squared_spectrum(rows)
+    power: Array = np.abs(np.fft.rfft(rows, axis=0)) ** 2
     f = np.asarray(np.fft.rfftfreq(len(rows), period), np.float64)
     inside = (f > 0.0) & (f < 0.5 / period * (1.0 - 1e-12))
     power[inside] *= 2.0

@@ -142,10 +142,9 @@ class ToolError(Metric):
 
 
 def leads_tool(log: FlightLog) -> bool:
-    """Return whether the mission of a bag has segments, or was changed in flight.
+    """Return whether the mission of a bag leads the tool, or was changed in flight.
 
-    A mission of waypoints only does not lead the tool; the bag tells whether it was flown as
-    planned.
+    One of the joints only does not; the bag tells whether it was flown as planned.
     """
     scenario = log.flight.get("scenario")
     planned = scenario.get("mission") if isinstance(scenario, dict) else None
@@ -154,10 +153,11 @@ def leads_tool(log: FlightLog) -> bool:
     try:
         own = {key: planned[key] for key in MissionSettings.model_fields if key in planned}
         settings = validate(MissionSettings, own, "mission of the bag")
-        if settings.has_segments:
-            return True
         period, last = log.timebase.period, float(tick_times(log)[-1])
-        reference = Mission(assumed_robot_of(log), settings, period).chunk(round(last / period), 1)
+        mission = Mission(assumed_robot_of(log), settings, period)
+        if mission.leads_tool:
+            return True
+        reference = mission.chunk(round(last / period), 1)
     except InputError:
         return False
     away = np.abs(log.reference_joints[-1, 0] - reference.joints[0, 0])

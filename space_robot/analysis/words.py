@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from space_robot_control.controller.plain_laws import NoLaw
+from space_robot_control.controller.law_choice import NoLaw
 from space_robot_msgs_py.bag.law_history import in_words
 
 from ..flight.start_step import sentence

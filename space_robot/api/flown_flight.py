@@ -11,7 +11,7 @@ from typing_extensions import Self
 
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.config.arguments import as_path
-from space_robot_msgs_py.config.html import html_table
+from space_robot_msgs_py.config.text import html_table
 from space_robot_msgs_py.config.validation import one_of, short
 from space_robot_msgs_py.errors import InputError
 

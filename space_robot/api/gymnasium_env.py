@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from space_robot_model.dynamics.attitude import attitude_error_into, rotate_back, rotation_matrix
 from space_robot_msgs_py.config.arguments import as_numbers, as_whole_number
-from space_robot_msgs_py.config.extras import install_command
+from space_robot_msgs_py.config.installation import install_command
 from space_robot_msgs_py.config.validation import short
 from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.samples import RobotState

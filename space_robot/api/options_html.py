@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from space_robot_msgs_py.config.html import html_table
+from space_robot_msgs_py.config.text import html_table
 from space_robot_msgs_py.config.validation import short
 
 from ..scenario.option_table import OPTIONS

@@ -49,10 +49,9 @@ class Scenario(FlightPlan):
     - ``controller``: a `ControlLaw` class or object; None: none, for `bench`
     - ``gains``: values by gain, in place of the default set's: ``{"k_1": 3.0, "h_bar": [...]}``,
       one for all axes or n+3 (base x, y, z, joints); or such a mapping for each of several laws
-    - ``mission``: `MissionSettings` or a mapping: ``waypoint_times`` s, ``waypoints_deg`` (flat,
-      degrees, or m for prismatic joints), ``base_quaternion`` ``[w, x, y, z]``,
-      ``base_point``, ``base_rate_deg_s``, ``initial_joints_deg``, ``initial_quaternion`` and
-      ``initial_rate_deg_s`` (default: the mission's start), ``events``; or a mission's document
+    - ``mission``: a mission's document, ``{"start": ..., "segments": [...]}``, or
+      `MissionSettings`; also ``initial_joints_deg``, ``initial_quaternion`` and
+      ``initial_rate_deg_s`` (default: the mission's start)
     - ``case``, ``sensors``, ``actuators``: their settings, objects or mappings
     - ``assumed_actuators``: the base's actuators as assumed by the flight software
     - ``parameters``: any parameter of a node, ``{"plant": {"friction.coulomb": 0.0}}``

@@ -10,7 +10,7 @@ import numpy as np
 
 from space_robot_msgs_py.config.validation import validate
 from space_robot_msgs_py.errors import InputError
-from space_robot_sim.environment.payload import with_payload
+from space_robot_sim.environment.environment import with_payload
 
 from ..console.files import make_folder, whole_file
 from ..flight.plan import FlightPlan

@@ -11,8 +11,8 @@ from pydantic import Field, PrivateAttr, ValidationInfo, field_validator, model_
 from typing_extensions import Self
 
 from space_robot_msgs_py.config.arguments import path_text
-from space_robot_msgs_py.config.choices import choices
 from space_robot_msgs_py.config.files import named_file
+from space_robot_msgs_py.config.text import choices
 from space_robot_msgs_py.config.validation import StrictModel, read_yaml, short, validate
 from space_robot_msgs_py.errors import InputError, explained_by
 

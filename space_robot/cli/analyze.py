@@ -196,7 +196,7 @@ def _set(log: FlightLog, name: str | None) -> ActuatorSet | None:
     """
     if name is None:
         return None
-    from space_robot_control.allocation.assumed_actuators import assumed_actuators
+    from space_robot_control.allocation.settings import assumed_actuators
 
     from ..analysis.described import robot_of
     from ..analysis.sizing import ActuatorSet

@@ -30,7 +30,7 @@ def names_in(folder: str, others: Sequence[str] = ()) -> Complete:
 
 def config_names(folder: str) -> list[str]:
     """Return the names of the folders in ``config/<folder>``; if none, those of its YAML files."""
-    from space_robot_msgs_py.config.directory import config_directory
+    from space_robot_msgs_py.config.installation import config_directory
 
     files = list((config_directory() / folder).iterdir())
     folders = [file.name for file in files if file.is_dir()]

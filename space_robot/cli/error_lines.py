@@ -6,7 +6,7 @@ import re
 
 import click
 
-from space_robot_msgs_py.config.choices import choices
+from space_robot_msgs_py.config.text import choices
 from space_robot_msgs_py.errors import SpaceRobotError
 
 _NO_COMMAND = re.compile(r"No such command '(.*?)'")

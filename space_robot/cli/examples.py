@@ -69,7 +69,7 @@ def _share() -> Path:
     Raises:
         InputError: the installation is incomplete.
     """
-    from space_robot_msgs_py.config.directory import config_directory
+    from space_robot_msgs_py.config.installation import config_directory
     from space_robot_msgs_py.errors import InputError
 
     share = config_directory().parent

@@ -171,11 +171,10 @@ def with_gears(
 def held_ripple(flight: Flight, plan: FlightPlan) -> Array | None:
     """Return (m,) the RMS of the torque about its mean, N m, with the robot held still.
 
-    It is flown for `HELD` s at the first waypoint of ``flight``, the last half of which counts.
+    It is flown for `HELD` s at the start of ``flight``, the last half of which counts.
     None: it diverges.
     """
-    first = flight.mission_settings.waypoints_deg[: flight.robot.n]
-    there = {"waypoint_times": [0.0], "waypoints_deg": first, "segments": [""]}
+    there = {"joints_deg": flight.mission_settings.joints_deg, "segments": [""]}
     held = plan.with_parameters("mission", there).model_copy(update={"duration": HELD})
     try:
         log = simulate(Flight(resolve(held)))

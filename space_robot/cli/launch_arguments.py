@@ -171,8 +171,7 @@ def _words(option: click.Option, argument: str) -> list[str]:
 
 def _of_file(file: str) -> tuple[dict[str, dict[str, Any]], dict[str, dict[str, Any]]]:
     """Return the parameters of a ROS parameter file by node: those of the flight, and ROS's own."""
-    from space_robot_msgs_py.config.files import is_of_ros, node_parameters
-    from space_robot_msgs_py.config.trees import flatten
+    from space_robot_msgs_py.config.files import flatten, is_of_ros, node_parameters
 
     from .scenario_option import NODES
 

@@ -14,7 +14,7 @@ import click
 
 from space_robot_msgs_py.config.text import printable
 from space_robot_msgs_py.errors import SpaceRobotError
-from space_robot_msgs_py.ros.lifeline import hold_to_standard_input
+from space_robot_msgs_py.ros.process import hold_to_standard_input
 
 from ..console.streams import is_of_output, standard_streams
 from ..processes.interruption import Interrupted, raising_signals

@@ -32,7 +32,7 @@ class PieceTemplate(NamedTuple):
 
 
 def _is_law(name: str) -> bool:
-    from space_robot_control.controller.plain_laws import NoLaw
+    from space_robot_control.controller.law_choice import NoLaw
     from space_robot_control.laws import laws
 
     return name in laws() or name == NoLaw.name

@@ -12,7 +12,7 @@ from .numbers import FiniteRange
 from .options import flight_option
 
 if TYPE_CHECKING:
-    from space_robot_control.navigation.settings import Mode
+    from space_robot_control.navigation.settings import NavigationMode
 
 SECTION = "Gains and studies"
 
@@ -52,7 +52,7 @@ def reproduce(
     duration: float | None,
     brief: bool,
     sensors: str,
-    navigation: Mode | None,
+    navigation: NavigationMode | None,
     actuators: str,
     jobs: int | None,
     as_json: bool,

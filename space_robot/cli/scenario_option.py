@@ -37,7 +37,7 @@ def parameters(
 
 def _set(tree: dict[str, dict[str, Any]], text: str, where: str) -> None:
     """Put ``plant.hold_ticks=40`` into ``tree``."""
-    from space_robot_msgs_py.config.trees import flatten
+    from space_robot_msgs_py.config.files import flatten
     from space_robot_msgs_py.config.validation import one_of, short
     from space_robot_msgs_py.config.yaml_text import YamlTextError, parse_yaml
     from space_robot_msgs_py.errors import InputError
@@ -89,7 +89,7 @@ def _use(context: click.Context, path: Path | None, ignored: Collection[str]) ->
 
 def _scenario_parameters(content: Any, where: str) -> dict[str, dict[str, Any]]:
     """``parameters`` of a scenario: by node and name, or as ``--set`` has them."""
-    from space_robot_msgs_py.config.trees import flatten, nest
+    from space_robot_msgs_py.config.files import flatten, nest
     from space_robot_msgs_py.config.validation import one_of, short
     from space_robot_msgs_py.errors import InputError
 

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from space_robot_sim.plant.wall_clock import SPIN_BEFORE_DEADLINE_S, WallClock
+from space_robot_sim.plant.pacing import SPIN_BEFORE_DEADLINE_S, WallClock
 
 from .checked_item import CheckedItem
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 
-from space_robot_msgs_py.config.extras import requirements
+from space_robot_msgs_py.config.installation import requirements
 
 from .checked_item import ROS, CheckedItem
 from .packages import check_packages, check_python

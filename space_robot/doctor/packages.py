@@ -8,7 +8,7 @@ import sys
 from collections.abc import Iterator, Mapping, Sequence
 from importlib.metadata import PackageNotFoundError, version
 
-from space_robot_msgs_py.config.extras import install_packages
+from space_robot_msgs_py.config.installation import install_packages
 
 from .checked_item import CheckedItem
 

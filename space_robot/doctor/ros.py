@@ -10,7 +10,7 @@ from typing import Any
 
 from space_robot_msgs_py.config.text import one_line_of
 from space_robot_msgs_py.errors import SpaceRobotError
-from space_robot_msgs_py.ros.process_environment import defaults
+from space_robot_msgs_py.ros.process import defaults
 
 from ..flight.graph.domain import domain_asked_for, is_quiet, ros_domain
 from ..flight.graph.processes import has_ros2_run

@@ -9,17 +9,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from space_robot_control.controller.law_choice import LawChoice
-from space_robot_control.controller.supervision import NEW
-from space_robot_control.flight_code.acceptance import CHOOSE, AnswerRecording, RecordingSupervisor
-from space_robot_control.flight_code.folder import Exported
-from space_robot_control.flight_code.hostile import (
+from space_robot_control.controller.tick import NEW
+from space_robot_control.flight_code.acceptance import (
+    CHOOSE,
     REFERENCE_SHARE,
     SHARE,
+    AnswerRecording,
+    RecordingSupervisor,
     hostile_ticks,
     shake,
     spoil,
     spoiled_reference,
 )
+from space_robot_control.flight_code.folder import Exported
 from space_robot_msgs_py.errors import FlightError
 from space_robot_msgs_py.samples import RobotState
 
@@ -134,8 +136,8 @@ def _hostile(plan: FlightPlan, exported: Exported, laws: Sequence[str]) -> Answe
             supervisor.use(choice.chosen)
             recording.add(CHOOSE, place, supervisor, 0)
         if random.random() < REPEATED:  # one that is not answered at once
-            supervisor.judge(tick)
-        if supervisor.judge(tick) != NEW:
+            supervisor.judge_stamp(tick)
+        if supervisor.judge_stamp(tick) != NEW:
             continue
         if choice.change_at(tick):
             supervisor.use(choice.chosen)

@@ -19,7 +19,7 @@ from space_robot_control.controller.controller import Controller, ControllerSnap
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.compiled.records import Block, RecordOwner
 from space_robot_msgs_py.config.arguments import as_numbers, as_whole_number
-from space_robot_msgs_py.config.trees import Tree
+from space_robot_msgs_py.config.files import Tree
 from space_robot_msgs_py.config.validation import short
 from space_robot_msgs_py.errors import FlightError, InputError
 from space_robot_msgs_py.samples import Command, Reference, RobotState

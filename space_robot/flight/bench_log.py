@@ -10,8 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from space_robot_control.controller.law_changes import LawChanges
-from space_robot_control.controller.plain_laws import NoLaw
+from space_robot_control.controller.law_choice import LawChoice, NoLaw
 from space_robot_control.laws import ControlLaw
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.errors import DivergedError, FlightError
@@ -54,8 +53,8 @@ class BenchLog:
         assert log.commanded_torque is not None
         assert log.telemetry is not None
         width, axes = len(plant.names.commanded), log.axes
-        rows, changes = history.rows(), LawChanges()
-        no_law = NoLaw({}, flight.period, axes)
+        rows, no_law = history.rows(), NoLaw({}, flight.period, axes)
+        choice = LawChoice(no_law)
         last: ControlLaw | None = None
         command = Command(0, np.zeros(width))
         for start in range(0, log.ticks, STRETCH_TICKS):
@@ -68,8 +67,10 @@ class BenchLog:
                 if len(row) > width:
                     log.telemetry[start + k] = row[width:].reshape(4, axes)
                     law = law_at(flight.law, flight.swaps, start + k)
-                if law is not last and (change := changes.at(start + k, law)):
-                    log.laws += (change.law,)
+                if law is not last:
+                    choice.choose(law)
+                    if change := choice.change_at(start + k):
+                        log.laws += (change.law,)
                 last = law
                 command.torque[:] = row[:width]
                 with suppress(DivergedError):  # in the last step of a flight that ended by it

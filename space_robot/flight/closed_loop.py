@@ -6,9 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from space_robot_control.controller.controller import Controller, unusable
-from space_robot_control.controller.kernels import controller_tick
-from space_robot_control.controller.signal_kernels import USABLE
-from space_robot_control.laws.compiled import CompiledLaw, LawCode
+from space_robot_control.controller.signals import USABLE
+from space_robot_control.controller.tick import controller_tick
+from space_robot_control.laws.base import CompiledLaw, LawCode
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.compiled.kernels import RecordFunction, kernel
 from space_robot_msgs_py.compiled.records import Block

@@ -17,13 +17,10 @@ import numpy as np
 from space_robot_control.allocation.allocation import allocate, allocation_code
 from space_robot_control.controller.supervisor import Supervisor
 from space_robot_control.laws import CompiledLaw, laws
-from space_robot_msgs_py.compiled.cache import cache_directory
-from space_robot_msgs_py.compiled.call_graph import count_compiled, index_files
-from space_robot_msgs_py.ros.lifeline import hold_to_standard_input
-from space_robot_msgs_py.ros.run_module import module_command
+from space_robot_msgs_py.compiled.cache import cache_directory, count_compiled, index_files
+from space_robot_msgs_py.ros.process import hold_to_standard_input, module_command
 from space_robot_msgs_py.samples import Command, Reference, RobotState
-from space_robot_msgs_py.wire.codecs import CommandCodec, StateCodec
-from space_robot_msgs_py.wire.compiled_codec import read, write
+from space_robot_msgs_py.wire.codecs import CommandCodec, StateCodec, read, write
 
 from ..processes.child_process import child_process
 from ..processes.interruption import not_lost_in_callbacks
@@ -114,7 +111,7 @@ def _answer_and_exchange(flight: Flight) -> None:
     reference = Reference.at_rest(flight.robot.n)
     flight.controller.update(state, reference)
     supervisor = Supervisor(flight.controller, hold_ticks=0)
-    supervisor.judge(0)
+    supervisor.judge_stamp(0)
     command = supervisor.answer(state, reference)
     commands.decode(commands.encode(command), command)
 

@@ -14,13 +14,15 @@ from space_robot_msgs_py.bag.blocks import blocks_of
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.bag.recorder import BagRecorder
 from space_robot_msgs_py.samples import Command, RobotState
-from space_robot_msgs_py.wire.clock import ClockCodec
 from space_robot_msgs_py.wire.codecs import CommandCodec, StateCodec
-from space_robot_msgs_py.wire.controller_law import LawCodec
-from space_robot_msgs_py.wire.controller_signals import SignalsCodec
-from space_robot_msgs_py.wire.controller_telemetry import TelemetryCodec
-from space_robot_msgs_py.wire.reference_codec import ReferenceCodec
-from space_robot_msgs_py.wire.truth_writer import TruthWriter
+from space_robot_msgs_py.wire.telemetry import (
+    ClockCodec,
+    LawCodec,
+    ReferenceCodec,
+    SignalsCodec,
+    TelemetryCodec,
+    TruthWriter,
+)
 
 from .plan import Flight
 

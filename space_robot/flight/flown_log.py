@@ -11,7 +11,7 @@ from space_robot_msgs_py import topics
 from space_robot_msgs_py.bag.flight_log import FlightLog, of_nan
 from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.samples import ReferenceChunk
-from space_robot_msgs_py.wire.controller_telemetry import SIGNALS
+from space_robot_msgs_py.wire.messages import TELEMETRY_ROWS
 
 from .plan import Flight
 
@@ -47,19 +47,7 @@ def columns_of(
     is_brief: bool = False,
 ) -> FlightLog:
     """Return the columns of a log, see `empty_log`; if ``is_brief``, of true states only."""
-    names = flight.plant.names
-    counts = len(names.wheels), len(names.thrusters)
-    log = FlightLog.allocate(
-        ticks,
-        names.joints,
-        flight.timebase,
-        *counts,
-        names.passive,
-        names.geared,
-        names.in_orbit,
-        new,
-        len(names.torquers),
-    )
+    log = FlightLog.allocate(ticks, flight.plant.names, flight.timebase, new)
     if is_brief:
         return log
     log.commanded_torque = new(log.applied_torque.shape)
@@ -76,7 +64,7 @@ def note_assumed_errors(flight: Flight, block: FlightLog, start: int, stop: int)
     assert block.telemetry is not None
     every = flight.controller_settings.telemetry_decimation
     rows = slice(-(-start // every) * every - block.first_tick, stop - block.first_tick, every)
-    block.assumed_error[rows] = block.telemetry[rows, SIGNALS.index("e")]
+    block.assumed_error[rows] = block.telemetry[rows, TELEMETRY_ROWS.index("e")]
 
 
 def ended_early(block: FlightLog, measured: int, answered: int) -> FlightLog:

@@ -11,15 +11,14 @@ from collections.abc import Callable
 
 from space_robot_control.controller.law_choice import LawChoice
 from space_robot_control.controller.reference_buffer import ReferenceBuffer
-from space_robot_control.controller.state_responder import StampStatus, StateResponder
-from space_robot_control.controller.supervisor import Supervisor
+from space_robot_control.controller.supervisor import StateResponder, Supervisor
+from space_robot_control.controller.tick import NEW
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.errors import MessageError
 from space_robot_msgs_py.samples import RobotState
 from space_robot_msgs_py.wire.codecs import CommandCodec, StateCodec
 from space_robot_msgs_py.wire.stamp_guard import AGREEING
-from space_robot_sim.plant.command_guard import CommandGuard
-from space_robot_sim.plant.messages import NONE, SentState, exchange_of
+from space_robot_sim.plant.messages import NONE, CommandGuard, SentState, exchange_of
 
 from .plan import Flight
 
@@ -54,11 +53,10 @@ class MessageLoop:
         self._exchange = exchange_of(settings, names, flight.period, self._states, self._guard)
         self._references = ReferenceBuffer(robot.n)
         self._answering = StateResponder(
-            flight.controller,
+            supervisor or flight.supervisor,
             LawChoice(flight.law, flight.swaps),
             self._references,
             flight.controller_settings,
-            supervisor=supervisor or flight.supervisor,
         )
         self._state = RobotState.allocate(robot.n)
         self._streamed = 0
@@ -107,7 +105,7 @@ class MessageLoop:
             stamp, *_ = [self._states.decode(topic, data, state) for topic, data in parts]
         except MessageError:
             return NONE
-        if self._answering.judge(stamp) is not StampStatus.NEW:
+        if self._answering.judge_stamp(stamp) != NEW:
             return NONE
         reference = references.at(stamp) if references.covers(stamp) else references.hold(stamp)
         if reference is None:

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from space_robot_control.guidance.courses import FEWEST_KNOTS, MOST_KNOTS, Piece, sample_times
 from space_robot_control.guidance.demand import MotionDemand, demand
-from space_robot_control.guidance.segments import read_segments
+from space_robot_control.guidance.segments import Segment, ToolSegment, read_segments
 from space_robot_model.elementary.matrices import norms
 from space_robot_model.hardware.base_actuators import BaseActuatorSettings
 from space_robot_model.hardware.capability import actuator_load, carried_momentum
@@ -27,10 +27,10 @@ from space_robot_msgs_py.compiled.records import assign
 from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.samples import SOURCES, RobotState
 from space_robot_msgs_py.topics import BASE_AXES
+from space_robot_sim.component import Installation
 from space_robot_sim.environment.environment import Environment, EnvironmentSettings
-from space_robot_sim.environment.orbit_settings import OrbitSettings
-from space_robot_sim.plant.surroundings import REPORT_TICKS
-from space_robot_sim.plant.tick import PlantMemory, update_true_state
+from space_robot_sim.environment.orbit import OrbitSettings
+from space_robot_sim.plant.tick import REPORT_TICKS, PlantMemory, update_true_state
 
 from ..scenario.resolved import ResolvedScenario
 
@@ -149,7 +149,8 @@ class Surroundings:
     def __init__(self, robot: Robot, orbit: OrbitSettings) -> None:
         """Put the robot, whose joints are all actuated, into an orbit."""
         self._robot, self._block = robot, PlantMemory.block(robot.n)
-        environment = Environment.build(robot, EnvironmentSettings(), orbit)
+        world = EnvironmentSettings(**{k: getattr(orbit, k) for k in OrbitSettings.model_fields})
+        environment = Environment.build(world, Installation(robot.n, robot=robot))
         assign(self._block[0], model=robot.model, environment=environment)
         self._truth = RobotState(0, self._block["truth"])
         self._ephemeris = Ephemeris(
@@ -217,14 +218,14 @@ def excess(hardware: BaseActuatorSettings, demands: Iterable[PieceDemand]) -> Ex
 def check_mission_demand(scenario: ResolvedScenario) -> None:
     """Check that the actuators that the flight software assumes can give what segments ask for.
 
-    The demand is that of the nominal robot without friction, in the plant's orbit. Missions of
-    waypoints only are not checked, nor those with ``limits: {check_actuators: false}``.
+    The demand is that of the nominal robot without friction, in the plant's orbit. Missions with
+    ``limits: {check_actuators: false}`` are not checked.
 
     Raises:
         InputError: a torque or momentum is too large; names segment, axis, time and amounts.
     """
     mission = scenario.mission
-    is_checked = mission.limits.check_actuators and mission.has_segments
+    is_checked = mission.limits.check_actuators and mission.written_segments
     if is_checked and (complaint := demand_complaint(scenario)):
         raise InputError(
             f"{complaint}: use `space-robot plan` to stretch it, or limits: "
@@ -233,8 +234,8 @@ def check_mission_demand(scenario: ResolvedScenario) -> None:
 
 
 def demand_remark(scenario: ResolvedScenario) -> str:
-    """Return what a mission of waypoints asks too much of the actuators in its flight, or ""."""
-    if scenario.mission.has_segments or not scenario.mission.limits.check_actuators:
+    """Return what a mission that is not refused asks too much of the actuators, or ""."""
+    if scenario.mission.limits.check_actuators and scenario.mission.written_segments:
         return ""
     complaint = demand_complaint(scenario, scenario.ticks * scenario.plant.period)
     return complaint and f"{complaint}: use `space-robot plan` to stretch it"
@@ -255,13 +256,13 @@ def held_base_remark(scenario: ResolvedScenario) -> str:
     """Return what a mission wants of a base that floats freely in its flight, or ""."""
     if scenario.plant.controls_base:
         return ""
-    pieces, segments = scenario.reference.pieces, read_segments(scenario.mission.segments)
-    legs = [None] * (len(pieces) - len(segments))
-    for number, (piece, segment) in enumerate(zip(pieces, [*legs, *segments], strict=True), 1):
+    pieces = scenario.reference.pieces
+    segments: Sequence[Segment | None] = read_segments(scenario.mission.segments) or [None]
+    for number, (piece, segment) in enumerate(zip(pieces, segments, strict=True), 1):
         if segment and segment.is_base_free:
             continue
         times = np.linspace(piece.begin, piece.end, FEWEST_KNOTS)
-        leads_tool = segment and segment.tool and segment.tool.frame != "base"
+        leads_tool = isinstance(segment, ToolSegment) and segment.tool.frame != "base"
         if leads_tool or piece.base.at(times)[:, 4:7].any():
             turns = any(scenario.plant.initial_rate_deg_s)
             advice = "" if turns else ": base: free plans for that"

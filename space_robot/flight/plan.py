@@ -7,11 +7,11 @@ from typing import Any
 
 from space_robot_control.controller.controller import Controller
 from space_robot_control.controller.supervisor import Supervisor
-from space_robot_control.flight_code.choice import supervisor_of
+from space_robot_control.flight_code.supervisors import supervisor_of
 from space_robot_control.laws import ControlLaw
 from space_robot_msgs_py.errors import InputError
-from space_robot_sim.plant.description import plant_description
 from space_robot_sim.plant.plant import Plant
+from space_robot_sim.plant.report import plant_description
 
 from ..processes.software import commit, versions
 from ..scenario.options import NO_FRICTION, FlightPlan
@@ -80,8 +80,8 @@ class Flight:
         return self.plant_settings.has_message_faults or not is_plain
 
     @cached_property
-    def supervisor(self) -> Supervisor | None:
-        """What answers in the place of the usual supervisor; None if that one does.
+    def supervisor(self) -> Supervisor:
+        """What answers the states, where the controller has to answer as a node does.
 
         The flight code in C is compiled, or the flight computer greeted, at the first request.
 
@@ -137,7 +137,7 @@ class Flight:
     @property
     def brief(self) -> dict[str, Any]:
         """What metrics need of `description`; a hundred times faster."""
-        if self.mission_settings.has_segments:  # the tool's path is in the scenario
+        if self.mission.leads_tool:  # its path is in the scenario
             return self.description
         return plant_description(self.robot, {}, self.plant, self.plant_settings)
 

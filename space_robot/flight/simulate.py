@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from space_robot_control.controller.law_changes import LawChanges
+from space_robot_control.controller.law_choice import LawChoice
 from space_robot_msgs_py.bag.blocks import block_bounds, blocks_of
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.bag.reader import read_flight
@@ -64,13 +64,13 @@ def fly_blocks(
         return
     block_of = block_of or (lambda start, stop: empty_log(flight, start, stop))
     laws: tuple[LawInForce, ...] = ()
-    changes = LawChanges()
+    choice = LawChoice(flight.law, flight.swaps)
     with recording(flight, bag) as messages:
         for start, stop in block_bounds(flight.ticks):
             block = block_of(start, stop)
             block.laws = laws
             try:
-                _fly_block(flight, block, changes, messages, progress)
+                _fly_block(flight, block, choice, messages, progress)
             except Exception as error:
                 measured = measured_ticks(flight.plant, error)
                 yield ended_early(block, measured - start, flight.plant.tick - start)
@@ -142,18 +142,18 @@ def _flown_by_messages(
 def _fly_block(
     flight: Flight,
     block: FlightLog,
-    changes: LawChanges,
+    choice: LawChoice,
     messages: Messages | None,
     progress: Callable[[int], None],
 ) -> None:
-    plant, controller, swaps = flight.plant, flight.controller, dict(flight.swaps)
+    plant, controller = flight.plant, flight.controller
     first, end = block.first_tick, block.first_tick + block.ticks
-    cuts = {*range(first, end, STRETCH_TICKS), *(k for k in swaps if first <= k < end), end}
+    swaps = {tick for tick, _ in flight.swaps if first <= tick < end}
+    cuts = {*range(first, end, STRETCH_TICKS), *swaps, end}
     for start, stop in itertools.pairwise(sorted(cuts)):
         progress(start)
-        if start in swaps and swaps[start].name != controller.law.name:
-            controller.law = swaps[start]
-        if change := changes.at(start, controller.law):
+        if change := choice.change_at(start):
+            controller.use(choice.chosen)
             block.laws += (change.law,)
         try:
             close_loop(plant, controller, block, start, stop)

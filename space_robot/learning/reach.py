@@ -10,12 +10,10 @@ from numpy.typing import NDArray
 
 from space_robot_model.dynamics.attitude import attitude_error_into
 from space_robot_msgs_py.compiled.kernels import kernel
-from space_robot_msgs_py.compiled.lane_rows import spread
-from space_robot_msgs_py.compiled.lane_words import as_lanes
-from space_robot_msgs_py.compiled.lanes import WIDTH, where, with_lane
+from space_robot_msgs_py.compiled.lanes import WIDTH, as_lanes, where, with_lane
 from space_robot_msgs_py.compiled.records import Block, Record, shaped
 from space_robot_msgs_py.samples import State
-from space_robot_sim.plant.lanes import move_lanes
+from space_robot_sim.plant.lanes import move_lanes, spread
 from space_robot_sim.plant.tick import RATE_LIMIT, advance, begin_interval, end_interval
 
 Array = NDArray[np.float64]

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from space_robot_msgs_py.compiled.lanes import WIDTH
 from space_robot_msgs_py.compiled.records import Block
 from space_robot_msgs_py.config.arguments import as_numbers, as_whole_number
-from space_robot_msgs_py.config.extras import install_command
+from space_robot_msgs_py.config.installation import install_command
 from space_robot_msgs_py.errors import InputError
 from space_robot_sim.plant.plant import Plant
 from space_robot_sim.plant.tick import PlantMemory

@@ -25,7 +25,7 @@ from multiprocessing import Pipe
 from multiprocessing.connection import Connection
 
 from space_robot_msgs_py.errors import SpaceRobotError
-from space_robot_msgs_py.ros.run_module import clean_environment, module_command
+from space_robot_msgs_py.ros.process import clean_environment, module_command
 
 from .interruption import SIGNALS
 

@@ -7,7 +7,7 @@ import subprocess
 from functools import cache
 from pathlib import Path
 
-from space_robot_msgs_py.config.directory import config_directory
+from space_robot_msgs_py.config.installation import config_directory
 
 PACKAGES = ("space_robot", "numpy", "scipy", "numba", "llvmlite", "matplotlib", "mcap", "rosbags")
 

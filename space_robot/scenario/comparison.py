@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 from space_robot_msgs_py.bag.description import read_description
 from space_robot_msgs_py.bag.folder import open_bag
-from space_robot_msgs_py.config.trees import flatten, nest
+from space_robot_msgs_py.config.files import flatten, nest
 from space_robot_msgs_py.config.validation import read_yaml, validate
 from space_robot_msgs_py.errors import InputError
 

@@ -11,11 +11,11 @@ import math
 from space_robot_sim.faults.grammar import Argument, Kind, by_name
 from space_robot_sim.plant.faults import PLANT_KINDS
 
-_SECONDS = Argument("SECONDS", "s of the wall clock", 0.0, 1e6)
+_SECONDS = Argument("SECONDS", "s of the wall clock", 0.0, 1e6, default=math.inf)
 _NODES = ("controller", "recorder", "mission")
 
 KILLS = {
-    node: Kind(f"kill_{node}", None, None, f"the {node}'s process is killed", lasts=False)
+    node: Kind(f"kill_{node}", None, f"the {node}'s process is killed", lasts=False)
     for node in _NODES
 }
 """Kinds of faults that kill a process, by node."""
@@ -23,7 +23,6 @@ STOPS = {
     node: Kind(
         f"stop_{node}",
         _SECONDS,
-        math.inf,
         f"the {node}'s process is stopped, and continues after SECONDS",
         lasts=False,
     )

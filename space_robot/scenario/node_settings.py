@@ -10,15 +10,13 @@ from pydantic import ValidationError
 
 from space_robot_control.controller.gains import gains_as_path, split_gains
 from space_robot_control.controller.settings import ControllerNodeSettings
-from space_robot_control.guidance.mission import pointing_start
-from space_robot_control.guidance.settings import MissionNodeSettings
+from space_robot_control.guidance.mission import MissionNodeSettings, pointing_start
 from space_robot_control.laws import ControlLaw
-from space_robot_control.navigation.assumed_sensors import assumed_numbers
+from space_robot_control.navigation.settings import assumed_numbers
 from space_robot_model.orbit.ephemeris import AssumedOrbit, AssumedTarget
 from space_robot_msgs_py.bag.recorder_settings import RecorderNodeSettings
-from space_robot_msgs_py.config.files import GIVEN
+from space_robot_msgs_py.config.files import GIVEN, Tree, flatten, merge, nest
 from space_robot_msgs_py.config.settings import NodeSettings
-from space_robot_msgs_py.config.trees import Tree, flatten, merge, nest
 from space_robot_msgs_py.config.validation import one_of, validate
 from space_robot_msgs_py.errors import InputError, explained_by
 from space_robot_sim.environment.events import Capture

@@ -14,7 +14,7 @@ from typing import Annotated, Any
 import numpy as np
 from pydantic import BaseModel, BeforeValidator, PlainValidator
 
-from space_robot_control.controller.plain_laws import law_of
+from space_robot_control.controller.law_choice import law_of
 from space_robot_control.guidance.mission import MissionSettings
 from space_robot_control.laws import ControlLaw, find_law, importable_name, laws
 from space_robot_model.hardware.base_actuators import BaseActuatorSettings
@@ -22,13 +22,12 @@ from space_robot_model.hardware.sensors import SensorSettings
 from space_robot_model.robot import Robot
 from space_robot_model.robot.find import ROBOTS, robot_as_path
 from space_robot_model.robot.mission_document import OF_PLANT, document_settings
-from space_robot_msgs_py.config.files import GIVEN, is_named
-from space_robot_msgs_py.config.trees import Tree, nest
+from space_robot_msgs_py.config.files import GIVEN, Tree, is_named, nest
 from space_robot_msgs_py.config.validation import StrictModel, validate
 from space_robot_sim.actuators.actuators import ActuatorSettings
 from space_robot_sim.environment.environment import EnvironmentSettings
 from space_robot_sim.environment.events import Capture, Release
-from space_robot_sim.environment.orbit_settings import OrbitSettings
+from space_robot_sim.environment.orbit import OrbitSettings
 
 from .disturbances import as_disturbance
 
@@ -167,20 +166,19 @@ def numbers_of(value: str | Tree) -> tuple[str, Tree]:
 def mission_of(mission: str | Tree) -> tuple[str, Tree, Tree]:
     """Return the file's name, and the settings for mission and plant.
 
-    Unless it is given too, the plant begins at the first waypoint.
+    Unless it is given too, the plant begins at the mission's start.
     """
     if isinstance(mission, str):
         return mission, {}, {}
     if "start" in mission:
         mission = document_settings(mission, "mission")
     of_mission = {key: v for key, v in mission.items() if key not in OF_PLANT}
-    waypoints = validate(MissionSettings, of_mission, "mission")
-    joints = len(waypoints.waypoints_deg) // len(waypoints.waypoint_times)
-    start: Tree = {"initial_joints_deg": waypoints.waypoints_deg[:joints]}
-    if not waypoints.base_point.strip():
-        start["initial_quaternion"] = waypoints.base_quaternion
-    if any(waypoints.base_rate_deg_s):
-        start["initial_rate_deg_s"] = waypoints.base_rate_deg_s
+    settings = validate(MissionSettings, of_mission, "mission")
+    start: Tree = {"initial_joints_deg": settings.joints_deg}
+    if not settings.base_point.strip():
+        start["initial_quaternion"] = settings.base_quaternion
+    if any(settings.base_rate_deg_s):
+        start["initial_rate_deg_s"] = settings.base_rate_deg_s
     return GIVEN, of_mission, start | {key: mission[key] for key in OF_PLANT if key in mission}
 
 

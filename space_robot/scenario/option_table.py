@@ -45,7 +45,7 @@ class Option:
     @property
     def help_text(self) -> str:
         """Return the help with the names of the files and the default."""
-        from space_robot_msgs_py.config.directory import config_directory
+        from space_robot_msgs_py.config.installation import config_directory
 
         text = self.help
         if "{names}" in text:

@@ -6,10 +6,9 @@ from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, ByteSize, Field
 
-from space_robot_control.navigation.settings import Mode
-from space_robot_msgs_py.bag.mcap_file import Compression
-from space_robot_msgs_py.config.namespace import full_namespace
-from space_robot_msgs_py.config.validation import StrictModel
+from space_robot_control.navigation.settings import NavigationMode
+from space_robot_msgs_py.bag.writer import Compression
+from space_robot_msgs_py.config.validation import StrictModel, full_namespace
 from space_robot_msgs_py.errors import explained_by
 from space_robot_sim.faults.grammar import Kinds, parse_faults
 from space_robot_sim.plant.faults import PLANT_KINDS
@@ -54,7 +53,7 @@ class FlightPlan(StrictModel):
     controller: LawGiven = of("controller")
     """Unless it is set, that of the gain set's ``controller.yaml``, if there is one. Also a
     `ControlLaw` class or object; a function, see
-    `space_robot_control.controller.plain_laws`; None: none, on the bench."""
+    `space_robot_control.controller.law_choice`; None: none, on the bench."""
     case: Case = of("case")
     disturbance: DisturbanceGiven = of("disturbance")
     """A table's file; also its columns, numbers by name, or a function of time that is sampled at
@@ -74,7 +73,7 @@ class FlightPlan(StrictModel):
     duration: float | None = of("duration")
     period: float | None = of("period")
     substeps: int | None = of("substeps")
-    navigation: Mode | None = of("navigation")
+    navigation: NavigationMode | None = of("navigation")
     command_latency_ticks: int = of("command_latency_ticks")
     friction: bool = of("friction")
     realtime: bool = of("realtime")

@@ -4,19 +4,17 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from space_robot_control.allocation.assumed_actuators import assumed_actuators
+from space_robot_control.allocation.settings import assumed_actuators
 from space_robot_control.controller.gains import build_laws
-from space_robot_control.controller.plain_laws import NoLaw
+from space_robot_control.controller.law_choice import NoLaw, parse_swaps
 from space_robot_control.controller.settings import OF_THE_SET
-from space_robot_control.controller.swaps import parse_swaps
 from space_robot_control.guidance.mission import Mission
 from space_robot_control.laws import ControlLaw
 from space_robot_control.laws import laws as known_laws
 from space_robot_model.hardware.base_actuators import BaseActuatorSettings
 from space_robot_model.robot import Robot
 from space_robot_model.robot.find import TRAJECTORIES, YAML, remake_advice, robot_files
-from space_robot_msgs_py.config.files import GIVEN
-from space_robot_msgs_py.config.trees import flatten, nest
+from space_robot_msgs_py.config.files import GIVEN, flatten, nest
 from space_robot_msgs_py.config.validation import one_of, validate
 from space_robot_msgs_py.errors import InputError, explained_by
 from space_robot_sim.environment.disturbance_table import JSON, DisturbanceTable
@@ -87,8 +85,7 @@ def _mission(settings: FlightSettings, robot: Robot) -> Mission:
             return Mission(robot, settings.mission, settings.plant.period)
         except InputError as error:
             file, numbers = settings.mission.mission, settings.mission
-            needed = robot.n * len(numbers.waypoint_times)
-            if not file and len(numbers.waypoints_deg) != needed:
+            if not file and len(numbers.joints_deg) != robot.n:
                 own = robot_files(settings.mission.robot).mission
                 raise InputError(f"{own}: {error}{remake_advice(own) if own else ''}") from None
             if not file.endswith((*YAML, *TRAJECTORIES)):

@@ -11,27 +11,25 @@ from typing import Any
 from pydantic import BaseModel
 
 from space_robot_control.allocation.settings import AllocationSettings
-from space_robot_control.controller.plain_laws import NoLaw
+from space_robot_control.controller.law_choice import NoLaw
 from space_robot_control.controller.settings import DEFAULT, ControllerNodeSettings
-from space_robot_control.guidance.mission import Mission, MissionSettings
-from space_robot_control.guidance.settings import MissionNodeSettings
+from space_robot_control.guidance.mission import Mission, MissionNodeSettings, MissionSettings
 from space_robot_control.laws import ControlLaw
-from space_robot_model.hardware.base_actuators import BaseActuatorSettings
-from space_robot_model.hardware.magnetic_torquers import MagneticTorquerSettings
+from space_robot_model.hardware.base_actuators import BaseActuatorSettings, MagneticTorquerSettings
 from space_robot_model.hardware.sensors import SensorSettings
 from space_robot_msgs_py.bag.recorder_settings import RecorderNodeSettings
-from space_robot_msgs_py.config.trees import Tree
+from space_robot_msgs_py.config.files import Tree
 from space_robot_msgs_py.errors import InputError
 from space_robot_sim.actuators.actuators import ActuatorSettings
 from space_robot_sim.environment.disturbance import DisturbanceSettings
 from space_robot_sim.environment.disturbance_table import DisturbanceTable
 from space_robot_sim.environment.environment import EnvironmentSettings
 from space_robot_sim.environment.friction import coefficients
-from space_robot_sim.environment.orbit_settings import OrbitSettings
+from space_robot_sim.environment.orbit import OrbitSettings
 from space_robot_sim.faults.grammar import Fault
-from space_robot_sim.plant.description import actuators, plant_description
 from space_robot_sim.plant.faults import PLANT_KINDS
 from space_robot_sim.plant.plant import Plant
+from space_robot_sim.plant.report import actuators, plant_description
 from space_robot_sim.plant.settings import MOST_TICKS, PlantNodeSettings
 
 from .faults import PROCESS_KINDS
@@ -143,13 +141,13 @@ class ResolvedScenario:
         """Number of ticks of the flight.
 
         Raises:
-            InputError: the flight is too long, or the mission defines no duration.
+            InputError: the flight is too long, or the mission has no segments.
         """
         duration, period = self.options.duration, self.plant.period
         if duration is None:
             duration = self.reference.duration
         if duration <= 0.0:
-            raise InputError("the mission has a single waypoint: give a duration")
+            raise InputError("the mission has no segments: give a duration")
         ticks = max(1, math.floor(duration / period + 1e-6))
         if ticks > MOST_TICKS:
             raise InputError(

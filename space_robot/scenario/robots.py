@@ -8,7 +8,7 @@ from typing import Any
 
 from space_robot_model.robot import Robot
 from space_robot_model.robot.find import robot_source
-from space_robot_msgs_py.config.trees import Tree
+from space_robot_msgs_py.config.files import Tree
 from space_robot_msgs_py.errors import InputError
 
 from .node_settings import FlightSettings

@@ -15,9 +15,9 @@ from pydantic import BaseModel, ValidationError
 
 from space_robot_control.controller.gains import PARAMETERS, check_gains
 from space_robot_control.laws import ControlLaw
+from space_robot_model.hardware.sensors import SensorSettings
 from space_robot_model.robot import Robot
-from space_robot_msgs_py.config.files import GIVEN
-from space_robot_msgs_py.config.trees import Tree, merge, nest
+from space_robot_msgs_py.config.files import GIVEN, Tree, merge, nest
 from space_robot_sim.faults.grammar import parse_faults
 from space_robot_sim.plant.faults import PLANT_KINDS
 from space_robot_sim.plant.settings import PlantNodeSettings
@@ -32,11 +32,11 @@ OF_PLANT = frozenset(
         "initial_rate_deg_s",
         *("torque_echo", "echo_scale", "echo_bias", "substeps", "command_latency_ticks"),
         *("drive_scale", "drive_bias", "drive_step", "drive_dead_band", "drive_lag"),
-        *("base_torque_limit", "joint_torque_limit", "star_tracker", "gyro", "encoders"),
+        *("base_torque_limit", "joint_torque_limit", *SensorSettings.model_fields),
     }
 )
 """Parameters of the plant on which nothing else in a scenario depends."""
-OF_SENSORS = frozenset({"star_tracker", "gyro", "encoders"})
+OF_SENSORS = frozenset(SensorSettings.model_fields)
 """Those that navigation assumes to be known, if they are given without a file."""
 OF_ORBIT = frozenset({"orbital_elements", "gravity", "sunlight"})
 """Those that a mission assumes to be known, if it depends on the orbit."""

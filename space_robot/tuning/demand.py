@@ -12,10 +12,10 @@ from space_robot_control.guidance.mission import MissionSettings
 from space_robot_model.dynamics.attitude import rotation_matrix
 from space_robot_model.dynamics.rho_space import RhoSpaceModel, rho_space_into
 from space_robot_model.robot import Robot
+from space_robot_sim.component import Installation
 from space_robot_sim.environment.disturbance import Disturbance, disturbance_torque
-from space_robot_sim.environment.environment import EnvironmentSettings
+from space_robot_sim.environment.environment import EnvironmentSettings, with_payload
 from space_robot_sim.environment.friction import coefficients
-from space_robot_sim.environment.payload import with_payload
 
 from .inertia import J0, SAMPLING, sampled_reference
 
@@ -91,7 +91,7 @@ def _smooth_force(
     count = len(chunk.joints)
     rotation, model = np.empty((3, 3)), RhoSpaceModel.allocate(robot.n)
     as_desired = np.array([1.0, 0.0, 0.0, 0.0])
-    disturbance = Disturbance.build(robot.n, case.disturbance) if case else None
+    disturbance = Disturbance.build(case.disturbance, Installation(robot.n)) if case else None
     force, torque = np.empty((count, robot.n + 3)), np.zeros(robot.n + 3)
     viscous = coefficients(robot, case.friction)[:, 1] if case else np.zeros(robot.n)
     for k, (theta, rates, accelerations) in enumerate(chunk.joints):

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from space_robot_control.laws import ControlLaw
 from space_robot_control.laws.base import NO_ESTIMATE
-from space_robot_control.navigation.low_pass import low_pass_weight
+from space_robot_control.navigation.rate_filters import low_pass_weight
 from space_robot_model.robot import Robot
 from space_robot_model.robot.gears import FlexibleModel, flexible_model, geared_joints
 

@@ -28,7 +28,7 @@ from numpy.typing import NDArray
 from space_robot_control.controller.settings import ControllerNodeSettings
 from space_robot_control.laws import ControlLaw
 from space_robot_control.laws.base import CONSTANT_INERTIA, NO_ESTIMATE
-from space_robot_control.navigation.low_pass import low_pass_weight
+from space_robot_control.navigation.rate_filters import low_pass_weight
 
 from .closed_loop import SLOWEST_GROWTH, RigidLoop
 from .flexible import FlexibleCheck

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from space_robot_control.laws import CompiledLaw, ControlLaw, Signals
-from space_robot_control.laws.checked import LawError, force_of
+from space_robot_control.laws.base import LawError, force_of
 from space_robot_msgs_py.compiled.records import Block, assign
 from space_robot_msgs_py.config.text import one_line_of
 

@@ -13,8 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from space_robot_control.laws import Signals, find_law
-from space_robot_control.laws.base import NOMINAL_INERTIA
-from space_robot_control.laws.checked import force_of
+from space_robot_control.laws.base import NOMINAL_INERTIA, force_of
 
 from .closed_loop import rigid_motion
 from .held_ripple import SETTLING

@@ -7,11 +7,11 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from space_robot_control.guidance.limits import too_fast, too_strong, turn_remarks
+from space_robot_control.guidance.limits import too_strong, turn_remarks
 from space_robot_control.guidance.mission import Mission, MissionSettings
 from space_robot_control.laws import CompiledLaw, ControlLaw
 from space_robot_control.laws.base import CONSTANT_INERTIA, NO_ESTIMATE
-from space_robot_control.navigation.low_pass import low_pass_weight
+from space_robot_control.navigation.rate_filters import low_pass_weight
 from space_robot_model.robot import Robot
 from space_robot_msgs_py.errors import InputError
 
@@ -145,7 +145,7 @@ def estimate_remark(tuned: Tuned) -> str:
 
 
 def limit_remarks(robot: Robot, mission: MissionSettings) -> list[str]:
-    """Return a warning for each joint whose limits the mission exceeds.
+    """Return a warning for each joint whose limit of effort the mission exceeds.
 
     The force is that of acceleration only, with constant attitude and locked passive joints:
     friction, velocity terms and control errors are not included.
@@ -155,16 +155,11 @@ def limit_remarks(robot: Robot, mission: MissionSettings) -> list[str]:
     except InputError:  # the flight itself reports it
         return []
     remarks = [f"warning: {text}" for text in turn_remarks(robot, planned.pieces)]
-    remarks += [
-        f"warning: mission: {b.joint} would move at {b.asked:.3g} {b.unit}, its limit is "
-        f"{b.limit:.3g} {b.unit}"
-        for b in too_fast(robot, planned.times, planned.waypoints)
-    ]
     has_limits = np.isfinite([limits.effort for limits in robot.limits]).any()
-    if not has_limits or len(planned.times) < 2:
+    if not has_limits or not planned.duration:
         return remarks
-    legs = np.diff(planned.times)
-    joints = sampled_reference(robot, mission, min(COARSE, *(legs / A_LEG))).joints
+    shortest = min(piece.end - piece.begin for piece in planned.pieces)
+    joints = sampled_reference(robot, mission, min(COARSE, shortest / A_LEG)).joints
     inertia = semi_floating_inertia(robot.nominal, joints[:, 0])[:, 3:, 3:]
     force = np.einsum("kij,kj->ki", inertia, joints[:, 2])
     return remarks + [

@@ -15,7 +15,7 @@ from space_robot_model.robot.placements import base_axes, body_frames
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.simulated_time import tick_from
 from space_robot_sim.environment.events import Capture
-from space_robot_sim.environment.grasp import Grasp
+from space_robot_sim.environment.impact import Grasp
 
 Array = NDArray[np.float64]
 

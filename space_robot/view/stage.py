@@ -13,7 +13,7 @@ from space_robot_model.elementary.matrices import unit_rows
 from space_robot_model.robot import Robot
 from space_robot_model.robot.parts import Visual
 from space_robot_model.robot.placements import base_axes, body_frames, wxyz
-from space_robot_msgs_py.config.extras import install_command
+from space_robot_msgs_py.config.installation import install_command
 from space_robot_msgs_py.errors import InputError
 
 from .horizon import Horizon

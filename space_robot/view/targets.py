@@ -17,7 +17,7 @@ from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.simulated_time import tick_from
 from space_robot_sim.environment.events import Capture, Event, Release
-from space_robot_sim.environment.grasp import Grasp
+from space_robot_sim.environment.impact import Grasp
 from space_robot_sim.environment.neighbouring_orbit import fall
 
 from ..analysis.described import captures_of, events_of, orbit_of

@@ -24,20 +24,16 @@ MOST_ROUNDS = 3 * MOST_THRUSTERS
 class NonNegative(Record):
     """Matrix and memory of `solve`."""
 
-    gram: Array = shaped(lambda n: (MOST_THRUSTERS, MOST_THRUSTERS))
-    """``B^T B``."""
-    right: Array = shaped(lambda n: (MOST_THRUSTERS,))
-    """``B^T b``."""
-    x: Array = shaped(lambda n: (MOST_THRUSTERS,))
-    """The solution."""
+    gram: Array = shaped(lambda n: (MOST_THRUSTERS, MOST_THRUSTERS), "``B^T B``")
+    right: Array = shaped(lambda n: (MOST_THRUSTERS,), "``B^T b``")
+    x: Array = shaped(lambda n: (MOST_THRUSTERS,), "The solution")
     is_used: Array = shaped(lambda n: (MOST_THRUSTERS,))
     """1 for each column that the solution uses (P), else 0 (Z)."""
     trial: Array = shaped(lambda n: (MOST_THRUSTERS,))
     """Solution on the columns in use, whatever its signs."""
     factor: Array = shaped(lambda n: (MOST_THRUSTERS, MOST_THRUSTERS))
     """Cholesky factor of their matrix."""
-    used: Array = shaped(lambda n: (MOST_THRUSTERS,))
-    """Their numbers."""
+    used: Array = shaped(lambda n: (MOST_THRUSTERS,), "Their numbers")
 
 
 @kernel

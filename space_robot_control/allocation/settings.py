@@ -1,4 +1,4 @@
-"""Settings of the allocation: how the flight software uses wheels and thrusters."""
+"""What the flight software assumes of the base's actuators, and how it uses them."""
 
 from __future__ import annotations
 
@@ -7,12 +7,29 @@ from typing import Annotated, Literal
 from pydantic import Field, model_validator
 from typing_extensions import Self
 
+from space_robot_model.hardware.base_actuators import BaseActuatorSettings
+from space_robot_model.hardware.sheets import read_sheet
+from space_robot_model.robot import Robot
 from space_robot_msgs_py.config.validation import StrictModel
 
 WheelAllocation = Literal["pseudo_inverse", "least_largest"]
 Modulation = Literal["pwm", "sigma_delta", "schmitt"]
 Dump = Literal["all", "thrusters", "magnetic", "none"]
 Share = Annotated[float, Field(ge=0.0, le=1.0)]
+
+
+def assumed_actuators(name: str, robot: Robot) -> BaseActuatorSettings:
+    """Read the base's actuators of a file of config/actuators, or at a path.
+
+    Parameters of the plant alone (a misaligned wheel, a weak thruster) are left out: the controller
+    does not know them.
+
+    Raises:
+        InputError: there is no such file, or it is wrong for ``robot``.
+    """
+    actuators = read_sheet(BaseActuatorSettings, "actuators", name)
+    actuators.check(robot, name)
+    return actuators
 
 
 class AllocationSettings(StrictModel):

@@ -17,17 +17,23 @@ from space_robot_msgs_py.compiled.records import Block, RecordOwner, assign
 from space_robot_msgs_py.errors import SingularAttitudeError, UnusableStateError
 from space_robot_msgs_py.samples import Command, RobotState
 
-from ..allocation.allocation import Allocation, allocation_code
-from ..allocation.diagnosis import Diagnosis, diagnose
+from ..allocation.allocation import Allocation, Diagnosis, allocation_code, diagnose
 from ..allocation.settings import AllocationSettings
 from ..laws import ControlLaw, Signals
-from ..laws.checked import force_of
-from ..navigation.low_pass import low_pass_weight
+from ..laws.base import force_of
 from ..navigation.navigation import Navigation
+from ..navigation.rate_filters import low_pass_weight
 from ..navigation.settings import NavigationFilterSettings
-from .kernels import apply_transfer, engage
-from .memory import ControllerMemory
-from .signal_kernels import LARGEST, NOT_UNIT, SINGULAR, TOO_LARGE, USABLE, compute_signals
+from .signals import (
+    LARGEST,
+    NOT_UNIT,
+    SINGULAR,
+    TOO_LARGE,
+    USABLE,
+    ControllerMemory,
+    compute_signals,
+)
+from .tick import apply_transfer, engage
 
 Array = NDArray[np.float64]
 
@@ -134,6 +140,13 @@ class Controller(RecordOwner):
         self._law = law
         self.engage()
 
+    def use(self, law: ControlLaw) -> bool:
+        """Let ``law`` be in force, if it is another one; return whether it is."""
+        is_other = self._law is not law
+        if is_other:
+            self.law = law
+        return is_other
+
     def engage(self) -> None:
         """Reset the law and let it take over from the applied force at the next tick."""
         self._law.reset()
@@ -207,7 +220,8 @@ class Controller(RecordOwner):
         """Allocate the base torque to the base's actuators, if it has any."""
         command = self.last_command
         if self._actuators.size:
-            self.allocate.call(self._address, 0, tick)  # its layout is that of any n
+            joints = 0  # the layout of an `Allocation` is the same for any number of them
+            self.allocate.call(self._address, joints, tick)
             command.torque[-self._actuators.size :] = self._actuators
         command.tick = tick
         return command

@@ -12,11 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from space_robot_model.robot.find import new_command, remake_advice, robot_files
-from space_robot_msgs_py.config.files import GIVEN, node_parameters
+from space_robot_msgs_py.config.files import GIVEN, Tree, nest, node_parameters
 from space_robot_msgs_py.config.text import one_line_of
-from space_robot_msgs_py.config.trees import Tree, nest
 from space_robot_msgs_py.config.validation import one_of, read_yaml, short
-from space_robot_msgs_py.config.yaml_text import check_file, is_folder
+from space_robot_msgs_py.config.yaml_text import check_readable, is_folder
 from space_robot_msgs_py.errors import InputError, SpaceRobotError
 
 from ..laws import ControlLaw, find_law, laws
@@ -44,10 +43,10 @@ def gain_files(robot: str, gain_set: str) -> dict[str, Path]:
     """
     path = Path(gain_set)
     if gain_set.endswith((".yaml", ".yml")):
-        check_file(path)
+        check_readable(path)
         return {path.stem: path}
     if "/" in gain_set:
-        return _gains_folder(path)
+        return _files(path)
     files = robot_files(robot)
     if robot == GIVEN:
         raise InputError("a robot that no file tells has no gains of its own: give some")
@@ -58,11 +57,23 @@ def gain_files(robot: str, gain_set: str) -> dict[str, Path]:
         )
     if gain_set == DEFAULT:
         if not (folder / DEFAULT_SETS).is_file():
-            return _gains_folder(folder)
+            return _files(folder)
         chosen = read_yaml(folder / DEFAULT_SETS)
         return {law: folder / str(name) / f"{law}.yaml" for law, name in chosen.items()}
     one_of(gain_set, [DEFAULT, *_sets(folder)], "gain set", f" of robot {short(files.name)}")
     return _files(folder / gain_set)
+
+
+def _sets(folder: Path) -> list[str]:
+    return sorted(entry.name for entry in folder.iterdir() if entry.is_dir())
+
+
+def _files(folder: Path) -> dict[str, Path]:
+    files = sorted(folder.glob("*.yaml")) if is_folder(folder) else []
+    gains = {file.stem: file for file in files if file.name != OF_THE_SET}
+    if not gains:
+        raise InputError(f"{short(str(folder))}: no folder with gain files (<law>.yaml)")
+    return gains
 
 
 def gains_as_path(gain_set: str, robot: str) -> str:
@@ -76,22 +87,6 @@ def gains_as_path(gain_set: str, robot: str) -> str:
         if (own := robot_files(robot).gains) and gain_set in _sets(own):
             return gain_set
     return f"{gain_set}/" if gain_set and is_folder(Path(gain_set)) else gain_set
-
-
-def _sets(folder: Path) -> list[str]:
-    return sorted(entry.name for entry in folder.iterdir() if entry.is_dir())
-
-
-def _gains_folder(path: Path) -> dict[str, Path]:
-    files = _files(path) if is_folder(path) else {}
-    if not files:
-        raise InputError(f"{short(str(path))}: no folder with gain files (<law>.yaml)")
-    return files
-
-
-def _files(folder: Path) -> dict[str, Path]:
-    files = sorted(file for file in folder.glob("*.yaml") if file.name != OF_THE_SET)
-    return {file.stem: file for file in files}
 
 
 def read_gains(path: Path, law: type[ControlLaw], axes: int) -> dict[str, Array]:
@@ -129,13 +124,13 @@ def check_gains(
         key = f"{where}: {law.name}.{name}"
         if name not in content:
             raise InputError(f"{key}: missing ({description})")
-        values = np.zeros(1) if _is_nominal(name, content[name]) else _numbers(content[name])
+        values = _numbers(name, content[name])
         if values is None:
             raise InputError(f"{key}: numbers were expected, got {short(content[name])}")
         if values.shape not in ((axes,), (1,)):
-            raise InputError(
-                f"{key}: {gain_lengths(axes)} were expected, got {_count(values)}{advice}"
-            )
+            listed = ", ".join(f"{value:g}" for value in np.ravel(values)[:3])
+            got = f"[{listed}]" if values.size <= 3 else f"{values.size}: [{listed}, ...]"
+            raise InputError(f"{key}: {gain_lengths(axes)} were expected, got {got}{advice}")
         fits = values > 0.0 if name in STRICTLY_POSITIVE else values >= 0.0
         if name in FRACTIONS:
             fits &= values < 1.0
@@ -155,35 +150,24 @@ def gain_range(name: str) -> str:
     return f"{text} (or {NOMINAL}: as numbers all 0)" if name == "h_bar" else text
 
 
-def _is_nominal(name: str, value: Any) -> bool:
-    if isinstance(value, (list, tuple)) and len(value) == 1:
-        (value,) = value
-    return name == "h_bar" and isinstance(value, str) and value == NOMINAL
-
-
 def gain_lengths(axes: int) -> str:
     """Return the allowed number of values of a gain, in words."""
     return f"{axes} values (base x, y, z and the joints) or 1"
 
 
-def _count(values: Array) -> str:
-    """Return few numbers as they are, and say of more how many they are."""
-    listed = ", ".join(f"{value:g}" for value in np.ravel(values)[:3])
-    return f"[{listed}]" if values.size <= 3 else f"{values.size}: [{listed}, ...]"
-
-
-def _numbers(value: Any) -> Array | None:
-    """Return a list of numbers; None for other values, booleans and texts included."""
+def _numbers(name: str, value: Any) -> Array | None:
+    """Return the numbers of a gain; None for other values, booleans and texts included."""
     if isinstance(value, np.ndarray):
         return value
+    if name == "h_bar" and (value == NOMINAL or value in ([NOMINAL], (NOMINAL,))):
+        return np.zeros(1)
     if not isinstance(value, (list, tuple)):
         return None
     if not all(isinstance(v, (int, float)) and not isinstance(v, bool) for v in value):
         return None
-    try:
+    with suppress(OverflowError):
         return np.array(value, dtype=np.float64)
-    except OverflowError:
-        return None
+    return None
 
 
 def build_law(
@@ -205,7 +189,7 @@ def build_law(
     """
     law = find_law(name) if isinstance(name, str) else name
     may_lack = settings.gains == DEFAULT and (bool(overrides) or not law.gain_descriptions())
-    files = _gain_files(settings, may_lack)
+    files = _files_of(settings, may_lack)
     if law.name in files:
         gains = read_gains(files[law.name], law, axes)
     elif may_lack:
@@ -284,8 +268,7 @@ def _copy_of(
     return copied
 
 
-def _gain_files(settings: ControllerNodeSettings, may_lack: bool) -> dict[str, Path]:
-    """Return the files of the chosen gains; empty if they are missing and ``may_lack``."""
+def _files_of(settings: ControllerNodeSettings, may_lack: bool) -> dict[str, Path]:
     try:
         return gain_files(settings.robot, settings.gains)
     except InputError:
@@ -307,5 +290,5 @@ def split_gains(parameters: Mapping[str, Any]) -> tuple[Tree, dict[str, Tree]]:
 
 def available_laws(settings: ControllerNodeSettings, may_lack: bool = False) -> list[str]:
     """Return the names of this project's laws covered by the gains, which ``may_lack``."""
-    files = _gain_files(settings, may_lack and settings.gains == DEFAULT)
+    files = _files_of(settings, may_lack and settings.gains == DEFAULT)
     return sorted(set(files) & set(laws()))

@@ -1,38 +1,43 @@
-"""The controller node's loop: answers every state with a command."""
+"""The controller node: a loop that answers every state with a command, laws as parameters."""
 
 from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
+from typing import Any
+
+from rcl_interfaces.msg import ParameterDescriptor, SetParametersResult
+from rclpy.parameter import Parameter
 
 from space_robot_model.robot.find import find_robot
 from space_robot_msgs_py import topics
+from space_robot_msgs_py.bag.law_history import LawChange
 from space_robot_msgs_py.compiled.records import Block
-from space_robot_msgs_py.ros.endpoints import RawPublisher, flush
-from space_robot_msgs_py.ros.health import Health, Level
-from space_robot_msgs_py.ros.loop import Wait
+from space_robot_msgs_py.config.validation import one_of
+from space_robot_msgs_py.errors import InputError, SpaceRobotError
+from space_robot_msgs_py.ros.endpoints import PausedInput, RawPublisher, flush
+from space_robot_msgs_py.ros.loop import Health, Level, Wait
 from space_robot_msgs_py.ros.managed_node import ManagedNode
-from space_robot_msgs_py.ros.paused import PausedInput
+from space_robot_msgs_py.ros.parameters import overrides
+from space_robot_msgs_py.samples import Reference, RobotState
 from space_robot_msgs_py.wire.stamp_guard import describe_new_time
 
-from ..allocation.assumed_actuators import assumed_actuators
+from ..allocation.settings import assumed_actuators
 from ..laws import ControlLaw
 from .controller import Controller
-from .law_set import LawSet
-from .reference_input import ReferenceInput
+from .gains import NOMINAL, build_laws, check_gains, gain_lengths, gain_range, split_gains
+from .inputs import ReferenceInput, StateInput
+from .law_choice import LawChoice, parse_swaps
 from .settings import ControllerNodeSettings
-from .state_input import StateInput
-from .state_responder import StampStatus, StateResponder
-from .supervisor import Mode, Supervisor
+from .supervisor import Mode, StateResponder, Supervisor
+from .tick import ANSWERED, REFUSED
 
-SupervisorOf = Callable[
-    [Controller, Sequence[ControlLaw], ControllerNodeSettings], Supervisor | None
-]
+SupervisorOf = Callable[[Controller, Sequence[ControlLaw], ControllerNodeSettings], Supervisor]
 FLUSH_S = 1.0
 LOOK_AHEAD_S = 0.02
 """The reference is looked for this often though it is not needed yet, so that no flood of others'
 messages pushes it out of its queue."""
-STAND_DOWN_S = 0.1
+DEACTIVATION_S = 0.1
 """Longest wait of a deactivated controller for a state to answer, s."""
 
 
@@ -45,18 +50,23 @@ class ControllerLoop:
         self,
         node: ManagedNode[ControllerNodeSettings],
         settings: ControllerNodeSettings,
-        supervisor_of: SupervisorOf = lambda *_: None,
+        supervisor_of: SupervisorOf = lambda controller, _, settings: Supervisor(
+            controller, settings.hold_ticks, settings.longest_jump
+        ),
     ) -> None:
         """Load the laws' compiled code, so that no tick comes late for it.
 
-        ``supervisor_of`` makes the supervisor from the controller, its laws and the settings; None
-        stands for the usual one.
+        ``supervisor_of`` makes the supervisor from the controller, its laws and the settings.
         """
         self._node, self._settings = node, settings
         robot = find_robot(settings.robot)
         self._laws = LawSet(node, settings, robot.n + 3)
         actuators = assumed_actuators(settings.actuators, robot)
-        self._laws.warm_up(robot, actuators)
+        at_rest = RobotState.allocate(robot.n), Reference.at_rest(robot.n)
+        for law in self._laws.laws:  # compiled code is loaded now: no tick or swap is late for it
+            supervisor = Supervisor(Controller(robot, law, settings.period, actuators=actuators), 0)
+            supervisor.judge_stamp(at_rest[0].tick)
+            supervisor.answer(*at_rest)
         self._controller = Controller(
             robot,
             self._laws.choice.chosen,
@@ -72,12 +82,11 @@ class ControllerLoop:
             node, robot, timebase, settings.reference_timeout, settings.join_timeout
         )
         self._answering = StateResponder(
-            self._controller,
+            supervisor_of(self._controller, self._laws.laws, settings),
             self._laws.choice,
             self._references.buffer,
             settings,
             node.get_fully_qualified_name(),
-            supervisor_of(self._controller, self._laws.laws, settings),
         )
         self._command_out = RawPublisher(node, topics.COMMAND)
         self._out = {
@@ -120,15 +129,15 @@ class ControllerLoop:
                 return self._states.wait
             tick = received
             last = self._answering.supervisor.last_stamp
-            standing = self._answering.judge(tick)
-            if standing is StampStatus.ANSWERED:  # the plant asked again: the same answer
+            status = self._answering.judge_stamp(tick)
+            if status == ANSWERED:  # the plant asked again: the same answer
                 self._command_out.publish(self._answering.answer)
                 return None
-            if standing is StampStatus.REFUSED:
+            if status == REFUSED:
                 self._states.reject("stamp")
                 return None
             if tick != last:
-                self._believe(tick, last)
+                self._accept(tick, last)
         reference = self._references.at(tick)
         if reference is None:
             is_awaited = self._references.is_awaited
@@ -144,7 +153,7 @@ class ControllerLoop:
         answering = self._answering
         answered = answering.supervisor.answered
         if answered >= 0 and self._node.count_publishers(self._states.inputs[0].full_name):
-            until = time.monotonic() + STAND_DOWN_S
+            until = time.monotonic() + DEACTIVATION_S
             tick = self._unanswered
             while tick <= answered and time.monotonic() < until:
                 self._node.let_others_work()
@@ -202,11 +211,94 @@ class ControllerLoop:
             if topic is topics.COMMAND and answering.supervisor.mode is not mode:
                 self._node.report()
         if answering.change:
-            self._laws.tell(answering.change)
+            self._laws.report(answering.change)
 
-    def _believe(self, tick: int, last: int) -> None:
+    def _accept(self, tick: int, last: int) -> None:
         """Accept a state with a plausible stamp, which may begin a new time."""
         if self._answering.supervisor.is_new_time and last >= 0:
             self._node.log(describe_new_time(tick, last, self._is_resumed))
         self._is_resumed = False
         self._state_at = time.monotonic()
+
+
+class LawSet:
+    """The laws of the gain set as parameters: ``controller``, and ``<law>.<gain>`` for each."""
+
+    def __init__(self, node: ManagedNode[Any], settings: ControllerNodeSettings, axes: int) -> None:
+        """Build all laws and declare their gains.
+
+        Raises:
+            InputError: a law, a gain or a swap is invalid.
+        """
+        self._node, self._settings, self._axes = node, settings, axes
+        _, gains = split_gains(overrides(node))
+        self._laws = build_laws(settings, axes, gains)
+        self.laws = list(self._laws.values())
+        """All laws, that in force at the start first."""
+        for law in self.laws:
+            self._declare(law)
+        swaps = [
+            (tick, self._laws[one_of(name, self._laws, "controller", " of swaps")])
+            for tick, name in parse_swaps(settings.swaps, settings.period)
+        ]
+        self.choice = LawChoice(self.laws[0], swaps)
+        """The law in force."""
+        descriptor = node.describe_parameter("controller")
+        descriptor.additional_constraints = f"one of {', '.join(self._laws)}"
+        node.set_descriptor("controller", descriptor)
+        node.add_on_set_parameters_callback(self._on_set)
+
+    def report(self, change: LawChange) -> None:
+        """Log a change, and let the parameter ``controller`` follow a planned swap."""
+        when = (
+            f"from tick {change.law.tick} on (t = {change.law.tick * self._settings.period:.4f} s)"
+        )
+        self._node.log(f"controller: {change}, {when}")
+        if self.choice.was_swapped:
+            self.choice.was_swapped = False
+            name = Parameter("controller", value=change.law.name)  # type: ignore[no-untyped-call]
+            self._node.set_parameters([name])
+
+    def close(self) -> None:
+        """Stop accepting changes."""
+        self._node.remove_on_set_parameters_callback(self._on_set)
+
+    def _declare(self, law: ControlLaw) -> None:
+        descriptions = law.gain_descriptions()
+        for gain, values in law.gain_values.items():
+            self._node.declare_parameter(
+                f"{law.name}.{gain}",
+                values.tolist(),
+                ParameterDescriptor(
+                    description=descriptions[gain],
+                    additional_constraints=f"{gain_lengths(self._axes)}; {gain_range(gain)}",
+                ),
+                ignore_override=True,
+            )
+
+    def _on_set(self, parameters: list[Any]) -> SetParametersResult:
+        """Check all changes first, then make them; the loop sees them at its next tick."""
+        gains = {name: law.gain_values for name, law in self._laws.items()}
+        chosen = self.choice.chosen
+        try:
+            for parameter in parameters:
+                law_name, _, gain = parameter.name.partition(".")
+                if parameter.name == "controller":
+                    chosen = self._laws[one_of(parameter.value, self._laws, "controller")]
+                elif law_name in gains and gain:
+                    law = self._laws[law_name]
+                    changed = {**gains[law_name], gain: list(parameter.value)}
+                    gains[law_name] = check_gains(changed, type(law), self._axes, "parameter")
+                    if gain == "h_bar" and any(gains[law_name][gain]) != law.h_bar.any():
+                        kinds = ["a constant", NOMINAL]  # compiled code is that of one of the two
+                        before, after = kinds if law.h_bar.any() else kinds[::-1]
+                        raise InputError(
+                            f"parameter {law_name}.h_bar cannot be changed from {before} to "
+                            f"{after} in flight: start with that gain, or swap to another law"
+                        )
+        except SpaceRobotError as error:
+            return SetParametersResult(successful=False, reason=str(error))
+        for name, law in self._laws.items():
+            law.gain_values = gains[name]
+        self.choice.choose(chosen)
+        return SetParametersResult(successful=True)

@@ -11,7 +11,7 @@ from space_robot_msgs_py.compiled.records import Block
 from space_robot_msgs_py.errors import MessageError
 from space_robot_msgs_py.samples import Reference, ReferenceChunk
 
-from .signal_kernels import LARGEST
+from .signals import LARGEST
 
 Array = NDArray[np.float64]
 

@@ -17,8 +17,7 @@ from space_robot_msgs_py.config.validation import read_yaml
 from space_robot_msgs_py.config.yaml_text import is_folder
 
 from ..allocation.settings import AllocationSettings
-from ..navigation.assumed_sensors import completed
-from ..navigation.settings import Mode, NavigationFilterSettings
+from ..navigation.settings import NavigationFilterSettings, NavigationMode, completed
 
 OF_THE_SET = "controller.yaml"
 """A file of a gain set with the controller's parameters that belong to its gains; need not be."""
@@ -93,7 +92,7 @@ class ControllerNodeSettings(NodeSettings):
         description="corner frequency of the low-pass filter of the time-delay estimate, Hz "
         "(0: none)",
     )
-    navigation: Mode = Field(
+    navigation: NavigationMode = Field(
         "direct", description="input of the laws: direct (measurements) or filtered (estimates)"
     )
     navigation_sensors: str = Field(

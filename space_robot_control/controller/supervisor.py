@@ -1,4 +1,4 @@
-"""Safe mode of the controller while its inputs are bad, and its recovery.
+"""Answers to received states, with a safe mode while inputs are bad, and recovery from it.
 
     nominal --bad state--> holding --hold_ticks of them--> safe --good state--> nominal
     nominal --attitude error near 180 degrees--> safe
@@ -6,33 +6,41 @@
 A reference that is not finite or too large is held at the last good one, in nominal mode.
 Holding repeats the last good torque, but closes the valves of thrusters: how long a pulse is to be
 is not known there. Safe commands none. Coming back, the law takes over from the
-applied force (`Controller.engage`). All of it happens in the kernels of `.supervision`.
+applied force (`Controller.engage`). All of it happens in the kernels of `tick`.
 """
 
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Iterator
 from enum import Enum
 
 import numpy as np
 from numpy.typing import NDArray
 
+from space_robot_msgs_py import topics
+from space_robot_msgs_py.bag.law_history import LawChange
 from space_robot_msgs_py.compiled.records import Block, assign
 from space_robot_msgs_py.samples import Command, RobotState
+from space_robot_msgs_py.wire.codecs import CommandCodec
+from space_robot_msgs_py.wire.telemetry import NODE, LawCodec, SignalsCodec, TelemetryCodec
 
-from ..allocation.diagnosis import Diagnosis
+from ..allocation.allocation import Diagnosis
 from ..laws import ControlLaw
-from ..laws.checked import force_of
-from ..laws.compiled import CompiledLaw, LawCode
+from ..laws.base import CompiledLaw, LawCode, force_of
 from .controller import Controller, unusable
-from .signal_kernels import SINGULAR, USABLE
-from .supervision import (
+from .law_choice import LawChoice
+from .reference_buffer import ReferenceBuffer
+from .settings import ControllerNodeSettings
+from .signals import SINGULAR, USABLE
+from .tick import (
+    NEW,
     Supervision,
     admit_state,
     answer_state,
     conclude,
     is_for_law,
-    judge,
+    judge_stamp,
     takes_over,
 )
 
@@ -117,9 +125,9 @@ class Supervisor:
         """True if that tick started a new time."""
         return bool(self._is_new_time[0])
 
-    def judge(self, tick: int) -> int:
-        """Return the standing of a state by its stamp, see `.supervision.judge`."""
-        return judge(self.block, tick)
+    def judge_stamp(self, tick: int) -> int:
+        """Return `ANSWERED`, `NEW` or `REFUSED` for a state of ``tick``."""
+        return judge_stamp(self.block, tick)
 
     def answer(self, state: RobotState, reference: Block) -> Command:
         """Return the command for a state, from the law or safe; see `Controller.update`.
@@ -133,12 +141,12 @@ class Supervisor:
             controller.engage()
         inputs = tick, state.block, reference, controller.period
         if isinstance(law, CompiledLaw):
-            answer_state(
-                self.block, controller.block, self._code_of(law), controller.allocate, *inputs
-            )
+            if self._law is not law:
+                self._law, self._code = law, law.code
+            answer_state(self.block, controller.block, self._code, controller.allocate, *inputs)
         else:
-            block, estimate, has_model = controller.block, law.estimate, law.needs_model
-            status = admit_state(self.block, block, law.h_bar, estimate, has_model, *inputs)
+            block, estimate, needs_model = controller.block, law.estimate, law.needs_model
+            status = admit_state(self.block, block, law.h_bar, estimate, needs_model, *inputs)
             if is_for_law(status):
                 force = force_of(law, controller.signals, tick)
                 command.torque[:] = controller.command_for(tick, force).torque
@@ -148,8 +156,7 @@ class Supervisor:
 
     def use(self, law: ControlLaw) -> None:
         """Let a law, whose gains may have changed, answer from the next state on."""
-        if self.controller.law is not law:
-            self.controller.law = law
+        self.controller.use(law)
 
     def telemetry(self) -> tuple[Array, Array, Array, Array]:
         """Telemetry of the last tick, see `Controller.telemetry`."""
@@ -167,7 +174,69 @@ class Supervisor:
         assign(self._record, last_tick=-1.0)
         return self._command
 
-    def _code_of(self, law: CompiledLaw) -> LawCode:
-        if self._law is not law:
-            self._law, self._code = law, law.code
-        return self._code
+
+class StateResponder:
+    """Answers each state once with the messages of the controller. Independent of ROS."""
+
+    def __init__(
+        self,
+        supervisor: Supervisor,
+        laws: LawChoice,
+        references: ReferenceBuffer,
+        settings: ControllerNodeSettings,
+        node: str = NODE,
+    ) -> None:
+        """Answer with ``supervisor`` under the laws chosen, as the node's settings say.
+
+        ``references`` receive the current tick; ``node`` is the node's full name.
+        """
+        self.supervisor, self._laws, self._references = supervisor, laws, references
+        names = supervisor.controller.names
+        self._commands = CommandCodec(names.commanded, settings.timebase)
+        self._telemetry = TelemetryCodec(names.axes)
+        self._signals = SignalsCodec(names.axes, settings.timebase)
+        self._law = LawCodec(settings.timebase, node)
+        self._telemetry_decimation = settings.telemetry_decimation
+        self.answer = b""
+        """The last command, as it was sent."""
+        self.change: LawChange | None = None
+        """The change of law or gains that came with it, if any."""
+
+    def judge_stamp(self, tick: int) -> int:
+        """Return `ANSWERED`, `NEW` or `REFUSED` for a received state of ``tick``.
+
+        An answered state was answered last: the plant repeats its request. The stamp of a refused
+        one is not plausible.
+        """
+        supervisor = self.supervisor
+        last = supervisor.last_stamp
+        status = supervisor.judge_stamp(tick)
+        if status == NEW and tick != last:
+            if supervisor.is_new_time:
+                self._references.begin(tick)
+            self._references.now = tick
+        return status
+
+    def messages(
+        self, tick: int, state: RobotState, reference: Block
+    ) -> Iterator[tuple[topics.Topic, bytes]]:
+        """Answer a state that is `NEW`; the messages to send, each to be sent at once.
+
+        The command goes out before the telemetry is written.
+        """
+        laws = self._laws
+        self.change = laws.change_at(tick)
+        if self.change:
+            yield topics.LAW, self._law.encode(self.change.law)
+            self.supervisor.use(laws.chosen)
+        state.tick = tick
+        self.answer = self.encode(self.supervisor.answer(state, reference))
+        yield topics.COMMAND, self.answer
+        if tick % self._telemetry_decimation == 0:
+            s, u, n_hat, e = self.supervisor.telemetry()
+            yield topics.TELEMETRY, self._telemetry.encode(tick, (s, u, n_hat, e))
+            yield topics.SIGNALS, self._signals.encode(tick, e, s, n_hat)
+
+    def encode(self, command: Command) -> bytes:
+        """Encode a command as a message."""
+        return self._commands.encode(command)

@@ -26,18 +26,13 @@ the force it reports acted all that time."""
 class TimeDelayPair(Record):
     """The last applied force and the acceleration it caused, per axis."""
 
-    seen: float = shaped(lambda n: ())
-    """1 if any tick has been observed, else 0."""
+    seen: float = shaped(lambda n: (), "1 if any tick has been observed, else 0")
     smoothing: float = shaped(lambda n: ())
     """Weight of a new pair in the low-pass, see `low_pass_weight`; 0: no low-pass."""
-    tick: float = shaped(lambda n: ())
-    """The last tick observed."""
-    rate: Array = shaped(lambda n: (n + 3,))
-    """rhodot at that tick."""
-    applied_force: Array = shaped(lambda n: (n + 3,))
-    """F_S over the last interval."""
-    acceleration: Array = shaped(lambda n: (n + 3,))
-    """Mean rhodd over the last interval."""
+    tick: float = shaped(lambda n: (), "The last tick observed")
+    rate: Array = shaped(lambda n: (n + 3,), "rhodot at that tick")
+    applied_force: Array = shaped(lambda n: (n + 3,), "F_S over the last interval")
+    acceleration: Array = shaped(lambda n: (n + 3,), "Mean rhodd over the last interval")
 
 
 @kernel

@@ -14,8 +14,7 @@ from space_robot_msgs_py.compiled.records import Field as RecordField
 from space_robot_msgs_py.compiled.records import Record
 
 from .c99 import language as lang
-from .c99.functions import Function, syntax_of
-from .c99.program import CALL, CONSTANT, FIELD, Constant, KernelProgram
+from .c99.program import CALL, CONSTANT, FIELD, Constant, Function, KernelProgram, syntax_of
 
 WIDTH = 100
 """Longest line."""
@@ -135,7 +134,6 @@ class Files:
         return CONSTANT.sub(lambda m: self._constants[int(m[1])], text)
 
     def _named_numbers(self) -> list[Constant]:
-        """Return the constants that are read."""
         numbers = {int(number) for number in CONSTANT.findall(self._text)}
         return [c for c, number in self.program.named_numbers.items() if number in numbers]
 
@@ -182,12 +180,7 @@ class Files:
                 text += f"    double at[{len(kind.items)}];\n"
             else:
                 for k, item in enumerate(kind.items):
-                    inner = (
-                        self.program.tuple_name(item)
-                        if isinstance(item, lang.TupleOf)
-                        else item.name
-                    )
-                    text += f"    {inner} item_{k};\n"
+                    text += f"    {self.program.type_name(item)} item_{k};\n"
             text += f"}} {name};\n\n"
         return text
 
@@ -204,17 +197,15 @@ class Files:
 
     def prototype(self, function: Function) -> str:
         """Return a function's head."""
-        parameters = ", ".join(
-            self._parameter(p.name, p.type, p.is_written) for p in function.parameters
-        )
-        kind = function.result
-        result = self.program.tuple_name(kind) if isinstance(kind, lang.TupleOf) else kind.name
+        parameters = ", ".join(map(self.program.parameter, function.parameters))
+        result = self.program.type_name(function.result)
         return f"{result} {self.name_of(function)}({parameters or 'void'})"
 
     def prototypes(self) -> str:
         """Return the declarations of the functions that several files call."""
         shared = [f for f in self.functions if not self._is_local(f)]
-        return "".join(f"{wrapped(self.prototype(f))};\n" for f in shared)
+        before = self.program.target.shared_function
+        return "".join(f"{wrapped(before + self.prototype(f))};\n" for f in shared)
 
     def rooms(self) -> dict[str, str]:
         """Return the functions by file."""
@@ -229,32 +220,18 @@ class Files:
         said = ast.get_docstring(tree) or tree.name
         line = function.body.__code__.co_firstlineno
         text = comment(f"{said}\n\nPython: {tree.name}, {file}, line {line}.")
-        text += wrapped(
-            f"{'static ' if self._is_local(function) else ''}{self.prototype(function)}"
-        )
+        target = self.program.target
+        before = target.local_function if self._is_local(function) else target.shared_function
+        text += wrapped(f"{before}{self.prototype(function)}")
         lines = (wrapped(self.final(line)) for line in function.lines)
         return "\n".join([text, "{", *lines, "}", ""])
 
-    def _parameter(self, name: str, kind: lang.Type, is_written: bool) -> str:
-        const = "" if is_written else "const "
-        if isinstance(kind, (lang.Pointer, lang.BlockOf)):
-            return f"{const}{self.program.struct_name(kind.record)} *{name}"
-        if isinstance(kind, lang.ArrayOf):
-            sizes = "".join(f"[{size}]" for size in kind.shape[1:])
-            first = "" if kind.shape[0] is None else kind.shape[0]
-            return f"{const if not sizes else ''}double {name}[{first}]{sizes}"
-        if isinstance(kind, lang.TupleOf):
-            return f"{self.program.tuple_name(kind)} {name}"
-        return f"{kind.name} {name}"
-
     def _is_local(self, function: Function) -> bool:
-        """Return whether only its own file calls a function."""
         number = self.program.functions.index(function)
         home = self.room_of(function.body.__module__)
         return number not in self._roots and self._calling_rooms[number] == {home}
 
     def _function_names(self) -> dict[int, str]:
-        """Return names by number: the kernel's, with module or law where several have it."""
         bare = {f: f.body.__name__.lstrip("_") for f in self.functions}
         names: dict[int, str] = {}
         taken: set[str] = set()
@@ -278,7 +255,6 @@ class Files:
         return names
 
     def _constant_names(self) -> dict[int, str]:
-        """Return names by number: the constant's, with its module's where several are."""
         constants = self._named_numbers()
         names = {}
         for constant in constants:

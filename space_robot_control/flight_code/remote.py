@@ -13,11 +13,11 @@ from numpy.typing import NDArray
 
 from space_robot_msgs_py.compiled.records import Block
 from space_robot_msgs_py.errors import FlightError, InputError
-from space_robot_msgs_py.samples import Reference, RobotState
+from space_robot_msgs_py.samples import RobotState
 
 from ..laws import ControlLaw
 from .folder import Exported
-from .library import CONDITION, Array, command_of, fill_measurement, fill_reference, measurement_of
+from .library import FlightCode, fill_measurement, fill_reference
 
 TIMEOUT_S = 2.0
 """Longest wait for an answer, s of the wall clock."""
@@ -27,7 +27,7 @@ BEGIN, JUDGE, ANSWER, USE, STAND_DOWN = range(5)
 """Kinds of requests."""
 
 
-class FlightComputer:
+class FlightComputer(FlightCode):
     """The flight software in a program that answers by UDP."""
 
     def __init__(self, exported: Exported, host: str, port: int) -> None:
@@ -36,26 +36,23 @@ class FlightComputer:
         Raises:
             InputError: nobody answers, or the program is for another robot.
         """
-        axes = exported.software.joints + 3
-        self._laws = [law.name for law in exported.software.laws]
-        measurement, command = measurement_of(exported), command_of(exported)
-        reference = exported.translated.dtype(Reference)
+        super().__init__(exported)
         request = [
             ("kind", np.int64),
             ("law", np.int64),
-            ("measurement", measurement.dtype),
-            ("reference", np.dtype(reference)),
+            ("measurement", self._measurement.dtype),
+            ("reference", self._reference.dtype),
         ]
         answer = [
             ("kind", np.int64),
             ("tick", np.int64),
             ("result", np.int64),
-            ("command", command.dtype),
-            ("condition", np.float64, (len(CONDITION),)),
-            ("telemetry", np.float64, (4, axes)),
+            ("command", self._command.dtype),
+            ("condition", np.float64, self._condition.shape),
+            ("telemetry", np.float64, self._telemetry.shape),
         ]
         self._request: NDArray[Any] = np.zeros(1, request)
-        self._answer: NDArray[Any] = np.zeros(1, answer)
+        self._dtype = np.dtype(answer)
         self._where = f"{host}:{port}"
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self._socket.settimeout(TIMEOUT_S)
@@ -75,18 +72,20 @@ class FlightComputer:
             data = self._socket.recv(LARGEST)
         except OSError as error:
             raise FlightError(f"the flight computer does not answer ({error})") from None
-        if len(data) != self._answer.nbytes:
+        if len(data) != (size := self._dtype.itemsize):
             raise FlightError(
-                f"the flight computer answered {len(data)} bytes instead of {self._answer.nbytes}: "
+                f"the flight computer answered {len(data)} bytes instead of {size}: "
                 "its code was exported for another robot or other actuators"
             )
-        self._answer = np.frombuffer(data, self._answer.dtype)
-        if (self._answer["kind"][0], self._answer["tick"][0]) != (kind, tick):
+        answer = np.frombuffer(data, self._dtype)
+        if (answer["kind"][0], answer["tick"][0]) != (kind, tick):
             raise FlightError("the flight computer answered another request")
-        return int(self._answer["result"][0])
+        self._command, self._condition = answer["command"], answer["condition"][0]
+        self._telemetry = answer["telemetry"][0]
+        return int(answer["result"][0])
 
-    def judge(self, tick: int) -> int:
-        """Return the standing of a state by its stamp."""
+    def judge_stamp(self, tick: int) -> int:
+        """Return the status of a state's stamp."""
         return self._ask(JUDGE, tick)
 
     def answer(self, state: RobotState, reference: Block) -> int:
@@ -101,23 +100,5 @@ class FlightComputer:
 
     def use(self, law: ControlLaw) -> None:
         """Let a law take over if another one is in force; its gains are the program's own."""
-        self._request["law"] = self._laws.index(law.name)
+        self._request["law"] = self._places[law.name]
         self._ask(USE, 0)
-
-    @property
-    def command(self) -> Array:
-        """The command of the last answer, as `Command.torque`."""
-        command: Array = self._answer["command"]["command"][0]
-        return command
-
-    @property
-    def telemetry(self) -> tuple[Array, Array, Array, Array]:
-        """s, u, N_hat and e of the last tick, (m,) each."""
-        s, u, n_hat, error = self._answer["telemetry"][0]
-        return s, u, n_hat, error
-
-    @property
-    def condition(self) -> Array:
-        """The numbers of `CONDITION`."""
-        condition: Array = self._answer["condition"][0]
-        return condition

@@ -18,22 +18,19 @@ from space_robot_msgs_py.samples import Reference, State
 from ..allocation.allocation import allocate, leave_alone
 from ..allocation.wheel_set import WheelSet, tabulate
 from ..controller.controller import Controller
-from ..controller.kernels import engage
-from ..controller.memory import ControllerMemory
-from ..controller.supervision import Supervision, answer_state, judge, swaps_due, takes_over
+from ..controller.signals import ControllerMemory
 from ..controller.supervisor import Supervisor
+from ..controller.tick import Supervision, answer_state, engage, judge_stamp, swaps_due, takes_over
 from ..laws import CompiledLaw, ControlLaw
 from .c99 import language as lang
 from .c99.program import KernelProgram
 from .files import Files, reachable
 
 ROOMS = {
-    "space_robot_control.controller.supervision": "supervision",
-    "space_robot_msgs_py.wire.stamp_guard": "supervision",
-    "space_robot_control.controller.kernels": "controller",
-    "space_robot_control.controller.signal_kernels": "controller",
+    "space_robot_control.controller.tick": "controller",
+    "space_robot_msgs_py.wire.stamp_guard": "controller",
+    "space_robot_control.controller.signals": "signals",
     "space_robot_control.controller.time_delay_estimation": "estimate",
-    "space_robot_control.controller.tracking": "tracking",
     "space_robot_control.navigation": "navigation",
     "space_robot_control.allocation": "allocation",
     "space_robot_model.dynamics": "dynamics",
@@ -202,7 +199,6 @@ def translate(software: FlightSoftware) -> Translated:
 def _program(
     software: FlightSoftware, constants: dict[lang.FieldName, float]
 ) -> tuple[KernelProgram, dict[str, Any]]:
-    """Return a program, and the functions that are called from outside."""
     program = KernelProgram(software.sizes, software.joints)
     program.constants = constants
     supervision, controller, state, reference = (
@@ -212,7 +208,7 @@ def _program(
     has_actuators = bool(software.controller.names.actuators)
     how = _value(lang.Known(allocate if has_actuators else leave_alone))
     calls: dict[str, tuple[Any, tuple[lang.Value, ...]]] = {
-        "judge": (judge, (supervision, tick)),
+        "judge": (judge_stamp, (supervision, tick)),
         "takes_over": (takes_over, (supervision, tick)),
         "engage": (engage, (controller,)),
     }
@@ -240,7 +236,6 @@ def _value(kind: lang.Type) -> lang.Value:
 
 
 def _law(law: CompiledLaw) -> lang.Value:
-    """Return a law as the argument of a kernel: its function bound, gains and memory passed."""
     own = type(law)
     items = {
         "run": lang.Known(own.kernel),
@@ -257,7 +252,6 @@ def _law(law: CompiledLaw) -> lang.Value:
 def _constants(
     software: FlightSoftware, program: KernelProgram, written: set[lang.FieldName]
 ) -> dict[lang.FieldName, float]:
-    """Return the fields that no kernel writes and that have one number, wherever they are."""
     numbers_of_field: dict[lang.FieldName, set[float | None]] = {}
 
     def visit(record: type[Record], numbers: Any) -> None:

@@ -3,21 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from space_robot_msgs_py.compiled.records import Block, assign
-from space_robot_msgs_py.errors import FlightError
+from space_robot_msgs_py.compiled.records import Block
+from space_robot_msgs_py.errors import FlightError, InputError
 from space_robot_msgs_py.samples import Command, RobotState
 
-from ..allocation.diagnosis import Diagnosis
+from ..allocation.allocation import Diagnosis
 from ..controller.controller import Controller
 from ..controller.settings import ControllerNodeSettings
 from ..controller.supervisor import Supervisor
 from ..laws import ControlLaw
-from .library import CONDITION, FlightLibrary
-from .remote import FlightComputer
+
+if TYPE_CHECKING:
+    from .library import FlightCode
 
 Array = NDArray[np.float64]
 TELEMETRY = ("s", "u", "N_hat", "e")
@@ -28,13 +30,8 @@ class ShadowError(FlightError):
 
 
 class _SupervisorWithCode(Supervisor):
-    """Supervisor that knows the flight code in C, too."""
-
     def __init__(
-        self,
-        controller: Controller,
-        settings: ControllerNodeSettings,
-        code: FlightLibrary | FlightComputer,
+        self, controller: Controller, settings: ControllerNodeSettings, code: FlightCode
     ) -> None:
         super().__init__(controller, settings.hold_ticks, settings.longest_jump)
         self._flight_code = code
@@ -56,16 +53,16 @@ class CodeSupervisor(_SupervisorWithCode):
     Its controller only tells which law is in force.
     """
 
-    def judge(self, tick: int) -> int:
+    def judge_stamp(self, tick: int) -> int:
         """Return the standing of a state by its stamp."""
-        standing = self._flight_code.judge(tick)
-        self._take_condition()
+        standing = self._flight_code.judge_stamp(tick)
+        self._flight_code.write_condition(self._record)
         return standing
 
     def answer(self, state: RobotState, reference: Block) -> Command:
         """Return the command for a state."""
         self._flight_code.answer(state, reference)
-        self._take_condition()
+        self._flight_code.write_condition(self._record)
         self._command.torque[:] = self._flight_code.command
         self._command.tick = state.tick
         return self._command
@@ -77,26 +74,19 @@ class CodeSupervisor(_SupervisorWithCode):
     @property
     def diagnosis(self) -> Diagnosis:
         """Empty: the actuators' health is in the memory of the flight code."""
-        return Diagnosis((), "", {})
-
-    def _take_condition(self) -> None:
-        numbers = self._flight_code.condition
-        record, first = self._record, CONDITION.index("rejected")
-        reason, mode, answered, last, is_new_time = numbers[:first]
-        assign(record, reason=reason, mode=mode, answered=answered, rejected=numbers[first:])
-        assign(record.stamps, last=last, is_new_time=is_new_time)
+        return Diagnosis()
 
 
 class ShadowSupervisor(_SupervisorWithCode):
     """Supervisor that compares every answer of the kernels with that of the flight code in C."""
 
-    def judge(self, tick: int) -> int:
+    def judge_stamp(self, tick: int) -> int:
         """Return the standing of a state by its stamp.
 
         Raises:
             ShadowError: C judges differently.
         """
-        standing, other = super().judge(tick), self._flight_code.judge(tick)
+        standing, other = super().judge_stamp(tick), self._flight_code.judge_stamp(tick)
         if standing != other:
             raise ShadowError(f"at tick {tick} Python judges the stamp as {standing}, C as {other}")
         return standing
@@ -129,3 +119,38 @@ def bits(numbers: Array) -> NDArray[np.int64]:
     copied: Array = np.array(numbers, dtype=np.float64)
     copied[np.isnan(copied)] = np.nan
     return copied.view(np.int64)
+
+
+def supervisor_of(
+    controller: Controller, laws: Sequence[ControlLaw], settings: ControllerNodeSettings
+) -> Supervisor:
+    """Return the supervisor that the settings ask for.
+
+    Args:
+        controller: with the law in force at the start.
+        laws: all laws that it may be given, that one first.
+        settings: of the controller's node.
+
+    Raises:
+        InputError: a law cannot be exported, or there is no compiler or no flight computer.
+    """
+    limits = settings.hold_ticks, settings.longest_jump
+    if settings.answers_in_python:
+        return Supervisor(controller, *limits)
+    if settings.controller_code != "python" and settings.shadow != "none":
+        raise InputError(
+            f"shadow {settings.shadow} compares C with Python: it needs controller_code python, "
+            f"got {settings.controller_code}"
+        )
+    # most flights need no translator
+    from .folder import Exported
+    from .library import FlightLibrary
+    from .remote import FlightComputer
+    from .software import FlightSoftware
+
+    exported = Exported(FlightSoftware.of(controller, laws, [], limits, {}), settings.robot)
+    if settings.controller_code.startswith("udp:"):
+        _, host, port = settings.controller_code.split(":")
+        return CodeSupervisor(controller, settings, FlightComputer(exported, host, int(port)))
+    kind = CodeSupervisor if settings.controller_code == "c" else ShadowSupervisor
+    return kind(controller, settings, FlightLibrary(exported))

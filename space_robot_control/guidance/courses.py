@@ -7,15 +7,20 @@ after it ends it is at rest, unless the base turns on.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from space_robot_model.elementary.matrices import norm
+from space_robot_model.elementary.matrices import dot_rows, norm
 
 if TYPE_CHECKING:
-    from .pointing import PointingGoal
+    from space_robot_model.elementary.splines import CubicSpline, QuinticSpline
+    from space_robot_model.orbit.ephemeris import Ephemeris
+    from space_robot_model.robot import Robot
+
+    from .goals import PointingGoal
 
 Array = NDArray[np.float64]
 
@@ -69,6 +74,28 @@ class BaseMotion(NamedTuple):
     def held(self) -> Course:
         """The course of a segment that does not lead the base."""
         return self.course or at_rest(self.quaternion)
+
+
+class SegmentStart(NamedTuple):
+    """Where a segment begins."""
+
+    robot: Robot
+    """As the flight software knows it."""
+    time: float
+    """s."""
+    joints: Array
+    """(n,) rad, or m of prismatic joints."""
+    base: BaseMotion
+    origin: Callable[[], Array]
+    """Returns the origin (3,) of the inertial frame from the robot's centre of mass, m."""
+    ephemeris: Callable[[], Ephemeris | None]
+    """Returns that of the assumed orbit; None: there is none."""
+
+
+Maker = Callable[[float], tuple[Course, Course]]
+"""Makes the courses of joints and base of a segment of a duration in s."""
+JointMaker = Callable[[float, Course], Course]
+"""Makes the course of the joints in a duration in s, while the base moves along a course."""
 
 
 def quintic(u: Array) -> tuple[Array, Array, Array]:
@@ -138,7 +165,7 @@ class BentLeg(NamedTuple):
 
     def at(self, time: Array) -> Array:
         """Return (T, 3, n) at times (T,), s."""
-        from space_robot_model.elementary.sine import sines_cosines  # slow to import
+        from space_robot_model.elementary.functions import sines_cosines  # slow to import
 
         u = np.clip((time - self.begin)[:, np.newaxis] / self.span, 0.0, 1.0)
         share, rate, acceleration = quintic(u)
@@ -204,6 +231,74 @@ class SteadyTurn(NamedTuple):
         return rows
 
 
+class SplineCourse(NamedTuple):
+    """Joints along a spline."""
+
+    begin: float
+    """s, time zero of the spline."""
+    spline: CubicSpline | QuinticSpline
+
+    def at(self, time: Array) -> Array:
+        """Return (T, 3, n) at times (T,), s."""
+        return self.spline.at(time - self.begin)
+
+
+class BrakedTurn(NamedTuple):
+    """The base comes to rest about the axis that it turns about."""
+
+    begin: float
+    """s."""
+    span: float
+    """s until it is at rest."""
+    quaternion: Array
+    """(4,) attitude at the begin, unit."""
+    omega: Array
+    """(3,) angular velocity at the begin, rad/s, base frame."""
+    alpha: Array
+    """(3,) angular acceleration at the begin; its part along ``omega`` goes on."""
+
+    def at(self, time: Array) -> Array:
+        """Return (T, 10) at times (T,), s: quaternion, velocity and acceleration, base frame."""
+        from space_robot_model.elementary.splines import QuinticSpline
+
+        rate = norm(self.omega)
+        if rate == 0.0:
+            return Slew(self.begin, self.span, self.quaternion, self.omega, 0.0).at(time)
+        axis = self.omega / rate
+        first = [0.0, rate, float(dot_rows(axis, self.alpha)[0])]
+        states = np.array([first, [0.5 * self.span * rate, 0.0, 0.0]])[:, :, np.newaxis]
+        turn = QuinticSpline(np.array([0.0, self.span]), states).at(time - self.begin)
+        rows = np.empty((len(time), 10))
+        rows[:, :4] = multiplied(self.quaternion, turned_by(axis, turn[:, 0, 0]))
+        rows[:, 4:7], rows[:, 7:] = turn[:, 1] * axis, turn[:, 2] * axis
+        return rows
+
+
+class AttitudeCourse(NamedTuple):
+    """The base along a cubic spline of the components of its quaternion, then normalised."""
+
+    begin: float
+    """s, time zero of the spline."""
+    spline: CubicSpline
+    """Of quaternions in one hemisphere."""
+
+    def at(self, time: Array) -> Array:
+        """Return (T, 10) at times (T,), s: quaternion, velocity and acceleration, base frame."""
+        p, p_rate, p_second = np.moveaxis(self.spline.at(time - self.begin), 1, 0)
+        length = np.sqrt(dot_rows(p, p))
+        q = p / length
+        stretch = dot_rows(p, p_rate) / length
+        q_rate = (p_rate - q * stretch) / length
+        stretch_rate = (
+            dot_rows(p_rate, p_rate) + dot_rows(p, p_second) - stretch * stretch
+        ) / length
+        q_second = (p_second - 2.0 * q_rate * stretch - q * stretch_rate) / length
+        back = q * np.array([1.0, -1.0, -1.0, -1.0])
+        # omega = 2 q* qdot; its derivative has |qdot|^2 in the scalar part only
+        omega, alpha = multiplied(back, 2.0 * q_rate), multiplied(back, 2.0 * q_second)
+        return np.hstack((q, omega[:, 1:], alpha[:, 1:]))
+
+
 def at_rest(quaternion: Array) -> Slew:
     """Return the course of a base that is held at an attitude (4,)."""
     return Slew(0.0, 1.0, quaternion, np.zeros(3), 0.0)
@@ -226,7 +321,7 @@ def multiplied(first: Array, second: Array) -> Array:
 
 def turned_by(axis: Array, angles: Array) -> Array:
     """Return the quaternions (K, 4) of turns by angles (K,), rad, about a unit axis (3,)."""
-    from space_robot_model.elementary.sine import sines_cosines  # slow to import
+    from space_robot_model.elementary.functions import sines_cosines  # slow to import
 
     sines, cosines = sines_cosines(0.5 * angles)
     return np.column_stack((cosines, sines[:, np.newaxis] * axis))
@@ -234,7 +329,7 @@ def turned_by(axis: Array, angles: Array) -> Array:
 
 def turn_between(first: Array, second: Array) -> tuple[Array, float]:
     """Return axis (3,) in the first frame and angle (rad, 0 to pi) of the shortest turn."""
-    from space_robot_model.elementary.arctangent import arctan2  # slow to import
+    from space_robot_model.elementary.functions import arctan2  # slow to import
 
     turn = multiplied(first * np.array([1.0, -1.0, -1.0, -1.0]), second)
     turn = -turn if turn[0] < 0.0 else turn

@@ -1,24 +1,30 @@
-"""The mission node's loop: streams the desired motion in chunks, in advance."""
+"""The mission node's loop: streams the desired motion in chunks, in advance.
+
+The motion is changed in flight by the parameter ``goto``, by trajectories on a topic, and by goals
+of an action.
+"""
 
 from __future__ import annotations
 
 import time
+from typing import TYPE_CHECKING
 
 from space_robot_model.robot.find import find_robot
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.errors import MessageError
 from space_robot_msgs_py.ros.endpoints import PolledCallbackGroup, RawPublisher, RawSubscription
-from space_robot_msgs_py.ros.health import Health, Level
-from space_robot_msgs_py.ros.loop import Wait
+from space_robot_msgs_py.ros.loop import Health, Level, Wait
 from space_robot_msgs_py.ros.managed_node import ManagedNode
 from space_robot_msgs_py.samples import RobotNames
 from space_robot_msgs_py.wire.cdr import header_stamp_ns
-from space_robot_msgs_py.wire.reference_codec import ReferenceCodec
 from space_robot_msgs_py.wire.stamp_guard import StampGuard, describe_new_time
+from space_robot_msgs_py.wire.telemetry import ReferenceCodec
 
-from .mission import Mission
+from .mission import Mission, MissionNodeSettings
 from .mission_changes import MissionChanges
-from .settings import MissionNodeSettings
+
+if TYPE_CHECKING:
+    from .trajectory_action import TrajectoryAction
 
 MOST_AT_ONCE = 100
 """Messages taken before the stream goes on: somebody may flood the topic."""
@@ -59,6 +65,16 @@ class MissionLoop:
             lambda: (max(self._stamps.last, 0), self._next),
             RobotNames.of(robot.joint_names, passive=robot.passive_names),
         )
+        self._action = self._offer_action()
+
+    def _offer_action(self) -> TrajectoryAction | None:
+        try:
+            from control_msgs.action import FollowJointTrajectory
+        except ImportError:  # without that package there is no action
+            return None
+        from .trajectory_action import TrajectoryAction
+
+        return TrajectoryAction(self._node, FollowJointTrajectory, self._changes)
 
     def begin(self) -> None:
         """Begin at the end of the stream."""
@@ -82,6 +98,8 @@ class MissionLoop:
 
     def close(self) -> None:
         """Stop accepting changes."""
+        if self._action:
+            self._action.close()
         self._changes.close()
 
     def health(self) -> Health:
@@ -93,7 +111,6 @@ class MissionLoop:
         return Health("nominal", values=values)
 
     def _resend_pending(self) -> None:
-        """Send the current reference again to new subscribers."""
         listeners = self._joints.listener_count + self._base.listener_count
         if listeners > self._listeners:
             self._next = min(self._next, self._chunk_start(max(self._stamps.last, 0)))
@@ -110,7 +127,6 @@ class MissionLoop:
         self._next = chunk.stop
 
     def _take_clock(self) -> bool:
-        """Read the clock messages; return whether there were any."""
         for count in range(MOST_AT_ONCE):
             data = self._clock.take()
             if data is None:
@@ -125,7 +141,6 @@ class MissionLoop:
         return True
 
     def _believe(self, tick: int) -> bool:
-        """Let ``tick`` be now if the guard believes it; a new time has a new stream."""
         stamps, last = self._stamps, self._stamps.last
         if not stamps.passes(tick):
             return False

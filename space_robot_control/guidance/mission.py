@@ -1,12 +1,13 @@
-"""The mission: joints through waypoints, the base's attitude held, then segments of any kind."""
+"""The mission: segments of any kind that follow one another from a start."""
 
 from __future__ import annotations
 
+import json
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import cached_property
-from itertools import pairwise
-from typing import TYPE_CHECKING, Annotated
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,21 +16,25 @@ from pydantic import Field
 from space_robot_model.elementary.matrices import direction_norm
 from space_robot_model.orbit.ephemeris import AssumedOrbit, Ephemeris
 from space_robot_model.robot import Robot
-from space_robot_model.robot.mission_document import Rates
-from space_robot_msgs_py.config.settings import Texts
+from space_robot_model.robot.find import mission_layers
+from space_robot_model.robot.mission_document import Rates, mission_layer
+from space_robot_msgs_py.config.columns import read_columns
+from space_robot_msgs_py.config.files import Tree
+from space_robot_msgs_py.config.settings import NodeSettings, Texts
 from space_robot_msgs_py.config.validation import StrictModel
+from space_robot_msgs_py.config.yaml_text import YamlTextError, parse_yaml
 from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.samples import ReferenceChunk
 
-from .checks import check_piece
-from .courses import BaseMotion, Piece, QuinticLeg, SteadyTurn
-from .limits import MissionLimits, check_positions
-from .segments import read_pointing, read_segments
+from .courses import BaseMotion, Piece, SteadyTurn
+from .goals import PointingGoal
+from .limits import MissionLimits, check_piece, check_start
+from .planner import Planner
+from .segments import FileSegment, HoldSegment, read_pointing, read_segments
 
 if TYPE_CHECKING:
     from .live import TrajectoryPoint
-    from .planner import Planner
-    from .pointing import PointingCourse, PointingGoal
+    from .pointing import PointingCourse
 
 Array = NDArray[np.float64]
 
@@ -39,15 +44,12 @@ ROUNDING = 1e-6
 
 
 class MissionSettings(StrictModel):
-    """Waypoints as flat lists, as ROS parameters hold them, and segments that follow them."""
+    """The start as flat lists, as ROS parameters hold them, and the segments from there on."""
 
-    waypoint_times: list[float] = Field(
-        [0.0], description="time of each waypoint, s, increasing from 0", min_length=1
-    )
-    waypoints_deg: list[float] = Field(
+    joints_deg: list[float] = Field(
         [0.0],
-        description="positions of the actuated joints, waypoint by waypoint, degrees (prismatic "
-        "joints: m)",
+        description="positions of the joints with motors at the start, degrees (prismatic joints: "
+        "m)",
     )
     base_quaternion: Annotated[list[float], Field(min_length=4, max_length=4)] = Field(
         [1.0, 0.0, 0.0, 0.0], description="base attitude to hold: w, x, y, z"
@@ -64,16 +66,10 @@ class MissionSettings(StrictModel):
     )
     segments: Texts = Field(
         [""],
-        description="segments that follow the last waypoint, each as YAML text: see the manual on "
-        "missions",
+        description="segments, one after the other, each as YAML text: see the manual on missions",
     )
     limits: MissionLimits = MissionLimits()
     assumed_orbit: AssumedOrbit = AssumedOrbit()
-
-    @property
-    def has_segments(self) -> bool:
-        """Whether there are segments, not waypoints only."""
-        return bool(self.written_segments)
 
     @property
     def written_segments(self) -> list[str]:
@@ -81,70 +77,108 @@ class MissionSettings(StrictModel):
         return [text for text in self.segments if text.strip()]
 
 
+class MissionNodeSettings(MissionSettings, NodeSettings):
+    """Parameters of mission_node."""
+
+    node: ClassVar[str] = "mission"
+    selectors: ClassVar[tuple[str, ...]] = ("robot", "mission")
+
+    mission: str = Field(
+        "",
+        description="a mission of config/missions, or a path to its YAML or to a trajectory in "
+        "CSV or Parquet (empty: the robot's)",
+    )
+    goto: str = Field(
+        "",
+        description="a segment to fly from now on in place of the mission, as YAML text, set in "
+        "flight; the same text again is ignored",
+    )
+    chunk_ticks: Annotated[int, Field(ge=1, le=10_000)] = Field(
+        100, description="ticks per message of the reference"
+    )
+    lead_ticks: Annotated[int, Field(ge=1, le=10_000)] = Field(
+        1000, description="lead of the reference ahead of the plant, ticks"
+    )
+
+    @classmethod
+    def layers(cls, selected: Mapping[str, str]) -> list[Path]:
+        """The mission's own file over the graph's."""
+        return [*super().layers(selected), *mission_layers(selected["robot"], selected["mission"])]
+
+    @classmethod
+    def read_layer(cls, path: Path, selected: Mapping[str, str]) -> Tree:
+        """Read a parameter file, a mission's document, or a trajectory.
+
+        Raises:
+            InputError: the file cannot be read, or a key in it is wrong.
+        """
+        layer = mission_layer(path, cls.node, selected["robot"])
+        if texts := layer.get("segments"):
+            layer["segments"] = [with_columns(text, path.parent) for text in texts]
+        return layer
+
+
+def with_columns(text: str, folder: Path) -> str:
+    """Return the text of a segment with the columns of its file in place of the file's name.
+
+    Args:
+        text: of the segment, YAML.
+        folder: where a relative path begins.
+
+    Raises:
+        InputError: the file cannot be read.
+    """
+    try:
+        content = parse_yaml(text)
+    except YamlTextError:
+        return text  # refused where segments are read
+    if not isinstance(content, dict) or not isinstance(name := content.get("file"), str):
+        return text
+    rest = {key: value for key, value in content.items() if key != "file"}
+    return json.dumps({"trajectory": read_columns(folder / name), **rest})
+
+
 class Mission:
     """The desired motion of joints and base, sampled at ticks.
 
-    It leads through waypoints with a rest in each, then through segments. Before the first waypoint
-    and after the end all is held.
+    Before it begins and after its end all is held, unless the base points.
     """
 
     def __init__(self, robot: Robot, settings: MissionSettings, period: float) -> None:
         """A mission for the joints with motors of ``robot``.
 
         Raises:
-            InputError: the waypoints do not fit the times or the joints, or are beyond the limits
-                of these; a segment is wrong or cannot be flown.
+            InputError: the start does not fit the joints, or is beyond their limits; a segment is
+                wrong or cannot be flown.
         """
-        n, times = robot.n, np.array(settings.waypoint_times)
-        if settings.has_segments and len(times) == 1 and len(settings.waypoints_deg) != n:
+        if len(settings.joints_deg) != robot.n:
             raise InputError(
-                f"the start has {len(settings.waypoints_deg)} joints; the robot has {n} with "
+                f"the start has {len(settings.joints_deg)} joints; the robot has {robot.n} with "
                 f"motors: {', '.join(robot.joint_names)}"
             )
-        if len(settings.waypoints_deg) != n * len(times):
-            raise InputError(
-                f"waypoints_deg has {len(settings.waypoints_deg)} values; "
-                f"{len(times)} waypoint_times and {n} joints need {n * len(times)}"
-            )
-        if times[0] != 0.0 or np.any(np.diff(times) <= 0.0):
-            raise InputError(f"waypoint_times must rise from 0, got {settings.waypoint_times}")
         length = direction_norm(settings.base_quaternion, "base_quaternion")
-        waypoints = robot.from_degrees(np.reshape(settings.waypoints_deg, (len(times), n)))
-        check_positions(robot, waypoints)
+        joints = robot.from_degrees(settings.joints_deg)
+        check_start(robot, joints)
         self._assumed_orbit = settings.assumed_orbit
         base = self._base_at_start(settings, np.array(settings.base_quaternion) / length)
         self.period = period
         """s, of a tick."""
-        self.pieces = [
-            _leg(begin, end, start, goal, base)
-            for (begin, end), (start, goal) in zip(
-                pairwise(times), pairwise(waypoints), strict=True
-            )
-        ]
-        """Legs between the waypoints, then the segments; at least one."""
-        still = [] if self.pieces else [_leg(0.0, 1.0, waypoints[0], waypoints[0], base)]
-        for leg in (*self.pieces, *still):
-            check_piece(robot, leg, has_limits=False)  # flights warn of those of waypoints
-        self._robot = robot.nominal
-        self._start, self._limits = (waypoints[0].copy(), base.quaternion), settings.limits
-        if segments := read_segments(settings.segments):
-            if self.pieces:
-                base = BaseMotion(self.pieces[-1].attitude, base.course, base.mode)
-            planner = self._new_planner()
-            self.pieces += planner.plan(float(times[-1]), waypoints[-1], base, segments)
-            base = planner.base
-        self._goes_on = base.course if base.mode else None
-        self.duration = self.pieces[-1].end if self.pieces else 0.0
+        self._robot, self._limits = robot.nominal, settings.limits
+        self._start = joints, base.quaternion
+        planner, segments = self._new_planner(), read_segments(settings.segments)
+        self.pieces = planner.plan(0.0, joints, base, segments or [HoldSegment(hold=1.0)])
+        """The planned segments; at least one."""
+        self._goes_on = planner.base.course if planner.base.mode else None
+        self.duration = self.pieces[-1].end if segments else 0.0
         """s, until the end of the last segment."""
-        self.pieces = self.pieces or still
-        self._first, self._begins = (
-            waypoints[0].copy(),
-            np.array([piece.begin for piece in self.pieces]),
-        )
+        self._begins = np.array([piece.begin for piece in self.pieces])
+
+    @property
+    def leads_tool(self) -> bool:
+        """Whether more is led than the joints from posture to posture."""
+        return any(piece.motion not in ("joints", "hold") for piece in self.pieces)
 
     def _new_planner(self) -> Planner:
-        from .planner import Planner  # slow to import, and a mission of waypoints needs none
-
         return Planner(self._robot, *self._start, self._limits, lambda: self.ephemeris)
 
     @cached_property
@@ -179,18 +213,6 @@ class Mission:
             except InputError as error:
                 raise InputError(f"after the mission's end: {error}") from None
 
-    @property
-    def times(self) -> Array:
-        """(K,) s, of the waypoints and of the ends of the segments."""
-        ends = [piece.end for piece in self.pieces] if self.duration else []
-        return np.array([0.0, *ends])
-
-    @property
-    def waypoints(self) -> Array:
-        """(K, n) desired positions at `times`, rad, or m of prismatic joints."""
-        goals = [piece.goal for piece in self.pieces] if self.duration else []
-        return np.array([self._first, *goals])
-
     def go_to(self, tick: int, segment: str) -> Piece:
         """Fly a segment, written as in a mission, from a tick on, in place of what was planned.
 
@@ -215,7 +237,8 @@ class Mission:
         segments = read_segments([segment])
         if not segments:
             raise InputError("a segment was expected, got an empty text")
-        if segments[0].file is not None:  # whoever reaches the node could have it read any file
+        # whoever reaches the node could have it read any file
+        if isinstance(segments[0], FileSegment):
             raise InputError("file: no file is read in flight, give the columns as trajectory")
         pieces = self._new_planner().plan(begin, joints[0], base, segments)
         self._replace([*before, *pieces])
@@ -263,14 +286,12 @@ class Mission:
         return piece
 
     def _state_at(self, tick: int) -> tuple[float, Array, Array, BaseMotion]:
-        """Return time, the reference of joints (3, n) and base (10,), and how the base goes on."""
         chunk, time = self.chunk(tick, 1), tick * self.period
         piece = self.pieces[int(np.searchsorted(self._begins[1:], time, side="right"))]
         base = BaseMotion(chunk.base[0, :4], piece.base if piece.mode else None, piece.mode)
         return time, chunk.joints[0], chunk.base[0], base
 
     def _replace(self, pieces: list[Piece]) -> None:
-        """Put pieces in the place of all that begins later."""
         kept = [piece for piece in self.pieces if piece.begin < pieces[0].begin]
         self.pieces = [*kept, *pieces]
         self._begins = np.array([piece.begin for piece in self.pieces])
@@ -287,13 +308,6 @@ class Mission:
             np.concatenate([piece.joints.at(part) for piece, part in flown]),
             np.concatenate([piece.base.at(part) for piece, part in flown]),
         )
-
-
-def _leg(begin: float, end: float, start: Array, goal: Array, base: BaseMotion) -> Piece:
-    """Return a leg of the joints between two waypoints; the attitude or what points is held."""
-    attitude = base.held.at(np.array([float(end)]))[0, :4]
-    course = QuinticLeg(begin, float(end - begin), start, goal - start)
-    return Piece(float(begin), float(end), course, base.held, goal, attitude, mode=base.mode)
 
 
 def pointing_start(settings: MissionSettings) -> tuple[list[float], list[float]]:
@@ -316,7 +330,7 @@ def _pointing(
     mode = read_pointing(settings.base_point, "start.base")
     try:
         course = PointingCourse(mode, ephemeris, 0.0, np.array([1.0, 0.0, 0.0, 0.0]))
-        course.check(0.0, settings.waypoint_times[-1])
+        course.check(0.0, 0.0)
     except InputError as error:
         raise InputError(f"start: {error}") from None
     return mode, course

@@ -1,4 +1,4 @@
-"""Changes of the mission in flight: the parameter ``goto``, trajectories by topic and by action."""
+"""Changes of the mission in flight: the parameter ``goto``, and trajectories."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import time
 from collections import deque
 from collections.abc import Callable
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,12 +23,9 @@ from space_robot_msgs_py.wire.definitions import decode
 from .courses import Piece
 from .mission import Mission
 
-if TYPE_CHECKING:
-    from .trajectory_action import TrajectoryAction
-
 Array = NDArray[np.float64]
 
-NAME = "goto"
+GOTO = "goto"
 UNFORESEEN = (ArithmeticError, AttributeError, LookupError, MemoryError, TypeError, ValueError)
 """What planning raises for numbers that no check has foreseen; the flight must go on."""
 TOLD_S = 1.0
@@ -47,7 +44,7 @@ class MissionChanges:
         ticks: Callable[[], tuple[int, int]],
         names: RobotNames,
     ) -> None:
-        """Subscribe, accept the parameter, and offer the action if its package is there.
+        """Subscribe, and accept the parameter.
 
         Args:
             node: of the mission.
@@ -65,16 +62,6 @@ class MissionChanges:
         self.counts = {"trajectories accepted": 0, "trajectories refused": 0}
         self._warnings, self._warning = deque[str](maxlen=MOST_TOLD), ""
         self._told_until = 0.0
-        self._action = self._offer_action()
-
-    def _offer_action(self) -> TrajectoryAction | None:
-        try:
-            from control_msgs.action import FollowJointTrajectory
-        except ImportError:
-            return None
-        from .trajectory_action import TrajectoryAction
-
-        return TrajectoryAction(self._node, FollowJointTrajectory, self)
 
     @property
     def time(self) -> float:
@@ -129,15 +116,13 @@ class MissionChanges:
         self._change(partial(self._mission.go_to, self._ticks()[1], "{hold: 1}"))
 
     def close(self) -> None:
-        """End the subscription and the action, and accept no parameter."""
-        if self._action:
-            self._action.close()
+        """End the subscription, and accept no parameter."""
         self._node.remove_on_set_parameters_callback(self._on_set)
         self._subscription.close()
 
     def _on_set(self, parameters: list[Any]) -> SetParametersResult:
         for parameter in parameters:
-            if parameter.name != NAME or parameter.value in ("", self._last_text):
+            if parameter.name != GOTO or parameter.value in ("", self._last_text):
                 continue  # a call may be repeated if its answer was lost
             try:
                 self._change(partial(self._mission.go_to, self._ticks()[1], parameter.value))
@@ -147,11 +132,6 @@ class MissionChanges:
         return SetParametersResult(successful=True)
 
     def _change(self, plan: Callable[[], Piece]) -> None:
-        """Fly what is planned.
-
-        Raises:
-            InputError: it cannot be planned; the mission is as it was.
-        """
         try:
             self.latest = piece = plan()
         except InputError:

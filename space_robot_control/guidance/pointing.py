@@ -2,120 +2,55 @@
 
 The orbit is that of the reference point, beside which the robot is: its own motion of metres is not
 followed. The Sun is where it is also while the Earth hides it.
+
+The frame T has its first axis along p, where the base points, and the second one in the half plane
+of p and v, the second direction: on its axes ``p = (P, 0, 0)`` and ``v = (v1, v2, 0)``, ``v2 > 0``.
+That both stay so, while p and v change, gives T's angular velocity, and its derivative.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from typing import Annotated, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field, field_validator, model_validator
 
-from space_robot_model.elementary.matrices import direction_norm, dot_rows, norm, product
-from space_robot_model.elementary.rotations import quaternion_of_rotation, rotation_of_rpy
+from space_robot_model.dynamics.algebra import (
+    Vector,
+    columns_quaternion,
+    cross,
+    dot,
+    multiply,
+    rotated,
+    scale,
+    store,
+    vector,
+)
+from space_robot_model.elementary.matrices import dot_rows, norm
 from space_robot_model.orbit.ephemeris import Ephemeris
-from space_robot_model.robot.mission_document import Angles
-from space_robot_msgs_py.config.choices import choices
-from space_robot_msgs_py.config.validation import StrictModel, short
+from space_robot_model.orbit.propagation import Motion, point_motion, target_motion
+from space_robot_msgs_py.compiled.kernels import kernel, subroutine
+from space_robot_msgs_py.config.validation import short
 from space_robot_msgs_py.errors import InputError
 
-Array = NDArray[np.float64]
+from .goals import FAR, LEAST_DEG, PointingGoal
 
-Point = Literal["nadir", "velocity", "sun", "target", "inertial"]
-Direction = Annotated[list[float], Field(min_length=3, max_length=3)]
-ABOUT = ("velocity", "nadir", "normal", "sun", "target")
-"""Second directions that have a name; any other is a vector on inertial axes."""
+Array = NDArray[np.float64]
+Derivatives = tuple[Vector, Vector, Vector]
+"""A vector with its first two derivatives, inertial axes."""
+
+FIXED, NADIR, VELOCITY, NORMAL, TARGET = range(5)
+"""Kinds of directions."""
+KINDS = {"nadir": NADIR, "velocity": VELOCITY, "normal": NORMAL, "target": TARGET}
 USUAL_ABOUT = {"nadir": "velocity", "velocity": "nadir", "target": "normal"}
-FAR = math.sqrt(0.5)
-"""Cosine of 45 degrees."""
-LEAST_DEG = 1.0
-"""Least angle between two directions that define an attitude, degrees."""
+ANCHOR_S = 5.0
+"""Time between the attitudes that decide the sign of a quaternion, s."""
 NEAREST = 0.1
 """Least distance of a target that is pointed at, m."""
 CHECKED_EVERY = 1.0
 """Time between those at which a pointing segment is checked, s."""
 AT_ONCE = 10_000
 """Times that are checked together."""
-
-
-class PointingGoal(StrictModel):
-    """``base: {point: ...}``: where an axis of the base points, and how the base turns about it."""
-
-    point: Point = Field(
-        description="direction in which the axis points: nadir (the Earth's centre), velocity (of "
-        "the orbit, as seen from the inertial frame), sun, target, or inertial (that of the key "
-        "direction)"
-    )
-    axis: Direction = Field(
-        [0.0, 0.0, 1.0], description="axis that points, base frame, of any length"
-    )
-    direction: Direction | None = Field(
-        None, description="direction to point in, inertial axes, of any length: for point: inertial"
-    )
-    about: str | Direction | None = Field(
-        None,
-        description="second direction, towards which about_axis is turned as far as axis allows: "
-        "velocity, nadir, normal (of the orbit), sun, target, or a vector on inertial axes (none: "
-        "velocity for nadir, nadir for velocity, normal for target; for sun and inertial the "
-        "inertial z axis, or x where z is within 45 degrees of the direction)",
-    )
-    about_axis: Direction | None = Field(
-        None,
-        description="axis that is turned towards about, base frame, of any length (none: the first "
-        "of x, y and z that is at least 45 degrees from axis)",
-    )
-    offset_deg: Angles = Field(
-        [0.0, 0.0, 0.0],
-        description="roll, pitch, yaw about fixed axes, degrees: the base's attitude in the frame "
-        "that points",
-    )
-
-    @field_validator("about", mode="before")
-    @classmethod
-    def _is_direction(cls, about: object) -> object:
-        if isinstance(about, str) and about not in ABOUT:
-            raise ValueError(f"{choices(about, ABOUT)}, or a direction [x, y, z] on inertial axes")
-        return about
-
-    @model_validator(mode="after")
-    def _has_directions(self) -> PointingGoal:
-        for key in ("axis", "direction", "about", "about_axis"):
-            if isinstance(vector := getattr(self, key), list):
-                direction_norm(vector, key)
-        if (self.point == "inertial") != (self.direction is not None):
-            raise ValueError(
-                "point: inertial needs direction: [x, y, z], inertial axes"
-                if self.direction is None
-                else f"direction is for point: inertial, not for {self.point}"
-            )
-        if self.about == self.point:
-            raise ValueError(
-                f"about: {self.about} is the direction that the axis points in: choose another one "
-                f"of {', '.join(name for name in ABOUT if name != self.point)}"
-            )
-        pairs = [("axis", self.axis, "about_axis", self.about_axis)]
-        if isinstance(self.about, list):
-            pairs.append(("direction", self.direction or [], "about", self.about))
-        for name, first, other, second in pairs:
-            if first and second and (angle := _line_angle(first, second)) < LEAST_DEG:
-                raise ValueError(
-                    f"{name} {short(first)} and {other} {short(second)} are parallel to "
-                    f"{angle:.2g} degrees, at least {LEAST_DEG:g} are needed"
-                )
-        return self
-
-    @property
-    def from_base(self) -> Array:
-        """(4,) quaternion from the base's frame to that whose first axis points.
-
-        The second axis of that frame is in the half plane of the first one and ``about``.
-        """
-        axes = _triad(self.axis, self.about_axis or _far_axis(self.axis))
-        offset = rotation_of_rpy(np.radians(self.offset_deg))
-        return quaternion_of_rotation(product(axes.T, offset))
 
 
 class PointingCourse:
@@ -135,9 +70,6 @@ class PointingCourse:
         Raises:
             InputError: there is no orbit or no target, but one is needed; names the key.
         """
-        from .pointing_kernel import FIXED, NADIR, NORMAL, TARGET, VELOCITY  # slow to import
-
-        kinds = {"nadir": NADIR, "velocity": VELOCITY, "normal": NORMAL, "target": TARGET}
         first: str | list[float] = goal.direction or goal.point
         for key, name in (("point", first), ("about", goal.about)):
             if not isinstance(name, str):
@@ -161,7 +93,7 @@ class PointingCourse:
                 name = [0.0, 0.0, 1.0] if abs(pointed[2]) <= FAR else [1.0, 0.0, 0.0]
             if name == "sun" and ephemeris is not None:
                 name = ephemeris.sun.tolist()
-            self._kinds[k] = kinds[name] if isinstance(name, str) else FIXED
+            self._kinds[k] = KINDS[name] if isinstance(name, str) else FIXED
             if not isinstance(name, str):
                 self._fixed[k] = np.array(name) / norm(name)
         self._from_base = goal.from_base
@@ -200,8 +132,6 @@ class PointingCourse:
         return self._rows(time, self._anchors_until(float(time.max(initial=0.0))))[:, :10]
 
     def _rows(self, time: Array, anchors: Array) -> Array:
-        from .pointing_kernel import pointing_into  # slow to import
-
         out, has_j2, nodes = np.empty((len(time), 12)), 0.0, np.empty((0, 18))
         if self._ephemeris is not None:
             has_j2 = self._ephemeris.has_j2
@@ -212,12 +142,8 @@ class PointingCourse:
         return out
 
     def _anchors_until(self, latest: float) -> Array:
-        """Return attitudes from the begin on, each in the hemisphere of that before it.
-
-        They make a quaternion's sign a function of time alone, and continuous.
-        """
-        from .pointing_kernel import ANCHOR_S  # slow to import
-
+        # each is in the hemisphere of that before it: so a quaternion's sign is a function of time
+        # alone, and continuous
         known = len(self._anchors)
         needed = max(int((latest - self._begin) / ANCHOR_S) + 1, 1)
         if needed > known:
@@ -231,21 +157,98 @@ class PointingCourse:
         return self._anchors
 
 
-def _triad(first: Sequence[float], second: Sequence[float]) -> Array:
-    """Return axes as columns (3, 3): the first vector's, in the plane of both, and the normal."""
-    axis = np.array(first) / norm(first)
-    normal = np.cross(axis, second)
-    normal = normal / norm(normal)
-    return np.column_stack((axis, np.cross(normal, axis), normal))
+@kernel
+def pointing_into(
+    nodes: Array,
+    has_j2: float,
+    kinds: NDArray[np.int64],
+    fixed: Array,
+    from_base: Array,
+    begin: float,
+    anchors: Array,
+    time: Array,
+    out: Array,
+) -> None:
+    """Write the motion of a base that points.
+
+    Args:
+        nodes: (K, 18) of the orbit, see `propagate`; not read if both directions are fixed.
+        has_j2: 1 with the Earth's oblateness, else 0.
+        kinds: (2,) integers, of the direction to point in and of the second one.
+        fixed: (2, 3) these directions on inertial axes, where they are fixed.
+        from_base: (4,) quaternion from the base's frame to T.
+        begin: s, of the first anchor.
+        anchors: (A, 4) quaternions every `ANCHOR_S`, in whose hemisphere is that of a time after
+            them, or (0, 4).
+        time: (T,) s.
+        out: (T, 12) quaternion, angular velocity, rad/s, and acceleration on the base's axes; then
+            the sine of the angle between the directions, and the length of the first one.
+    """
+    turn = (from_base[0], from_base[1], from_base[2], from_base[3])
+    back = (turn[0], -turn[1], -turn[2], -turn[3])
+    zero = (0.0, 0.0, 0.0)
+    point, target = (zero, zero, zero, zero), (zero, zero, zero, zero)
+    for i in range(len(time)):
+        if kinds[0] != FIXED or kinds[1] != FIXED:
+            point = point_motion(nodes, time[i], has_j2)
+        if kinds[0] == TARGET or kinds[1] == TARGET:
+            target = target_motion(nodes, time[i], has_j2, point)
+        first = direction(kinds[0], fixed[0], point, target)
+        second = direction(kinds[1], fixed[1], point, target)
+        t1, t2, t3, length, sine = triad(first[0], second[0])
+        q = multiply(columns_quaternion(t1, t2, t3), turn)
+        if len(anchors) > 0:
+            anchor = anchors[max(int((time[i] - begin) / ANCHOR_S), 0)]
+            if q[0] * anchor[0] + q[1] * anchor[1] + q[2] * anchor[2] + q[3] * anchor[3] < 0.0:
+                q = (-q[0], -q[1], -q[2], -q[3])
+        omega, alpha = turning(first, second, t1, t2, t3)
+        out[i, 0], out[i, 1], out[i, 2], out[i, 3] = q
+        store(rotated(back, omega), out[i], 4)
+        store(rotated(back, alpha), out[i], 7)
+        out[i, 10], out[i, 11] = sine, length
 
 
-def _far_axis(axis: Sequence[float]) -> list[float]:
-    """Return the first of the axes x, y, z that is at least 45 degrees from an axis."""
-    near = np.abs(axis) > FAR * norm(axis)
-    return [float(k == int(np.argmin(near))) for k in range(3)]
+@subroutine
+def direction(kind: int, fixed: Array, point: Motion, target: Motion) -> Derivatives:
+    """Return a direction, of any length, with its derivatives."""
+    if kind == FIXED:
+        zero = (0.0, 0.0, 0.0)
+        return vector(fixed, 0), zero, zero
+    if kind == TARGET:
+        return target[0], target[1], target[2]
+    r, v, a, j = point
+    if kind == NADIR:
+        return scale(r, -1.0), scale(v, -1.0), scale(a, -1.0)
+    if kind == VELOCITY:
+        return v, a, j
+    va, rj = cross(v, a), cross(r, j)
+    return cross(r, v), cross(r, a), (va[0] + rj[0], va[1] + rj[1], va[2] + rj[2])
 
 
-def _line_angle(first: Sequence[float], second: Sequence[float]) -> float:
-    """Return the angle between the lines along two vectors, degrees; for comparisons only."""
-    a, b = np.array(first) / norm(first), np.array(second) / norm(second)
-    return math.degrees(math.asin(min(norm(np.cross(a, b)), 1.0)))
+@subroutine
+def triad(p: Vector, v: Vector) -> tuple[Vector, Vector, Vector, float, float]:
+    """Return the axes of T, the length of ``p`` and the sine of the angle between the vectors."""
+    length, other = np.sqrt(dot(p, p)), np.sqrt(dot(v, v))
+    t1, aside = scale(p, 1.0 / length), scale(v, 1.0 / other)
+    t3 = cross(t1, aside)
+    sine = np.sqrt(dot(t3, t3))
+    t3 = scale(t3, 1.0 / sine)
+    return t1, cross(t3, t1), t3, length, sine
+
+
+@subroutine
+def turning(
+    first: Derivatives, second: Derivatives, t1: Vector, t2: Vector, t3: Vector
+) -> tuple[Vector, Vector]:
+    """Return angular velocity and acceleration of T, on its axes."""
+    (p, pd, pdd), (v, vd, vdd) = first, second
+    length, stretch = dot(p, t1), dot(pd, t1)
+    v1, v2 = dot(v, t1), dot(v, t2)
+    vd1, vd2 = dot(vd, t1), dot(vd, t2)
+    y, z = -dot(pd, t3) / length, dot(pd, t2) / length
+    x = (dot(vd, t3) + y * v1) / v2
+    yd = (x * z * length - 2.0 * y * stretch - dot(pdd, t3)) / length
+    zd = (dot(pdd, t2) - 2.0 * z * stretch - x * y * length) / length
+    # the rates of v1 and v2 are vd1 + z v2 and vd2 - z v1
+    xd = (dot(vdd, t3) + yd * v1 + y * (2.0 * vd1 + z * v2) - x * (2.0 * vd2 - z * v1)) / v2
+    return (x, y, z), (xd, yd, zd)

@@ -1,74 +1,37 @@
-"""Segments of a mission as they are written in its file."""
+"""Segments of a mission: what is written of each kind, and the courses that it becomes.
+
+A kind is one class: its keys with their limits, and `joints`, the course of the joints that it
+makes. Splines and tools are imported where they are used: they are slow to import, and a mission of
+joints needs none.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Annotated, Any, Literal
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Annotated, Any, ClassVar, Literal
 
-from pydantic import Field, PlainValidator, model_validator
+import numpy as np
+from pydantic import BeforeValidator, Field, PlainValidator
 
-from space_robot_model.elementary.matrices import direction_norm
-from space_robot_model.robot.mission_document import Attitude, Degrees, Orientation, Vector
-from space_robot_msgs_py.config.choices import choices
-from space_robot_msgs_py.config.text import printable
+from space_robot_model.robot import Robot
+from space_robot_model.robot.mission_document import Attitude
+from space_robot_msgs_py.config.columns import read_columns
+from space_robot_msgs_py.config.text import choices, printable
 from space_robot_msgs_py.config.validation import StrictModel, short, validate
 from space_robot_msgs_py.config.yaml_text import YamlTextError, parse_yaml
 from space_robot_msgs_py.errors import InputError
 
-from .pointing import PointingGoal
+from .courses import Array, BentLeg, Course, JointMaker, Maker, QuinticLeg, SegmentStart, knots
+from .goals import BaseTurn, PointingGoal, ToolGoal
+from .limits import FARTHEST, shown_unit
 
 MOST_SEGMENTS = 5_000
 """Largest number of segments of a mission; each is planned for a few milliseconds."""
-Seconds = Annotated[float, Field(ge=1e-6, le=1e6)]
 MOST_BENDS = 100
-Frame = Literal["inertial", "base", "start", "orbit"]
-MOTIONS = ("joints_deg", "tool", "hold", "reactionless_deg", "file", "trajectory")
-"""Keys of which a segment has one; a segment of the base alone has none."""
-WRITTEN = (
-    *("joints_deg", "bends_deg", "tool", "hold", "reactionless", "file"),
-    *("base", "duration"),
-)
-"""Keys of a segment in a mission's document."""
-ALONE = ("reactionless_deg", "file", "trajectory")
-"""Those that go without ``base``."""
 
 
-class ToolGoal(Orientation):
-    """Where a tool goes in a straight line; without an orientation the shortest joint motion."""
-
-    xyz: Vector | None = Field(None, description="position, m (none: it stays)")
-    frame: Frame = Field(
-        "start",
-        description="axes of the goal: inertial (origin: the base at t = 0), base (at the end of "
-        "the segment), start (a displacement and a turn on inertial axes), or orbit (the same on "
-        "axes that turn with the orbit: x ahead, y against its normal, z to the Earth's centre)",
-    )
-    link: str | None = Field(None, description="name of the tool, of a robot with several")
-    least: Literal["motion", "momentum"] = Field(
-        "motion",
-        description="what a robot with more joints than the path needs keeps least: the motion of"
-        " its joints, or the angular momentum that the base takes up",
-    )
-
-    @model_validator(mode="after")
-    def _something(self) -> ToolGoal:
-        if self.xyz is None and not self.is_given:
-            raise ValueError("give xyz, rpy_deg or quaternion")
-        return self
-
-
-class BaseTurn(StrictModel):
-    """``base: {turn_deg: 190, axis: [1, 2, 3]}``: a turn about one axis, from rest to rest."""
-
-    turn_deg: Degrees = Field(description="angle, degrees")
-    axis: Vector = Field(description="of the turn, base frame, any length")
-
-    @model_validator(mode="after")
-    def _has_axis(self) -> BaseTurn:
-        direction_norm(self.axis, "axis")
-        return self
-
-
+BaseGoal = Attitude | PointingGoal | BaseTurn | Literal["free"]
 KINDS_OF_BASE: dict[str, type[Attitude] | type[PointingGoal] | type[BaseTurn]] = {
     "rpy_deg": Attitude,
     "quaternion": Attitude,
@@ -76,18 +39,13 @@ KINDS_OF_BASE: dict[str, type[Attitude] | type[PointingGoal] | type[BaseTurn]] =
     "turn_deg": BaseTurn,
 }
 """Keys that tell what is said of the base."""
-OF_BASE = tuple(dict.fromkeys(key for kind in KINDS_OF_BASE.values() for key in kind.model_fields))
-"""All keys of ``base``."""
+BASE_KEYS = tuple(dict.fromkeys(k for kind in KINDS_OF_BASE.values() for k in kind.model_fields))
 
 
-def base_goal(content: Any) -> Attitude | PointingGoal | BaseTurn:
-    """Return where a segment brings the base, by its keys; a name is what the base points at.
-
-    Raises:
-        ValidationError: a key or a value is wrong.
-    """
-    if isinstance(content, (Attitude, PointingGoal, BaseTurn)):
-        return content
+def _base_goal(content: Any) -> BaseGoal:
+    if isinstance(content, (Attitude, PointingGoal, BaseTurn)) or content == "free":
+        goal: BaseGoal = content
+        return goal
     if isinstance(content, str):
         content = {"point": content}
     keys = [key for key in KINDS_OF_BASE if isinstance(content, dict) and key in content]
@@ -96,84 +54,219 @@ def base_goal(content: Any) -> Attitude | PointingGoal | BaseTurn:
     return (KINDS_OF_BASE[keys[0]] if keys else Attitude).model_validate(content)
 
 
-class Segment(StrictModel):
-    """A part of a mission; the joints move from rest to rest."""
+def _seconds(content: Any) -> Any:
+    if content is None:
+        raise ValueError("give s, or fast")
+    return None if content == "fast" else content
 
-    joints_deg: list[float] | None = Field(None, description="joints, degrees or m")
+
+# the kinds
+
+
+class Segment(StrictModel):
+    """A part of a mission in which the joints stay, and the base moves; the kinds are below."""
+
+    key: ClassVar[str] = "base"
+    """That a segment of this kind has."""
+    excludes: ClassVar[tuple[str, ...]] = ()
+    """Keys of all kinds that this one has not."""
+
+    base: Annotated[BaseGoal | None, PlainValidator(_base_goal)] = Field(
+        None,
+        description="attitude, turn, or what the base points at from now on; free: it turns as the "
+        "arm's motion turns it",
+    )
+    duration: Annotated[
+        Annotated[float, Field(ge=1e-6, le=1e6)] | None, BeforeValidator(_seconds)
+    ] = Field(None, description="s, or fast: as the limits of joints and base allow")
+
+    @classmethod
+    def allowed_keys(cls) -> tuple[str, ...]:
+        """Return the keys that a segment of this kind may have."""
+        return tuple(key for key in cls.model_fields if key not in cls.excludes)
+
+    @property
+    def is_base_free(self) -> bool:
+        """Whether the base turns as the arm's motion turns it."""
+        return self.base == "free"
+
+    @property
+    def span(self) -> float | None:
+        """The duration, s; None: as fast as the limits allow."""
+        return self.duration
+
+    @property
+    def motion(self) -> str:
+        """What the segment moves, in a word or two."""
+        words = [self.key.removesuffix("_deg")] if self.key != "base" else []
+        words += ["free base" if self.is_base_free else "base"] if self.base is not None else []
+        return " and ".join(words)
+
+    def joints(self, start: SegmentStart) -> JointMaker:
+        """Return what makes the course of the joints from a start.
+
+        Raises:
+            InputError: they cannot move so.
+        """
+        rise = np.zeros_like(start.joints)
+        return lambda span, _: QuinticLeg(start.time, span, start.joints, rise)
+
+    def courses(self, start: SegmentStart, turn: Callable[[float], Course]) -> Maker:
+        """Return what makes the courses of joints and base from a start.
+
+        Args:
+            start: of the segment.
+            turn: makes the course of a base that is not free in a duration, s.
+        """
+        make = self.joints(start)
+
+        def led(span: float) -> tuple[Course, Course]:
+            base = turn(span)
+            return make(span, base), base
+
+        def freed(span: float) -> tuple[Course, Course]:
+            from .free_base import free_attitude
+
+            joints, quaternion = make(span, turn(span)), start.base.quaternion
+            times = knots(span)
+            return joints, free_attitude(start.robot, joints, quaternion, start.time, times)
+
+        return freed if self.is_base_free else led
+
+
+class JointSegment(Segment):
+    """The joints go to a posture, on a line in their space or bent."""
+
+    key = "joints_deg"
+    joints_deg: list[float] = Field(description="joints, degrees or m")
     bends_deg: list[list[float]] | None = Field(
         None,
         max_length=MOST_BENDS,
         description="amplitudes of bends on the way to joints_deg, by sin(pi s), sin(2 pi s), ...:"
         " a list of joints each, degrees or m",
     )
-    tool: ToolGoal | None = None
-    hold: Seconds | None = Field(None, description="time to stay, s")
-    reactionless_deg: list[float] | None = Field(
-        None, description="joints to approach without a torque on the base, degrees or m"
-    )
-    file: str | None = Field(None, description="CSV or Parquet file of a trajectory")
-    trajectory: dict[str, list[float]] | None = Field(
-        None, description="the columns of such a file"
-    )
-    base: Annotated[Attitude | PointingGoal | BaseTurn | None, PlainValidator(base_goal)] = Field(
-        None, description="attitude, turn, or what the base points at from now on"
-    )
-    is_base_free: bool = Field(
-        False, description="the base turns as the arm's motion turns it: base: free"
-    )
-    duration: Seconds | None = Field(None, description="s")
-    fast: bool = Field(False, description="as fast as the limits of joints and base allow")
 
-    @model_validator(mode="before")
-    @classmethod
-    def _as_written(cls, content: Any) -> Any:
-        """Accept ``reactionless: {joints_deg: [...]}``, ``base: free`` and ``duration: fast``."""
-        if not isinstance(content, dict):
-            return content
-        content = dict(content)
-        if "reactionless" in content:
-            inner = content.pop("reactionless")
-            if not isinstance(inner, dict) or set(inner) != {"joints_deg"}:
-                expected = "reactionless: {joints_deg: [...]} was expected"
-                raise ValueError(f"{expected}, got {short(inner)}")
-            content["reactionless_deg"] = inner["joints_deg"]
-        if content.get("base") == "free":
-            content |= {"is_base_free": True}
-            del content["base"]
-        if content.get("duration") == "fast":
-            content |= {"fast": True}
-            del content["duration"]
-        return content
+    def joints(self, start: SegmentStart) -> JointMaker:
+        """Return what makes the course of the joints from a start."""
+        rise = posture(start.robot, self.joints_deg, "joints_deg") - start.joints
+        if self.bends_deg is None:
+            return lambda span, _: QuinticLeg(start.time, span, start.joints, rise)
+        bends = np.array([posture(start.robot, bend, "bends_deg") for bend in self.bends_deg])
+        return lambda span, _: BentLeg(start.time, span, start.joints, rise, bends)
 
-    @model_validator(mode="after")
-    def _fits(self) -> Segment:
-        motions = [name for name in MOTIONS if getattr(self, name) is not None]
-        if len(motions) > 1:
-            raise ValueError(f"{' and '.join(motions)} were given: a segment has one of them")
-        if not motions and self.base is None:
-            raise ValueError(f"give one of {', '.join(MOTIONS)}, or base")
-        if self.base is not None and motions and motions[0] in ALONE:
-            raise ValueError(f"base cannot be combined with {motions[0]}")
-        if self.bends_deg is not None and self.joints_deg is None:
-            raise ValueError("bends_deg needs joints_deg")
-        if self.is_base_free and (not motions or motions[0] in ("hold", *ALONE)):
-            raise ValueError("base: free needs joints_deg or tool")
-        timed = [self.duration is not None, self.fast, self.hold is not None]
-        if self.file is not None or self.trajectory is not None:
-            if any(timed):
-                raise ValueError("a trajectory has its own duration")
-        elif sum(timed) != 1:
-            raise ValueError("give duration (s), or duration: fast; hold has its own")
-        return self
+
+class ToolSegment(Segment):
+    """A tool goes in a straight line, and turns about one axis."""
+
+    key = "tool"
+    tool: ToolGoal
+
+    def courses(self, start: SegmentStart, turn: Callable[[float], Course]) -> Maker:
+        """Return what makes the courses of joints and base from a start."""
+        from .tool_paths import ToolCourses
+
+        if self.is_base_free and self.tool.frame != "base":
+            return ToolCourses(self.tool, start).free
+        return super().courses(start, turn)
+
+    def joints(self, start: SegmentStart) -> JointMaker:
+        """Return what makes the course of the joints from a start."""
+        from .tool_paths import ToolCourses
+
+        return ToolCourses(self.tool, start).led
+
+
+class HoldSegment(Segment):
+    """The joints stay."""
+
+    key = "hold"
+    excludes = ("duration",)
+    hold: Annotated[float, Field(ge=1e-6, le=1e6)] = Field(description="time to stay, s")
 
     @property
-    def motion(self) -> str:
-        """What the segment moves, in a word or two."""
-        moved = [name for name in MOTIONS if getattr(self, name) is not None]
-        words = [name.removesuffix("_deg") for name in moved]
-        if self.is_base_free:
-            words.append("free base")
-        return " and ".join([*words, "base"] if self.base is not None else words)
+    def span(self) -> float | None:
+        """The duration, s."""
+        return self.hold
+
+
+class PostureGoal(StrictModel):
+    """A posture to approach."""
+
+    joints_deg: list[float] = Field(description="joints, degrees or m")
+
+
+class ReactionlessSegment(Segment):
+    """The joints approach a posture without a torque on the base."""
+
+    key = "reactionless"
+    excludes = ("base",)
+    reactionless: PostureGoal
+
+    def joints(self, start: SegmentStart) -> JointMaker:
+        """Return what makes the course of the joints from a start."""
+        from .free_base import reactionless_course
+
+        goal = posture(start.robot, self.reactionless.joints_deg, "reactionless")
+        return reactionless_course(start, goal)
+
+
+class TableSegment(Segment):
+    """Joints, and maybe the base, follow the columns of a table, which has its own duration."""
+
+    key = "trajectory"
+    excludes: ClassVar[tuple[str, ...]] = ("base", "duration")
+    trajectory: dict[str, list[float]] = Field(description="the columns of such a file")
+
+    @property
+    def columns(self) -> dict[str, list[float]]:
+        """The columns of the table by name."""
+        return self.trajectory
+
+
+class FileSegment(TableSegment):
+    """The same from a file."""
+
+    key = "file"
+    excludes = ("base", "duration", "trajectory")
+    trajectory: dict[str, list[float]] = Field(default_factory=dict)
+    file: str = Field(description="CSV or Parquet file of a trajectory")
+
+    @property
+    def columns(self) -> dict[str, list[float]]:
+        """The columns of the table by name."""
+        return read_columns(Path(self.file))
+
+
+SEGMENT_KINDS: dict[str, type[Segment]] = {
+    kind.key: kind
+    for kind in (
+        *(JointSegment, ToolSegment, HoldSegment, ReactionlessSegment),
+        *(FileSegment, TableSegment, Segment),
+    )
+}
+"""Kinds of segments by the key that each of them has."""
+SEGMENT_KEYS = tuple(
+    dict.fromkeys(key for kind in SEGMENT_KINDS.values() for key in kind.allowed_keys())
+)
+
+
+def posture(robot: Robot, values: Sequence[float], key: str) -> Array:
+    """Return the positions (n,) of joints that are written in degrees, rad or m.
+
+    Raises:
+        InputError: there are too few or too many values, or one is too large; names the key.
+    """
+    if len(values) != robot.n:
+        raise InputError(f"{key}: {robot.n} values were expected, got {len(values)}")
+    positions = robot.from_degrees(values)
+    if (far := np.abs(positions)).max() > FARTHEST:
+        joint = int(np.argmax(far))
+        scale, unit = shown_unit(robot, joint)
+        raise InputError(
+            f"{key}: joint {robot.joint_names[joint]!r}: at most {FARTHEST * scale:.6g} "
+            f"{unit} can be flown, got {values[joint]:g}"
+        )
+    return positions
 
 
 def read_segments(texts: Sequence[str]) -> list[Segment]:
@@ -182,19 +275,33 @@ def read_segments(texts: Sequence[str]) -> list[Segment]:
     Raises:
         InputError: a segment is wrong; names it, counted from 1.
     """
-    written, segments = [text for text in texts if text.strip()], []
+    written = [text for text in texts if text.strip()]
     if len(written) > MOST_SEGMENTS:
         raise InputError(f"{len(written)} segments, at most {MOST_SEGMENTS} are planned")
-    for number, text in enumerate(written, 1):
-        try:
-            content = parse_yaml(text)
-        except YamlTextError as error:
-            raise InputError(f"segment {number}: {error}") from None
-        _check_keys(content, f"segment {number}", (*WRITTEN, *Segment.model_fields), WRITTEN)
-        if isinstance(content, dict) and isinstance(base := content.get("base"), dict):
-            _check_keys(base, f"segment {number}: base", OF_BASE, OF_BASE)
-        segments.append(validate(Segment, content, f"segment {number}"))
-    return segments
+    return [_segment(text, f"segment {number}") for number, text in enumerate(written, 1)]
+
+
+def _segment(text: str, where: str) -> Segment:
+    content = _parsed(text, where)
+    if not isinstance(content, Mapping):
+        return validate(Segment, content, where)
+    _check_keys(content, where, SEGMENT_KEYS)
+    if isinstance(base := content.get("base"), dict):
+        _check_keys(base, f"{where}: base", BASE_KEYS)
+    motions = [key for key in SEGMENT_KINDS if key in content and key != "base"]
+    if len(motions) > 1:
+        raise InputError(f"{where}: {' and '.join(motions)} were given: a segment has one of them")
+    if not motions and "base" not in content:
+        raise InputError(f"{where}: give one of {', '.join(SEGMENT_KINDS)}")
+    kind = SEGMENT_KINDS[motions[0] if motions else "base"]
+    if wrong := [key for key in content if key not in kind.allowed_keys()]:
+        raise InputError(f"{where}: {wrong[0]} does not go with {kind.key}")
+    if "duration" in kind.allowed_keys() and "duration" not in content:
+        raise InputError(f"{where}: give duration (s), or duration: fast")
+    segment = validate(kind, content, where)
+    if segment.is_base_free and not isinstance(segment, (JointSegment, ToolSegment)):
+        raise InputError(f"{where}: base: free needs joints_deg or tool")
+    return segment
 
 
 def read_pointing(text: str, where: str) -> PointingGoal:
@@ -203,20 +310,23 @@ def read_pointing(text: str, where: str) -> PointingGoal:
     Raises:
         InputError: it is wrong; names ``where``.
     """
-    try:
-        content = parse_yaml(text)
-    except YamlTextError as error:
-        raise InputError(f"{where}: {error}") from None
+    content = _parsed(text, where)
     content = {"point": content} if isinstance(content, str) else content
-    _check_keys(content, where, tuple(PointingGoal.model_fields), tuple(PointingGoal.model_fields))
+    _check_keys(content, where, tuple(PointingGoal.model_fields))
     return validate(PointingGoal, content, where)
 
 
-def _check_keys(content: Any, where: str, known: Sequence[str], allowed: Sequence[str]) -> None:
-    """Refuse a key that is not ``known``, with those that a document may have."""
+def _parsed(text: str, where: str) -> Any:
+    try:
+        return parse_yaml(text)
+    except YamlTextError as error:
+        raise InputError(f"{where}: {error}") from None
+
+
+def _check_keys(content: Any, where: str, known: Sequence[str]) -> None:
     for key, value in content.items() if isinstance(content, dict) else ():
         if key not in known:
-            advice = choices(str(key), allowed)
+            advice = choices(str(key), known)
             raise InputError(
                 f"{where}: {printable(str(key))}: unknown key, got {short(value)}: {advice}"
             )

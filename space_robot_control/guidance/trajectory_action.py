@@ -9,7 +9,7 @@ import time
 from collections.abc import Callable
 from contextlib import closing, nullcontext
 from functools import partial
-from typing import Any, NamedTuple, Protocol
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,13 +21,16 @@ from space_robot_msgs_py import topics
 from space_robot_msgs_py.errors import InputError, MessageError
 from space_robot_msgs_py.ros.endpoints import PolledCallbackGroup, RawSubscription
 from space_robot_msgs_py.ros.managed_node import ManagedNode
-from space_robot_msgs_py.ros.restart import until
+from space_robot_msgs_py.ros.service_calls import until
 from space_robot_msgs_py.samples import RobotNames
-from space_robot_msgs_py.wire.compiled_codec import CompiledCodec
-from space_robot_msgs_py.wire.joint_states import JointStates
+from space_robot_msgs_py.wire.codecs import CompiledCodec
+from space_robot_msgs_py.wire.messages import describe
 
 from .courses import Piece
-from .goal_tolerances import GoalTolerances, GoalVerdict
+from .live import GoalTolerances, GoalVerdict
+
+if TYPE_CHECKING:
+    from .mission_changes import MissionChanges
 
 Array = NDArray[np.float64]
 
@@ -38,47 +41,6 @@ MOST_AT_ONCE = 1_000
 OF_OTHER_JOINTS = ("component_path_tolerance", "component_goal_tolerance")
 
 
-class Motions(Protocol):
-    """The motion of a mission, which a goal replaces."""
-
-    latest: Piece | None
-    """The last motion that was asked for in flight."""
-
-    @property
-    def time(self) -> float:
-        """Simulated time, s."""
-        ...
-
-    @property
-    def names(self) -> RobotNames:
-        """Names of the joints."""
-        ...
-
-    def joints(self) -> Array:
-        """Return the reference (3, n) of the joints at this time."""
-        ...
-
-    def follow(self, trajectory: Any) -> None:
-        """Follow a trajectory_msgs/JointTrajectory.
-
-        Raises:
-            InputError: it is wrong; the reason has been told.
-        """
-        ...
-
-    def refuse(self, reason: str) -> None:
-        """Tell why a trajectory is refused."""
-        ...
-
-    def warn(self, text: str) -> None:
-        """Tell what is wrong."""
-        ...
-
-    def stop(self) -> None:
-        """Bring the reference to rest."""
-        ...
-
-
 class MeasuredJoints:
     """The joints as /joint_states reports them while a goal with tolerances is followed."""
 
@@ -86,7 +48,7 @@ class MeasuredJoints:
         """Subscribe."""
         assert node.settings is not None
         self._subscription = RawSubscription(node, topics.JOINT_STATES, PolledCallbackGroup())
-        self._codec = CompiledCodec(JointStates.of_robot(names, node.settings.timebase))
+        self._codec = CompiledCodec(describe(topics.JOINT_STATES, names, node.settings.timebase))
         self._motors, self._all = len(names.joints), len(names.all_joints)
 
     def take(self) -> tuple[Array, Array]:
@@ -142,7 +104,7 @@ class TrajectoryAction:
     to rest.
     """
 
-    def __init__(self, node: ManagedNode[Any], action: Any, motions: Motions) -> None:
+    def __init__(self, node: ManagedNode[Any], action: Any, motions: MissionChanges) -> None:
         """Offer the action.
 
         Args:
@@ -171,7 +133,7 @@ class TrajectoryAction:
         self._server.destroy()
 
     def _accept(self, request: Any) -> GoalResponse:
-        """Check a goal and follow it; the action has no field for a reason."""
+        # a refusal's reason is logged: the action has no field for it
         try:
             if request.multi_dof_trajectory.joint_names or any(
                 getattr(request, name) for name in OF_OTHER_JOINTS
@@ -201,7 +163,6 @@ class TrajectoryAction:
         return CancelResponse.ACCEPT if self._stop("to cancel a goal") else CancelResponse.REJECT
 
     def _stop(self, what: str) -> bool:
-        """Bring the reference to rest; return whether that is possible."""
         try:
             self._motions.stop()
         except InputError as error:  # a joint would leave its limits meanwhile
@@ -210,7 +171,6 @@ class TrajectoryAction:
         return True
 
     async def _lead(self, goal: ServerGoalHandle, pursuit: Pursuit) -> Any:
-        """Wait for the end of a trajectory, telling the reference meanwhile."""
         if pursuit.tolerances.are_given:
             pursuit.measured = MeasuredJoints(self._node, self._motions.names)
         with closing(pursuit.measured) if pursuit.measured else nullcontext():
@@ -229,7 +189,6 @@ class TrajectoryAction:
         await until(lambda: time.monotonic() >= wake_at or self._outcome(goal, pursuit) is not None)
 
     def _outcome(self, goal: ServerGoalHandle, pursuit: Pursuit) -> GoalEnding | None:
-        """Return how a goal ends; None: it goes on."""
         if self._is_closed:
             return GoalEnding(goal.abort, GoalVerdict("INVALID_GOAL", "the mission has ended"))
         if goal.is_cancel_requested:
@@ -245,7 +204,6 @@ class TrajectoryAction:
         return GoalEnding(goal.succeed if verdict.code == "SUCCESSFUL" else goal.abort, verdict)
 
     def _feedback(self) -> Any:
-        """Return the reference of the joints at this time."""
         motions, feedback = self._motions, self._action.Feedback()
         feedback.header.stamp = Time(nanoseconds=round(motions.time * 1e9)).to_msg()
         feedback.joint_names = list(motions.names.joints)

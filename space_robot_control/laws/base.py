@@ -1,21 +1,123 @@
-"""Base classes of control laws: gains, memory, and one equation."""
+"""Base classes of control laws: signals, gains, memory, one equation, and the call of it."""
 
 from __future__ import annotations
 
 import copy
+import signal
+import traceback
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
-from typing import Any, ClassVar
+from collections.abc import Callable, Mapping
+from functools import cache
+from pathlib import Path
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
-from space_robot_msgs_py.compiled.records import Field, Record, RecordOwner
-from space_robot_msgs_py.samples import LawInForce
+from space_robot_model.dynamics.model import Model
+from space_robot_model.dynamics.rho_space import RhoSpaceModel
+from space_robot_model.robot import Robot
+from space_robot_model.robot.kinematics import ToolState, tool_state
+from space_robot_msgs_py.compiled.kernels import RecordFunction, keep_types
+from space_robot_msgs_py.compiled.records import (
+    Block,
+    Field,
+    Record,
+    RecordOwner,
+    RecordView,
+    nested,
+    prefix,
+    shaped,
+)
+from space_robot_msgs_py.config.text import one_line_of
+from space_robot_msgs_py.config.validation import short
+from space_robot_msgs_py.errors import SpaceRobotError
+from space_robot_msgs_py.samples import LawInForce, Reference
 
-from .signals import Array, Signals, per_axis
+Array = NDArray[np.float64]
 
 NO_ESTIMATE, CONSTANT_INERTIA, NOMINAL_INERTIA = range(3)
 """Inertia of a law's time-delay estimate, see `ControlLaw.estimate`."""
+_BLOCKS = ("gains_block", "memory_block")
+"""Attributes of a law that hold its memory."""
+
+
+def per_axis(description: str, unit: str = "") -> Any:
+    """Declare a gain, or a field of a law's memory, with one value per axis: (m,)."""
+    return shaped(lambda n: (n + 3,), ", ".join(filter(None, (description, unit))))
+
+
+class SignalsView(RecordView):
+    """Signals for laws in Python: the fields, and what is computed on demand."""
+
+    robot: Robot
+    """The robot as the controller knows it, without payload."""
+
+    def tool_state(self, tool: str | None = None) -> ToolState:
+        """Return pose and Jacobians of a tool of the nominal robot; see `Signals.tool_state`."""
+        signals: Any = self
+        return tool_state(self.robot, signals.quaternion, signals.joint_positions, tool)
+
+
+class Signals(Record):
+    """Inputs of a law at a tick, in the coordinates ``rho = [eps_e, theta]``, m = n+3 axes.
+
+    eps_e is the vector part of ``attitude_error``; it is desired to be zero.
+    The state is the one that flight software knows: measured, or estimated by navigation. For a
+    base without attitude actuators all signals of m axes are zero on the base's.
+    """
+
+    view_type = SignalsView
+
+    error: Array = per_axis("e = rho_d - rho")
+    error_rate: Array = per_axis("edot")
+    acceleration_desired: Array = per_axis("rhodd_d")
+    n_hat: Array = per_axis("time-delay estimate N_hat of (35), (36)", "N m")
+    """Zero for laws without time-delay estimate."""
+    tick: float = shaped(lambda n: (), "number of the tick")
+    time: float = shaped(lambda n: (), "simulated time, s")
+    quaternion: Array = shaped(lambda n: (4,), "base attitude [w, x, y, z], base to inertial frame")
+    """As measured or estimated, of either sign."""
+    attitude_error: Array = shaped(
+        lambda n: (4,), "q_e = q_d* q [w, x, y, z], base to desired frame; free base: to inertial"
+    )
+    """The sign is the one for which rho is continuous."""
+    omega_base: Array = shaped(lambda n: (3,), "angular velocity in the base frame, rad/s")
+    joint_positions: Array = shaped(lambda n: (n,), "rad, or m for prismatic joints")
+    joint_velocities: Array = shaped(lambda n: (n,), "rad/s, or m/s")
+    rho: Array = per_axis("rho = [eps_e, theta]")
+    rho_rate: Array = per_axis("rhodot")
+    rho_step: Array = per_axis("step of rho since the last tick by one of the reference")
+    """Zero while the base's reference goes on where it was; no torque causes it."""
+    rate_step: Array = per_axis("step of rhodot by the same")
+    applied_force: Array = per_axis("F_S applied over the last interval", "N m")
+    paired_force: Array = per_axis("the same through the low-pass of the time-delay pair", "N m")
+    paired_acceleration: Array = per_axis("mean rhodd of that interval, through the same low-pass")
+    base_is_free: float = shaped(lambda n: (), "1 if nothing turns the base, else 0", uniform=True)
+    reference: Reference = nested(Reference)
+    """Desired motion of base and joints."""
+    nominal: RhoSpaceModel = nested(RhoSpaceModel)
+    """``inertia`` (m, m) H_S and ``bias`` (m,) c_S; filled only for laws with ``uses_model``, and
+    for a time-delay estimate with the nominal inertia.
+
+    For a base without attitude actuators they are those of
+    `space_robot_model.dynamics.rho_space`.
+    """
+    model: Model = nested(Model)
+    """Numbers of the nominal robot for the algorithms of `space_robot_model.dynamics`."""
+    robot: Robot
+    """The same robot; for laws in Python only."""
+
+    def tool_state(self, tool: str | None = None) -> ToolState:
+        """Return pose and Jacobians of a tool of the nominal robot; for laws in Python only.
+
+        Args:
+            tool: its name; None: the robot's first.
+
+        Raises:
+            InputError: the robot has no such tool.
+        """
+        raise NotImplementedError("signals in kernels have no robot")
 
 
 class LawGains(Record):
@@ -29,10 +131,6 @@ class LawMemory(Record):
     """Zero for a law without sliding surface."""
     u: Array = per_axis("pseudo-acceleration", "rad/s2 (eps: 1/s2)")
     force: Array = per_axis("generalised force F_S", "N m")
-
-
-_BLOCKS = ("gains_block", "memory_block")
-"""Attributes of a law that hold its memory."""
 
 
 class ControlLaw(RecordOwner, ABC):
@@ -130,7 +228,7 @@ class ControlLaw(RecordOwner, ABC):
 
     @property
     def adds_inertia(self) -> bool:
-        """True if ``H_S u`` is added to the law's force, see `checked.force_of`."""
+        """True if ``H_S u`` is added to the law's force, see `force_of`."""
         return self.estimate == NOMINAL_INERTIA and self.h_bar.size > 0
 
     def reset(self) -> None:
@@ -140,3 +238,130 @@ class ControlLaw(RecordOwner, ABC):
     @abstractmethod
     def force(self, signals: Signals) -> Array:
         """Return the generalised force F_S (m,), N m; valid until the next call."""
+
+
+class SomeGains(Record):
+    """Common layout of the gains of any law: at least one gain."""
+
+    first: Array = per_axis("first gain")
+
+
+class LawCode(NamedTuple):
+    """A law for compiled loops; the type is the same for every law."""
+
+    run: Any
+    """The kernel as a function of `Signals`, `SomeGains`, `LawMemory` and the period."""
+    gains: Block
+    """A block of `SomeGains`."""
+    memory: Block
+    """A block of `LawMemory`."""
+    h_bar: Array
+    """(m,) h_bar of the time-delay estimate, kg m2; empty if the law has none."""
+    estimate: int
+    """See `ControlLaw.estimate`."""
+    uses_model: bool
+    """See `ControlLaw.needs_model`."""
+    adds_inertia: bool
+    """See `ControlLaw.adds_inertia`."""
+
+
+keep_types(LawCode, lambda code: code.run)
+
+
+class CompiledLaw(ControlLaw):
+    """A law with a ``kernel`` (and a ``memory_type``, if it has internal states)."""
+
+    @staticmethod
+    @abstractmethod
+    def kernel(signals: Signals, gains: Any, memory: Any, period: float) -> None:
+        """Compute ``memory.s``, ``memory.u`` and ``memory.force`` of a tick; a `kernel`.
+
+        Args:
+            signals: of this tick; read only.
+            gains: a record of ``gains_type``.
+            memory: a record of ``memory_type``.
+            period: of the controller, s.
+        """
+
+    @classmethod
+    def function(cls, width: int = 1) -> RecordFunction:
+        """Return the kernel, compiled for this law's records of numbers of a width.
+
+        Raises:
+            InputError: it cannot be compiled for that width.
+        """
+        own: list[Any] = [cls.gains_type, cls.memory_type]  # classes are hashable
+        return _compiled(cls.kernel, *own, width)
+
+    @property
+    def code(self) -> LawCode:
+        """The law for compiled loops; gains and memory are shared, not copied."""
+        n = len(self.memory.s) - 3
+        gains = prefix(self.gains_block, SomeGains.dtype(n))
+        memory = prefix(self.memory_block, LawMemory.dtype(n))
+        needs = self.h_bar, self.estimate, self.needs_model, self.adds_inertia
+        return LawCode(self.function(), gains, memory, *needs)
+
+    def force(self, signals: Signals) -> Array:
+        """Run the kernel; ``signals`` is a `Signals.view`."""
+        n = len(self.memory.s) - 3
+        self.function().call(
+            signals.address, n, self.gains.address, n, self.memory.address, n, self.period
+        )
+        force: Array = self.memory.force
+        return force
+
+
+@cache
+def _compiled(kernel: Callable[..., None], gains: Any, memory: Any, width: int) -> RecordFunction:
+    own, seen = (Signals, gains, memory), (Signals, SomeGains, LawMemory)
+    return RecordFunction(kernel, own, seen, width)
+
+
+class LawError(SpaceRobotError):
+    """The code of a law raised an error, called ``sys.exit``, or returned an invalid force."""
+
+
+def force_of(law: ControlLaw, signals: Signals, tick: int) -> Array:
+    """Return the generalised force F_S (m,) of a law, with H_S u if ``h_bar`` is nominal.
+
+    Args:
+        law: the active law.
+        signals: of the tick.
+        tick: number of the tick, for error messages.
+
+    Raises:
+        LawError: its code raised an error or called ``sys.exit``, or the returned value is not
+            an array with one number per axis.
+    """
+    try:
+        force = law.force(signals)
+    except SpaceRobotError:
+        raise
+    except BaseException as error:
+        if _is_of_user(error):
+            raise
+        place = traceback.extract_tb(error.__traceback__)[-1]
+        raise LawError(
+            f"controller {law.name} failed at tick {tick}: {one_line_of(error)} "
+            f"({Path(place.filename).name}, line {place.lineno})"
+        ) from error
+    wanted = law.memory.force
+    if type(force) is not np.ndarray or (force.shape, force.dtype) != (wanted.shape, wanted.dtype):
+        got = f"shape {force.shape}, {force.dtype}" if type(force) is np.ndarray else short(force)
+        raise LawError(
+            f"controller {law.name} failed at tick {tick}: force() must return {wanted.size} "
+            f"numbers, an array of {wanted.dtype}, got {got}"
+        )
+    if law.adds_inertia:
+        for column, u in zip(signals.nominal.inertia.T, law.memory.u, strict=True):
+            force = force + column * u  # in the order of the compiled loop, so the bits are its
+    return force
+
+
+def _is_of_user(error: BaseException) -> bool:
+    # Ctrl-C: a subclass of KeyboardInterrupt, or the one of Python's own handler
+    by_python = signal.getsignal(signal.SIGINT) is signal.default_int_handler
+    return isinstance(error, KeyboardInterrupt) and (
+        type(error) is not KeyboardInterrupt or by_python
+    )

@@ -5,9 +5,7 @@ from __future__ import annotations
 from space_robot_model.dynamics.rho_space import force_for
 from space_robot_msgs_py.compiled.kernels import kernel
 
-from .base import LawGains, LawMemory
-from .compiled import CompiledLaw
-from .signals import Array, Signals, per_axis
+from .base import Array, CompiledLaw, LawGains, LawMemory, Signals, per_axis
 
 
 class Gains(LawGains):

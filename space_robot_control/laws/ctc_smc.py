@@ -8,9 +8,7 @@ from space_robot_model.dynamics.rho_space import force_for
 from space_robot_msgs_py.compiled.kernels import kernel
 from space_robot_msgs_py.compiled.lanes import where
 
-from .base import LawGains, LawMemory
-from .compiled import CompiledLaw
-from .signals import Array, Signals, per_axis
+from .base import Array, CompiledLaw, LawGains, LawMemory, Signals, per_axis
 
 
 class Gains(LawGains):

@@ -9,13 +9,11 @@ joints' torques are known, and of Basilisk's ``jointMotionCompensator``.
 
 from __future__ import annotations
 
-from space_robot_model.elementary.cholesky import cholesky_into, solve_cholesky
+from space_robot_model.elementary.linear_algebra import cholesky_into, solve_cholesky
 from space_robot_msgs_py.compiled.kernels import kernel
 from space_robot_msgs_py.compiled.records import shaped
 
-from .base import LawGains, LawMemory
-from .compiled import CompiledLaw
-from .signals import Array, Signals, per_axis
+from .base import Array, CompiledLaw, LawGains, LawMemory, Signals, per_axis
 
 
 class Gains(LawGains):

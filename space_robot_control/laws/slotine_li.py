@@ -14,28 +14,23 @@ from space_robot_model.dynamics.algebra import (
 from space_robot_model.dynamics.attitude import rotate
 from space_robot_model.dynamics.model import Model
 from space_robot_model.dynamics.regressor import (
+    MassCoordinates,
     Regressor,
     column,
     force_in_rho,
     force_on_vectors_into,
+    mass_coordinates_into,
     motions_into,
+    second_moments_into,
     take_rho,
     vectors_into,
 )
-from space_robot_model.dynamics.second_moments import (
-    MassCoordinates,
-    mass_coordinates_into,
-    second_moments_into,
-)
-from space_robot_model.elementary.cholesky import cholesky_into
-from space_robot_model.elementary.definite import move_to_side, normalise
+from space_robot_model.elementary.linear_algebra import cholesky_into, move_to_side, normalise
 from space_robot_msgs_py.compiled.kernels import kernel, subroutine
 from space_robot_msgs_py.compiled.lanes import any_lane, uniform, where
 from space_robot_msgs_py.compiled.records import nested, shaped
 
-from .base import LawGains, LawMemory
-from .compiled import CompiledLaw
-from .signals import Array, Signals, per_axis
+from .base import Array, CompiledLaw, LawGains, LawMemory, Signals, per_axis
 
 SLOWEST_ADAPTATION = 1e-30
 """Smallest rate in 1/J that counts as such; 0 in ``gamma`` stands for it, and nothing adapts."""
@@ -256,7 +251,7 @@ class SlotineLi(CompiledLaw):
     """``F_S = Y(rho, rhodot, v, vdot) pi + K_D s``, ``pidot = Gamma Y^T s`` projected.
 
     ``s = edot + lambda e`` and ``v = rhodot_d + lambda e``. The parameters pi are the second
-    moments D of `space_robot_model.dynamics.second_moments`, in which the model of a free-floating
+    moments D of `space_robot_model.dynamics.regressor`, in which the model of a free-floating
     robot is exactly linear; the standard parameters of its bodies are not such (Xu, Shum, Lee &
     Kanade, CMU-RI-TR-91-14, 1991). ``Gamma G = B G B``, with B the moments of the nominal robot
     with every body scaled by the root of its ``gamma``: for equal ``gamma``, ``gamma D0 G D0``.

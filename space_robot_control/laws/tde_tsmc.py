@@ -7,9 +7,7 @@ import numpy as np
 from space_robot_msgs_py.compiled.kernels import kernel
 from space_robot_msgs_py.compiled.lanes import where
 
-from .base import LawGains, LawMemory
-from .compiled import CompiledLaw
-from .signals import Array, Signals, per_axis
+from .base import Array, CompiledLaw, LawGains, LawMemory, Signals, per_axis
 
 
 class Gains(LawGains):

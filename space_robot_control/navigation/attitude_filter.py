@@ -12,15 +12,21 @@ covariance is approximated. Whenever attitude or bias change, the increments are
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
-from space_robot_model.dynamics.algebra import inverse_symmetric
+from space_robot_model.dynamics.algebra import (
+    dot,
+    inverse_symmetric,
+    store,
+    transform_symmetric,
+    vector,
+)
 from space_robot_msgs_py.compiled.kernels import kernel
 from space_robot_msgs_py.compiled.lanes import any_lane, negated, where, whole
 from space_robot_msgs_py.compiled.records import Record, nested, shaped
-
-from .quaternions import is_same, multiply, small_angle, turn
 
 Array = NDArray[np.float64]
 
@@ -39,13 +45,12 @@ NOT_STARTED, STARTED, FILTERING = 0.0, 1.0, 2.0
 
 
 class Scratch(Record):
-    """Matrices of one call."""
+    """Quaternions and matrices of one call."""
 
     quaternion: Array = shaped(lambda n: (4,))
     present: Array = shaped(lambda n: (4,))
     rotation: Array = shaped(lambda n: (3,))
-    transition: Array = shaped(lambda n: (3, 6))
-    """Upper half of the transition matrix."""
+    transition: Array = shaped(lambda n: (3, 6), "Upper half of the transition matrix")
     upper: Array = shaped(lambda n: (3, 6))
     gain: Array = shaped(lambda n: (6, 3))
     weighted: Array = shaped(lambda n: (6, 3))
@@ -57,34 +62,25 @@ class AttitudeFilter(Record):
 
     noise: Array = shaped(lambda n: (3, 3))
     """Covariance of a tracker's measurement on the base's axes, rad2."""
-    angle_walk: float = shaped(lambda n: ())
-    """Square of the gyro's angle random walk, rad2/s."""
-    rate_walk: float = shaped(lambda n: ())
-    """Square of its rate random walk, rad2/s3."""
-    initial_bias_variance: float = shaped(lambda n: ())
-    """rad2/s2."""
+    angle_walk: float = shaped(lambda n: (), "Square of the gyro's angle random walk, rad2/s")
+    rate_walk: float = shaped(lambda n: (), "Square of its rate random walk, rad2/s3")
+    initial_bias_variance: float = shaped(lambda n: (), "rad2/s2")
     gate: float = shaped(lambda n: ())
     """Square of the largest accepted innovation, in standard deviations."""
-    delay: float = shaped(lambda n: (), uniform=True)
-    """D, ticks."""
-    stage: float = shaped(lambda n: ())
-    """`NOT_STARTED`, `STARTED` or `FILTERING`."""
+    delay: float = shaped(lambda n: (), "D, ticks", uniform=True)
+    stage: float = shaped(lambda n: (), "`NOT_STARTED`, `STARTED` or `FILTERING`")
     reported: Array = shaped(lambda n: (4,))
     """The tracker's last measurement, which is held until the next."""
     quaternion: Array = shaped(lambda n: (4,))
     """Estimated attitude at k - D, from the base to the inertial frame."""
-    bias: Array = shaped(lambda n: (3,))
-    """Estimated bias of the gyro, rad/s."""
+    bias: Array = shaped(lambda n: (3,), "Estimated bias of the gyro, rad/s")
     covariance: Array = shaped(lambda n: (6, 6))
     """Of the errors of attitude (base's axes, rad) and bias (rad/s) at k - D."""
-    present: Array = shaped(lambda n: (4,))
-    """Estimated attitude at k."""
+    present: Array = shaped(lambda n: (4,), "Estimated attitude at k")
     innovation: Array = shaped(lambda n: (3,))
     """Of the last measurement: measured less estimated attitude on the base's axes, rad."""
-    updates: float = shaped(lambda n: ())
-    """Number of measurements used."""
-    rejected: float = shaped(lambda n: ())
-    """Number of measurements rejected by the gate."""
+    updates: float = shaped(lambda n: (), "Number of measurements used")
+    rejected: float = shaped(lambda n: (), "Number of measurements rejected by the gate")
     rejected_in_a_row: float = shaped(lambda n: ())
     gyro: Array = shaped(lambda n: (RING, 3))
     """Samples of the last ticks, rad/s, by tick modulo `RING`."""
@@ -244,14 +240,9 @@ def update(filter: AttitudeFilter, quaternion: Array, is_asked: bool) -> bool:
     if not any_lane(is_asked):
         return is_asked
     p, noise, scratch = filter.covariance, filter.noise, filter.scratch
-    innovation, gain, weighted, rest = (
-        filter.innovation,
-        scratch.gain,
-        scratch.weighted,
-        scratch.remaining,
-    )
-    cosine = small_angle(filter.quaternion, quaternion, innovation)
-    xx, yy, zz, xy, xz, yz = inverse_symmetric(
+    gain, weighted, rest = scratch.gain, scratch.weighted, scratch.remaining
+    cosine = small_angle(filter.quaternion, quaternion, filter.innovation)
+    inverse = inverse_symmetric(
         (
             p[0, 0] + noise[0, 0],
             p[1, 1] + noise[1, 1],
@@ -261,38 +252,30 @@ def update(filter: AttitudeFilter, quaternion: Array, is_asked: bool) -> bool:
             p[1, 2] + noise[1, 2],
         )
     )
-    a, b, c = innovation[0], innovation[1], innovation[2]
+    xx, yy, zz, xy, xz, yz = inverse
+    innovation = vector(filter.innovation, 0)
+    a, b, c = innovation
     distance = xx * a * a + yy * b * b + zz * c * c + 2.0 * (xy * a * b + xz * a * c + yz * b * c)
     is_within = (filter.gate <= 0.0) | ((cosine > 0.0) & (distance <= filter.gate))
     is_used: bool = is_asked & is_within
     if not any_lane(is_used):
         return is_used
-    for i in range(6):  # K = P H^T S^-1, H = [E 0]
-        gain[i, 0] = p[i, 0] * xx + p[i, 1] * xy + p[i, 2] * xz
-        gain[i, 1] = p[i, 0] * xy + p[i, 1] * yy + p[i, 2] * yz
-        gain[i, 2] = p[i, 0] * xz + p[i, 1] * yz + p[i, 2] * zz
+    for i in range(6):  # K = P H^T S^-1, H = [E 0]; P, R and S are symmetric: rows are columns
+        store(transform_symmetric(inverse, vector(p[i], 0)), gain[i], 0)
     for i in range(6):  # (E - K H) P
         for j in range(6):
-            rest[i, j] = p[i, j] - (
-                gain[i, 0] * p[0, j] + gain[i, 1] * p[1, j] + gain[i, 2] * p[2, j]
-            )
+            rest[i, j] = p[i, j] - dot(vector(gain[i], 0), vector(p[j], 0))
     for i in range(6):
         for j in range(3):
-            weighted[i, j] = (
-                gain[i, 0] * noise[0, j] + gain[i, 1] * noise[1, j] + gain[i, 2] * noise[2, j]
-            ) - rest[i, j]
+            weighted[i, j] = dot(vector(gain[i], 0), vector(noise[j], 0)) - rest[i, j]
     for i in range(6):  # (E - K H) P (E - K H)^T + K R K^T, whose upper triangle is as good
         for j in range(i, 6):
-            updated = rest[i, j] + (
-                weighted[i, 0] * gain[j, 0]
-                + weighted[i, 1] * gain[j, 1]
-                + weighted[i, 2] * gain[j, 2]
-            )
+            updated = rest[i, j] + dot(vector(weighted[i], 0), vector(gain[j], 0))
             p[i, j] = where(is_used, updated, p[i, j])
             p[j, i] = p[i, j]
     for i in range(3):
-        scratch.rotation[i] = gain[i, 0] * a + gain[i, 1] * b + gain[i, 2] * c
-        error = gain[3 + i, 0] * a + gain[3 + i, 1] * b + gain[3 + i, 2] * c
+        scratch.rotation[i] = dot(vector(gain[i], 0), innovation)
+        error = dot(vector(gain[3 + i], 0), innovation)
         filter.bias[i] = where(is_used, filter.bias[i] + error, filter.bias[i])
     turn(scratch.rotation, scratch.quaternion)
     multiply(filter.quaternion, scratch.quaternion, scratch.quaternion)
@@ -329,3 +312,61 @@ def recompute(filter: AttitudeFilter, tick: int, period: float, is_asked: bool) 
         multiply(scratch.present, scratch.quaternion, scratch.present)
     for i in range(4):
         filter.present[i] = where(is_asked, scratch.present[i], filter.present[i])
+
+
+@kernel
+def multiply(left: Array, right: Array, out: Array) -> None:
+    """Write the unit quaternion of ``left`` after ``right`` into ``out``, which may be either.
+
+    With ``left`` from the base to the inertial frame, ``right`` turns about the base's axes. The
+    product is normalised, so that rounding does not add up over hours.
+    """
+    a, b, c, d = left[0], left[1], left[2], left[3]
+    w, x, y, z = right[0], right[1], right[2], right[3]
+    p, q = a * w - b * x - c * y - d * z, a * x + b * w + c * z - d * y
+    r, s = a * y - b * z + c * w + d * x, a * z + b * y - c * x + d * w
+    scale = 1.0 / math.sqrt(p * p + q * q + r * r + s * s)
+    out[0], out[1], out[2], out[3] = scale * p, scale * q, scale * r, scale * s
+
+
+@kernel
+def turn(rotation: Array, out: Array) -> None:
+    """Write the quaternion of a rotation vector (3,), rad, into ``out``, up to its length.
+
+    ``[1, tan(|r|/2) r/|r|]``, the tangent by its series: to 1e-12 of the angle up to 0.1 rad, and
+    in plain arithmetic, so that every machine gets the same bits.
+    """
+    x, y, z = 0.5 * rotation[0], 0.5 * rotation[1], 0.5 * rotation[2]
+    square = min(x * x + y * y + z * z, 1.0)
+    factor = 1.0 + square * (1.0 / 3.0 + square * (2.0 / 15.0 + square * (17.0 / 315.0)))
+    out[0], out[1], out[2], out[3] = 1.0, factor * x, factor * y, factor * z
+
+
+@kernel
+def small_angle(origin: Array, other: Array, out: Array) -> float:
+    """Write the rotation from ``origin`` to ``other``, on ``origin``'s axes, into ``out`` (3,).
+
+    Twice the Gibbs vector, rad: the inverse of `turn` to third order, whichever signs the
+    quaternions have.
+
+    Returns:
+        |cos| of half its angle; below it, where 0, lies half a turn: then ``out`` is useless.
+    """
+    a, b, c, d = origin[0], origin[1], origin[2], origin[3]
+    w, x, y, z = other[0], other[1], other[2], other[3]
+    cosine: float = a * w + b * x + c * y + d * z
+    factor = where(cosine != 0.0, 2.0 / where(cosine != 0.0, cosine, 1.0), 0.0)
+    out[0] = factor * (a * x - b * w - c * z + d * y)
+    out[1] = factor * (a * y + b * z - c * w - d * x)
+    out[2] = factor * (a * z - b * y + c * x - d * w)
+    return abs(cosine)
+
+
+@kernel
+def is_same(one: Array, other: Array) -> bool:
+    """Return True if two quaternions are equal up to sign."""
+    as_is, negative = True, True
+    for k in range(4):
+        as_is = as_is & (one[k] == other[k])
+        negative = negative & (one[k] == -other[k])
+    return as_is | negative

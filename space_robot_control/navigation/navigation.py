@@ -21,8 +21,16 @@ from .attitude_filter import (
     propagate,
     start,
 )
-from .joint_filter import JointFilter, begin_joints, filter_joints, tune
-from .low_pass import LowPass, begin_low_pass, low_pass_weight, pass_low
+from .rate_filters import (
+    JointFilter,
+    LowPass,
+    begin_joints,
+    begin_low_pass,
+    filter_joints,
+    low_pass_weight,
+    pass_low,
+    tune,
+)
 from .settings import NavigationFilterSettings
 
 Array = NDArray[np.float64]
@@ -37,17 +45,13 @@ class Navigation(Record):
 
     is_filtered: float = shaped(lambda n: (), uniform=True)
     """0: the laws see the measured state itself."""
-    is_active: float = shaped(lambda n: ())
-    """1 from the first state on."""
-    tick: float = shaped(lambda n: ())
-    """Tick of the last state."""
+    is_active: float = shaped(lambda n: (), "1 from the first state on")
+    tick: float = shaped(lambda n: (), "Tick of the last state")
     attitude: AttitudeFilter = nested(AttitudeFilter)
     low_pass: LowPass = nested(LowPass)
     joints: JointFilter = nested(JointFilter)
-    gyro: Array = shaped(lambda n: (3,))
-    """Last sample, rad/s."""
-    between: Array = shaped(lambda n: (3,))
-    """Scratch: a sample between two, or a rate; rad/s."""
+    gyro: Array = shaped(lambda n: (3,), "Last sample, rad/s")
+    between: Array = shaped(lambda n: (3,), "Scratch: a sample between two, or a rate; rad/s")
     estimate: State = nested(State)
     """What the laws see. Its torque lags as its rates do: so it is the one that belongs to them."""
 
@@ -95,7 +99,7 @@ class Navigation(Record):
 def navigate(navigation: Navigation, tick: int, measured: State, period: float) -> None:
     """Estimate the state at ``tick`` from ``measured`` into ``navigation.estimate``.
 
-    The measured state is usable, see `..kernels.status_of`: others must not come here. Over states
+    The caller has checked that the measured state is usable (`status_of`). Over states
     that were lost (up to `LONGEST_BRIDGE`) the rates are interpolated; after more of them the
     attitude begins anew, and after a jump back in time everything does.
     """

@@ -1,17 +1,38 @@
-"""Settings of navigation and its filter."""
+"""Settings of navigation: the sensors as the filter believes them to be, and its smoothing."""
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+import math
+from collections.abc import Mapping
+from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, Field
 
+from space_robot_model.elementary.matrices import norm
+from space_robot_model.hardware.sensors import SensorSettings
+from space_robot_model.hardware.sheets import read_sheet
 from space_robot_msgs_py.config.validation import StrictModel
 
-Mode = Literal["direct", "filtered"]
+NavigationMode = Literal["direct", "filtered"]
 AS_THE_SENSORS = -1.0
 """Value that selects the number of the sensors' own settings."""
 
+LEAST_ANGLE = 1e-7
+"""rad; no tracker is assumed to be better, for nothing else in the filter is that exact."""
+LEAST = 1e-9
+"""No gyro and no encoder is assumed to be better, rad and rad/s."""
+MAY_BE_ZERO = (
+    "tracker_delay",
+    "gyro_rate_walk",
+    "joint_rate_noise",
+    "gate",
+    "rate_filter_hz",
+    "joint_bandwidth_hz",
+)
+"""Numbers of which 0 says something; where it would say that something is perfect, it counts as
+not given."""
+UNIFORM = 1.0 / math.sqrt(12.0)
+"""Standard deviation of the error of rounding to steps of 1."""
 LEAST_SIGMA = 1e-12
 """A noise above 0 that is smaller counts as this: the filter's numbers are of its square."""
 
@@ -74,3 +95,53 @@ class NavigationFilterSettings(StrictModel):
     joint_bandwidth_hz: Corner = Field(
         150.0, description="bandwidth of the filter of joint angles and rates, Hz (0: none)"
     )
+
+
+def completed(
+    settings: NavigationFilterSettings, sensors: str, period: float
+) -> NavigationFilterSettings:
+    """Return the settings with missing numbers filled from the sensors.
+
+    Args:
+        settings: as they were given.
+        sensors: a name in config/sensors, or a path; read only if a number is missing.
+        period: s.
+
+    Raises:
+        InputError: there is no such file, or it is wrong.
+    """
+    missing = [name for name, value in settings.model_dump().items() if not _is_given(name, value)]
+    if not missing:
+        return settings
+    assumed = assumed_numbers(read_sheet(SensorSettings, "sensors", sensors), period)
+    return settings.model_copy(update={name: assumed[name] for name in missing})
+
+
+def assumed_numbers(sensors: SensorSettings, period: float) -> Mapping[str, Any]:
+    """Return the filter parameters for ``sensors``, by the names of its settings.
+
+    The noise of a gyro's samples counts as an equivalent angle random walk; rates that encoders
+    difference have the noise of the angles.
+    """
+    tracker, gyro, encoders = sensors.star_tracker, sensors.gyro, sensors.encoders
+    rounding = UNIFORM * tracker.step
+    sample = norm((gyro.noise, UNIFORM * gyro.step)) * math.sqrt(period)
+    angle_step = 2.0 * math.pi / 2.0**encoders.bits if encoders.bits else 0.0
+    joint_rate = norm((encoders.velocity_noise, UNIFORM * encoders.velocity_step))
+    return {
+        "tracker_across": max(LEAST_ANGLE, norm((tracker.noise_across, rounding))),
+        "tracker_about": max(LEAST_ANGLE, norm((tracker.noise_about, rounding))),
+        "tracker_boresight": list(tracker.boresight),
+        "tracker_delay": tracker.delay,
+        "gyro_angle_walk": max(LEAST, norm((gyro.angle_random_walk, sample))),
+        "gyro_rate_walk": gyro.rate_random_walk,
+        "gyro_bias": max(LEAST, *(abs(bias) for bias in gyro.initial_bias)),
+        "joint_angle_noise": max(LEAST, norm((encoders.noise, UNIFORM * angle_step))),
+        "joint_rate_noise": 0.0 if encoders.difference_ticks else max(LEAST, joint_rate),
+    }
+
+
+def _is_given(name: str, value: float | list[float]) -> bool:
+    if isinstance(value, list):
+        return any(value)
+    return value > 0.0 or (value == 0.0 and name in MAY_BE_ZERO)

@@ -5,8 +5,25 @@ in inertial axes about one origin, so no frame transformations between links are
 inertia is stored in three blocks: ``[[J, G], [G^T, M]]``, angular part first, J and M symmetric.
 
 A locked joint adds its link's inertia and force to those of the parent (hybrid dynamics,
-Featherstone 2008, chapter 9), which is faster than a free joint. Wheels are leaves on the base,
-rotors of geared joints leaves on the joints' parents.
+Featherstone 2008, chapter 9), which is faster than a free joint.
+
+Reaction wheels are leaves on the base, rotors of motors behind gears leaves on their joints'
+parents. With spin inertia J about its axis a, a balanced leaf that turns with Omega relative to
+the body that carries it obeys
+
+    J (Omegadot + a . wdot) = u,
+
+with the torque u on it: motor torque less friction. The body's inertia I includes the locked leaf.
+Without Omegadot the body has the inertia ``I - J a a^T`` and the additional moment
+``- u a - w x J Omega a`` in its balance (a gyrostat: Hughes, Spacecraft Attitude Dynamics, 1986,
+chapter 3). A wheel at rest by friction is a locked leaf.
+
+A rotor's motion is seen through the gear of ratio N: with the motor angle theta_m and the torque f
+(motor less gear and friction) Omega is ``N thetadot_m`` and u ``f / N``. Spong (J. Dyn. Sys. Meas.
+Control 109, 1987) leaves out ``a . wdot``; without it the momentum of the whole would not be
+conserved (De Luca & Book, Robots with Flexible Elements, Springer Handbook of Robotics, 2016,
+section 11.1). The torque of the gear, ``K (theta_m - theta) + D (thetadot_m - thetadot)``, acts on
+the joint.
 """
 
 from __future__ import annotations
@@ -14,22 +31,27 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from space_robot_msgs_py.compiled.kernels import kernel
+from space_robot_msgs_py.compiled.kernels import kernel, subroutine
 from space_robot_msgs_py.compiled.lanes import all_lanes, any_lane, uniform, where, whole
 
 from .algebra import (
     Matrix,
     Symmetric,
     Vector,
+    accumulate_wrench,
     add,
     add_symmetric,
+    collect_wrench,
+    cross,
     dot,
     inverse_symmetric,
+    load_motion,
     outer_subtracted,
     outer_subtracted_general,
     scale,
     skew_added,
     store,
+    store_motion,
     subtract,
     symmetric,
     transform,
@@ -37,12 +59,12 @@ from .algebra import (
     transform_transposed,
     vector,
 )
-from .branches import accumulate, collect_children, keep_motion, kept_motion
+from .kinematics import joint_axis, rotor_row
 from .model import Data, Model
-from .rotors import take_rotor, turn_rotor
-from .wheels import take_wheels, turn_wheels
 
 Array = NDArray[np.float64]
+Articulated = tuple[Symmetric, Matrix, Symmetric, Vector, Vector]
+"""J, G and M of an articulated inertia, moment and force of its bias force."""
 
 
 @kernel
@@ -58,8 +80,9 @@ def aba(
 
     Call it after `forward_kinematics` and `spatial_velocities`. ``force`` (N+6,) is
     ``[f0, tau0, tau]``, the base's part in inertial axes, N and N m. Joints locked in ``data`` do
-    not accelerate; the required torque is in ``data.holding``. Wheels, then rotors of geared
-    joints, come after the joints in velocities, force and ``out``.
+    not accelerate; the required torque is in ``data.holding``, that of a locked rotor seen through
+    its gear. Wheels, then rotors of geared joints, come after the joints in velocities, force and
+    ``out``.
     """
     # inwards: the articulated-body inertia and bias force of each link, free about its joint
     inertia = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
@@ -69,7 +92,7 @@ def aba(
     for j in range(whole(model.joint_count) - 1, -1, -1):
         i = j + 1
         if uniform(model.branches[i]) != 0.0:
-            inertia, coupling, mass, bias_moment, bias_force = collect_children(
+            inertia, coupling, mass, bias_moment, bias_force = _collect_branches(
                 data.inwards[i], inertia, coupling, mass, bias_moment, bias_force
             )
         inertia = add_symmetric(inertia, symmetric(data.inertia[i]))
@@ -112,15 +135,15 @@ def aba(
         bias_force = add(bias_force, transform_transposed(coupling, angular))
         bias_force = add(bias_force, transform_symmetric(mass, linear))
         if uniform(model.rotor[j]) != 0.0:
-            inertia, bias_moment = take_rotor(model, j, force, data, inertia, bias_moment)
+            inertia, bias_moment = _take_rotor(model, j, force, data, inertia, bias_moment)
         if uniform(model.continues[j]) == 0.0:
             row = data.inwards[whole(model.parent[j])]
-            accumulate(row, inertia, coupling, mass, bias_moment, bias_force)
+            _accumulate_branch(row, inertia, coupling, mass, bias_moment, bias_force)
             inertia = mass = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
             coupling = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
             bias_moment = bias_force = (0.0, 0.0, 0.0)
     if uniform(model.branches[0]) != 0.0:
-        inertia, coupling, mass, bias_moment, bias_force = collect_children(
+        inertia, coupling, mass, bias_moment, bias_force = _collect_branches(
             data.inwards[0], inertia, coupling, mass, bias_moment, bias_force
         )
     inertia = add_symmetric(inertia, symmetric(data.inertia[0]))
@@ -130,7 +153,7 @@ def aba(
     bias_moment = add(bias_moment, vector(data.bias[0], 0))
     bias_force = add(bias_force, vector(data.bias[0], 3))
     if uniform(model.wheel_count) > 0.0:
-        inertia, bias_moment = take_wheels(
+        inertia, bias_moment = _take_wheels(
             model, omega_inertial, joint_velocities, force, data, inertia, bias_moment
         )
     # free-floating base: no joint to the ground
@@ -144,15 +167,15 @@ def aba(
     store(linear, out, 0)
     store(angular, out, 3)
     # outwards: the accelerations
-    turn_wheels(model, angular, force, data, out)
+    _turn_wheels(model, angular, force, data, out)
     if uniform(model.branches[0]) != 0.0:
-        keep_motion(angular, linear, data.outwards[0])
+        store_motion(angular, linear, data.outwards[0])
     for j in range(whole(model.joint_count)):
         i = j + 1
         if uniform(model.continues[j]) == 0.0:
-            angular, linear = kept_motion(data.outwards[whole(model.parent[j])])
+            angular, linear = load_motion(data.outwards[whole(model.parent[j])])
         if uniform(model.rotor[j]) != 0.0:
-            turn_rotor(model, j, angular, force, data, out)
+            _turn_rotor(model, j, angular, force, data, out)
         angular = add(angular, vector(data.coriolis[i], 0))
         linear = add(linear, vector(data.coriolis[i], 3))
         acceleration = data.u_over_d[i] - dot(vector(data.U_over_D[i], 0), angular)
@@ -166,7 +189,7 @@ def aba(
         angular = add(angular, scale(vector(data.motion[i], 0), acceleration))
         linear = add(linear, scale(vector(data.motion[i], 3), acceleration))
         if uniform(model.branches[i]) != 0.0:
-            keep_motion(angular, linear, data.outwards[i])
+            store_motion(angular, linear, data.outwards[i])
 
 
 @kernel
@@ -194,3 +217,110 @@ def solve_spatial(
     angular = transform_symmetric(inverse_symmetric(complement), subtract(moment, coupled))
     linear = transform_symmetric(inverse_mass, subtract(force, transform_transposed(g, angular)))
     return angular, linear
+
+
+@subroutine
+def _accumulate_branch(
+    row: Array, inertia: Symmetric, coupling: Matrix, mass: Symmetric, moment: Vector, force: Vector
+) -> None:
+    for k in range(6):
+        row[k] += inertia[k]
+        row[15 + k] += mass[k]
+    for k in range(9):
+        row[6 + k] += coupling[k]
+    accumulate_wrench(row[21:], moment, force)
+
+
+@subroutine
+def _collect_branches(
+    row: Array, inertia: Symmetric, coupling: Matrix, mass: Symmetric, moment: Vector, force: Vector
+) -> Articulated:
+    inertia = add_symmetric(inertia, symmetric(row))
+    mass = add_symmetric(mass, symmetric(row[15:]))
+    c = coupling
+    coupling = (
+        c[0] + row[6],
+        c[1] + row[7],
+        c[2] + row[8],
+        c[3] + row[9],
+        c[4] + row[10],
+        c[5] + row[11],
+        c[6] + row[12],
+        c[7] + row[13],
+        c[8] + row[14],
+    )
+    for k in range(21):
+        row[k] = 0.0
+    moment, force = collect_wrench(row[21:], moment, force)
+    return inertia, coupling, mass, moment, force
+
+
+@subroutine
+def _take_leaf(
+    inertia: Symmetric, moment: Vector, axis: Vector, spin: float, torque: float, is_locked: bool
+) -> tuple[Symmetric, Vector]:
+    if not all_lanes(is_locked):
+        free = outer_subtracted(inertia, axis, scale(axis, spin))
+        inertia = where(is_locked, inertia, free)
+        free_moment = add(moment, scale(axis, torque))
+        moment = where(is_locked, moment, free_moment)
+    return inertia, moment
+
+
+@kernel
+def _take_wheels(
+    model: Model,
+    omega_inertial: Array,
+    velocities: Array,
+    force: Array,
+    data: Data,
+    inertia: Symmetric,
+    bias_moment: Vector,
+) -> tuple[Symmetric, Vector]:
+    n, r = whole(model.joint_count), data.rotation
+    momentum = (0.0, 0.0, 0.0)
+    for k in range(whole(model.wheel_count)):
+        a, spin_inertia = vector(model.wheel_axis[k], 0), model.wheel_inertia[k]
+        axis = (dot(vector(r[0], 0), a), dot(vector(r[1], 0), a), dot(vector(r[2], 0), a))
+        store(axis, data.wheel_axis[k], 0)
+        momentum = add(momentum, scale(axis, spin_inertia * velocities[n + k]))
+        is_locked = data.locked[n + k] != 0.0
+        inertia, bias_moment = _take_leaf(
+            inertia, bias_moment, axis, spin_inertia, force[6 + n + k], is_locked
+        )
+    return inertia, add(bias_moment, cross(vector(omega_inertial, 0), momentum))
+
+
+@kernel
+def _turn_wheels(model: Model, angular: Vector, force: Array, data: Data, out: Array) -> None:
+    n = whole(model.joint_count)
+    for k in range(whole(model.wheel_count)):
+        of_base = dot(vector(data.wheel_axis[k], 0), angular)
+        is_locked = data.locked[n + k] != 0.0
+        free = force[6 + n + k] / model.wheel_inertia[k] - of_base
+        out[6 + n + k] = where(is_locked, 0.0, free)
+        if any_lane(is_locked):
+            holding = force[6 + n + k] - model.wheel_inertia[k] * of_base
+            data.holding[n + k] = where(is_locked, holding, data.holding[n + k])
+
+
+@subroutine
+def _take_rotor(
+    model: Model, j: int, force: Array, data: Data, inertia: Symmetric, bias_moment: Vector
+) -> tuple[Symmetric, Vector]:
+    axis, row = joint_axis(model, j, data), rotor_row(model, j)
+    torque, is_locked = force[6 + row] / model.gear_ratio[j], data.locked[row] != 0.0
+    return _take_leaf(inertia, bias_moment, axis, model.rotor_inertia[j], torque, is_locked)
+
+
+@subroutine
+def _turn_rotor(
+    model: Model, j: int, angular: Vector, force: Array, data: Data, out: Array
+) -> None:
+    row, ratio = rotor_row(model, j), model.gear_ratio[j]
+    coupled = model.rotor_inertia[j] * ratio * dot(joint_axis(model, j, data), angular)
+    torque = force[6 + row] - coupled
+    is_locked = data.locked[row] != 0.0
+    out[6 + row] = where(is_locked, 0.0, torque / (model.rotor_inertia[j] * ratio * ratio))
+    if any_lane(is_locked):
+        data.holding[row] = where(is_locked, torque, data.holding[row])

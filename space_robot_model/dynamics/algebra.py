@@ -1,8 +1,13 @@
-"""Algebra of three-vectors, 3 x 3 matrices and quaternions, as tuples.
+"""Algebra of three-vectors, 3 x 3 matrices and quaternions as tuples, and their memory.
 
 Tuples are kept in registers, since the compiler need not consider overlaps as for array views.
 A symmetric matrix is ``(xx, yy, zz, xy, xz, yz)``, a general one nine numbers row by row, a
 quaternion ``(w, x, y, z)``.
+
+Recursions visit bodies branch by branch (see `Model`). Along a branch the parent is the previous
+body, and its values are in registers; at the start of a branch they are loaded from its row. In
+the inward recursion the result of a branch is added to its parent's row, which the parent collects
+and clears.
 """
 
 from __future__ import annotations
@@ -17,6 +22,8 @@ Vector = tuple[float, float, float]
 Symmetric = tuple[float, float, float, float, float, float]
 Matrix = tuple[float, float, float, float, float, float, float, float, float]
 Quaternion = tuple[float, float, float, float]
+Spatial = tuple[Vector, Vector]
+"""Angular and linear part of a velocity, acceleration or force."""
 
 
 @subroutine
@@ -59,6 +66,20 @@ def dot(a: Vector, b: Vector) -> float:
 def cross(a: Vector, b: Vector) -> Vector:
     """Return ``a x b``."""
     return (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
+
+
+@subroutine
+def combine(x: Vector, y: Vector, z: Vector, a: float, b: float, c: float) -> Vector:
+    """Return ``a x + b y + c z``."""
+    return add(add(scale(x, a), scale(y, b)), scale(z, c))
+
+
+@subroutine
+def rotate_axes(x: Vector, y: Vector, z: Vector, rotation: Array) -> tuple[Vector, Vector, Vector]:
+    """Return the axes of a frame with a ``rotation`` (9,), row by row, relative to x, y, z."""
+    e = rotation
+    first, second = combine(x, y, z, e[0], e[3], e[6]), combine(x, y, z, e[1], e[4], e[7])
+    return first, second, combine(x, y, z, e[2], e[5], e[8])
 
 
 @subroutine
@@ -199,3 +220,48 @@ def rotated(q: Quaternion, a: Vector) -> Vector:
     t = scale(cross((x, y, z), a), 2.0)
     s = cross((x, y, z), t)
     return a[0] + w * t[0] + s[0], a[1] + w * t[1] + s[1], a[2] + w * t[2] + s[2]
+
+
+@subroutine
+def store_frame(axes: Matrix, origin: Vector, row: Array) -> None:
+    """Write the axes and origin of a body into ``row`` (12,)."""
+    for k in range(9):
+        row[k] = axes[k]
+    store(origin, row, 9)
+
+
+@subroutine
+def load_frame(row: Array) -> tuple[Matrix, Vector]:
+    """Return the axes and origin written by `store_frame`."""
+    axes = (row[0], row[1], row[2], row[3], row[4], row[5], row[6], row[7], row[8])
+    return axes, vector(row, 9)
+
+
+@subroutine
+def store_motion(angular: Vector, linear: Vector, row: Array) -> None:
+    """Write a velocity or acceleration of a body into ``row`` (6,)."""
+    store(angular, row, 0)
+    store(linear, row, 3)
+
+
+@subroutine
+def load_motion(row: Array) -> Spatial:
+    """Return the motion written by `store_motion`."""
+    return vector(row, 0), vector(row, 3)
+
+
+@subroutine
+def accumulate_wrench(row: Array, moment: Vector, force: Vector) -> None:
+    """Add moment and force of a branch to its parent's ``row`` (6,)."""
+    for k in range(3):
+        row[k] += moment[k]
+        row[3 + k] += force[k]
+
+
+@subroutine
+def collect_wrench(row: Array, moment: Vector, force: Vector) -> Spatial:
+    """Return the sum of the arguments and the branches' contributions; clear ``row`` (6,)."""
+    total = add(moment, vector(row, 0)), add(force, vector(row, 3))
+    for k in range(6):
+        row[k] = 0.0
+    return total

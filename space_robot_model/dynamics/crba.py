@@ -46,7 +46,7 @@ def crba(model: Model, data: Data, out: Array) -> None:
             out[r, c] = 0.0
     for j in range(whole(model.joint_count) - 1, -1, -1):
         if uniform(model.branches[j + 1]) != 0.0:
-            mass, moment, inertia = _taken_in(data.inwards[j + 1], mass, moment, inertia)
+            mass, moment, inertia = _collect(data.inwards[j + 1], mass, moment, inertia)
         mass += model.mass[j + 1]
         moment = add(moment, vector(data.first_moment[j + 1], 0))
         inertia = add_symmetric(inertia, symmetric(data.inertia[j + 1]))
@@ -65,11 +65,11 @@ def crba(model: Model, data: Data, out: Array) -> None:
             column[5 + i] = out[5 + i, 6 + j] = element
             i = whole(model.parent[i - 1])
         if uniform(model.continues[j]) == 0.0:
-            _hand_in(data.inwards[whole(model.parent[j])], mass, moment, inertia)
+            _accumulate(data.inwards[whole(model.parent[j])], mass, moment, inertia)
             mass, moment = 0.0, (0.0, 0.0, 0.0)
             inertia = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     if uniform(model.branches[0]) != 0.0:
-        mass, moment, inertia = _taken_in(data.inwards[0], mass, moment, inertia)
+        mass, moment, inertia = _collect(data.inwards[0], mass, moment, inertia)
     mass += model.mass[0]
     moment = add(moment, vector(data.first_moment[0], 0))
     xx, yy, zz, xy, xz, yz = add_symmetric(inertia, symmetric(data.inertia[0]))
@@ -89,8 +89,7 @@ def crba(model: Model, data: Data, out: Array) -> None:
 
 
 @subroutine
-def _hand_in(row: Array, mass: float, moment: Vector, inertia: Symmetric) -> None:
-    """Add a branch's composite body to its parent's ``row``."""
+def _accumulate(row: Array, mass: float, moment: Vector, inertia: Symmetric) -> None:
     row[0] += mass
     for k in range(3):
         row[1 + k] += moment[k]
@@ -99,10 +98,9 @@ def _hand_in(row: Array, mass: float, moment: Vector, inertia: Symmetric) -> Non
 
 
 @subroutine
-def _taken_in(
+def _collect(
     row: Array, mass: float, moment: Vector, inertia: Symmetric
 ) -> tuple[float, Vector, Symmetric]:
-    """Return the sum of the arguments and the branches' contributions; clear ``row``."""
     mass, moment = mass + row[0], add(moment, vector(row, 1))
     inertia = add_symmetric(inertia, symmetric(row[4:]))
     for k in range(10):

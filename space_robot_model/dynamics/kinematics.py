@@ -8,16 +8,22 @@ from numpy.typing import NDArray
 from space_robot_msgs_py.compiled.kernels import kernel, subroutine
 from space_robot_msgs_py.compiled.lanes import uniform, whole
 
-from ..elementary.sine import sin_cos
+from ..elementary.functions import sin_cos
 from .algebra import (
     Matrix,
     Symmetric,
     Vector,
     add,
+    combine,
     cross,
     dot,
+    load_frame,
+    load_motion,
+    rotate_axes,
     scale,
     store,
+    store_frame,
+    store_motion,
     subtract,
     symmetric,
     transform,
@@ -25,9 +31,7 @@ from .algebra import (
     vector,
 )
 from .attitude import rotation_matrix
-from .branches import keep_frame, keep_motion, kept_frame, kept_motion
 from .model import Data, Model
-from .rotors import add_rotor_momentum_rate
 
 Array = NDArray[np.float64]
 
@@ -46,23 +50,19 @@ def forward_kinematics(model: Model, quaternion: Array, joint_positions: Array, 
     r = data.rotation
     axes = (r[0, 0], r[0, 1], r[0, 2], r[1, 0], r[1, 1], r[1, 2], r[2, 0], r[2, 1], r[2, 2])
     joint = (0.0, 0.0, 0.0)
-    keep_frame(axes, joint, data.frame[0])
+    store_frame(axes, joint, data.frame[0])
     # separate loops: a call within the long one would spill its registers
     for j in range(whole(model.joint_count)):
         data.turn[j, 1], data.turn[j, 0] = sin_cos(joint_positions[j])
     for j in range(whole(model.joint_count)):
         if uniform(model.continues[j]) == 0.0:
-            axes, joint = kept_frame(data.frame[whole(model.parent[j])])
+            axes, joint = load_frame(data.frame[whole(model.parent[j])])
         x = (axes[0], axes[3], axes[6])
         y = (axes[1], axes[4], axes[7])
         z = (axes[2], axes[5], axes[8])
-        e, offset, motion = model.rotation[j], model.offset[j], data.motion[j + 1]
-        x, y, z = (
-            _combined(x, y, z, e[0], e[3], e[6]),
-            _combined(x, y, z, e[1], e[4], e[7]),
-            _combined(x, y, z, e[2], e[5], e[8]),
-        )
-        joint = add(joint, _combined(x, y, z, offset[0], offset[1], offset[2]))
+        offset, motion = model.offset[j], data.motion[j + 1]
+        x, y, z = rotate_axes(x, y, z, model.rotation[j])
+        joint = add(joint, combine(x, y, z, offset[0], offset[1], offset[2]))
         if uniform(model.is_prismatic[j]) == 0.0:
             ct, st = data.turn[j, 0], data.turn[j, 1]
             x, y = add(scale(x, ct), scale(y, st)), subtract(scale(y, ct), scale(x, st))
@@ -73,21 +73,15 @@ def forward_kinematics(model: Model, quaternion: Array, joint_positions: Array, 
             store((0.0, 0.0, 0.0), motion, 0)
             store(z, motion, 3)
         axes = (x[0], y[0], z[0], x[1], y[1], z[1], x[2], y[2], z[2])
-        keep_frame(axes, joint, data.frame[j + 1])
+        store_frame(axes, joint, data.frame[j + 1])
     _place(model, data)
-
-
-@subroutine
-def _combined(x: Vector, y: Vector, z: Vector, a: float, b: float, c: float) -> Vector:
-    """Return ``a x + b y + c z``."""
-    return add(add(scale(x, a), scale(y, b)), scale(z, c))
 
 
 @subroutine
 def _place(model: Model, data: Data) -> None:
     """Compute first moment and inertia of every body about the origin, from its frame."""
     for i in range(whole(model.joint_count) + 1):
-        axes, joint = kept_frame(data.frame[i])
+        axes, joint = load_frame(data.frame[i])
         com = add(joint, transform(axes, vector(model.com[i], 0)))
         moment = scale(com, model.mass[i])
         store(moment, data.first_moment[i], 0)
@@ -129,10 +123,10 @@ def spatial_velocities(
     v = (0.0, 0.0, 0.0)
     _momentum_rate(model, 0, w, v, data)
     if uniform(model.branches[0]) != 0.0:
-        keep_motion(w, v, data.outwards[0])
+        store_motion(w, v, data.outwards[0])
     for j in range(whole(model.joint_count)):
         if uniform(model.continues[j]) == 0.0:
-            w, v = kept_motion(data.outwards[whole(model.parent[j])])
+            w, v = load_motion(data.outwards[whole(model.parent[j])])
         motion, coriolis = data.motion[j + 1], data.coriolis[j + 1]
         angular = scale(vector(motion, 0), joint_velocities[j])
         linear = scale(vector(motion, 3), joint_velocities[j])
@@ -140,11 +134,11 @@ def spatial_velocities(
         store(cross(w, angular), coriolis, 0)
         store(add(cross(v, angular), cross(w, linear)), coriolis, 3)
         if uniform(model.rotor[j]) != 0.0:
-            add_rotor_momentum_rate(model, j, w, joint_velocities, data)
+            _add_rotor_momentum_rate(model, j, w, joint_velocities, data)
         w, v = add(w, angular), add(v, linear)
         _momentum_rate(model, j + 1, w, v, data)
         if uniform(model.branches[j + 1]) != 0.0:
-            keep_motion(w, v, data.outwards[j + 1])
+            store_motion(w, v, data.outwards[j + 1])
 
 
 @subroutine
@@ -154,3 +148,25 @@ def _momentum_rate(model: Model, i: int, w: Vector, v: Vector, data: Data) -> No
     angular = add(transform_symmetric(symmetric(data.inertia[i]), w), cross(moment, v))
     store(add(cross(w, angular), cross(v, linear)), data.bias[i], 0)
     store(cross(w, linear), data.bias[i], 3)
+
+
+@subroutine
+def rotor_row(model: Model, j: int) -> int:
+    """Return where the rotor of joint j stands in velocities and locked joints."""
+    return whole(model.joint_count) + whole(model.wheel_count) + whole(model.rotor[j]) - 1
+
+
+@subroutine
+def joint_axis(model: Model, j: int, data: Data) -> Vector:
+    """Return the axis of joint j, also of one that slides along it, in inertial axes."""
+    return vector(data.motion[j + 1], 0 if uniform(model.is_prismatic[j]) == 0.0 else 3)
+
+
+@subroutine
+def _add_rotor_momentum_rate(
+    model: Model, j: int, omega_parent: Vector, velocities: Array, data: Data
+) -> None:
+    spin = model.rotor_inertia[j] * model.gear_ratio[j] * velocities[rotor_row(model, j)]
+    row = data.bias[whole(model.parent[j])]
+    moment = cross(omega_parent, scale(joint_axis(model, j, data), spin))
+    store(add(vector(row, 0), moment), row, 0)

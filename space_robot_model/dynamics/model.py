@@ -65,13 +65,13 @@ class Model(Record):
     rest: Array = shaped(lambda n: (MOST_JOINTS,))
     """Rest position of each passive joint's spring, rad or m."""
     wheel_count: float = shaped(lambda n: (), uniform=True)
-    """Number of reaction wheels (`space_robot_model.dynamics.wheels`), at most MOST_WHEELS."""
+    """Number of reaction wheels (`space_robot_model.dynamics.aba`), at most MOST_WHEELS."""
     wheel_axis: Array = shaped(lambda n: (MOST_WHEELS, 3))
     """Spin axes of the wheels, unit vectors in the base frame."""
     wheel_inertia: Array = shaped(lambda n: (MOST_WHEELS,))
     """Inertia of each wheel about its axis, kg m2; included in the base's."""
     rotor_count: float = shaped(lambda n: (), uniform=True)
-    """Number G of joints with gears (`space_robot_model.dynamics.rotors`)."""
+    """Number G of joints with gears (`space_robot_model.dynamics.aba`)."""
     rotor: Array = shaped(lambda n: (MOST_JOINTS,), uniform=True)
     """Number of each joint's rotor from 1; 0 for joints without a gear."""
     rotor_inertia: Array = shaped(lambda n: (MOST_JOINTS,))

@@ -10,16 +10,34 @@ is simple since ``H11 = M E``. Then ``H_S = J^-T H_r J^-1`` and
 ``c_S = J^-T (c_r + H_r (b - J^-1 Jdot J^-1 rhodot))``, with ``F_S = J^-T F`` on the right of
 (25). On D's axes, with ``w_e = w0 - omega_d``, the base turns with ``w0dot = J0^-1 (epsdd_e - J0dot
 w_e) + b`` and ``b = alpha_d + omega_d x w_e``; b is zero on all other axes.
+
+Where nothing turns the base either, all six of its coordinates are eliminated, the rotation in
+inertial axes, so that no attitude is singular: with B = [v0, w0] and M = thetadot,
+``H_f = H_MM - H_MB H_BB^-1 H_BM`` and ``c_f = c_M - H_MB H_BB^-1 c_B``, so that
+``H_f thetadd + c_f = tau`` (the generalized inertia of Umetani and Yoshida 1989; Papadopoulos and
+Dubowsky 1991). It holds for any momentum.
 """
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
-from space_robot_msgs_py.compiled.kernels import kernel
+from space_robot_msgs_py.compiled.kernels import kernel, subroutine
 from space_robot_msgs_py.compiled.records import Record, nested, shaped
 
+from .algebra import (
+    Symmetric,
+    add,
+    dot,
+    inverse_symmetric,
+    scale,
+    store,
+    transform_symmetric,
+    vector,
+)
 from .attitude import attitude_jacobian_inverse, rotate, rotate_back, rotation_matrix
 from .crba import crba
 from .kinematics import forward_kinematics, spatial_velocities
@@ -27,6 +45,7 @@ from .model import Data, Model
 from .rnea import rnea_bias
 
 Array = NDArray[np.float64]
+Block = NDArray[Any]
 
 
 class RhoSpaceModel(Record):
@@ -146,7 +165,6 @@ def semi_floating_into(
 
 @kernel
 def _eliminate_translation(full: Array, full_bias: Array, inertia: Array, bias: Array) -> None:
-    """Compute ``H_r = H22 - H21 H12 / M``, ``c_r = c2 - H21 c1 / M``: no force on the base."""
     total_mass = full[0, 0]
     for i in range(bias.size):
         bias[i] = full_bias[3 + i]
@@ -156,3 +174,65 @@ def _eliminate_translation(full: Array, full_bias: Array, inertia: Array, bias: 
             inertia[i, j] = full[3 + i, 3 + j]
             for k in range(3):
                 inertia[i, j] -= full[3 + i, k] * full[k, 3 + j] / total_mass
+
+
+@kernel
+def eliminate_rotation(out: RhoSpaceModel) -> None:
+    """Convert H_r and c_r of `semi_floating_into` to H_f and c_f of the joints.
+
+    The base's axes are decoupled, with inertia 1 (so that laws can invert the matrix) and zero
+    bias: zero acceleration gives zero force.
+    """
+    inertia, bias = out.inertia, out.bias
+    mobility, base_bias = _base_mobility(inertia), vector(bias, 0)
+    for j in range(3, bias.size):
+        turned = transform_symmetric(mobility, (inertia[0, j], inertia[1, j], inertia[2, j]))
+        bias[j] -= dot(turned, base_bias)
+        for i in range(3, bias.size):
+            inertia[i, j] -= dot(turned, (inertia[i, 0], inertia[i, 1], inertia[i, 2]))
+    for k in range(3):
+        bias[k] = 0.0
+        for i in range(bias.size):
+            inertia[k, i] = inertia[i, k] = 0.0
+        inertia[k, k] = 1.0
+
+
+@subroutine
+def _base_mobility(inertia: Array) -> Symmetric:
+    i = inertia
+    return inverse_symmetric((i[0, 0], i[1, 1], i[2, 2], i[0, 1], i[0, 2], i[1, 2]))
+
+
+@kernel
+def free_inverse_dynamics_along(
+    model: Model, references: Block, work: RhoSpaceModel, out: Array
+) -> None:
+    """Write the joint torques for each of N references into ``out`` (N, n+3), N m.
+
+    The momentum is zero, so the base rotates with ``w0 = -H_BB^-1 H_BM thetadot``; the attitude
+    does not matter.
+
+    Args:
+        model: the robot.
+        references: (N,) block of `Reference`, with unit quaternions.
+        work: scratch.
+        out: zero in the base's axes, then the joints.
+    """
+    inertia, inertial, omega_base = work.inertia, work.vectors[1], work.vectors[2]
+    for k in range(references.size):
+        attitude, positions = references[k].quaternion, references[k].joint_positions
+        rates, accelerations = references[k].joint_velocities, references[k].joint_accelerations
+        omega_base[:] = 0.0
+        semi_floating_into(model, attitude, positions, omega_base, rates, work)
+        momentum = (0.0, 0.0, 0.0)
+        for j in range(rates.size):
+            column = (inertia[0, 3 + j], inertia[1, 3 + j], inertia[2, 3 + j])
+            momentum = add(momentum, scale(column, -rates[j]))
+        store(transform_symmetric(_base_mobility(inertia), momentum), inertial, 0)
+        rotate_back(work.rotation, inertial, omega_base)
+        semi_floating_into(model, attitude, positions, omega_base, rates, work)
+        eliminate_rotation(work)
+        for i in range(out.shape[1]):
+            out[k, i] = work.bias[i]
+            for j in range(rates.size):
+                out[k, i] += inertia[i, 3 + j] * accelerations[j]

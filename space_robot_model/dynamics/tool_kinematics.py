@@ -35,6 +35,7 @@ from .algebra import (
     cross,
     dot,
     inverse_symmetric,
+    load_frame,
     scale,
     store,
     subtract,
@@ -43,7 +44,6 @@ from .algebra import (
     transform_symmetric,
     vector,
 )
-from .branches import kept_frame
 from .crba import crba
 from .kinematics import forward_kinematics
 from .model import Data, Model
@@ -104,7 +104,7 @@ def tool_kinematics_into(
     """
     forward_kinematics(model, quaternion, joint_positions, out.data)
     crba(model, out.data, out.full_inertia)
-    axes, origin = kept_frame(out.data.frame[body])
+    axes, origin = load_frame(out.data.frame[body])
     tool = add(origin, transform(axes, vector(point, 0)))
     for k in range(3):
         column = transform(axes, (mounting[0, k], mounting[1, k], mounting[2, k]))
@@ -116,7 +116,6 @@ def tool_kinematics_into(
 
 @subroutine
 def _fixed_base(model: Model, body: int, tool: Vector, out: ToolKinematics) -> None:
-    """Fill ``J_b`` and ``J_m``; joints that do not carry the tool have columns of zeros."""
     out.base[:] = 0.0
     out.joints[:] = 0.0
     for k in range(6):
@@ -135,7 +134,6 @@ def _fixed_base(model: Model, body: int, tool: Vector, out: ToolKinematics) -> N
 
 @subroutine
 def _momentum_coupling(tool: Vector, out: ToolKinematics) -> None:
-    """Fill ``H~_wm``, ``H~_ww`` and the tool's position: moments about the centre of mass."""
     full = out.full_inertia
     mass = full[0, 0]
     com = (full[1, 5] / mass, full[2, 3] / mass, full[0, 4] / mass)
@@ -157,7 +155,6 @@ def _momentum_coupling(tool: Vector, out: ToolKinematics) -> None:
 
 @subroutine
 def _eliminate_base(out: ToolKinematics) -> None:
-    """Fill ``J_w``, ``J_held`` and ``J_g``: ``v0`` follows from P = 0, ``w0`` from L = 0."""
     full = out.full_inertia
     mass, mobility = full[0, 0], inverse_symmetric(symmetric(out.inertia))
     for c in range(3):

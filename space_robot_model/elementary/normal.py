@@ -1,28 +1,50 @@
-"""Standard normal distribution: cumulative distribution function, quantiles, random numbers."""
+"""Normal random numbers: quantiles of the random bits of NumPy's generator `PCG64`.
+
+Seeds are spread by the hash of NumPy's `SeedSequence`; the generator is PCG XSL RR 128/64 of
+M. E. O'Neill, "PCG: A Family of Simple Fast Space-Efficient Statistically Good Algorithms for
+Random Number Generation", Harvey Mudd College, HMC-CS-2014-0905 (2014).
+"""
 
 from __future__ import annotations
 
 import math
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from space_robot_msgs_py.compiled.kernels import kernel, subroutine
-from space_robot_msgs_py.compiled.lane_words import as_lanes, as_numbers
-from space_robot_msgs_py.compiled.lanes import WIDTH, all_lanes, any_lane, lane_of, where
+from space_robot_msgs_py.compiled.lanes import (
+    WIDTH,
+    all_lanes,
+    any_lane,
+    as_lanes,
+    as_numbers,
+    lane_of,
+    where,
+)
 
-from .exponential import exp, log
-from .random_bits import bits_of, following, pcg64
+from .functions import log
 
 Array = NDArray[np.float64]
 Pair = tuple[float, float]
+Words = tuple[np.uint64, np.uint64]
+State = tuple[np.uint64, np.uint64, np.uint64, np.uint64]
+"""State and increment of a generator, the upper and the lower 64 bits of each."""
 
-ROOT_TWO_PI = 2.5066282746310007
-SERIES_LIMIT = 3.0
-"""Limit between series and continued fraction of the cumulative distribution function."""
+POOL = 4
+"""Words of 32 bits among which seeds are mixed."""
+WORDS = 8
+"""Words of 32 bits in a state and its increment."""
+LOW = np.uint64(0xFFFFFFFF)
+HALF, WORD = np.uint64(16), np.uint64(32)
+ONE, TOP, FULL = np.uint64(1), np.uint64(58), np.uint64(64)
+HASH, HASH_FACTOR = np.uint64(0x43B0D7E5), np.uint64(0x931E8875)
+OUT_HASH, OUT_FACTOR = np.uint64(0x8B51F9DD), np.uint64(0x58F38DED)
+MIX_LEFT, MIX_RIGHT = np.uint64(0xCA01F9DD), np.uint64(0x4973F715)
+FACTOR_HIGH, FACTOR_LOW = np.uint64(0x2360ED051FC65DA4), np.uint64(0x4385DF649FCCF645)
+UNUSED_BITS = np.uint64(12)
 CENTRE = 0.425
 """Distance from 1/2 up to which Wichura's first pair of polynomials is used."""
-UNUSED_BITS = np.uint64(12)
 TAIL = 5.0
 """Limit of sqrt(-log p) between his second and third pair."""
 
@@ -59,17 +81,6 @@ OUTER: tuple[Pair, ...] = (
 )
 
 
-def normal_quantile(share: ArrayLike) -> Array:
-    """Return the standard normal quantiles of probabilities ``share``, in their shape.
-
-    They are minus infinity at 0, infinity at 1, and NaN outside.
-    """
-    shares = np.asarray(share, dtype=np.float64)
-    quantiles = np.empty(shares.size)
-    _quantiles(np.ascontiguousarray(shares).reshape(-1), quantiles)
-    return quantiles.reshape(shares.shape)
-
-
 @kernel
 def normal_numbers(draws: Array, seed: float, key: int, block: int) -> None:
     """Fill ``draws`` with standard normal numbers, a function of the three integers.
@@ -97,17 +108,12 @@ def normal_numbers(draws: Array, seed: float, key: int, block: int) -> None:
 
 
 @kernel
-def _quantiles(shares: Array, out: Array) -> None:
-    for i in range(out.size):
-        out[i] = quantile(shares[i])
-
-
-@kernel
 def quantile(share: float) -> float:
-    """Return `normal_quantile` of one number, for kernels.
+    """Return the standard normal quantile of probability ``share``.
 
-    M. J. Wichura, "Algorithm AS 241: The Percentage Points of the Normal Distribution", Applied
-    Statistics 37 (1988). The error is below 6 units in the last place.
+    It is minus infinity at 0, infinity at 1, and NaN outside. The error is below 6 units in the
+    last place (M. J. Wichura, "Algorithm AS 241: The Percentage Points of the Normal
+    Distribution", Applied Statistics 37, 1988).
     """
     q = share - 0.5
     is_central = abs(q) <= CENTRE
@@ -125,7 +131,6 @@ def quantile(share: float) -> float:
 
 @subroutine
 def _ratio(polynomials: tuple[Pair, ...], r: float) -> float:
-    """Return the ratio of two polynomials in ``r``, from their pairs of coefficients."""
     above, below = polynomials[0]
     for k in range(1, len(polynomials)):
         above, below = polynomials[k][0] + r * above, polynomials[k][1] + r * below
@@ -133,23 +138,63 @@ def _ratio(polynomials: tuple[Pair, ...], r: float) -> float:
 
 
 @kernel
-def normal_cdf(z: float) -> float:
-    """Return the standard normal cumulative distribution function at ``z``.
+def pcg64(first: int, second: int, third: int) -> State:
+    """Return the state of ``numpy.random.PCG64((first, second, third))``.
 
-    For |z| up to 3 it is ``1/2 + phi(z) (z + z^3/3 + z^5/(3 5) + ...)``, beyond it Laplace's
-    continued fraction ``phi(z) / (z + 1/(z + 2/(z + ...)))``. The relative error is below 3e-13.
+    The three seeds are integers from 0 to 2**32 - 1.
     """
-    if np.isnan(z):
-        return z
-    size = abs(z)
-    density = exp(-0.5 * size * size) / ROOT_TWO_PI
-    if size <= SERIES_LIMIT:
-        term, total, k = size, size, 3.0
-        while term > 1e-17 * total:
-            term *= size * size / k
-            total, k = total + term, k + 2.0
-        return 0.5 + math.copysign(density * total, z)
-    rest = size
-    for k in range(120, 0, -1):
-        rest = size + k / rest
-    return density / rest if z < 0.0 else 1.0 - density / rest
+    pool = np.zeros(POOL, np.uint64)
+    pool[0], pool[1], pool[2] = np.uint64(first), np.uint64(second), np.uint64(third)
+    constant = HASH
+    for i in range(POOL):
+        pool[i], constant = _hash(pool[i], constant, HASH_FACTOR)
+    for i in range(POOL):
+        for k in range(POOL):
+            if i != k:
+                value, constant = _hash(pool[i], constant, HASH_FACTOR)
+                mixed = (MIX_LEFT * pool[k] - MIX_RIGHT * value) & LOW
+                pool[k] = mixed ^ (mixed >> HALF)
+    words = np.zeros(WORDS, np.uint64)
+    constant = OUT_HASH
+    for i in range(WORDS):
+        words[i], constant = _hash(pool[i % POOL], constant, OUT_FACTOR)
+    high, low = words[0] | (words[1] << WORD), words[2] | (words[3] << WORD)
+    upper, lower = words[4] | (words[5] << WORD), words[6] | (words[7] << WORD)
+    step_high, step_low = (upper << ONE) | (lower >> np.uint64(63)), (lower << ONE) | ONE
+    high, low = _add_128(step_high, step_low, high, low)
+    return following((high, low, step_high, step_low))
+
+
+@subroutine
+def _hash(value: np.uint64, constant: np.uint64, factor: np.uint64) -> Words:
+    value = value ^ constant
+    constant = (constant * factor) & LOW
+    value = (value * constant) & LOW
+    return value ^ (value >> HALF), constant
+
+
+@subroutine
+def _add_128(high: np.uint64, low: np.uint64, other_high: np.uint64, other_low: np.uint64) -> Words:
+    total = low + other_low
+    return high + other_high + np.uint64(total < low), total
+
+
+@subroutine
+def following(state: State) -> State:
+    """Return the state after ``state``: its product with the factor, plus the increment."""
+    high, low, step_high, step_low = state
+    a, b, c, d = low >> WORD, low & LOW, FACTOR_LOW >> WORD, FACTOR_LOW & LOW
+    middle = a * d + (b * d >> WORD)  # the upper half of low times FACTOR_LOW
+    carry = (middle & LOW) + b * c
+    upper = a * c + (middle >> WORD) + (carry >> WORD)
+    high = high * FACTOR_LOW + low * FACTOR_HIGH + upper
+    high, low = _add_128(high, low * FACTOR_LOW, step_high, step_low)
+    return high, low, step_high, step_low
+
+
+@subroutine
+def bits_of(state: State) -> np.uint64:
+    """Return the 64 random bits that the generator gives in ``state``."""
+    high, low = state[0], state[1]
+    turn, value = high >> TOP, high ^ low
+    return (value >> turn) | (value << ((FULL - turn) & np.uint64(63)))

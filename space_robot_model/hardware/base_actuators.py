@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
-from typing import Any, Literal
+from functools import partial
+from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field
+from pydantic import AfterValidator, Field
 
 from space_robot_msgs_py.config.validation import StrictModel
 from space_robot_msgs_py.errors import InputError
-from space_robot_msgs_py.samples import RobotNames
+from space_robot_msgs_py.samples import MOST_TORQUERS, RobotNames
 
 from ..robot import Robot
-from .magnetic_torquers import MagneticTorquerSettings
+from .sheets import NO_VECTORS, MountedSheet, Positive, Vectors, are_directions, directions
 from .thrusters import ThrusterSettings
 from .wheels import WheelSettings
 
@@ -22,6 +23,36 @@ Array = NDArray[np.float64]
 BaseActuation = Literal["ideal", "hardware", "none"]
 LEAST_SHARE = 1e-6
 """Tolerance of a unit torque in the check of the actuators."""
+
+
+class MagneticTorquerSettings(MountedSheet):
+    """Magnetic torquers on the base, which unload its wheels; by default none.
+
+    A dipole m in the magnetic field B turns the base with ``m x B``, never about the field.
+    """
+
+    section: ClassVar[str] = "magnetic_torquers"
+
+    axes: Annotated[Vectors, AfterValidator(partial(are_directions, most=MOST_TORQUERS))] = Field(
+        NO_VECTORS,
+        description="directions of the dipoles in the base frame: x, y, z of each torquer, one "
+        "after the other ([0.0]: no torquers)",
+    )
+    max_dipole: Positive = Field(
+        [100.0],
+        description="largest dipole either way, A m2; one value for all torquers, or one per "
+        "torquer",
+    )
+
+    @property
+    def count(self) -> int:
+        """Number of torquers."""
+        return len(directions(self.axes))
+
+    @property
+    def unit_axes(self) -> Array:
+        """(M, 3) directions of the dipoles as unit vectors in the base frame."""
+        return directions(self.axes)
 
 
 class BaseActuatorSettings(StrictModel):
@@ -93,8 +124,8 @@ class BaseActuatorSettings(StrictModel):
             raise InputError(f"actuators {file}: {error}") from None
 
     def _check(self, robot: Robot) -> None:
-        kinds = ("wheels", "thrusters", "magnetic_torquers")
-        parts = [part for part in kinds if getattr(self, part).count]
+        sheets = (self.wheels, self.thrusters, self.magnetic_torquers)
+        parts = [sheet.section for sheet in sheets if sheet.count]
         if self.base_actuation != "hardware":
             if parts:
                 raise InputError(
@@ -107,16 +138,11 @@ class BaseActuatorSettings(StrictModel):
             raise InputError("base_actuation is hardware: no wheels.axes or thrusters.positions")
         self.wheels.check(robot.inertia[0])
         self.thrusters.check()
-        _ = self.magnetic_torquers.largest  # one value, or one per torquer
+        self.magnetic_torquers.values("max_dipole")  # one value, or one per torquer
         _check_torques(self)
 
 
 def _check_torques(settings: BaseActuatorSettings) -> None:
-    """Check that the actuators can produce a torque in any direction; thrusters have one sign.
-
-    Raises:
-        InputError: names an axis without torque.
-    """
     axes, torques = settings.wheels.unit_axes, settings.thrusters.torques
     if not len(torques):
         if np.linalg.matrix_rank(axes, tol=LEAST_SHARE) < 3:
@@ -139,10 +165,7 @@ def _check_torques(settings: BaseActuatorSettings) -> None:
 
 
 def _can_push(columns: Array, wanted: Array) -> bool:
-    """Return True if ``wanted`` (3,) is a non-negative combination of ``columns`` (3, k).
-
-    It is a linear program, because SciPy 1.15 returns a wrong residual of nnls.
-    """
+    # a linear program, because SciPy 1.15 returns a wrong residual of nnls
     from scipy.optimize import linprog  # slow to import
 
     if not columns.size:

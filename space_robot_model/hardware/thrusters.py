@@ -2,25 +2,25 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from functools import partial
+from typing import Annotated, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import AfterValidator, Field
 
-from space_robot_msgs_py.config.validation import StrictModel
 from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.samples import MOST_THRUSTERS
 
-from .mounting import (
+from .sheets import (
     FEWEST,
     NO_VECTORS,
+    MountedSheet,
     Positive,
     Vectors,
     are_directions,
     are_vectors,
     directions,
-    values_of,
     vectors,
 )
 
@@ -30,26 +30,22 @@ Array = NDArray[np.float64]
 STANDARD_GRAVITY = 9.80665
 """m/s2."""
 PER_THRUSTER = "one value for all thrusters, or one per thruster"
+Positions = Annotated[Vectors, AfterValidator(partial(are_vectors, most=MOST_THRUSTERS))]
+Directions = Annotated[Vectors, AfterValidator(partial(are_directions, most=MOST_THRUSTERS))]
 Times = Annotated[list[Annotated[float, Field(ge=0.0, le=1.0)]], FEWEST]
 
 
-def _positions(flat: list[float]) -> list[float]:
-    return are_vectors(flat, MOST_THRUSTERS)
-
-
-def _directions(flat: list[float]) -> list[float]:
-    return are_directions(flat, MOST_THRUSTERS)
-
-
-class ThrusterSettings(StrictModel):
+class ThrusterSettings(MountedSheet):
     """Thrusters on the base, fed from one tank; by default none."""
 
-    positions: Annotated[Vectors, AfterValidator(_positions)] = Field(
+    section: ClassVar[str] = "thrusters"
+
+    positions: Positions = Field(
         NO_VECTORS,
         description="positions from the base's CoM, in the base frame, m: x, y, z of each "
         "thruster, one behind the other ([0.0]: no thrusters)",
     )
-    directions: Annotated[Vectors, AfterValidator(_directions)] = Field(
+    directions: Directions = Field(
         NO_VECTORS,
         description="directions of the force on the base, in the base frame: x, y, z of each "
         "thruster, one behind the other",
@@ -90,14 +86,6 @@ class ThrusterSettings(StrictModel):
         """(T, 3) torque of each open thruster about the base's CoM, N m, in the base frame."""
         forces = self.unit_directions * self.values("force")[:, None]
         return np.asarray(np.cross(self.places, forces), dtype=np.float64)
-
-    def values(self, name: str) -> Array:
-        """Return the values (T,) of the setting ``name``, one per thruster.
-
-        Raises:
-            InputError: neither one value, nor one per thruster.
-        """
-        return values_of(getattr(self, name), f"thrusters.{name}", self.count, "thruster")
 
     @property
     def mass_flow(self) -> Array:

@@ -2,35 +2,32 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from functools import partial
+from typing import Annotated, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import AfterValidator, Field
 
-from space_robot_msgs_py.config.validation import StrictModel
 from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.samples import MOST_WHEELS
 
-from .mounting import NO_VECTORS, Positive, Sizes, Vectors, are_directions, directions, values_of
+from .sheets import NO_VECTORS, MountedSheet, Positive, Sizes, Vectors, are_directions, directions
 
 Array = NDArray[np.float64]
-
 
 PER_WHEEL = "one value for all wheels, or one per wheel"
 
 
-def _axes(flat: list[float]) -> list[float]:
-    return are_directions(flat, MOST_WHEELS)
-
-
-class WheelSettings(StrictModel):
+class WheelSettings(MountedSheet):
     """Balanced reaction wheels on the base; by default none.
 
     The base's inertia in the robot's file includes the locked rotors of the wheels.
     """
 
-    axes: Annotated[Vectors, AfterValidator(_axes)] = Field(
+    section: ClassVar[str] = "wheels"
+
+    axes: Annotated[Vectors, AfterValidator(partial(are_directions, most=MOST_WHEELS))] = Field(
         NO_VECTORS,
         description="spin axes in the base frame: x, y, z of each wheel, one after the other "
         "([0.0]: no wheels)",
@@ -61,19 +58,6 @@ class WheelSettings(StrictModel):
     def unit_axes(self) -> Array:
         """(W, 3) spin axes as unit vectors in the base frame."""
         return directions(self.axes)
-
-    def values(self, name: str) -> Array:
-        """Return the values (W,) of the setting ``name``, one per wheel.
-
-        Raises:
-            InputError: neither one value, nor one per wheel.
-        """
-        return values_of(getattr(self, name), f"wheels.{name}", self.count, "wheel")
-
-    def limits(self, name: str) -> Array:
-        """Return the `values` of a limit, with infinity for 0 (no limit)."""
-        values = self.values(name)
-        return np.where(values > 0.0, values, np.inf)
 
     def spin_momenta(self, speeds: Array) -> Array:
         """Return ``J Omega`` (..., W), N m s, for speeds relative to the base (..., W), rad/s."""

@@ -13,7 +13,7 @@ from typing_extensions import Self
 from space_robot_msgs_py.config.validation import StrictModel
 
 from ..elementary.matrices import norm
-from ..elementary.series import plain_sin_cos
+from ..elementary.rotations import plain_sin_cos
 
 Array = NDArray[np.float64]
 

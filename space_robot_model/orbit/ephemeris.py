@@ -131,23 +131,12 @@ class Ephemeris:
             self._nodes = extended
         return self._nodes
 
-    def motion(self, time: Array) -> OrbitalMotion:
-        """Return the motion of the reference point from the Earth's centre.
+    def motion(self, time: Array, of_target: bool = False) -> OrbitalMotion:
+        """Return the motion of the reference point from the Earth's centre at times (T,), s.
 
-        Args:
-            time: (T,) s from tick 0; earlier times count as 0.
+        With ``of_target`` it is that of the target from the reference point. Times before tick 0
+        count as 0.
         """
-        return self._motion(time, of_target=False)
-
-    def target_motion(self, time: Array) -> OrbitalMotion:
-        """Return the motion of the target from the reference point.
-
-        Args:
-            time: (T,) s from tick 0; earlier times count as 0.
-        """
-        return self._motion(time, of_target=True)
-
-    def _motion(self, time: Array, of_target: bool) -> OrbitalMotion:
         from .propagation import motions_into  # slow to import
 
         times, out = np.ascontiguousarray(time, dtype=np.float64), np.empty((4, len(time), 3))

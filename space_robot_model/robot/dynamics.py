@@ -11,12 +11,10 @@ from space_robot_msgs_py.compiled.lanes import WIDTH
 
 from ..dynamics.aba import aba
 from ..dynamics.crba import crba
-from ..dynamics.free_floating import free_inverse_dynamics_along
-from ..dynamics.inverse_dynamics import AlongScratch, inverse_dynamics_along
 from ..dynamics.kinematics import forward_kinematics, spatial_velocities
 from ..dynamics.model import Data
-from ..dynamics.rho_space import RhoSpaceModel
-from ..dynamics.rnea import rnea_bias
+from ..dynamics.rho_space import RhoSpaceModel, free_inverse_dynamics_along
+from ..dynamics.rnea import AlongScratch, inverse_dynamics_along, rnea_bias
 from .kinematics import check_robot, unit_quaternion, vector
 
 if TYPE_CHECKING:

@@ -27,12 +27,11 @@ from urllib.parse import quote, unquote
 import yaml
 
 from space_robot_msgs_py.config.arguments import path_text
-from space_robot_msgs_py.config.choices import choices
-from space_robot_msgs_py.config.directory import config_directory
 from space_robot_msgs_py.config.files import GIVEN, is_named, named_file
-from space_robot_msgs_py.config.text import printable
+from space_robot_msgs_py.config.installation import config_directory
+from space_robot_msgs_py.config.text import choices, printable
 from space_robot_msgs_py.config.validation import read_yaml, short
-from space_robot_msgs_py.config.yaml_text import check_file, is_folder, parse_yaml, read_file
+from space_robot_msgs_py.config.yaml_text import check_readable, is_folder, parse_yaml, read_file
 from space_robot_msgs_py.errors import InputError, explained_by
 
 from .files import document_of, is_urdf
@@ -105,7 +104,7 @@ def robot_files(robot: str) -> RobotFiles:
     robot = split_choice(robot).name
     path = Path(robot)
     if robot.endswith((*YAML, *URDF)):
-        check_file(path)
+        check_readable(path)
         return _own_folder(path) if path.stem == OWN else _in_config(path)
     if "/" in robot:
         return _own_folder(_file_of(path))
@@ -153,7 +152,7 @@ def mission_file(robot: str, mission: str = "") -> Path:
         InputError: there is no such mission or robot; with advice.
     """
     if mission.endswith(TRAJECTORIES):
-        check_file(Path(mission))
+        check_readable(Path(mission))
         return Path(mission)
     if mission:
         return named_file("missions", mission)

@@ -12,7 +12,6 @@ from space_robot_msgs_py.config.validation import short
 from space_robot_msgs_py.errors import InputError
 
 from ..dynamics.tool_kinematics import ToolKinematics, tool_kinematics_into
-from ..elementary.least_squares import singular_values
 from ..elementary.matrices import norm
 
 if TYPE_CHECKING:
@@ -118,7 +117,7 @@ def manipulability(jacobian: Array) -> float:
 
     With the generalised Jacobian a posture where it is zero is a dynamic singularity.
     """
-    return float(np.prod(singular_values(jacobian)))
+    return float(np.prod(np.linalg.svd(jacobian, compute_uv=False)))
 
 
 class MountedTool(NamedTuple):

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from space_robot_msgs_py.samples import Timebase
-from space_robot_msgs_py.wire.markers import CUBE, CYLINDER, MESH, SPHERE, Marker, MarkersCodec
+from space_robot_msgs_py.wire.viewers import CUBE, CYLINDER, MESH, SPHERE, Marker, MarkersCodec
 
 from .parts import Visual
 from .placements import frame_names, wxyz

@@ -8,8 +8,7 @@
       limits: {base_torque: 2.0}
       events: []
 
-Older files hold ROS parameters of mission_node and plant_node; they are read on. A trajectory in a
-CSV or Parquet file is a mission, too: it begins at its first row.
+A trajectory in a CSV or Parquet file is a mission, too: it begins at its first row.
 """
 
 from __future__ import annotations
@@ -25,8 +24,7 @@ from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
 from space_robot_msgs_py.config.columns import missing_column, read_columns
-from space_robot_msgs_py.config.files import GIVEN, node_parameters
-from space_robot_msgs_py.config.trees import Tree
+from space_robot_msgs_py.config.files import GIVEN, Tree, node_parameters
 from space_robot_msgs_py.config.validation import StrictModel, read_yaml, validate
 from space_robot_msgs_py.errors import InputError, explained_by
 
@@ -132,8 +130,7 @@ class MissionDocument(StrictModel):
         start = self.start.base or StartBase(rpy_deg=[0.0, 0.0, 0.0])
         base, rate = np.asarray(start.unit_quaternion).tolist(), start.rate_deg_s
         parameters: Tree = {
-            "waypoint_times": [0.0],
-            "waypoints_deg": self.start.joints_deg,
+            "joints_deg": self.start.joints_deg,
             "segments": [json.dumps(segment) for segment in self.segments],
             **({"limits": self.limits} if self.limits else {}),
             "initial_joints_deg": self.start.joints_deg,

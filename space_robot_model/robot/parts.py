@@ -28,7 +28,7 @@ from pydantic import (
 from pydantic_core import core_schema
 from typing_extensions import Self
 
-from space_robot_msgs_py.config.choices import choices
+from space_robot_msgs_py.config.text import choices
 from space_robot_msgs_py.config.validation import short
 
 from ..elementary.matrices import norm, product

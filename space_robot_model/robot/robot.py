@@ -14,14 +14,14 @@ from numpy.typing import ArrayLike, NDArray
 
 from space_robot_msgs_py.compiled.records import assign
 from space_robot_msgs_py.config.arguments import as_numbers, as_path
-from space_robot_msgs_py.config.html import html_table
+from space_robot_msgs_py.config.text import html_table
 from space_robot_msgs_py.config.validation import one_of, read_yaml, short
 from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.topics import BASE_AXES
 
 from ..dynamics.model import Model
 from ..elementary.matrices import product
-from ..elementary.series import plain_sin_cos
+from ..elementary.rotations import plain_sin_cos
 from .files import exact_document, read_content
 from .flatten import Part, arrays_of
 from .inertia import inertia_elements, inertia_tensor
@@ -41,6 +41,8 @@ from .parts import (
 from .urdf import UrdfRobot, read_urdf
 
 Array = NDArray[np.float64]
+RANK_TOLERANCE = 1e-7
+"""Singular values below this share of the largest count as zero."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -342,10 +344,13 @@ class Robot:
         Raises:
             InputError: an argument has another type or shape.
         """
-        from ..elementary.least_squares import null_space
         from .kinematics import tool_state
 
-        return null_space(tool_state(self, quaternion_wxyz, joint_positions).coupling)
+        coupling = tool_state(self, quaternion_wxyz, joint_positions).coupling
+        _, values, axes = np.linalg.svd(coupling)
+        rank = np.count_nonzero(values > RANK_TOLERANCE * values.max(initial=0.0))
+        basis: Array = axes[rank:].T
+        return basis
 
     def with_last_link(self, mass: float, inertia: list[float]) -> Robot:
         """Return the robot with mass and inertia of the body with the tool replaced, CoM kept.

@@ -8,9 +8,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from space_robot_msgs_py.config.extras import install_command
+from space_robot_msgs_py.config.installation import install_command
 from space_robot_msgs_py.config.validation import one_of, short
-from space_robot_msgs_py.config.yaml_text import check_file, read_file
+from space_robot_msgs_py.config.yaml_text import check_readable, read_file
 from space_robot_msgs_py.errors import InputError
 
 from ..dynamics.model import MOST_JOINTS
@@ -160,7 +160,7 @@ def expand_urdf(path: Path) -> str:
     """
     if path.suffix != XACRO:
         return read_file(path)
-    check_file(path)
+    check_readable(path)
     try:
         import xacro
     except ImportError:

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from space_robot_msgs_py.config.choices import nearest
+from space_robot_msgs_py.config.text import nearest
 from space_robot_msgs_py.config.validation import short
 
 from ..elementary.matrices import norm

@@ -1,16 +1,75 @@
-"""Messages of a bag, in batches, for all storage formats."""
+"""Messages of a bag, in batches, for all storage formats, and the metadata.yaml of rosbag2."""
 
 from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from typing import Protocol
+from pathlib import Path
+from typing import Any, Protocol
 
+from pydantic import BaseModel, Field, ValidationError
+
+from ..config.validation import read_yaml, validate
+from ..config.yaml_text import parse_yaml
+from ..errors import InputError
 from ..topics import Topic
 from .batch import Batch
-from .findings import SHOWN
-from .metadata import METADATA, BagInformation, parse_information
-from .writer import DESCRIPTION
+from .writer import DESCRIPTION, METADATA
+
+
+class _Topic(BaseModel):
+    name: str
+
+
+class _Count(BaseModel):
+    topic_metadata: _Topic
+    message_count: int
+
+
+class BagInformation(BaseModel):
+    """Metadata of rosbag2 about a bag, of any version, as needed by a reader."""
+
+    relative_file_paths: list[str] = Field(default_factory=list)
+    topics_with_message_count: list[_Count]
+    compression_mode: str = ""
+    custom_data: dict[str, Any] | None = None
+
+    @property
+    def noted(self) -> dict[str, str]:
+        """Custom data, as texts."""
+        return {key: str(value) for key, value in (self.custom_data or {}).items()}
+
+    @property
+    def counts(self) -> dict[str, int]:
+        """Number of messages per topic."""
+        return {t.topic_metadata.name: t.message_count for t in self.topics_with_message_count}
+
+    @property
+    def compressed(self) -> bool:
+        """True if rosbag2 itself compressed files or messages, rather than MCAP its chunks."""
+        return self.compression_mode.lower() in ("file", "message")
+
+
+def read_information(path: Path) -> BagInformation:
+    """Read the metadata in a bag's folder.
+
+    Raises:
+        InputError: there is none, or it is no rosbag2 metadata.
+    """
+    file = path / METADATA
+    content = read_yaml(file).get("rosbag2_bagfile_information")
+    if not isinstance(content, dict):
+        raise InputError(f"{file}: not the metadata of a rosbag2 bag")
+    return validate(BagInformation, content, str(file))
+
+
+def _information_in(file: Storage) -> BagInformation | None:
+    """Return the copy of the metadata in an MCAP file; None if there is none."""
+    try:
+        text = file.metadata.get("rosbag2", {}).get("serialized_metadata", "")
+        return BagInformation.model_validate(parse_yaml(text))
+    except (InputError, ValidationError):
+        return None
 
 
 class Storage(Protocol):
@@ -58,12 +117,10 @@ class Bag:
             closed: nothing but the files can say that the bag is unfinished.
             lacks_files: some that metadata.yaml names are not there.
         """
-        self._files, self._found = files, damage
+        self._files, self._damage = files, damage
         self.finished = closed and all(file.has_end for file in files)
         """True if its recorder closed it."""
         self._information, self._lacks_files = information, lacks_files
-        self._counts: Counter[str] = Counter()
-        self._span_ns: tuple[int, int] | None = None
 
     def topics(self) -> dict[str, str]:
         """Return the type by topic."""
@@ -71,24 +128,16 @@ class Bag:
 
     def batches(self) -> Iterator[Batch]:
         """Yield all messages, as they were written, file by file."""
-        self._counts, self._span_ns = Counter(), None
         for file in self._files:
-            for batch in file.batches():
-                self._counts[batch.topic] += len(batch)
-                first, last = int(batch.log_ns.min()), int(batch.log_ns.max())
-                if self._span_ns:
-                    first, last = min(first, self._span_ns[0]), max(last, self._span_ns[1])
-                self._span_ns = first, last
-                yield batch
+            yield from file.batches()
 
     def recorded(self) -> dict[str, int] | None:
         """Return the number of messages per topic that the bag should hold; None: unknown.
 
         By the files' own statistics; by metadata.yaml, if they have none.
         """
-        information = self._information
         if self._lacks_files or any(file.counts is None for file in self._files):
-            return information.counts if information else None
+            return self._information.counts if self._information else None
         return dict(sum((file.counts or Counter() for file in self._files), Counter[str]()))
 
     def custom_data(self) -> dict[str, str]:
@@ -96,11 +145,7 @@ class Bag:
 
         From metadata.yaml, its copy in the file, or what was noted when recording began.
         """
-        copies = [
-            parse_information(file.metadata.get("rosbag2", {}).get("serialized_metadata", ""))
-            for file in self._files[::-1]
-        ]
-        for information in (self._information, *copies):
+        for information in (self._information, *map(_information_in, self._files[::-1])):
             if information and information.custom_data:
                 return information.noted
         return next((m for f in self._files if (m := f.metadata.get(DESCRIPTION))), {})
@@ -112,32 +157,15 @@ class Bag:
 
     @property
     def damage(self) -> list[str]:
-        """The faults of files and metadata.yaml, a sentence each."""
-        texts = self._found + [text for file in self._files for text in file.damage]
-        information, recorded = self._information, self.recorded()
-        if not information or not recorded:
-            return texts
-        wrong = [
-            f"{METADATA}: {count} messages on {name}, but {true} in the bag"
-            for name, count in information.counts.items()
-            if count != (true := max(recorded.get(name, 0), self._counts[name]))
-        ]
-        texts += wrong[:SHOWN]
-        if len(wrong) > SHOWN:
-            texts.append(f"{METADATA}: so it is with {len(wrong) - SHOWN:,} more topics")
-        if self._counts == recorded and self._span_ns and information.span_ns != self._span_ns:
-            claimed, true_span = (
-                f"{start / 1e9:.9g} to {stop / 1e9:.9g} s"
-                for start, stop in (information.span_ns, self._span_ns)
-            )
-            texts.append(f"{METADATA}: messages from {claimed}, but {true_span} in the bag")
-        return texts
+        """What is wrong with the folder and its files, a sentence each."""
+        return self._damage + [text for file in self._files for text in file.damage]
 
     def counts(self) -> dict[str, int]:
         """Count the messages of each topic that can be read."""
-        for _ in self.batches():
-            pass
-        return self._counts
+        counts: Counter[str] = Counter()
+        for batch in self.batches():
+            counts[batch.topic] += len(batch)
+        return counts
 
     def messages(self, *wanted: Topic) -> Iterator[tuple[str, bytes]]:
         """Yield topic name and bytes of messages of some topics, in order for each topic."""
@@ -145,3 +173,10 @@ class Bag:
         for batch in self.batches():
             if batch.topic in names:
                 yield from ((batch.topic, batch.message(i)) for i in range(len(batch)))
+
+
+def some_of(names: Sequence[str]) -> str:
+    """Return the first of some names, and how many there are more; a bag may have thousands."""
+    shown = 12
+    more = f", and {len(names) - shown:,} more" if len(names) > shown else ""
+    return ", ".join(names[:shown]) + more

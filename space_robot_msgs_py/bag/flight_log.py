@@ -16,16 +16,18 @@ from ..samples import (
     PASSIVE_FIELDS,
     STATE_FIELDS,
     LawInForce,
+    MeasuredSignals,
     ReferenceChunk,
+    RobotNames,
     RobotState,
     State,
+    StateSignals,
     Timebase,
 )
+from ..signals import signals_of
 
 Array = NDArray[np.float64]
 
-ORBIT_WIDTHS = {name: width for name, width in zip(ORBIT_FIELDS, (3, 3, 3, 12), strict=True)}
-"""Columns of a flight in orbit, and their widths."""
 REFERENCE = ("reference_joints", "reference_base")
 """The columns the desired motion fills."""
 MEASURED_COLUMNS = STATE_FIELDS + PASSIVE_FIELDS
@@ -37,28 +39,9 @@ def of_nan(shape: tuple[int, ...]) -> Array:
     return np.full(shape, np.nan)
 
 
-@dataclass(slots=True)
-class MeasuredStates:
-    """Measured states: the state columns of a `FlightLog` as the sensors report them."""
-
-    base_position: Array
-    """(N, 3) m, inertial frame."""
-    quaternion: Array
-    """(N, 4) ``[w, x, y, z]``."""
-    base_velocity: Array
-    """(N, 3) m/s, inertial frame."""
-    omega_base: Array
-    """(N, 3) rad/s, base frame."""
-    joint_positions: Array
-    """(N, n) rad, of prismatic joints m."""
-    joint_velocities: Array
-    """(N, n) rad/s, of prismatic joints m/s."""
-    applied_torque: Array
-    """(N, n+3) N m, reported for the interval that ended at the tick; base frame, then joints."""
-    passive_positions: Array
-    """(N, p) rad or m."""
-    passive_velocities: Array
-    """(N, p) rad/s or m/s."""
+@dataclass(eq=False, repr=False)
+class MeasuredStates(MeasuredSignals):
+    """Measured states: columns (N, ...) of a `FlightLog` as the sensors report them."""
 
     @classmethod
     def of(cls, log: FlightLog) -> MeasuredStates:
@@ -87,10 +70,11 @@ class MeasuredStates:
         return MeasuredStates(*(change(name, column) for name, column in self.columns.items()))
 
 
-@dataclass(slots=True)
-class FlightLog:
+@dataclass(eq=False, repr=False, kw_only=True)
+class FlightLog(StateSignals):
     """True and desired motion and the torque given, tick by tick from 0.
 
+    Each signal is a column (N, ...), as wide as the robot has of it: (N, 0) of what it has not.
     If measurements differ from the true states, and both were recorded, `measured` has the
     measurements. Without it both are equal, or only the measurements are known.
     """
@@ -98,52 +82,13 @@ class FlightLog:
     timebase: Timebase
     joint_names: tuple[str, ...]
     """Names of the joints with motors."""
-    base_position: Array
-    """(N, 3) m, inertial frame."""
-    quaternion: Array
-    """(N, 4) ``[w, x, y, z]``."""
-    base_velocity: Array
-    """(N, 3) m/s, inertial frame."""
-    omega_base: Array
-    """(N, 3) rad/s, base frame."""
-    joint_positions: Array
-    """(N, n) rad, of prismatic joints m."""
-    joint_velocities: Array
-    """(N, n) rad/s, of prismatic joints m/s."""
-    applied_torque: Array
-    """(N, n+3) N m given over the interval that ended at the tick; base frame, then joints, whose
-    prismatic ones have N."""
     reference_joints: Array
     """(N, 3, n) desired position, velocity, acceleration."""
     reference_base: Array
     """(N, 10) desired quaternion, angular velocity, acceleration (base frame)."""
-    wheel_velocities: Array
-    """(N, W) rad/s relative to the base, as many as the base has reaction wheels."""
-    wheel_torques: Array
-    """(N, W) N m that the wheels' motors gave over the interval that ended at the tick."""
-    thrusts: Array
-    """(N, T) N, means over the interval that ended at the tick, as many as there are thrusters."""
     actuator_commands: Array
     """(N, W+T+M) the controller's answer to the tick: torques of the wheels' motors, N m, then
     forces of the thrusters, N, then dipoles of magnetic torquers, A m2 (NaN: none)."""
-    passive_positions: Array
-    """(N, p) rad, of prismatic joints m, as many as the robot has joints without motors."""
-    passive_velocities: Array
-    """(N, p) rad/s, of prismatic joints m/s."""
-    motor_positions: Array
-    """(N, G) rad or m, of the motors behind gears, as many as there are; seen through the gears."""
-    motor_velocities: Array
-    """(N, G) rad/s or m/s, of the same."""
-    orbit_position: Array
-    """(N, 3) m, of the inertial frame's origin from the Earth's centre; (N, 0) without an orbit, as
-    all that follows."""
-    orbit_velocity: Array
-    """(N, 3) m/s."""
-    magnetic_field: Array
-    """(N, 3) T, base frame."""
-    external_torques: Array
-    """(N, 12) N m about the robot's centre of mass over the interval that begins, inertial axes, by
-    `space_robot_msgs_py.samples.SOURCES`."""
     passive_names: tuple[str, ...] = ()
     """Names of the joints without motors."""
     geared_names: tuple[str, ...] = ()
@@ -187,31 +132,35 @@ class FlightLog:
     def allocate(
         cls,
         ticks: int,
-        joint_names: tuple[str, ...],
+        names: RobotNames | tuple[str, ...],
         timebase: Timebase,
-        wheels: int = 0,
-        thrusters: int = 0,
-        passive_names: tuple[str, ...] = (),
-        geared_names: tuple[str, ...] = (),
-        in_orbit: bool = False,
         new: Callable[[tuple[int, ...]], Array] = of_nan,
-        torquers: int = 0,
     ) -> FlightLog:
-        """A log of ``ticks`` rows of NaN, for a base with so many wheels, thrusters and torquers.
+        """Return a log of NaN.
 
-        ``new`` makes a column of a shape; it may be one of other numbers, to be written later.
+        Args:
+            ticks: its rows.
+            names: of all that the robot has, or of its joints with motors if it has no more.
+            timebase: of its ticks.
+            new: makes a column of a shape; it may be one of other numbers, to be written later.
         """
-        n, passive, geared = len(joint_names), len(passive_names), len(geared_names)
-        shapes = [
-            *((3,), (4,), (3,), (3,), (n,), (n,), (n + 3,), (3, n), (10,)),
-            *((wheels,), (wheels,), (thrusters,), (wheels + thrusters + torquers,)),
-            *((passive,), (passive,), (geared,), (geared,)),
-            *((size if in_orbit else 0,) for size in ORBIT_WIDTHS.values()),
-        ]
-        columns: list[Any] = [new((ticks, *shape)) for shape in shapes]
-        log = cls(timebase, joint_names, *columns)
-        log.passive_names, log.geared_names = passive_names, geared_names
-        return log
+        if not isinstance(names, RobotNames):
+            names = RobotNames(names)
+        widths = {name: (s.column_width(names),) for name, s in signals_of(StateSignals).items()}
+        shapes: dict[str, tuple[int, ...]] = {
+            **widths,
+            "reference_joints": (3, len(names.joints)),
+            "reference_base": (10,),
+            "actuator_commands": (len(names.actuators),),
+        }
+        columns: dict[str, Any] = {name: new((ticks, *shape)) for name, shape in shapes.items()}
+        return cls(
+            timebase=timebase,
+            joint_names=names.joints,
+            passive_names=names.passive,
+            geared_names=names.geared,
+            **columns,
+        )
 
     @property
     def ticks(self) -> int:

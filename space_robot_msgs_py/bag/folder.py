@@ -8,25 +8,20 @@ from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import numpy as np
 from mcap.writer import MCAP0_MAGIC
 
-from ..config.choices import MOST_COMPARED, MOST_NEAR, nearest
-from ..config.text import printable
+from ..config.text import MOST_COMPARED, MOST_NEAR, nearest, printable
 from ..errors import InputError
 from .batch import Batch
-from .contents import Bag, Storage
-from .findings import some_of
+from .contents import Bag, BagInformation, Storage, read_information, some_of
 from .mcap_storage import McapStorage
-from .metadata import METADATA, BagInformation, read_information
+from .writer import METADATA
 
 if TYPE_CHECKING:
     from rosbags.rosbag2 import Reader
 
 _SQLITE_MAGIC = b"SQLite format 3\0"
 _STORAGES = (".mcap", ".db3")
-
-
 _BATCH = 1000
 
 
@@ -39,22 +34,18 @@ class RosbagsStorage:
         Raises:
             InputError: it cannot be read.
         """
-        self._path = path
+        self._path, self._fault = path, ""
         self.counts: Counter[str] | None = None
         self.metadata: dict[str, dict[str, str]] = {}
         self.has_end = True
-        self._fault = ""
-        self._not_messages = 0
         try:
             with _reader(path) as reader:
-                names = {c.topic: c.msgtype for c in reader.connections}
+                self._types = {str(c.topic): str(c.msgtype) for c in reader.connections}
         except Exception as error:  # sqlite and zstd have errors of their own
             raise InputError(f"{path}: cannot be read ({_line(error)})") from None
-        # a broken database may have anything in any place
-        self._types = {name: kind for name, kind in names.items() if _is_text(name, kind)}
 
     def topics(self) -> dict[str, str]:
-        """Type by topic."""
+        """Return the type by topic."""
         return self._types
 
     @property
@@ -68,44 +59,28 @@ class RosbagsStorage:
         return [self._fault] if self._fault else []
 
     def batches(self) -> Iterator[Batch]:
-        """All messages by log time; they end where they can no longer be read."""
-        self._fault, self._not_messages = "", 0
+        """Yield all messages by log time; they end where they can no longer be read."""
+        self._fault = ""
         waiting: dict[str, list[tuple[int, bytes]]] = {name: [] for name in self._types}
         try:
             with _reader(self._path) as reader:
                 for connection, log_ns, data in reader.messages():
-                    if connection.topic not in waiting or not isinstance(data, bytes):
-                        self._not_messages += 1
-                        continue
-                    entries = waiting[connection.topic]
-                    entries.append((int(log_ns), data))
-                    if len(entries) == _BATCH:
-                        yield self._batch(connection.topic, entries)
-                        entries.clear()
+                    name = str(connection.topic)
+                    waiting[name].append((int(log_ns), bytes(memoryview(data))))
+                    if len(waiting[name]) == _BATCH:
+                        yield Batch.of(name, self._types[name], waiting[name])
+                        waiting[name] = []
         except Exception as error:  # likewise
             self._fault = f"{self._path.name}: cannot be read to its end ({_line(error)})"
-        if self._not_messages and not self._fault:
-            self._fault = f"{self._path.name}: {self._not_messages} messages that are none"
-        for name, entries in waiting.items():
-            if entries:
-                yield self._batch(name, entries)
-
-    def _batch(self, topic: str, entries: list[tuple[int, bytes]]) -> Batch:
-        data = np.frombuffer(b"".join(message for _, message in entries), np.uint8)
-        lengths = np.array([len(message) for _, message in entries], np.int64)
-        log_ns = np.array([stamp % 2**63 for stamp, _ in entries], np.int64)
-        starts = np.cumsum(lengths) - lengths
-        return Batch(topic, self._types[topic], "cdr", data, starts, lengths, log_ns, log_ns)
+        for name, messages in waiting.items():
+            if messages:
+                yield Batch.of(name, self._types[name], messages)
 
 
 def _reader(path: Path) -> Reader:
     from rosbags.rosbag2 import Reader  # few bags need it, with its YAML and SQLite
 
     return Reader(path)
-
-
-def _is_text(*values: object) -> bool:
-    return all(isinstance(value, str) for value in values)
 
 
 def _line(error: Exception) -> str:
@@ -131,20 +106,20 @@ def open_bag(path: Path) -> Bag:
             information = read_information(path)
         except InputError as error:
             damage = [str(error)]
-        else:
-            damage = information.doubts
     if information and information.compressed:
         for name in information.relative_file_paths:
             _check_regular(path / Path(name).name)
         return Bag([RosbagsStorage(path)], information, [], closed)
-    there = [file for suffix in _STORAGES for file in path.glob(f"*{suffix}")]
-    there.sort(key=lambda file: (len(file.name), file.name))
+    files = [file for suffix in _STORAGES for file in path.glob(f"*{suffix}")]
+    files.sort(key=lambda file: (len(file.name), file.name))
     if information:
-        there = _listed(path, information, there, damage)
-    if not there:
-        hint = damage[-1] if damage else f"not a bag folder (no {METADATA}, no .mcap)"
-        raise InputError(hint if damage else f"{path}: {hint}{_suggestion(path)}")
-    return _open_files(there, information, damage, closed)
+        files = _listed(path, information, files, damage)
+    if not files and damage:
+        raise InputError(damage[-1])
+    if not files:
+        hint = f"{path}: not a bag folder (no {METADATA}, no .mcap)"
+        raise InputError(f"{hint}{_suggestion(path)}")
+    return _open_files(files, information, damage, closed)
 
 
 def _suggestion(folder: Path, name: str = "") -> str:
@@ -160,18 +135,18 @@ def _suggestion(folder: Path, name: str = "") -> str:
 
 
 def _listed(
-    path: Path, information: BagInformation, there: list[Path], damage: list[str]
+    path: Path, information: BagInformation, existing: list[Path], damage: list[str]
 ) -> list[Path]:
     """Return the existing files that metadata.yaml names, in its order."""
     names = [Path(name).name for name in information.relative_file_paths]
     files = [path / name for name in names if (path / name).exists()]
     missing = [name for name in names if not (path / name).exists()]
-    others = [file for file in there if file.name not in names]
+    others = [file for file in existing if file.name not in names]
     if missing:
         damage.append(f"{path / METADATA} names {some_of(missing)}, not there")
     if others:
         what = "left out" if files else "read instead"
-        damage.append(f"{METADATA} does not name {some_of(f.name for f in others)}: {what}")
+        damage.append(f"{METADATA} does not name {some_of([f.name for f in others])}: {what}")
     return files or others
 
 
@@ -194,11 +169,7 @@ def _open_files(
 
 
 def _check_regular(file: Path) -> None:
-    """Check for a regular file: reading a pipe or a device may never end.
-
-    Raises:
-        InputError: it is neither a file, nor a folder, nor absent.
-    """
+    # Reading a pipe or a device may never end.
     if file.exists() and not (file.is_file() or file.is_dir()):
         raise InputError(f"{file}: cannot be read (a pipe, socket or device, not a file)")
 

@@ -7,16 +7,52 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import BaseModel, Field, TypeAdapter, ValidationError
 
 from .. import topics
+from ..config.text import parse_json
 from ..samples import Timebase
 from ..wire.cdr import header_stamp_ns
-from ..wire.controller_telemetry import TelemetryCodec
 from ..wire.stamp_guard import StampGuard
+from ..wire.telemetry import TelemetryCodec
+
+LONGEST_JUMP = 20_000
+"""Largest plausible step in ticks between messages: 10 s at 2 kHz."""
+
+
+ACCOUNTS_KEY = "space_robot.accounting"
+"""Of the accounts in a bag's custom data."""
+Count = Annotated[int, Field(ge=0, strict=True)]
+
+
+class Account(BaseModel):
+    """Counts of messages of one topic that the recorder has written into a bag."""
+
+    received: Count
+    """Distinct messages with a plausible stamp."""
+    missing: Count
+    """Messages sent, but neither received nor excluded on purpose."""
+    repeated: Count = 0
+    """Messages excluded because they had arrived before."""
+    invalid_stamps: Count = 0
+    """Messages in the bag whose stamp is not plausible."""
+    while_inactive: Count = 0
+    """Messages excluded because the recorder was inactive when they were sent."""
+
+
+_ACCOUNTS = TypeAdapter(dict[str, Account])
+
+
+def noted_accounts(noted: Mapping[str, str]) -> dict[str, Account]:
+    """Read the accounts in a bag's custom data, by topic; empty if none is valid."""
+    try:
+        return _ACCOUNTS.validate_python(parse_json(noted.get(ACCOUNTS_KEY, "{}")))
+    except (ValueError, ValidationError):
+        return {}
 
 
 def message_tick(topic: topics.Topic, data: bytes, timebase: Timebase) -> int:
@@ -26,10 +62,6 @@ def message_tick(topic: topics.Topic, data: bytes, timebase: Timebase) -> int:
     if topic.is_latched:
         return 0
     return TelemetryCodec.decode(data)[0]
-
-
-LONGEST_JUMP = 20_000
-"""Largest plausible step in ticks between messages: 10 s at 2 kHz."""
 
 
 @dataclass(slots=True)

@@ -22,58 +22,28 @@ from ..samples import (
     Timebase,
 )
 from ..wire.definitions import decode
-from .accounts import Account, noted_accounts, paused
 from .batch import Batch
 from .contents import Bag
 from .description import read_description
-from .findings import half_truth, missing_ticks, unread_messages
 from .flight_log import REFERENCE, FlightLog, MeasuredStates, finite_rows
 from .folder import open_bag
 from .message_accounting import (
     LONGEST_JUMP,
+    Account,
     MessageAccounting,
     lost_messages,
+    noted_accounts,
     topics_with_allowed_gaps,
     unanswered_ticks,
 )
-from .robots import REQUIRED
-from .rows import Rows, stamps_of
-from .selection import Selection
+from .rows import Rows
+from .selection import REQUIRED, Selection
 
 DEFAULT_PERIOD = 0.0005
 """Period of a bag without a description, s."""
 _STAMPS_LOOKED_AT = 200
-
-
-def fill_gaps(log: FlightLog) -> None:
-    """Give ticks without a usable state the one before, and missing references the last point.
-
-    From the first whole tick to the last state; `FlightLog.filled` counts the states. Only what
-    the sensors report is filled in: the truth has no such gaps.
-    """
-    measured = log if log.measured is None else log.measured
-    states = finite_rows(getattr(measured, name) for name in STATE_FIELDS)
-    known = log.finite(STATE_FIELDS) | states
-    end = len(known) - int(np.argmax(known[::-1])) if known.any() else 0
-    log.filled = int(np.count_nonzero(~states[:end]))
-    _repeat_before(measured, STATE_FIELDS, states, end)
-    passive = finite_rows(getattr(measured, name) for name in PASSIVE_FIELDS)
-    _repeat_before(measured, PASSIVE_FIELDS, passive, end)
-    _repeat_before(log, ACTUATOR_FIELDS, log.finite(ACTUATOR_FIELDS), end)
-    references = log.finite(REFERENCE)
-    _repeat_before(log, REFERENCE, references, end)
-    log.reference_joints[:end][~references[:end], 1:] = 0.0  # at rest
-    log.reference_base[:end][~references[:end], 4:] = 0.0
-
-
-def _repeat_before(
-    log: FlightLog | MeasuredStates, columns: tuple[str, ...], good: NDArray[np.bool_], end: int
-) -> None:
-    source = np.maximum.accumulate(np.where(good[:end], np.arange(end), -1))
-    bad = np.flatnonzero(~good[:end] & (source >= 0))
-    for name in columns:
-        column: Any = getattr(log, name)
-        column[bad] = column[source[bad]]
+_STRETCHES = 3
+"""Stretches without a whole tick that are told."""
 
 
 def read_flight(
@@ -111,7 +81,12 @@ def read_flight(
 
 def _read(bag: Bag, remap: Mapping[str, str], namespace: str | None) -> FlightLog:
     selection = Selection(bag, remap, namespace)
-    flight, damage = _description(bag)
+    damage: list[str] = []
+    flight: dict[str, Any] = {}
+    try:
+        flight = read_description(bag.custom_data())
+    except InputError as error:
+        damage.append(str(error))
     rows = _empty_rows(bag, selection, flight, damage)
     for topic, batch in selection.batches():
         rows.take(topic, batch)
@@ -121,16 +96,30 @@ def _read(bag: Bag, remap: Mapping[str, str], namespace: str | None) -> FlightLo
     rows.split_truth()
     log, excused = rows.log, topics_with_allowed_gaps(flight)
     log.flight, log.namespace = flight, selection.namespace
-    gone = _gone(selection, rows)
+    recorded = selection.recorded() or {}
+    unread = {name: recorded[name] - rows.counts[name] for name in recorded}
+    unread = {name: count for name, count in unread.items() if count > 0}
     accounts = noted_accounts(bag.custom_data())
-    _count_lost(bag, selection, rows, gone, accounts)
+    _count_lost(bag, selection, rows, unread, accounts)
     if excused and not (bag.incomplete or any(log.lost[topic.full_name] for topic in REQUIRED)):
         fill_gaps(log)
     whole = log.whole
     ticks = len(whole) - int(np.argmax(whole[::-1])) if whole.any() else 0
-    damage += [*bag.damage, *unread_messages(selection.recorded() or {}, gone)]
+    damage += bag.damage
+    if unread:
+        each = ", ".join(f"{name} {count}" for name, count in unread.items())
+        of_all = f"{sum(unread.values())} of {sum(recorded.values())} recorded messages"
+        damage.append(f"{of_all} cannot be read: {each}")
     damage += [f"{name} is left out: {wrong}" for name, wrong in selection.wrong.items()]
-    damage += rows.anomalies(bool(excused)) + paused(accounts) + half_truth(rows.counts)
+    damage += rows.anomalies(bool(excused))
+    if inactive := {name: a.while_inactive for name, a in accounts.items() if a.while_inactive}:
+        each = ", ".join(f"{name} {count}" for name, count in inactive.items())
+        damage.append(f"messages were sent while the recorder was inactive: {each}")
+    half = [topic.full_name for topic in topics.TRUTH if rows.counts[topic.full_name]]
+    if len(half) == 1:
+        damage.append(
+            f"of the true states only {half[0]} is there: the measured ones are taken for them"
+        )
     if not ticks:
         context = "; ".join(_not_finished(bag) + damage)
         raise InputError(f"not one tick with its state and reference ({context})")
@@ -142,12 +131,51 @@ def _read(bag: Bag, remap: Mapping[str, str], namespace: str | None) -> FlightLo
     return rows.finish(ticks)
 
 
-def _description(bag: Bag) -> tuple[dict[str, Any], list[str]]:
-    """Read the description of the flight, and report its defects."""
-    try:
-        return read_description(bag.custom_data()), []
-    except InputError as error:
-        return {}, [str(error)]
+def fill_gaps(log: FlightLog) -> None:
+    """Give ticks without a usable state the one before, and missing references the last point.
+
+    From the first whole tick to the last state; `FlightLog.filled` counts the states. Only what
+    the sensors report is filled in: the truth has no such gaps.
+    """
+    measured = log if log.measured is None else log.measured
+    states = finite_rows(getattr(measured, name) for name in STATE_FIELDS)
+    known = log.finite(STATE_FIELDS) | states
+    end = len(known) - int(np.argmax(known[::-1])) if known.any() else 0
+    log.filled = int(np.count_nonzero(~states[:end]))
+    _repeat_before(measured, STATE_FIELDS, states, end)
+    passive = finite_rows(getattr(measured, name) for name in PASSIVE_FIELDS)
+    _repeat_before(measured, PASSIVE_FIELDS, passive, end)
+    _repeat_before(log, ACTUATOR_FIELDS, log.finite(ACTUATOR_FIELDS), end)
+    references = log.finite(REFERENCE)
+    _repeat_before(log, REFERENCE, references, end)
+    log.reference_joints[:end][~references[:end], 1:] = 0.0  # at rest
+    log.reference_base[:end][~references[:end], 4:] = 0.0
+
+
+def _repeat_before(
+    log: FlightLog | MeasuredStates, columns: tuple[str, ...], good: NDArray[np.bool_], end: int
+) -> None:
+    source = np.maximum.accumulate(np.where(good[:end], np.arange(end), -1))
+    bad = np.flatnonzero(~good[:end] & (source >= 0))
+    for name in columns:
+        column: Any = getattr(log, name)
+        column[bad] = column[source[bad]]
+
+
+def missing_ticks(whole: NDArray[np.bool_], timebase: Timebase) -> list[str]:
+    """Describe the ticks without state or reference; ``whole`` (N,) is true for others."""
+    edges = np.diff(np.concatenate(([True], whole, [True])).astype(np.int8))
+    starts, stops = np.flatnonzero(edges < 0), np.flatnonzero(edges > 0)
+    if not len(starts):
+        return []
+    spans = [
+        f"{timebase.stamp_ns(int(start)) / 1e9:.4f} to {timebase.stamp_ns(int(stop) - 1) / 1e9:.4f}"
+        for start, stop in zip(starts[:_STRETCHES], stops, strict=False)
+    ]
+    rest = len(starts) - _STRETCHES
+    more = f", and {rest} stretches more" if rest > 0 else ""
+    count = f"{np.count_nonzero(~whole)} of {len(whole)} ticks"
+    return [f"{count} lack state or reference: t = {', '.join(spans)} s{more}"]
 
 
 def first_states(bag: Bag, selection: Selection) -> tuple[RobotNames, list[int]]:
@@ -157,32 +185,29 @@ def first_states(bag: Bag, selection: Selection) -> tuple[RobotNames, list[int]]
         InputError: there is none, or none that can be read.
     """
     names: tuple[str, ...] = ()
+    moved: tuple[str, ...] = ()
+    """The joints of the first reference that names no others; the rest have no motor."""
     referenced: list[tuple[str, ...]] = []
     stamps: list[int] = []
     for topic, batch in selection.batches():
         if topic is topics.JOINT_STATES:
             names = names or next(_joint_names(topic, batch), ())
-            stamps += stamps_of(batch).tolist()
-        elif topic is topics.REFERENCE_JOINTS and not _moved(names, referenced):
+            stamps += batch.stamps.tolist()
+        elif topic is topics.REFERENCE_JOINTS and not moved:
             referenced += dict.fromkeys(_joint_names(topic, batch))
-        if len(stamps) >= _STAMPS_LOOKED_AT and _moved(names, referenced):
+        moved = next((known for known in referenced if known and set(known) <= set(names)), ())
+        if len(stamps) >= _STAMPS_LOOKED_AT and moved:
             break
     if not names:
         raise missing(topics.JOINT_STATES, bag, selection)
-    moved = _moved(names, referenced)
     passive = tuple(name for name in names if name not in moved) if moved else ()
     if len(passive) > MOST_PASSIVE:
         passive = ()
     return RobotNames(tuple(name for name in names if name not in passive), passive=passive), stamps
 
 
-def _moved(names: tuple[str, ...], referenced: Sequence[tuple[str, ...]]) -> tuple[str, ...]:
-    """Return the joints of the first reference that names no others; the rest have no motor."""
-    return next((moved for moved in referenced if moved and set(moved) <= set(names)), ())
-
-
 def _empty_rows(bag: Bag, selection: Selection, flight: dict[str, Any], damage: list[str]) -> Rows:
-    """Rows for the joints and the period of the bag's first states."""
+    """Return rows for the joints and the period of the bag's first states."""
     names, stamps = first_states(bag, selection)
     timebase, doubt = timebase_of(stamps, flight)
     damage += doubt
@@ -192,7 +217,7 @@ def _empty_rows(bag: Bag, selection: Selection, flight: dict[str, Any], damage: 
 
 
 def _joint_names(topic: topics.Topic, batch: Batch) -> Iterator[tuple[str, ...]]:
-    """The joints in each message of a batch that can be read."""
+    """Yield the joints in each message of a batch that can be read."""
     for i in range(len(batch)):
         with suppress(MessageError):
             message = decode(batch.message(i), topic.type)
@@ -202,7 +227,7 @@ def _joint_names(topic: topics.Topic, batch: Batch) -> Iterator[tuple[str, ...]]
 def timebase_of(
     first_stamps: Sequence[int], flight: Mapping[str, Any]
 ) -> tuple[Timebase, list[str]]:
-    """The period that was flown with: as described, if the stamps (ns) are not against it.
+    """Return the period of the flight: as described, if the stamps (ns) are not against it.
 
     With it what is wrong with the description's.
     """
@@ -235,34 +260,26 @@ def _not_finished(bag: Bag) -> list[str]:
     return [] if bag.finished else ["the bag was not finished"]
 
 
-def _gone(selection: Selection, rows: Rows) -> dict[str, int]:
-    """Recorded messages that could not be read, by topic."""
-    recorded = selection.recorded() or {}
-    counts = ((name, count - rows.counts[name]) for name, count in recorded.items())
-    return {name: count for name, count in counts if count > 0}
-
-
 def _count_lost(
     bag: Bag,
     selection: Selection,
     rows: Rows,
-    gone: Mapping[str, int],
+    unread: Mapping[str, int],
     accounts: Mapping[str, Account],
 ) -> None:
-    """`FlightLog.lost` and `FlightLog.unanswered`: what never came and what is gone since."""
-    log = rows.log
-    there = selection.topics()
+    """Set `FlightLog.lost` and `FlightLog.unanswered`: what never came, and what cannot be read."""
+    log, in_bag = rows.log, selection.topics()
     accounting = {
         topic.full_name: rows.accounting.get(topic.full_name, MessageAccounting(topic))
         for topic in topics.ALL
-        if topic.full_name in rows.accounting or (bag.finished and topic in there)
+        if topic.full_name in rows.accounting or (bag.finished and topic in in_bag)
     }
     log.lost = lost_messages(accounting, topics_with_allowed_gaps(log.flight), bag.finished)
     for name in log.lost if bag.finished else ():
-        account, unread = accounts.get(name), gone.get(name, 0)
-        if account and rows.counts[name] + unread == account.received + account.invalid_stamps:
-            log.lost[name] = account.missing + unread  # the bag is the one that was counted
+        account, gone = accounts.get(name), unread.get(name, 0)
+        if account and rows.counts[name] + gone == account.received + account.invalid_stamps:
+            log.lost[name] = account.missing + gone  # the bag is the one that was counted
         else:
-            log.lost[name] = max(log.lost[name], unread)
+            log.lost[name] = max(log.lost[name], gone)
     if topics.COMMAND.full_name in accounting:
         log.unanswered = unanswered_ticks(accounting, bag.finished)

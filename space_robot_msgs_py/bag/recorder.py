@@ -11,20 +11,20 @@ from typing import Any
 from .. import topics
 from ..errors import FlightError, MessageError
 from ..samples import Timebase
-from ..wire.carrier import unwrap
-from .accounts import ACCOUNTS_KEY
-from .mcap_file import Compression
+from ..wire.viewers import unwrap
 from .message_accounting import (
+    ACCOUNTS_KEY,
     MessageAccounting,
     SequenceCount,
     lost_messages,
     message_tick,
     topics_with_allowed_gaps,
 )
-from .remappings import remappings_note
-from .writer import BagWriter
+from .writer import BagWriter, Compression
 
 FLIGHT_KEY = "space_robot.flight"
+TOPICS_KEY = "space_robot.topics"
+"""Of our topics by the ones that they were recorded as, where these are others."""
 ROBOT_KEY = "robot_file"
 """Key of the robot's numbers in the description."""
 CHUNK_BYTES = 1 << 16
@@ -71,13 +71,15 @@ class BagRecorder:
             t.name: t.carries or t._replace(name=names[t.name]) for t in topics.RECORDED
         }
         """Topics by their names in the bag."""
-        self._writer = BagWriter(
-            path,
-            self._written.values(),
-            {FLIGHT_KEY: json.dumps(self._flight), **remappings_note(names, namespace)},
-            compression,
-            split_size,
-        )
+        remapped = {
+            names[topic.name]: topic.full_name
+            for topic in topics.ALL
+            if names[topic.name] != own[topic.name]
+        }
+        description = {FLIGHT_KEY: json.dumps(self._flight)}
+        if remapped:
+            description[TOPICS_KEY] = json.dumps(remapped)
+        self._writer = BagWriter(path, self._written.values(), description, compression, split_size)
         self._chunk_bytes = min(CHUNK_BYTES, split_size or CHUNK_BYTES)
         self._most_bytes = min(MOST_CHUNKS * CHUNK_BYTES, split_size or MOST_CHUNKS * CHUNK_BYTES)
         self._timebase = timebase
@@ -88,7 +90,7 @@ class BagRecorder:
         self.kept_tick = -1
         """The last tick whose state is in the file for good; -1: none."""
         self._kept = 0
-        self._flush_at, self._open_bytes = time.monotonic() + CHUNK_AGE_S, 0
+        self._flush_at = time.monotonic() + CHUNK_AGE_S
         self._closed = False
 
     def record(self, topic: topics.Topic, data: bytes, sent_ns: int = 0, sequence: int = 0) -> None:
@@ -116,14 +118,12 @@ class BagRecorder:
             return
         log_ns = self._timebase.stamp_ns(max(0, min(tick, counted.last)))
         try:
-            self._open_bytes = self._writer.write(
-                self._written[topic.name], log_ns, sent_ns or log_ns, tick, data
-            )
+            self._writer.write(self._written[topic.name], log_ns, sent_ns or log_ns, tick, data)
         except OSError as error:
             self._fail(error)
-            return
-        if self._open_bytes > self._most_bytes:  # no time to flush so far
-            self.flush()
+        else:
+            if self._writer.open_bytes > self._most_bytes:  # no time to flush so far
+                self.flush()
 
     def describe(self, flown: Any) -> None:
         """Add to the flight's description what the plant says, where nobody has said more.
@@ -175,14 +175,15 @@ class BagRecorder:
                     self.accounting[topic.full_name].last
                     for topic in (topics.JOINT_STATES, topics.BASE_STATE)
                 )
-        self._flush_at, self._open_bytes = time.monotonic() + CHUNK_AGE_S, 0
+        self._flush_at = time.monotonic() + CHUNK_AGE_S
 
     def flush_if_due(self) -> bool:
         """`flush` if the open chunk is full, or may be older than `CHUNK_AGE_S`; whether it was so.
 
         To be called often.
         """
-        is_due = self._open_bytes > self._chunk_bytes or time.monotonic() >= self._flush_at
+        is_full = self._writer.open_bytes > self._chunk_bytes and not self.failure
+        is_due = is_full or time.monotonic() >= self._flush_at
         if is_due:
             self.flush()
         return is_due

@@ -7,7 +7,7 @@ from typing import Annotated, ClassVar
 from pydantic import ByteSize, Field, field_validator
 
 from ..config.settings import NodeSettings
-from .mcap_file import Compression
+from .writer import Compression
 
 LEAST_SPLIT_SIZE = 65_536
 """Every file has 20 kB of definitions and indexes, whatever its messages."""

@@ -30,16 +30,16 @@ class FileSummary(NamedTuple):
 
 
 class _Dumper(yaml.SafeDumper):
-    """Writes as rosbag2 (yaml-cpp) does."""
-
-    def ignore_aliases(self, data: Any) -> bool:
-        """No anchors, which other readers need not know."""
-        return True
+    """Writes as rosbag2 (yaml-cpp) does; PyYAML's C code cannot indent sequences so."""
 
     def __init__(self, *arguments: Any, **options: Any) -> None:
         super().__init__(*arguments, **options)
         self.long_texts: dict[str, str] = {}
         """By what stands for them."""
+
+    def ignore_aliases(self, data: Any) -> bool:
+        """No anchors, which other readers need not know."""
+        return True
 
     def represent_text(self, text: str) -> yaml.ScalarNode:
         """Represent a text; a long one of JSON by a short one that stands for it."""
@@ -61,7 +61,7 @@ _Dumper.add_representer(str, _Dumper.represent_text)
 
 
 def to_yaml(value: Any) -> str:
-    """Text as rosbag2 writes it, without a line's end."""
+    """Return the text that rosbag2 writes, without a line's end."""
     stream = StringIO()
     dumper = _Dumper(stream, sort_keys=False, default_flow_style=False, width=math.inf)
     dumper.open()
@@ -74,7 +74,7 @@ def to_yaml(value: Any) -> str:
 
 
 def qos_profiles(topic: Topic) -> list[dict[str, Any]]:
-    """The QoS a topic is offered with."""
+    """Return the QoS a topic is offered with."""
     return [
         {
             "history": "keep_last",
@@ -100,13 +100,12 @@ def bag_information(
         topics: each with its number of messages.
         custom: the custom data.
     """
-    start, duration = _times([file.span_ns for file in files])
+    whole = sum(file.message_count for file in files)
     return {
         "version": 9,
         "storage_identifier": "mcap",
-        "duration": duration,
-        "starting_time": start,
-        "message_count": sum(file.message_count for file in files),
+        **_times([file.span_ns for file in files], "duration", "starting_time"),
+        "message_count": whole,
         "topics_with_message_count": [
             {
                 "topic_metadata": {
@@ -124,25 +123,26 @@ def bag_information(
         "compression_format": "",
         "compression_mode": "",
         "relative_file_paths": [file.name for file in files],
-        "files": [_file_information(file) for file in files],
+        "files": [
+            {
+                "path": file.name,
+                **_times([file.span_ns], "starting_time", "duration"),
+                "message_count": file.message_count,
+            }
+            for file in files
+        ],
         "custom_data": dict(custom) or None,
         "ros_distro": "jazzy",
     }
 
 
-def _file_information(file: FileSummary) -> dict[str, Any]:
-    start, duration = _times([file.span_ns])
-    return {
-        "path": file.name,
-        "starting_time": start,
-        "duration": duration,
-        "message_count": file.message_count,
-    }
-
-
-def _times(spans_ns: Sequence[tuple[int, int] | None]) -> tuple[dict[str, int], dict[str, int]]:
-    """Start and duration of what has these first and last log times."""
+def _times(spans_ns: Sequence[tuple[int, int] | None], *keys: str) -> dict[str, dict[str, int]]:
+    """Return start and duration of what has these first and last log times, in a key order."""
     known = [span for span in spans_ns if span]
     first = min((span[0] for span in known), default=_NEVER_NS)
     last = max((span[1] for span in known), default=_NEVER_NS)
-    return {"nanoseconds_since_epoch": first}, {"nanoseconds": last - first}
+    times = {
+        "starting_time": {"nanoseconds_since_epoch": first},
+        "duration": {"nanoseconds": last - first},
+    }
+    return {key: times[key] for key in keys}

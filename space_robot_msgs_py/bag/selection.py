@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections import Counter
+from collections.abc import Collection, Iterator, Mapping
+
+from space_robot_msgs_py.config.validation import full_namespace
 
 from .. import topics as graph
+from ..config.text import parse_json
 from ..config.validation import one_of
 from ..errors import InputError
 from .batch import Batch
-from .contents import Bag
-from .findings import some_of
-from .recorder import FLIGHT_KEY
-from .remappings import noted_remappings
-from .robots import find_namespace, is_type
+from .contents import Bag, some_of
+from .recorder import FLIGHT_KEY, TOPICS_KEY
+
+REQUIRED = (graph.JOINT_STATES, graph.BASE_STATE, graph.REFERENCE_JOINTS, graph.REFERENCE_BASE)
+"""Topics that a flight cannot be read without."""
 
 
 class Selection:
@@ -32,79 +36,138 @@ class Selection:
         """
         self._bag, self._remap = bag, dict(remap)
         self.wrong: dict[str, str] = {}
-        """The finding instead of the right type, by our topic."""
+        """What is wrong with the type, by our topic."""
         for theirs, ours in self._remap.items():
             one_of(ours, graph.BY_NAME, "topic", f" to take {theirs} for")
             if list(self._remap.values()).count(ours) > 1:
                 raise InputError(f"more than one topic is to be taken for {ours}")
-        noted = noted_remappings(bag.custom_data())
+        noted = _noted_remappings(bag.custom_data())
         taken = {n: ours for n, ours in noted.items() if ours not in self._remap.values()}
         taken |= self._remap
         is_ours = FLIGHT_KEY in bag.custom_data()
         self.namespace = find_namespace(bag, namespace, taken.values(), is_ours)
         """The robot's."""
-        self._names = {topic.in_namespace(self.namespace): topic for topic in graph.ALL}
-        for name, topic in list(self._names.items()):
-            if topic.full_name in taken.values():
-                del self._names[name]
+        self._names = {
+            topic.in_namespace(self.namespace): topic
+            for topic in graph.ALL
+            if topic.full_name not in taken.values()
+        }
         self._names |= {theirs: graph.BY_NAME[ours] for theirs, ours in taken.items()}
 
     def batches(self) -> Iterator[tuple[graph.Topic, Batch]]:
-        """All messages of our topics, as they were written."""
+        """Yield all messages of our topics, as they were written."""
         for batch in self._bag.batches():
-            topic = self.ours(batch.topic)
+            topic = self._names.get(batch.topic)
             if topic and self._fits(topic, batch.type, batch.encoding):
                 yield topic, batch
 
-    def ours(self, name: str) -> graph.Topic | None:
-        """Our topic that a topic of the bag is taken for."""
-        return self._names.get(name)
-
     def topics(self) -> list[graph.Topic]:
-        """Our topics that the bag has with the right type, messages or none.
+        """Return our topics that the bag has with the right type, messages or none.
 
         Raises:
             InputError: a topic to remap is not in the bag.
         """
-        there = self._bag.topics()
+        kinds = self._bag.topics()
         for theirs in self._remap:
-            if theirs not in there:
-                raise InputError(f"no topic {theirs} to remap; it has {self.listing()}")
+            if theirs not in kinds:
+                listing = some_of(sorted(kinds)) or "no topics"
+                raise InputError(f"no topic {theirs} to remap; it has {listing}")
         chosen = [
             topic
-            for name, kind in there.items()
-            if (topic := self.ours(name)) and self._fits(topic, kind, "cdr")
+            for name, kind in kinds.items()
+            if (topic := self._names.get(name)) and self._fits(topic, kind, "cdr")
         ]
         return sorted(set(chosen), key=graph.ALL.index)
 
     def recorded(self) -> dict[str, int] | None:
-        """Messages that the bag should hold, by our topic; None: nobody counted."""
+        """Return the messages that the bag should hold, by our topic; None: nobody counted."""
         counts = self._bag.recorded()
         if counts is None:
             return None
-        named = ((self.ours(name), count) for name, count in counts.items())
+        named = ((self._names.get(name), count) for name, count in counts.items())
         return {
             topic.full_name: count
             for topic, count in named
             if topic and topic.full_name not in self.wrong
         }
 
-    def listing(self) -> str:
-        """The bag's topics in words."""
-        return some_of(sorted(self._bag.topics())) or "no topics"
-
     def listing_instead_of(self, topic: graph.Topic) -> str:
-        """The topics with messages in words, those first that may be the one that is looked for."""
+        """Return the topics with messages in words, those of the type of ``topic`` first."""
         kinds, counts = self._bag.topics(), self._bag.counts()
         names = [name for name in sorted(kinds) if counts.get(name)]
-        names.sort(key=lambda name: not is_type(kinds[name], topic))
+        names.sort(key=lambda name: not _is_type(kinds[name], topic))
         return f"it has {some_of(names)}" if names else "no topic of it has any"
 
     def _fits(self, topic: graph.Topic, kind: str, encoding: str) -> bool:
         if encoding != "cdr":
             self.wrong[topic.full_name] = f"encoded as {encoding!r}, 'cdr' is needed"
-        elif kind and not is_type(kind, topic):
+        elif kind and not _is_type(kind, topic):
             self.wrong[topic.full_name] = f"of type {kind}, {topic.type} is needed"
         else:
             return True
         return False
+
+
+def _is_type(kind: str, topic: graph.Topic) -> bool:
+    """Return True if a topic's type in a bag is ours, in ROS's or in DDS' spelling."""
+    return kind.replace("/msg/", "/") == topic.type.replace("/msg/", "/")
+
+
+def _noted_remappings(noted: Mapping[str, str]) -> dict[str, str]:
+    """Return our topic by the one that it was recorded as, as our recorder noted it."""
+    try:
+        remappings = parse_json(noted.get(TOPICS_KEY, "{}"))
+        ours = list(remappings.values())
+        is_sound = len(set(ours)) == len(ours) and graph.BY_NAME.keys() >= set(ours)
+    except (ValueError, AttributeError, TypeError):
+        return {}
+    return remappings if is_sound else {}
+
+
+def find_namespace(bag: Bag, wanted: str | None, known: Collection[str], is_ours: bool) -> str:
+    """Find the namespace of the robot to be read.
+
+    Args:
+        bag: it has the robot's topics by their full names.
+        wanted: namespace of the one that is meant; None: the only one there is.
+        known: our topics, by their full names in the root namespace, that others stand for.
+        is_ours: whether our recorder wrote the bag: it declares its topics first.
+
+    Returns:
+        The root namespace if the bag has no robot: who reads it says what is missing.
+
+    Raises:
+        InputError: it has several robots, or none in the namespace that is wanted.
+    """
+    needed = [topic for topic in REQUIRED if topic.full_name not in known]
+    namespaces = _count_namespaces(bag.topics(), needed)
+    if not is_ours and (not bag.finished or len(needed) not in namespaces.values()):
+        bag.counts()  # all topics are known once all messages have been passed
+        namespaces = _count_namespaces(bag.topics(), needed)
+    whole = sorted(name for name, count in namespaces.items() if count == len(needed))
+    if wanted is not None:
+        namespace = full_namespace(wanted)
+        if namespaces and namespace not in namespaces:
+            raise InputError(
+                f"no robot in namespace {namespace}; it has {some_of(sorted(namespaces))}"
+            )
+        return namespace
+    if len(whole) > 1:
+        raise InputError(
+            f"robots of {len(whole)} namespaces, {some_of(whole)}: choose one (--namespace)"
+        )
+    if whole:
+        return whole[0]
+    if not namespaces or graph.ROOT in namespaces:
+        return graph.ROOT
+    return namespaces.most_common(1)[0][0]
+
+
+def _count_namespaces(kinds: Mapping[str, str], needed: Collection[graph.Topic]) -> Counter[str]:
+    """Count by namespace the needed topics that are in a bag (type by full name)."""
+    counts: Counter[str] = Counter()
+    for name, kind in kinds.items():
+        for topic in needed:
+            if name.endswith(f"/{topic.name}") and (not kind or _is_type(kind, topic)):
+                counts[name.removesuffix(topic.name).rstrip("/") or graph.ROOT] += 1
+    return counts

@@ -5,18 +5,37 @@ Each file stands for itself: the last message of every latched topic is at its b
 
 from __future__ import annotations
 
+import errno
+import os
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
+from contextlib import suppress
 from pathlib import Path
+from typing import IO, Any, Literal, cast
+
+from mcap.data_stream import RecordBuilder
+from mcap.records import DataEnd, Footer
+from mcap.writer import MCAP0_MAGIC, CompressionType, IndexType, Writer
 
 from ..errors import InputError
 from ..topics import Topic
 from ..wire.definitions import definition, jazzy
-from .mcap_file import Channel, Compression, McapFile
 from .rosbag2_yaml import FileSummary, bag_information, qos_profiles, to_yaml
 
+Compression = Literal["none", "lz4", "zstd"]
+_COMPRESSIONS: dict[Compression, CompressionType] = {
+    "none": CompressionType.NONE,
+    "lz4": CompressionType.LZ4,
+    "zstd": CompressionType.ZSTD,
+}
 DESCRIPTION = "space_robot"
 """Name of our metadata records: one at each file's beginning, one at the bag's end."""
+METADATA = "metadata.yaml"
+_INDEXES = IndexType.CHUNK | IndexType.MESSAGE | IndexType.METADATA
+_NEVER_FULL = 1 << 62
+"""Size of a chunk: only `BagWriter.flush` ends one."""
+_MESSAGE_BYTES = 31
+"""Length of a message's record without its data."""
 
 
 class BagWriter:
@@ -43,17 +62,18 @@ class BagWriter:
             InputError: it exists already, or cannot be written.
         """
         self.path = path
+        self.open_bytes = 0
+        """Bytes of the messages in the open chunk."""
         self._topics = tuple(topics)
         self._description = dict(description)
         self._compression, self._split_size = compression, split_size
         self._channels = {topic.name: number for number, topic in enumerate(self._topics, 1)}
-        self._in_files = [_channel(topic) for topic in self._topics]
-        self._files: list[McapFile] = []
+        self._files: list[_McapFile] = []
         self._latched: dict[int, tuple[int, int, bytes] | None] = {
             self._channels[topic.name]: None for topic in self._topics if topic.is_latched
         }
         """Publish time, sequence and bytes of the last message of each latched topic."""
-        self._begins_file = False
+        self._is_full = False
         """True if the next message is the first of another file."""
         try:
             path.mkdir(parents=True, exist_ok=True)
@@ -65,28 +85,24 @@ class BagWriter:
         except OSError as error:
             raise InputError(f"{path}: no bag can be written there ({error.strerror})") from None
 
-    def write(self, topic: Topic, log_ns: int, publish_ns: int, sequence: int, data: bytes) -> int:
-        """Add a message; the first after a full file begins another one.
-
-        Returns:
-            Bytes in the open chunk.
+    def write(self, topic: Topic, log_ns: int, publish_ns: int, sequence: int, data: bytes) -> None:
+        """Add a message to the open chunk; the first after a full file begins another one.
 
         Raises:
             OSError: the next file cannot be begun.
         """
         channel, sequence = self._channels[topic.name], sequence & 0xFFFFFFFF
-        if self._begins_file:
-            self._begins_file = False
+        if self._is_full:
+            self._is_full = False
             self._end_file({})
             self._begin_file()
             for latched, message in self._latched.items():
                 if message:
                     self._files[-1].add(latched, log_ns, *message)
-        file = self._files[-1]
-        file.add(channel, log_ns, publish_ns, sequence, data)
+        self._files[-1].add(channel, log_ns, publish_ns, sequence, data)
+        self.open_bytes += _MESSAGE_BYTES + len(data)
         if channel in self._latched:
             self._latched[channel] = (publish_ns, sequence, data)
-        return file.open_bytes
 
     def describe(self, description: Mapping[str, str]) -> None:
         """Note more, or what is known better, in this file, those to come and at the end.
@@ -107,10 +123,11 @@ class BagWriter:
         """
         file = self._files[-1]
         file.check_in_place()
-        if file.open_bytes:
-            file.end_chunk()
+        if self.open_bytes:
+            file.writer.flush()
+            self.open_bytes = 0
             self._whole_bytes = file.size
-            self._begins_file = 0 < self._split_size <= file.size
+            self._is_full = 0 < self._split_size <= file.size
 
     def close(self, custom: Mapping[str, str]) -> None:
         """Finish the last file and write metadata.yaml, after a `flush`.
@@ -124,9 +141,9 @@ class BagWriter:
         self._end_file(custom)
         information = self._information({**self._description, **custom}, self._topics)
         text = to_yaml({"rosbag2_bagfile_information": information}) + "\n"
-        part = self.path / "metadata.yaml.part"
+        part = self.path / f"{METADATA}.part"
         part.write_text(text, encoding="utf-8")
-        part.replace(self.path / "metadata.yaml")
+        part.replace(self.path / METADATA)
 
     def abandon(self) -> None:
         """After a failure: leave the whole chunks and, if there is room, a valid MCAP end."""
@@ -134,7 +151,7 @@ class BagWriter:
 
     def _begin_file(self) -> None:
         path = self.path / f"{self.path.name}_{len(self._files)}.mcap"
-        file = McapFile(path, self._in_files, self._compression)
+        file = _McapFile(path, self._topics, self._compression)
         self._files.append(file)
         try:
             self._add_records(self._description, ())  # no topics yet, as rosbag2 has it
@@ -148,11 +165,11 @@ class BagWriter:
         self._files[-1].finish()
 
     def _add_records(self, custom: Mapping[str, str], topics: Sequence[Topic]) -> None:
-        file = self._files[-1]
-        file.add_metadata(DESCRIPTION, custom)
+        writer = self._files[-1].writer
+        writer.add_metadata(DESCRIPTION, dict(custom))
         # rosbag2 has the bag's metadata at both ends of a file, too; `reindex` reads them
         text = to_yaml(self._information(custom, topics))
-        file.add_metadata("rosbag2", {"serialized_metadata": text})
+        writer.add_metadata("rosbag2", {"serialized_metadata": text})
 
     def _information(self, custom: Mapping[str, str], topics: Sequence[Topic]) -> dict[str, object]:
         counts = sum((file.counts for file in self._files), Counter[int]())
@@ -161,9 +178,86 @@ class BagWriter:
         return bag_information(files, counted, custom)
 
 
-def _channel(topic: Topic) -> Channel:
-    metadata = {
-        "offered_qos_profiles": to_yaml(qos_profiles(topic)),
-        "topic_type_hash": jazzy().hash_rihs01(topic.type),
-    }
-    return Channel(topic.full_name, topic.type, definition(topic.type).encode(), metadata)
+class _McapFile:
+    """A file with an `mcap.Writer`, whose chunks end on request and are passed to the kernel."""
+
+    def __init__(self, path: Path, topics: Sequence[Topic], compression: Compression) -> None:
+        self.path = path
+        self.size = 0
+        """Bytes written."""
+        self.counts: Counter[int] = Counter()
+        """Number of messages by channel."""
+        self.span_ns: tuple[int, int] | None = None
+        """First and last log time (None: no message)."""
+        self._file = path.open("xb", buffering=0)
+        self.writer = Writer(
+            cast(IO[Any], self),
+            chunk_size=_NEVER_FULL,
+            compression=_COMPRESSIONS[compression],
+            index_types=_INDEXES,
+        )
+        try:
+            self.writer.start("ros2", "space_robot")
+        except OSError:
+            self.remove()
+            raise
+        schemas = {
+            kind: self.writer.register_schema(kind, "ros2msg", definition(kind).encode())
+            for kind in dict.fromkeys(topic.type for topic in topics)
+        }
+        for topic in topics:
+            metadata = {
+                "offered_qos_profiles": to_yaml(qos_profiles(topic)),
+                "topic_type_hash": jazzy().hash_rihs01(topic.type),
+            }
+            self.writer.register_channel(topic.full_name, "cdr", schemas[topic.type], metadata)
+
+    def add(self, channel: int, log_ns: int, publish_ns: int, sequence: int, data: bytes) -> None:
+        """Add a message to the open chunk."""
+        self.writer.add_message(channel, log_ns, data, publish_ns, sequence)
+        self.counts[channel] += 1
+        first, last = self.span_ns or (log_ns, log_ns)
+        self.span_ns = min(first, log_ns), max(last, log_ns)
+
+    def finish(self) -> None:
+        """Write indexes and statistics, and close the file."""
+        self.writer.finish()
+        self._file.close()
+
+    def abandon(self, size: int) -> None:
+        """Keep the first ``size`` bytes and, if there is room, end the file."""
+        if self._file.closed:
+            return
+        end = RecordBuilder()
+        DataEnd(0).write(end)
+        Footer(0, 0, 0).write(end)
+        with suppress(OSError):
+            self._file.truncate(size)
+            os.pwrite(self._file.fileno(), end.end() + MCAP0_MAGIC, size)
+        self._file.close()
+
+    def remove(self) -> None:
+        """Close and delete the file."""
+        self._file.close()
+        self.path.unlink(missing_ok=True)
+
+    def check_in_place(self) -> None:
+        """Check that the file was not removed or moved away."""
+        with suppress(FileNotFoundError, NotADirectoryError):
+            if os.path.samestat(self.path.stat(), os.fstat(self._file.fileno())):
+                return
+        raise FileNotFoundError(errno.ENOENT, "its file was removed or moved away")
+
+    def write(self, data: bytes) -> None:
+        """Write all bytes, or raise an error; called by `mcap.Writer`, as `tell` and `flush`."""
+        rest = memoryview(data)
+        while rest:
+            rest = rest[self._file.write(rest) :]
+        self.size += len(data)
+
+    def tell(self) -> int:
+        """Return the number of bytes written."""
+        return self.size
+
+    def flush(self) -> None:
+        """Do nothing: the kernel has all bytes."""

@@ -1,18 +1,24 @@
-"""Folder of the compiled code on disk; its name is a digest of the sources."""
+"""Compiled code on disk: its folder, whose name is a digest of the sources, and what is in it."""
 
 from __future__ import annotations
 
 import hashlib
 import os
+import re
 import shutil
 import stat
 import sys
 import tempfile
+from collections.abc import Iterable, Iterator
 from functools import cache
 from pathlib import Path
+from types import CodeType
+from typing import Any
 
 ROOM_BYTES = 16 << 20
 """Required free space for a complete cache, with reserve."""
+_NAME = re.compile(rb"\b[A-Z][A-Z0-9_]+\b")
+_CONSTANT = re.compile(rb"\n([A-Z][A-Z0-9_, ]+) = (.*)")
 
 
 @cache
@@ -24,10 +30,19 @@ def cache_directory() -> Path:
     here = Path(__file__).resolve()
     root = here.parents[2]
     digest = hashlib.sha256(str(root).encode())  # one cache per installation, as in Numba
+    others: list[bytes] = []
+    names: set[bytes] = set()
     for source in sorted(root.glob("space_robot*/**/*.py")):
         text = source.read_bytes()
         if b"@kernel" in text or b"@subroutine" in text or source.parent == here.parent:
             digest.update(text)
+            names.update(_NAME.findall(text.partition(b"\n\n\n")[0]))  # in its imports
+        else:
+            others.append(text)
+    for text in others:  # the numbers of other files that kernels use are compiled into them
+        for constants, values in _CONSTANT.findall(text):
+            if not names.isdisjoint(_NAME.findall(constants)):
+                digest.update(constants + values)
     home = os.environ.get("XDG_CACHE_HOME") or str(Path.home() / ".cache")
     base = os.environ.get("NUMBA_CACHE_DIR") or str(Path(home) / "space_robot")
     wanted, name = Path(base), digest.hexdigest()[:16]
@@ -68,3 +83,53 @@ def _temporary_cache() -> Path:
     except OSError:
         pass
     return Path(tempfile.mkdtemp(prefix="space_robot_"))
+
+
+def index_files(functions: Iterable[Any]) -> set[str]:
+    """Return the index file of each of some kernels and of the kernels that they call.
+
+    Numba writes the file when the kernel is compiled. Subroutines have no file: they are compiled
+    into their callers.
+    """
+    files: set[str] = set()
+    seen: set[int] = set()
+    waiting = list(functions)
+    while waiting:
+        function = waiting.pop()
+        if id(function) in seen:
+            continue
+        seen.add(id(function))
+        if path := getattr(getattr(function._cache, "_cache_file", None), "_index_path", None):
+            files.add(path)
+        waiting += _called(function.py_func)
+    return files
+
+
+def count_compiled(files: Iterable[str], since_ns: int = 0) -> int:
+    """Return the number of `index_files` that have been written since a time, ns."""
+    return sum(_written_ns(file) > since_ns for file in files)
+
+
+def _written_ns(file: str) -> int:
+    try:
+        return os.stat(file).st_mtime_ns
+    except OSError:
+        return 0
+
+
+def _called(function: Any) -> Iterator[Any]:
+    """Yield the kernels and subroutines that a function refers to."""
+    for name in _names(function.__code__):
+        value = function.__globals__.get(name)
+        if hasattr(value, "py_func"):
+            yield value
+    for cell in function.__closure__ or ():
+        if hasattr(cell.cell_contents, "py_func"):
+            yield cell.cell_contents
+
+
+def _names(code: CodeType) -> Iterator[str]:
+    yield from code.co_names
+    for constant in code.co_consts:
+        if isinstance(constant, CodeType):
+            yield from _names(constant)

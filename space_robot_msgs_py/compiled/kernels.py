@@ -1,9 +1,9 @@
 """Decorators of compiled functions, with a disk cache that is never outdated.
 
 Numba's cache checks only the file of a function, and does not detect changes of called functions in
-other files. Here the name of the cache folder is a digest of all files with kernels in the three
-packages: an edit of one of them starts a new cache, other edits do not. All processes share the
-cache.
+other files. Here the name of the cache folder is a digest of all files with kernels, and of the
+constants that they use: an edit of one of them starts a new cache, other edits do not. All
+processes share the cache.
 """
 
 from __future__ import annotations
@@ -13,18 +13,18 @@ import re
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
 from typing import Any, TypeVar, cast
+from weakref import WeakKeyDictionary
 
 import numba
 from numba.core.caching import FunctionCache
 from numba.core.ccallback import CFunc
 from numba.core.errors import NumbaError
 from numba.core.runtime.nrt import rtsys
+from numba.core.typing.typeof import typeof_impl
 from numba.experimental import function_type  # noqa: F401  (what Numba makes of a RecordFunction)
 
 from ..errors import InputError
-from . import block_type, lane_arithmetic, lane_words  # noqa: F401  (they register with Numba)
 from .cache import cache_directory
-from .kept_types import keep_types
 from .record_type import record_type
 from .records import Record
 
@@ -131,6 +131,28 @@ class RecordFunction(_FunctionType):  # type: ignore[misc]
     def signature(self) -> Any:
         """Return the function type as seen by a loop, for Numba."""
         return self._signature
+
+
+def keep_types(kind: type, key: Callable[[Any], Any]) -> None:
+    """Let Numba keep the types of values of a class from one call of a kernel to the next.
+
+    A kernel called from Python asks for the types of its arguments. Numba makes those of functions,
+    and of tuples with functions, anew for every call, which takes longer than a law.
+
+    Args:
+        kind: the class.
+        key: returns the part of a value that its type depends on; the type is kept as long as it.
+    """
+    of_numba = typeof_impl.dispatch(kind)
+    types: WeakKeyDictionary[Any, Any] = WeakKeyDictionary()
+
+    def type_of(value: Any, context: Any) -> Any:
+        known = types.get(key(value))
+        if known is None:
+            known = types[key(value)] = of_numba(value, context)
+        return known
+
+    typeof_impl.register(kind, type_of)
 
 
 keep_types(RecordFunction, lambda function: function)

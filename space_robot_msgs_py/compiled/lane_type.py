@@ -2,22 +2,40 @@
 
 Its value is a vector of LLVM, ``<8 x double>``, which the compiler turns into the instructions of
 the processor. IEEE arithmetic of a vector is that of its elements, so a lane has the bits of a
-plain number. A comparison gives a mask, ``<8 x i1>``; it has no truth value. What can be done with
-both is in `lane_arithmetic` and `lane_words`.
+plain number. A comparison gives a mask, ``<8 x i1>``; it has no truth value. The functions of
+`lanes` are defined for both here.
 """
 
 from __future__ import annotations
 
+import math
+import operator
+from collections.abc import Callable
 from typing import Any, ClassVar
 
+import numpy as np
 from llvmlite import ir
 from numba.core import cgutils, types
-from numba.core.imputils import lower_cast
+from numba.core.imputils import lower_builtin, lower_cast
 from numba.core.typeconv.castgraph import Conversion
+from numba.core.typing.templates import AbstractTemplate, infer_global, signature
 from numba.extending import models, register_model
 
-from .lanes import WIDTH
+from .lanes import (
+    WIDTH,
+    all_lanes,
+    any_lane,
+    as_lanes,
+    as_numbers,
+    lane_of,
+    negated,
+    uniform,
+    where,
+    whole,
+    with_lane,
+)
 
+_Build = Callable[..., Any]
 DOUBLE, BIT, INDEX = ir.DoubleType(), ir.IntType(1), ir.IntType(32)
 LANE_VECTOR, MASK_VECTOR = ir.VectorType(DOUBLE, WIDTH), ir.VectorType(BIT, WIDTH)
 
@@ -89,3 +107,394 @@ def _spread(builder: Any, value: Any, vector: Any) -> Any:
     first = builder.insert_element(unknown, value, INDEX(0))
     zeros = ir.Constant(ir.VectorType(INDEX, WIDTH), [0] * WIDTH)
     return builder.shuffle_vector(first, unknown, zeros)
+
+
+# Arithmetic, comparisons and functions
+
+
+def _is_number(kind: Any) -> bool:
+    return isinstance(kind, (types.Float, types.Integer, types.Literal))
+
+
+def _some_lanes(args: Any) -> bool:
+    return LANE in args and all(kind == LANE or _is_number(kind) for kind in args)
+
+
+def _some_masks(args: Any) -> bool:
+    return MASK in args and all(isinstance(kind, (MaskType, types.Boolean)) for kind in args)
+
+
+def _define(function: Any, arity: int, result: Any, build: _Build, of: Any = LANE) -> None:
+    """Define ``function`` of lanes, or masks, with the instructions emitted by ``build``."""
+    accepts = _some_lanes if of is LANE else _some_masks
+
+    class Pointwise(AbstractTemplate):
+        key = function
+
+        def generic(self, args: Any, kws: Any) -> Any:
+            if len(args) == arity and not kws and accepts(args):
+                return signature(result, *[of] * arity)
+            return None
+
+    def lower(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        return build(builder, *args)
+
+    infer_global(function)(Pointwise)
+    lower_builtin(function, *[type(of)] * arity)(lower)
+
+
+def _intrinsic(name: str, arity: int = 1) -> _Build:
+    """Return an emitter of a vector function of LLVM."""
+
+    def build(builder: Any, *args: Any) -> Any:
+        kind = ir.FunctionType(LANE_VECTOR, [LANE_VECTOR] * arity)
+        whole_name = f"llvm.{name}.v{WIDTH}f64"
+        return builder.call(cgutils.get_or_insert_function(builder.module, kind, whole_name), args)
+
+    return build
+
+
+def _arithmetic(name: str) -> _Build:
+    return lambda builder, a, b: getattr(builder, name)(a, b)
+
+
+def _comparison(sign: str) -> _Build:
+    if sign == "!=":
+        return lambda builder, a, b: builder.fcmp_unordered(sign, a, b)
+    return lambda builder, a, b: builder.fcmp_ordered(sign, a, b)
+
+
+def _constant(value: float) -> Any:
+    return ir.Constant(LANE_VECTOR, [DOUBLE(value)] * WIDTH)
+
+
+def _second_if(sign: str) -> _Build:
+    """Return an emitter of Python's ``min`` or ``max``: the second argument if it compares so."""
+    return lambda builder, a, b: builder.select(builder.fcmp_ordered(sign, b, a), b, a)
+
+
+def _sign(builder: Any, x: Any) -> Any:
+    zero = _constant(0.0)  # zeros and NaN stay what they are
+    below = builder.select(builder.fcmp_ordered("<", x, zero), _constant(-1.0), x)
+    return builder.select(builder.fcmp_ordered(">", x, zero), _constant(1.0), below)
+
+
+def _is_finite(builder: Any, x: Any) -> Any:
+    return builder.fcmp_ordered("<", _intrinsic("fabs")(builder, x), _constant(math.inf))
+
+
+def _is_nan(builder: Any, x: Any) -> Any:
+    return builder.fcmp_unordered("uno", x, x)
+
+
+def _define_all(
+    functions: dict[Any, _Build], arity: int, result: Any = LANE, of: Any = LANE
+) -> None:
+    for names, build in functions.items():
+        for function in names if isinstance(names, tuple) else (names,):
+            _define(function, arity, result, build, of)
+
+
+_define_all(
+    {
+        (operator.add, operator.iadd): _arithmetic("fadd"),
+        (operator.sub, operator.isub): _arithmetic("fsub"),
+        (operator.mul, operator.imul): _arithmetic("fmul"),
+        (operator.truediv, operator.itruediv): _arithmetic("fdiv"),
+        min: _second_if("<"),
+        max: _second_if(">"),
+        (math.copysign, np.copysign): _intrinsic("copysign", 2),
+    },
+    2,
+)
+_define_all(
+    {
+        operator.lt: _comparison("<"),
+        operator.le: _comparison("<="),
+        operator.gt: _comparison(">"),
+        operator.ge: _comparison(">="),
+        operator.eq: _comparison("=="),
+        operator.ne: _comparison("!="),
+    },
+    2,
+    MASK,
+)
+_define_all(
+    {
+        operator.neg: lambda builder, x: builder.fneg(x),
+        operator.pos: lambda builder, x: x,
+        (abs, np.abs, math.fabs): _intrinsic("fabs"),
+        (np.sqrt, math.sqrt): _intrinsic("sqrt"),
+        np.floor: _intrinsic("floor"),
+        np.sign: _sign,
+    },
+    1,
+)
+_define_all({(np.isnan, math.isnan): _is_nan, (np.isfinite, math.isfinite): _is_finite}, 1, MASK)
+_define_all(
+    {
+        operator.and_: _arithmetic("and_"),
+        operator.or_: _arithmetic("or_"),
+        operator.xor: _arithmetic("xor"),
+    },
+    2,
+    MASK,
+    MASK,
+)
+
+
+@infer_global(math.frexp)
+class _Exponent(AbstractTemplate):
+    def generic(self, args: Any, kws: Any) -> Any:
+        return signature(types.UniTuple(LANE, 2), LANE) if args == (LANE,) else None
+
+
+@lower_builtin(math.frexp, LaneType)
+def _exponent(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+    """Emit mantissa and exponent, both as floats, from the bits of a float."""
+    (x,) = args
+    words = ir.VectorType(ir.IntType(64), WIDTH)
+
+    def bits(value: int) -> Any:
+        return ir.Constant(words, [value] * WIDTH)
+
+    is_small = builder.fcmp_ordered("<", _intrinsic("fabs")(builder, x), _constant(2.0**-1022))
+    normal = builder.select(is_small, builder.fmul(x, _constant(2.0**54)), x)
+    word = builder.bitcast(normal, words)
+    power = builder.and_(builder.lshr(word, bits(52)), bits(0x7FF))
+    two_52 = builder.bitcast(builder.or_(power, bits(0x433 << 52)), LANE_VECTOR)  # 2**52 + power
+    offset = builder.select(is_small, _constant(2.0**52 + 1076), _constant(2.0**52 + 1022))
+    half = builder.or_(builder.and_(word, bits(~(0x7FF << 52))), bits(1022 << 52))
+    mantissa, exponent = builder.bitcast(half, LANE_VECTOR), builder.fsub(two_52, offset)
+    is_nonzero = builder.fcmp_unordered("!=", x, _constant(0.0))
+    is_usual = builder.and_(_is_finite(builder, x), is_nonzero)
+    return cgutils.pack_array(
+        builder,
+        [builder.select(is_usual, mantissa, x), builder.select(is_usual, exponent, _constant(0.0))],
+    )
+
+
+@infer_global(np.fmod)
+class _Remainder(AbstractTemplate):
+    def generic(self, args: Any, kws: Any) -> Any:
+        return signature(LANE, LANE, LANE) if _some_lanes(args) else None
+
+
+@lower_builtin(np.fmod, LaneType, LaneType)
+def _remainder(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+    """Emit the function of plain numbers lane by lane: it is rare."""
+    plain = signature(types.float64, types.float64, types.float64)
+    function = context.get_function(np.fmod, plain)
+    total = ir.Constant(LANE_VECTOR, ir.Undefined)
+    for k in range(WIDTH):
+        one = function(builder, [builder.extract_element(value, INDEX(k)) for value in args])
+        total = builder.insert_element(total, one, INDEX(k))
+    return total
+
+
+# Choices of values, and what all lanes share
+
+
+@infer_global(negated)
+class _Negated(AbstractTemplate):
+    def generic(self, args: Any, kws: Any) -> Any:
+        (kind,) = args
+        return signature(kind, kind) if isinstance(kind, (types.Boolean, MaskType)) else None
+
+
+@lower_builtin(negated, types.Boolean)
+@lower_builtin(negated, MaskType)
+def _negated(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+    return builder.not_(args[0])
+
+
+@infer_global(where)
+class _Where(AbstractTemplate):
+    def generic(self, args: Any, kws: Any) -> Any:
+        if len(args) != 3 or kws:
+            return None
+        condition, *values = args
+        result = self.context.unify_types(*(types.unliteral(value) for value in values))
+        if isinstance(result, types.UniTuple):
+            is_known = isinstance(condition, (types.Boolean, MaskType))
+            return signature(result, condition, result, result) if is_known else None
+        if condition == MASK:
+            result = MASK if result == types.boolean else result
+            result = LANE if isinstance(result, types.Number) else result
+            return signature(result, MASK, result, result) if result in (LANE, MASK) else None
+        if not isinstance(condition, types.Boolean):
+            return None
+        scalars = (types.Number, types.Boolean, LaneType, MaskType)
+        return signature(result, condition, result, result) if isinstance(result, scalars) else None
+
+
+@lower_builtin(where, MaskType, types.Any, types.Any)
+@lower_builtin(where, types.Boolean, types.Any, types.Any)
+def _where(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+    condition, *values = args
+    if not isinstance(sig.return_type, types.UniTuple):
+        return builder.select(condition, *values)
+    pairs = zip(*(cgutils.unpack_tuple(builder, value) for value in values), strict=True)
+    return cgutils.pack_array(builder, [builder.select(condition, *pair) for pair in pairs])
+
+
+def _reads_one(function: Any, of_number: Any, of_lane: Any, emit: _Build) -> None:
+    """Define a function of the first lane, or of a plain number."""
+
+    class OfFirstLane(AbstractTemplate):
+        key = function
+
+        def generic(self, args: Any, kws: Any) -> Any:
+            (kind,) = args
+            if kind in (LANE, MASK):
+                return signature(of_lane(kind), kind)
+            if isinstance(kind, (types.Number, types.Boolean)):
+                return signature(of_number(kind), kind)
+            return None
+
+    def lower(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        value, kind = args[0], sig.args[0]
+        if kind in (LANE, MASK):
+            value = builder.extract_element(value, INDEX(0))
+            kind = types.float64 if kind == LANE else types.boolean
+        return emit(context, builder, value, kind, sig.return_type)
+
+    infer_global(function)(OfFirstLane)
+    for kind in (LaneType, MaskType, types.Number, types.Boolean):
+        lower_builtin(function, kind)(lower)
+
+
+_reads_one(
+    uniform,
+    types.unliteral,
+    lambda kind: types.float64 if kind == LANE else types.boolean,
+    lambda context, builder, value, kind, result: value,
+)
+_reads_one(
+    whole,
+    lambda kind: types.intp,
+    lambda kind: types.intp,
+    lambda context, builder, value, kind, result: context.cast(builder, value, kind, result),
+)
+
+
+def _reduces(function: Any, name: str) -> None:
+    """Define a function of all lanes of a mask, or of a plain truth value."""
+
+    class OfAllLanes(AbstractTemplate):
+        key = function
+
+        def generic(self, args: Any, kws: Any) -> Any:
+            (kind,) = args
+            is_condition = isinstance(kind, (MaskType, types.Boolean))
+            return signature(types.boolean, kind) if is_condition else None
+
+    def lower(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        if sig.args[0] != MASK:
+            return args[0]
+        kind = ir.FunctionType(BIT, [MASK_VECTOR])
+        whole_name = f"llvm.vector.reduce.{name}.v{WIDTH}i1"
+        return builder.call(cgutils.get_or_insert_function(builder.module, kind, whole_name), args)
+
+    infer_global(function)(OfAllLanes)
+    for kind in (MaskType, types.Boolean):
+        lower_builtin(function, kind)(lower)
+
+
+_reduces(any_lane, "or")
+_reduces(all_lanes, "and")
+
+
+@infer_global(lane_of)
+class _LaneOf(AbstractTemplate):
+    def generic(self, args: Any, kws: Any) -> Any:
+        kind, _ = args
+        if kind in (LANE, MASK):
+            return signature(types.float64 if kind == LANE else types.boolean, kind, types.intp)
+        return signature(kind, kind, types.intp) if isinstance(kind, types.Float) else None
+
+
+@lower_builtin(lane_of, LaneType, types.Integer)
+@lower_builtin(lane_of, MaskType, types.Integer)
+def _lane_of(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+    return builder.extract_element(*args)
+
+
+@lower_builtin(lane_of, types.Float, types.Integer)
+def _lane_of_number(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+    return args[0]
+
+
+@infer_global(with_lane)
+class _WithLane(AbstractTemplate):
+    def generic(self, args: Any, kws: Any) -> Any:
+        return signature(LANE, LANE, types.intp, types.float64) if args[0] == LANE else None
+
+
+@lower_builtin(with_lane, LaneType, types.Integer, types.Float)
+def _with_lane(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+    value, lane, number = args
+    return builder.insert_element(value, number, lane)
+
+
+@infer_global(as_lanes)
+class _AsLanes(AbstractTemplate):
+    def generic(self, args: Any, kws: Any) -> Any:
+        (kind,) = args
+        is_array = isinstance(kind, types.Array) and kind.dtype == types.float64
+        if not is_array or kind.layout != "C" or kind.ndim < 1:
+            return None
+        return signature(array_of_lanes(kind.ndim - 1) if kind.ndim > 1 else LANE, kind)
+
+
+@lower_builtin(as_lanes, types.Array)
+def _as_lanes(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+    from numba.np import arrayobj  # only the compiler needs it
+
+    numbers = arrayobj.make_array(sig.args[0])(context, builder, value=args[0])
+    data = builder.bitcast(numbers.data, LANE_VECTOR.as_pointer())
+    if sig.return_type == LANE:
+        return builder.load(data, align=1)
+    shape, strides = (cgutils.unpack_tuple(builder, p) for p in (numbers.shape, numbers.strides))
+    return _view(context, builder, sig.return_type, data, shape[:-1], strides[:-1], 8 * WIDTH)
+
+
+@infer_global(as_numbers)
+class _AsNumbers(AbstractTemplate):
+    def generic(self, args: Any, kws: Any) -> Any:
+        (kind,) = args
+        is_array = isinstance(kind, types.Array) and kind.dtype in (LANE, types.float64)
+        if not is_array or kind.layout != "C":
+            return None
+        return signature(types.Array(types.float64, kind.ndim + 1, "C"), kind)
+
+
+@lower_builtin(as_numbers, types.Array)
+def _as_numbers(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+    from numba.np import arrayobj  # only the compiler needs it
+
+    wide = arrayobj.make_array(sig.args[0])(context, builder, value=args[0])
+    width = WIDTH if sig.args[0].dtype == LANE else 1
+    shape, strides = (cgutils.unpack_tuple(builder, part) for part in (wide.shape, wide.strides))
+    data = builder.bitcast(wide.data, DOUBLE.as_pointer())
+    shape, strides = [*shape, cgutils.intp_t(width)], [*strides, cgutils.intp_t(8)]
+    return _view(context, builder, sig.return_type, data, shape, strides, 8)
+
+
+def _view(
+    context: Any, builder: Any, kind: Any, data: Any, shape: Any, strides: Any, itemsize: int
+) -> Any:
+    """Emit an array of a kind over memory that another one keeps."""
+    from numba.np import arrayobj  # only the compiler needs it
+
+    array = arrayobj.make_array(kind)(context, builder)
+    arrayobj.populate_array(
+        array,
+        data=data,
+        shape=cgutils.pack_array(builder, shape),
+        strides=cgutils.pack_array(builder, strides),
+        itemsize=cgutils.intp_t(itemsize),
+        meminfo=None,
+        parent=None,
+    )
+    return array._getvalue()

@@ -8,7 +8,7 @@ of all lanes together. For plain numbers these functions do what they do for one
 
 from __future__ import annotations
 
-from typing import TypeVar
+from typing import Any, TypeVar
 
 _Value = TypeVar("_Value")
 WIDTH = 8
@@ -56,3 +56,13 @@ def lane_of(value: _Value, lane: int) -> _Value:
 def with_lane(value: float, lane: int, number: float) -> float:
     """Return ``value`` with another number in one lane."""
     return number
+
+
+def as_lanes(array: Any) -> Any:
+    """Return a contiguous array (..., 8) of floats as an array (...) of lanes, in kernels."""
+    raise TypeError("only kernels see an array as lanes")
+
+
+def as_numbers(array: Any) -> Any:
+    """Return an array (...) of lanes as one of floats (..., 8), one of floats as (..., 1)."""
+    raise TypeError("only kernels see an array as numbers")

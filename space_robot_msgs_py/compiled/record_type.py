@@ -1,4 +1,4 @@
-"""Records in compiled code: a pointer and the number of joints n, one type for all n.
+"""Records, and blocks of them, in compiled code: a pointer and the number of joints n.
 
 The same layout is read with plain numbers, or with lanes in their place (`lane_type`).
 
@@ -6,11 +6,15 @@ Numba's type of a record has constant field offsets, so that functions of the re
 again for every n. Here offsets and shapes are computed from the formulas of `Layout` when a field
 is read. Kernels see the same: numbers, arrays and nested records as attributes. For a record from
 Python, n follows from its size.
+
+A block is an array (k,) of records: ``block[i]`` is a record, ``block[i:j]`` a block,
+``block.size`` is k, and ``block[i] = record`` copies it.
 """
 
 from __future__ import annotations
 
 import hashlib
+import operator
 from functools import cache
 from typing import Any
 
@@ -18,18 +22,24 @@ import numpy as np
 from numba.core import cgutils, imputils, types
 from numba.core.pythonapi import NativeValue
 from numba.core.registry import cpu_target
-from numba.core.typing.templates import AttributeTemplate, infer_getattr
+from numba.core.typing.templates import (
+    AbstractTemplate,
+    AttributeTemplate,
+    infer_getattr,
+    infer_global,
+    signature,
+)
 from numba.core.typing.typeof import typeof_impl
 from numba.extending import models, register_model, unbox
 
 from .lane_type import LANE, array_of_lanes
-from .layouts import Dimension, Layout, Polynomial
-from .records import layout_of
+from .records import Dimension, Layout, Polynomial, layout_of
 
 BYTES = 8
 """Size of a float64, of which all records consist, bytes."""
 _INT = cgutils.intp_t
 _FLOAT = cpu_target.target_context.get_value_type(types.float64)
+_typeof_array = typeof_impl.dispatch(np.ndarray)
 _typeof_scalar = typeof_impl.dispatch(np.generic)
 
 
@@ -128,7 +138,7 @@ class _RecordAttributes(AttributeTemplate):
 @imputils.lower_getattr_generic(RecordType)
 def _get_field(context: Any, builder: Any, kind: RecordType, value: Any, name: str) -> Any:
     record = cgutils.create_struct_proxy(kind)(context, builder, value=value)
-    offset, field = _found(kind, name)
+    offset, field = _place_of(kind, name)
     place = _place(builder, kind, record.data, offset, record.n)
     if isinstance(field, Layout):
         inner = cgutils.create_struct_proxy(record_type(field, kind.width))(context, builder)
@@ -161,7 +171,7 @@ def _get_field(context: Any, builder: Any, kind: RecordType, value: Any, name: s
 @imputils.lower_setattr_generic(RecordType)
 def _set_field(context: Any, builder: Any, sig: Any, args: Any, name: str) -> None:
     kind, value_type = sig.args
-    offset, field = _found(kind, name)
+    offset, field = _place_of(kind, name)
     if field != ():
         raise TypeError(f"write {name}[:] = ...")
     record = cgutils.create_struct_proxy(kind)(context, builder, value=args[0])
@@ -170,7 +180,7 @@ def _set_field(context: Any, builder: Any, sig: Any, args: Any, name: str) -> No
     builder.store(number, builder.bitcast(place, number.type.as_pointer()), align=BYTES)
 
 
-def _found(kind: RecordType, name: str) -> tuple[Polynomial, tuple[Dimension, ...] | Layout]:
+def _place_of(kind: RecordType, name: str) -> tuple[Polynomial, tuple[Dimension, ...] | Layout]:
     place = kind.layout.find(name)
     assert place is not None
     return place
@@ -191,3 +201,126 @@ def value_of(builder: Any, polynomial: Polynomial, n: Any) -> Any:
         elif factor:
             total = _INT(factor)
     return _INT(0) if total is None else total
+
+
+class BlockType(types.Type):
+    """Numba type of a block of records with a layout."""
+
+    def __init__(self, layout: Layout, width: int = 1) -> None:
+        self.record = record_type(layout, width)
+        super().__init__(f"Block{self.record.name}")
+
+    @property
+    def key(self) -> Any:
+        """Identity of the type, for Numba."""
+        return self.record.key
+
+
+@cache
+def block_type(layout: Layout, width: int) -> BlockType:
+    """Return the `BlockType`, always the same one."""
+    return BlockType(layout, width)
+
+
+@register_model(BlockType)
+class _BlockModel(models.StructModel):
+    def __init__(self, manager: Any, kind: BlockType) -> None:
+        members = [("data", types.voidptr), ("n", types.intp)]
+        super().__init__(manager, kind, [*members, ("size", types.intp), ("step", types.intp)])
+
+
+@typeof_impl.register(np.ndarray)
+def _typeof_block(value: Any, context: Any) -> Any:
+    known = layout_of(value.dtype) if value.dtype.names and value.ndim == 1 else None
+    return block_type(*known) if known else _typeof_array(value, context)
+
+
+@unbox(BlockType)
+def _unbox_block(kind: BlockType, array: Any, c: Any) -> Any:
+    from numba.np import arrayobj  # only the compiler needs it
+
+    plain = types.Array(types.uint8, 1, "A")
+    native = arrayobj.make_array(plain)(c.context, c.builder)
+    pointer = c.builder.bitcast(native._getpointer(), c.pyapi.voidptr)
+    error = cgutils.is_not_null(c.builder, c.pyapi.nrt_adapt_ndarray_from_python(array, pointer))
+    block = cgutils.create_struct_proxy(kind)(c.context, c.builder)
+    block.data = c.builder.bitcast(native.data, cgutils.voidptr_t)
+    block.n = joints(c.builder, kind.record, native.itemsize)
+    (block.size,) = cgutils.unpack_tuple(c.builder, native.shape)
+    (block.step,) = cgutils.unpack_tuple(c.builder, native.strides)
+    # the caller holds the reference to the array
+    c.context.nrt.decref(c.builder, plain, native._getvalue())
+    return NativeValue(block._getvalue(), is_error=error)
+
+
+@infer_getattr
+class _BlockAttributes(AttributeTemplate):
+    key = BlockType
+
+    def resolve_size(self, block: BlockType) -> Any:
+        return types.intp
+
+
+@imputils.lower_getattr(BlockType, "size")
+def _size_of_block(context: Any, builder: Any, kind: BlockType, value: Any) -> Any:
+    return cgutils.create_struct_proxy(kind)(context, builder, value=value).size
+
+
+@infer_global(operator.getitem)
+class _GetItem(AbstractTemplate):
+    def generic(self, args: Any, kws: Any) -> Any:
+        block, index = args
+        if not isinstance(block, BlockType):
+            return None
+        if isinstance(index, types.Integer):
+            return signature(block.record, block, types.intp)
+        return signature(block, block, index) if isinstance(index, types.SliceType) else None
+
+
+@infer_global(operator.setitem)
+class _SetItem(AbstractTemplate):
+    def generic(self, args: Any, kws: Any) -> Any:
+        block, _, record = args
+        if not isinstance(block, BlockType) or record != block.record:
+            return None
+        return signature(types.void, block, types.intp, record)
+
+
+def _item(builder: Any, block: Any, index: Any) -> Any:
+    return cgutils.pointer_add(builder, block.data, builder.mul(index, block.step, flags=["nsw"]))
+
+
+@imputils.lower_builtin(operator.getitem, BlockType, types.Integer)
+def _get_item(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+    block = cgutils.create_struct_proxy(sig.args[0])(context, builder, value=args[0])
+    record = cgutils.create_struct_proxy(sig.return_type)(context, builder)
+    record.data, record.n = _item(builder, block, args[1]), block.n
+    return record._getvalue()
+
+
+@imputils.lower_builtin(operator.getitem, BlockType, types.SliceType)
+def _get_items(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+    from numba.cpython import slicing  # only the compiler needs it
+
+    kind, slice_type = sig.args
+    block = cgutils.create_struct_proxy(kind)(context, builder, value=args[0])
+    part = context.make_helper(builder, slice_type, args[1])
+    slicing.guard_invalid_slice(context, builder, slice_type, part)
+    slicing.fix_slice(builder, part, block.size)
+    proxy = cgutils.create_struct_proxy(kind)(context, builder, value=args[0])
+    proxy.data = _item(builder, block, part.start)
+    proxy.size = slicing.get_slice_length(builder, part)
+    proxy.step = builder.mul(block.step, part.step)
+    return proxy._getvalue()
+
+
+@imputils.lower_builtin(operator.setitem, BlockType, types.Integer, RecordType)
+def _set_item(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+    kind, _, record_type = sig.args
+    block = cgutils.create_struct_proxy(kind)(context, builder, value=args[0])
+    record = cgutils.create_struct_proxy(record_type)(context, builder, value=args[2])
+    numbers = value_of(builder, kind.record.layout.size, block.n)
+    cgutils.raw_memcpy(
+        builder, _item(builder, block, args[1]), record.data, numbers, kind.record.bytes
+    )
+    return context.get_dummy_value()

@@ -2,7 +2,9 @@
 
 A kernel receives a `Record` as a pointer and the number of joints, instead of a dozen arrays to
 check and unpack. NumPy and Numba both read the fields as attributes, from the same declaration:
-NumPy uses the layout for one n, Numba the formula for all n.
+NumPy uses the layout for one n (`Record.dtype`). Compiled code uses a formula with n at run time,
+so that it works for robots of any size: each dimension of an array is ``a + b n``, so sizes and
+offsets are polynomials of n.
 """
 
 from __future__ import annotations
@@ -12,18 +14,105 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache, lru_cache
 from types import SimpleNamespace
-from typing import Any, ClassVar, cast
+from typing import Any, ClassVar, NamedTuple, cast
 
 import numpy as np
 from numpy.typing import NDArray
 from typing_extensions import Self
 
 from .lanes import WIDTH
-from .layouts import Layout, dimensions_of
 
 Block = NDArray[Any]
 """An array (1,) of one record; Numba unboxes it ten times faster than the record."""
 Shape = Callable[[int], tuple[int, ...]]
+Origin = str | Callable[[Any, Any], Any]
+"""Path of an attribute, or a function of what there is to fill a record from."""
+DEGREE = 2
+"""Highest power of n in the size of a field, as in a matrix."""
+
+
+class Dimension(NamedTuple):
+    """``constant + slope n`` elements."""
+
+    constant: int
+    slope: int
+
+
+class Polynomial(NamedTuple):
+    """``a + b n + c n^2``, a number of consecutive float64."""
+
+    a: int = 0
+    b: int = 0
+    c: int = 0
+
+    def plus(self, other: Polynomial) -> Polynomial:
+        """Return the sum."""
+        return Polynomial(self.a + other.a, self.b + other.b, self.c + other.c)
+
+    def times(self, dimension: Dimension) -> Polynomial:
+        """Return the product.
+
+        Raises:
+            TypeError: the power of n exceeds `DEGREE`.
+        """
+        constant, slope = dimension
+        if self.c * slope:
+            raise TypeError(f"a field's size may grow with n to the power of {DEGREE} at most")
+        b, c = self.b * constant + self.a * slope, self.c * constant + self.b * slope
+        return Polynomial(self.a * constant, b, c)
+
+
+@dataclass(frozen=True)
+class Layout:
+    """Fields of a record by name, in memory order.
+
+    Records with equal fields have equal layouts, so a compiled function accepts all of them.
+    """
+
+    fields: tuple[tuple[str, tuple[Dimension, ...] | Layout], ...]
+    """Dimensions of an array, () for a number, or the layout of a nested record."""
+
+    @property
+    def size(self) -> Polynomial:
+        """Number of float64 in the record."""
+        return _end_of(self.fields)
+
+    def find(self, name: str) -> tuple[Polynomial, tuple[Dimension, ...] | Layout] | None:
+        """Return offset, in numbers, and shape or layout of a field; None if it does not exist."""
+        for k, (known, kind) in enumerate(self.fields):
+            if known == name:
+                return _end_of(self.fields[:k]), kind
+        return None
+
+
+def _end_of(fields: tuple[tuple[str, tuple[Dimension, ...] | Layout], ...]) -> Polynomial:
+    total = Polynomial()
+    for _, kind in fields:
+        total = total.plus(kind.size if isinstance(kind, Layout) else count(kind))
+    return total
+
+
+def count(dimensions: tuple[Dimension, ...]) -> Polynomial:
+    """Return the number of elements of an array."""
+    total = Polynomial(1)
+    for dimension in dimensions:
+        total = total.times(dimension)
+    return total
+
+
+def dimensions_of(name: str, shape: Callable[[int], tuple[int, ...]]) -> tuple[Dimension, ...]:
+    """Derive the formula of a shape from its values.
+
+    Raises:
+        TypeError: a dimension is not ``a + b n``.
+    """
+    dimensions = tuple(
+        Dimension(at_0, at_1 - at_0) for at_0, at_1 in zip(shape(0), shape(1), strict=True)
+    )
+    for n in (2, 7):
+        if tuple(constant + slope * n for constant, slope in dimensions) != shape(n):
+            raise TypeError(f"the shape of field {name!r} must be linear in n")
+    return dimensions
 
 
 @dataclass(frozen=True)
@@ -36,11 +125,15 @@ class Field:
     """Meaning and unit, for users."""
     uniform: bool = False
     """True if kernels need the same numbers in all lanes, see `lanes`."""
+    origin: Origin | None = None
+    """Where its first numbers are from, for those who fill the record; None: it begins at zero."""
 
 
-def shaped(shape: Shape, description: str = "", *, uniform: bool = False) -> Any:
+def shaped(
+    shape: Shape, description: str = "", *, uniform: bool = False, origin: Origin | None = None
+) -> Any:
     """Declare a `Field`."""
-    return Field(shape, description, uniform)
+    return Field(shape, description, uniform, origin)
 
 
 def nested(record: type[Record]) -> Any:
@@ -263,9 +356,9 @@ def _uniform_places(record: Any, dtype: np.dtype[Any]) -> NDArray[np.intp]:
 
 
 _LAYOUTS: dict[np.dtype[Any], tuple[Layout, int]] = {}
-_FOUND: dict[int, tuple[np.dtype[Any], tuple[Layout, int]]] = {}
+_LAYOUTS_BY_ID: dict[int, tuple[np.dtype[Any], tuple[Layout, int]]] = {}
 """Results of `layout_of` by the identity of the dtype: its hash takes longer than a tick."""
-MOST_FOUND = 1024
+MOST_KEPT = 1024
 
 
 def layout_of(dtype: np.dtype[Any]) -> tuple[Layout, int] | None:
@@ -273,12 +366,12 @@ def layout_of(dtype: np.dtype[Any]) -> tuple[Layout, int] | None:
 
     None if it is not that of a record.
     """
-    remembered = _FOUND.get(id(dtype))
-    if remembered is not None and remembered[0] is dtype:
-        return remembered[1]
+    kept = _LAYOUTS_BY_ID.get(id(dtype))
+    if kept is not None and kept[0] is dtype:
+        return kept[1]
     known = _LAYOUTS.get(dtype)
     if known is not None:
-        if len(_FOUND) >= MOST_FOUND:
-            _FOUND.clear()
-        _FOUND[id(dtype)] = dtype, known
+        if len(_LAYOUTS_BY_ID) >= MOST_KEPT:
+            _LAYOUTS_BY_ID.clear()
+        _LAYOUTS_BY_ID[id(dtype)] = dtype, known
     return known

@@ -1,4 +1,7 @@
-"""Checks of the arguments of public functions; errors name the argument and its value."""
+"""Checks of the arguments of public functions.
+
+An argument that is something else is an `InputError` with its name and value.
+"""
 
 from __future__ import annotations
 
@@ -17,32 +20,20 @@ Array = NDArray[np.float64]
 
 
 def as_path(value: Any, name: str) -> Path:
-    """Return a value as a path.
-
-    Raises:
-        InputError: ``value`` is neither text nor a path.
-    """
+    """Return a value as a path."""
     if not isinstance(value, (str, os.PathLike)):
         raise InputError(f"{name}: a path was expected, got {short(value)}")
     return Path(value)
 
 
 def path_text(value: Any, name: str) -> str:
-    """Return a path as written; `pathlib` would remove the ``./`` of ``./one``.
-
-    Raises:
-        InputError: ``value`` is neither text nor a path.
-    """
+    """Return a path as written; `pathlib` would remove the ``./`` of ``./one``."""
     as_path(value, name)
     return str(value)
 
 
 def as_numbers(value: Any, name: str) -> Array:
-    """Return real numbers as an array of any shape, float64.
-
-    Raises:
-        InputError: ``value`` has other elements, or rows of different lengths.
-    """
+    """Return real numbers as an array of any shape, float64."""
     try:
         numbers = np.asarray(value)
     except ValueError:
@@ -53,11 +44,7 @@ def as_numbers(value: Any, name: str) -> Array:
 
 
 def as_positive(value: Any, name: str) -> float:
-    """Return a finite number above 0.
-
-    Raises:
-        InputError: ``value`` is something else.
-    """
+    """Return a finite number above 0."""
     number = as_numbers(value, name)
     if number.shape or not 0.0 < number < np.inf:
         raise InputError(f"{name}: a number above 0 was expected, got {short(value)}")
@@ -65,11 +52,7 @@ def as_positive(value: Any, name: str) -> float:
 
 
 def as_whole_number(value: Any, name: str, least: int, most: int | None = None) -> int:
-    """Return an integer in a range.
-
-    Raises:
-        InputError: ``value`` is not an integer, or out of range.
-    """
+    """Return an integer in a range."""
     allowed = f"{least} or more" if most is None else f"{least} to {most}"
     try:
         number = operator.index(value)

@@ -4,16 +4,14 @@ from __future__ import annotations
 
 import csv
 import math
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Sequence
 from itertools import islice
 from pathlib import Path
-from typing import Any
 
 from ..errors import InputError
-from .choices import nearest
-from .text import printable
+from .text import nearest, printable
 from .validation import short
-from .yaml_text import check_file
+from .yaml_text import check_readable
 
 MOST_ROWS, MOST_COLUMNS, MOST_VALUES = 100_000, 1_000, 190_000
 LARGEST_CSV = 128 * 2**20
@@ -34,7 +32,7 @@ def read_columns(path: Path) -> dict[str, list[float]]:
         InputError: it cannot be read, is too large, or holds something that is no number; names
             line and column.
     """
-    check_file(path)
+    check_readable(path)
     if path.suffix == ".parquet":
         return _read_parquet(path)
     if path.stat().st_size > LARGEST_CSV:
@@ -107,51 +105,37 @@ def _check_size(rows: int, columns: int, path: Path) -> None:
 
 def _read_parquet(path: Path) -> dict[str, list[float]]:
     try:
-        from pyarrow import ArrowException
+        from pyarrow import ArrowException, float64, types
         from pyarrow.parquet import ParquetFile
     except ImportError:
         raise InputError(f"{path}: Parquet files need pyarrow: [parquet]") from None
+    columns = {}
     try:
         with ParquetFile(path) as file:
             # its sizes are known before anything is unpacked
             _check_size(file.metadata.num_rows, file.metadata.num_columns, path)
-            schema = file.schema_arrow
-            _check_names(schema.names, path)
-            for field in schema:
-                _check_kind(field, path)
-            return dict(_parquet_columns(file.read(), path))
+            _check_names(file.schema_arrow.names, path)
+            table = file.read()
+        for name, column in zip(table.column_names, table.columns, strict=True):
+            where = f"{path}: {printable(name)}"
+            if types.is_dictionary(column.type):
+                column = column.cast(column.type.value_type)
+            kind = column.type
+            if not (types.is_integer(kind) or types.is_floating(kind) or types.is_decimal(kind)):
+                got = short(str(kind))[1:-1]
+                raise InputError(f"{where}: numbers were expected, got a column of {got}")
+            columns[name] = column.cast(float64(), safe=False).to_pylist()
+            for row, value in enumerate(columns[name], 1):
+                if value is None or not math.isfinite(value):
+                    got = "none" if value is None else value
+                    raise InputError(
+                        f"{path}: row {row}: {printable(name)}: a number was expected, got {got}"
+                    )
     except InputError:
         raise
     except (ArrowException, OSError, ValueError, MemoryError):
         raise InputError(f"{path}: damaged, or not a Parquet file") from None
-
-
-def _check_kind(field: Any, path: Path) -> None:
-    """Check that a column of a Parquet file has numbers."""
-    from pyarrow import types
-
-    kind = field.type.value_type if types.is_dictionary(field.type) else field.type
-    if not (types.is_integer(kind) or types.is_floating(kind) or types.is_decimal(kind)):
-        raise InputError(
-            f"{path}: {printable(field.name)}: numbers were expected, "
-            f"got a column of {short(str(field.type))[1:-1]}"
-        )
-
-
-def _parquet_columns(table: Any, path: Path) -> Iterator[tuple[str, list[float]]]:
-    from pyarrow import float64, types
-
-    for name, column in zip(table.column_names, table.columns, strict=True):
-        if types.is_dictionary(column.type):
-            column = column.cast(column.type.value_type)
-        values = column.cast(float64(), safe=False).to_pylist()
-        for row, value in enumerate(values, 1):
-            if value is None or not math.isfinite(value):
-                raise InputError(
-                    f"{path}: row {row}: {printable(name)}: a number was expected, got "
-                    f"{'none' if value is None else value}"
-                )
-        yield name, values
+    return columns
 
 
 def _number(cell: str, where: str, has_commas: bool) -> float:

@@ -1,16 +1,20 @@
-"""The files of ``config/``, by name or by path."""
+"""The files of ``config/``, by name or by path, and the trees of settings that they hold."""
 
 from __future__ import annotations
 
 import os.path
+from collections.abc import Iterator, Mapping
 from pathlib import Path
+from typing import Any
 
 from ..errors import InputError
-from .choices import choices
-from .directory import config_directory
-from .trees import Tree, merge, nest
+from .installation import config_directory
+from .text import choices, printable
 from .validation import read_yaml, short
-from .yaml_text import check_file
+from .yaml_text import check_readable
+
+Tree = dict[str, Any]
+"""Nested settings."""
 
 GIVEN = "given"
 """In place of a file's name: there is no file, all values are set directly."""
@@ -33,7 +37,7 @@ def named_file(kind: str, name: str) -> Path:
     """
     if name.endswith((".yaml", ".yml")):
         path = Path(name)
-        check_file(path)
+        check_readable(path)
         return path
     folder = config_directory() / kind
     if not is_named(kind, name):
@@ -52,11 +56,7 @@ def is_named(kind: str, name: str) -> bool:
 
 
 def named_layers(kind: str, name: str) -> list[Path]:
-    """Return the `named_file` in a list; an empty list for `GIVEN`.
-
-    Raises:
-        InputError: there is no such file; lists the existing ones.
-    """
+    """Return the `named_file` in a list; an empty list for `GIVEN`."""
     return [] if name == GIVEN else [named_file(kind, name)]
 
 
@@ -81,3 +81,48 @@ def node_parameters(path: Path, node: str) -> Tree:
         if str(name).strip("/").removeprefix("**/") in ("**", f"{node}_node"):
             merged = merge(merged, nest(parameters))
     return merged
+
+
+def merge(below: Tree, above: Mapping[str, Any]) -> Tree:
+    """Return ``below`` with its leaves overridden by those of ``above``."""
+    merged = dict(below)
+    for key, value in above.items():
+        old = merged.get(key)
+        both = isinstance(old, dict) and isinstance(value, Mapping)
+        merged[key] = merge(old, value) if both else value  # type: ignore[arg-type]
+    return merged
+
+
+def nest(flat: Mapping[Any, Any]) -> Tree:
+    """Convert ``{"a.b": 1}`` to ``{"a": {"b": 1}}``.
+
+    Raises:
+        InputError: a key has a value and also a group of values.
+    """
+    tree: Tree = {}
+    for key, value in flat.items():
+        head, _, rest = str(key).partition(".")
+        inner = nest({rest: value}) if rest else nest(value) if isinstance(value, dict) else value
+        _refuse_both(tree, {head: inner})
+        tree = merge(tree, {head: inner})
+    return tree
+
+
+def _refuse_both(one: Tree, other: Tree, prefix: str = "") -> None:
+    """Check that no key is a value in one tree and a group of values in the other."""
+    for key in one.keys() & other.keys():
+        first, second = one[key], other[key]
+        if isinstance(first, dict) is not isinstance(second, dict):
+            name = printable(f"{prefix}{key}")
+            raise InputError(f"{name}: given as a value, and as a group of values")
+        if isinstance(first, dict):
+            _refuse_both(first, second, f"{prefix}{key}.")
+
+
+def flatten(tree: Mapping[Any, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
+    """Yield ``("a.b", 1)`` for each leaf of ``{"a": {"b": 1}}``; an empty mapping is a leaf."""
+    for key, value in tree.items():
+        if isinstance(value, Mapping) and value:
+            yield from flatten(value, f"{prefix}{key}.")
+        else:
+            yield f"{prefix}{key}", value

@@ -17,9 +17,8 @@ from typing_extensions import Self
 
 from ..samples import Timebase
 from ..topics import Topic
-from .directory import GRAPH_FILE, config_directory
-from .files import node_parameters
-from .trees import Tree, merge, nest
+from .files import Tree, merge, nest, node_parameters
+from .installation import GRAPH_FILE, config_directory
 from .validation import StrictModel, short, validate
 
 SHORTEST_PERIOD = 1e-5
@@ -75,15 +74,7 @@ class NodeSettings(StrictModel):
 
     @classmethod
     def read_layer(cls, path: Path, selected: Mapping[str, str]) -> Tree:
-        """Read what a file says to the node.
-
-        Args:
-            path: one of `layers`.
-            selected: the selectors' values.
-
-        Raises:
-            InputError: the file cannot be read.
-        """
+        """Read what a file of `layers` says to the node, for the selectors' values."""
         return node_parameters(path, cls.node)
 
     @classmethod

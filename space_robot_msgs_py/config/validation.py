@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pickle
+import re
 from collections.abc import Iterable
 from dataclasses import InitVar, is_dataclass
 from functools import lru_cache
@@ -13,8 +14,8 @@ from pydantic import BaseModel, ConfigDict, ValidationError, ValidationInfo, fie
 from pydantic.fields import FieldInfo
 
 from ..errors import InputError
-from .choices import choices
-from .text import printable
+from ..topics import ROOT
+from .text import choices, printable
 from .yaml_text import YamlTextError, parse_yaml, read_file
 
 
@@ -51,6 +52,7 @@ UNKNOWN_KEY = ("extra_forbidden", "unexpected_keyword_argument")
 NO_MAPPING = ("model_type", "dataclass_type", "named_tuple_type", "arguments_type")
 MOST_KEPT = 100_000
 """Maximum length of a text with cached content, in characters."""
+_NAMESPACE = re.compile(r"(/[A-Za-z_][A-Za-z0-9_]*)+")
 
 
 def read_yaml(path: Path) -> dict[str, Any]:
@@ -100,35 +102,27 @@ def one_line(error: ValidationError, schema: type[BaseModel], where: str) -> str
     if first["type"] in NO_MAPPING:
         text = "a mapping was expected"
     if first["type"] in UNKNOWN_KEY:
-        allowed = choices(str(first["loc"][-1]), _allowed_keys(schema, first["loc"][:-1]))
-        text, got = f"unknown key{got}: {allowed}", ""
-    if first["type"] in ON_NUMBERS and (description := _description(schema, first["loc"])):
+        fields = _fields(_field_at(schema, first["loc"][:-1])[0]).items()
+        allowed = sorted(str(name) for name, field in fields if not field.exclude)
+        text, got = f"unknown key{got}: {choices(str(first['loc'][-1]), allowed)}", ""
+    if first["type"] in ON_NUMBERS and (description := _field_at(schema, first["loc"])[1]):
         got += f" ({description.removesuffix('.')})"
     more = f" (and {len(faults) - 1} more)" if len(faults) > 1 else ""
     return f"{where}: {key + ': ' if key else ''}{text}{got}{more}"
 
 
-def _description(schema: Any, location: tuple[int | str, ...]) -> str:
-    """Return the description of a field, with its unit; empty if it has none."""
+def _field_at(schema: Any, location: tuple[int | str, ...]) -> tuple[Any, str]:
+    """Return the annotation and the description of the field at a location within ``schema``."""
     description = ""
     for step in location:
         fields = _fields(schema)
-        if step not in fields:
-            return ""
-        schema, description = fields[step].annotation, fields[step].description or ""
-        while get_origin(schema) not in (None, list, dict):
-            schema = get_args(schema)[0]
-    return description
-
-
-def _allowed_keys(schema: Any, location: tuple[int | str, ...]) -> list[str]:
-    """Return the keys, as in files, of the model at a location within ``schema``."""
-    for step in location:
-        fields = _fields(schema)  # none: an item of a list, a value of a mapping
-        schema = fields[step].annotation if fields else get_args(schema)[-1]
+        if step in fields:
+            schema, description = fields[step].annotation, fields[step].description or ""
+        else:  # an item of a list, a value of a mapping
+            schema, description = (get_args(schema) or (schema,))[-1], ""
         while get_origin(schema) not in (None, list, dict):  # Annotated, a union with None
             schema = get_args(schema)[0]
-    return sorted(str(name) for name, field in _fields(schema).items() if not field.exclude)
+    return schema, description
 
 
 def _fields(schema: Any) -> dict[int | str, FieldInfo]:
@@ -174,3 +168,26 @@ def one_of(
         advice = choices(str(name), names, listing=listing)
         raise InputError(f"unknown {what} {short(name)}{context}: {advice}")
     return name
+
+
+def full_namespace(text: str) -> str:
+    """Return a namespace in ROS's form: ``/sat1`` for ``sat1`` or ``/sat1/``, ``/`` if empty.
+
+    Raises:
+        InputError: invalid namespace.
+    """
+    if not (name := text.strip("/")):
+        return ROOT
+    namespace = f"/{name}"
+    if not _NAMESPACE.fullmatch(namespace) or "__" in namespace:
+        raise InputError(
+            f"{short(text)} is not a namespace: letters, digits and _ were expected, not starting "
+            "with a digit, such as sat1 or fleet/sat1"
+        )
+    return namespace
+
+
+def relative(name: str, namespace: str) -> str:
+    """Return a name relative to a namespace; empty if it is in another or a nested one."""
+    prefix, _, last = name.rpartition("/")
+    return last if (prefix or ROOT) == namespace else ""

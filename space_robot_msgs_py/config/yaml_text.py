@@ -17,24 +17,21 @@ from typing import Any, BinaryIO
 import yaml
 
 from ..errors import InputError
-from .choices import MOST_COMPARED, nearest
-from .text import printable
+from .text import MOST_COMPARED, nearest, printable, shortened
 
 try:
     from yaml import CSafeLoader as SafeLoader  # four times as fast
 except ImportError:  # PyYAML was built without libyaml
     from yaml import SafeLoader  # type: ignore[assignment]
 
+LONGEST_NAME = 250
+"""Maximum displayed characters of a file's name in errors."""
 LARGEST_FILE = 16 * 2**20
 """Largest size of a file, bytes."""
 DEEPEST = 64
 """Largest depth of nested lists and mappings."""
-LONGEST_NAME = 250
-"""Maximum displayed characters of a file's name in errors."""
 MOST_VALUES = 200_000
-"""Largest number of values in a text; they take a second to build."""
-MOST_REPEATED = 100_000
-"""Largest number of values added by aliases."""
+"""Largest number of values in a text, those repeated by aliases included."""
 
 _FLOAT, _TIMESTAMP, _MERGE = (
     f"tag:yaml.org,2002:{kind}" for kind in ("float", "timestamp", "merge")
@@ -59,20 +56,15 @@ def read_file(path: Path) -> str:
         return data.decode("utf-8")
 
 
-def check_file(path: Path) -> None:
-    """Check that a file can be read.
-
-    Raises:
-        InputError: the file does not exist, or cannot be read.
-    """
+def check_readable(path: Path) -> None:
+    """Check that a file can be read; an `InputError` has the reason."""
     with _opened(path):
         pass
 
 
 @contextmanager
 def _opened(path: Path) -> Iterator[BinaryIO]:
-    name = str(path) if str(path).isprintable() else repr(str(path))
-    name = name if len(name) <= LONGEST_NAME else f"{name[:40]}...{name[-40:]}"
+    name = shortened(str(path) if str(path).isprintable() else repr(str(path)), LONGEST_NAME)
     try:
         # opening a pipe must not block
         descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
@@ -119,7 +111,7 @@ def parse_yaml(text: str) -> Any:
         YamlTextError: not YAML, a repeated key, or a limit is exceeded.
     """
     try:
-        _measure(text)
+        _check_size(text)
         return yaml.load(text, Loader=_Loader)
     except yaml.YAMLError as error:
         mark = getattr(error, "problem_mark", None)
@@ -130,39 +122,32 @@ def parse_yaml(text: str) -> Any:
         raise YamlTextError(f"not YAML ({error})") from None
 
 
-def _measure(text: str) -> None:
-    """Check the limits from the stream of YAML events, before values are built."""
-    sizes: dict[str, int] = {}
-    opened: list[tuple[str | None, int]] = []
-    size = repeated = 0
+def _check_size(text: str) -> None:
+    """Refuse nesting and aliases that would exhaust the stack or the memory once they are built."""
+    sizes: dict[str | None, int] = {}
+    open_collections: list[tuple[str | None, int]] = []
+    size = 0
     for event in yaml.parse(text, Loader=_Loader):
+        if isinstance(event, yaml.CollectionEndEvent):
+            anchor, before = open_collections.pop()
+            sizes[anchor] = size - before
+        elif isinstance(event, yaml.AliasEvent):
+            if any(anchor == event.anchor for anchor, _ in open_collections):
+                raise _refused(f"the alias {event.anchor!r} contains itself", event)
+            size += sizes.get(event.anchor, 0)
+        elif isinstance(event, yaml.NodeEvent):
+            size += 1
+            sizes[event.anchor] = 1
+            if isinstance(event, yaml.CollectionStartEvent):
+                open_collections.append((event.anchor, size))
         if size > MOST_VALUES:
             raise _refused(f"more than {MOST_VALUES} values", event)
-        if isinstance(event, yaml.CollectionStartEvent):
-            opened.append((event.anchor, size))
-            size += 1
-            if len(opened) > DEEPEST:
-                raise _refused(f"nested deeper than {DEEPEST} levels", event)
-        elif isinstance(event, yaml.CollectionEndEvent):
-            anchor, before = opened.pop()
-            if anchor:
-                sizes[anchor] = size - before
-        elif isinstance(event, yaml.ScalarEvent):
-            size += 1
-            if event.anchor:
-                sizes[event.anchor] = 1
-        elif isinstance(event, yaml.AliasEvent):
-            if any(anchor == event.anchor for anchor, _ in opened):
-                raise _refused(f"the alias {event.anchor!r} contains itself", event)
-            again = sizes.get(event.anchor or "", 0)
-            size += again
-            repeated += again
-            if repeated > MOST_REPEATED:
-                raise _refused(f"aliases repeat more than {MOST_REPEATED} values", event)
+        if len(open_collections) > DEEPEST:
+            raise _refused(f"nested deeper than {DEEPEST} levels", event)
 
 
-def _refused(problem: str, event: Any) -> yaml.YAMLError:
-    return yaml.constructor.ConstructorError(problem=problem, problem_mark=event.start_mark)
+def _refused(problem: str, place: Any) -> yaml.YAMLError:
+    return yaml.constructor.ConstructorError(problem=problem, problem_mark=place.start_mark)
 
 
 class _Loader(SafeLoader):
@@ -181,30 +166,22 @@ class _Loader(SafeLoader):
             return value
         except (ValueError, TypeError, LookupError, AttributeError, OverflowError):
             kind = node.tag.removeprefix("tag:yaml.org,2002:")
-            said = f" {node.value[:40]!r}" if isinstance(node.value, str) else ""
-            raise yaml.constructor.ConstructorError(
-                problem=f"the value{said} is not of type {kind}", problem_mark=node.start_mark
-            ) from None
+            value = f" {node.value[:40]!r}" if isinstance(node.value, str) else ""
+            raise _refused(f"the value{value} is not of type {kind}", node) from None
 
     def construct_mapping(self, node: Any, deep: bool = False) -> dict[Any, Any]:
         if not isinstance(node, yaml.MappingNode):
-            raise yaml.constructor.ConstructorError(
-                problem="a mapping was expected", problem_mark=node.start_mark
-            )
-        seen = set()
+            raise _refused("a mapping was expected", node)
+        keys = set()
         for key_node, _ in node.value:
             if key_node.tag == _MERGE:
                 continue
             key = self.construct_object(key_node, deep=True)
             if not isinstance(key, Hashable):
-                raise yaml.constructor.ConstructorError(
-                    problem="a key must be a text or a number", problem_mark=key_node.start_mark
-                )
-            if key in seen:
-                raise yaml.constructor.ConstructorError(
-                    problem=f"the key {key!r} occurs twice", problem_mark=key_node.start_mark
-                )
-            seen.add(key)
+                raise _refused("a key must be a text or a number", key_node)
+            if key in keys:
+                raise _refused(f"the key {key!r} occurs twice", key_node)
+            keys.add(key)
         mapping: dict[Any, Any] = super().construct_mapping(node, deep)
         return mapping
 

@@ -15,10 +15,15 @@ from typing import Any, NamedTuple
 from rclpy.callback_groups import CallbackGroup
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.serialization import serialize_message
 from rclpy.topic_endpoint_info import TopicEndpointInfo
+from std_msgs.msg import Bool
 
+from .. import topics
+from ..errors import MessageError
 from ..topics import Topic
-from .rclpy_internals import raw_publish, take_serialized
+from ..wire.definitions import decode
+from .rclpy_internals import SubscriptionWaitSet, raw_publish, take_serialized
 
 
 class PolledCallbackGroup(CallbackGroup):
@@ -184,3 +189,59 @@ class RawSubscription:
         data, info = taken
         sequence = info["publication_sequence_number"]
         return Received(data, info["source_timestamp"], 0 if sequence == NOT_COUNTED else sequence)
+
+
+class Waiter:
+    """Waits until one of some subscriptions has a message."""
+
+    def __init__(self, node: Node) -> None:
+        """Create the waiter; ``node`` is any node of the process."""
+        self._context = node.context
+        self._sets: dict[int, SubscriptionWaitSet] = {}
+
+    def wait(self, inputs: Sequence[RawSubscription], timeout_s: float) -> None:
+        """Sleep until there is a message, or until the timeout."""
+        size = len(inputs)
+        if size not in self._sets:
+            self._sets[size] = SubscriptionWaitSet(self._context, size)
+        self._sets[size].wait([entry.handle for entry in inputs], timeout_s)
+
+
+# /simulation/paused tells all nodes of a pause, so that watchdogs ignore it.
+
+
+class PausedOutput:
+    """Publisher of the pause, latched for late subscribers."""
+
+    def __init__(self, node: Node) -> None:
+        self._publisher = RawPublisher(node, topics.SIMULATION_PAUSED)
+        self._published: bool | None = None
+
+    def tell(self, is_paused: bool) -> None:
+        """Publish whether the simulation is paused, if this has changed."""
+        if is_paused is not self._published:
+            self._published = is_paused
+            self._publisher.publish(serialize_message(Bool(data=is_paused)))
+
+
+class PausedInput:
+    """Subscriber to the pause of the simulation."""
+
+    def __init__(self, node: Node) -> None:
+        self._input = RawSubscription(node, topics.SIMULATION_PAUSED, PolledCallbackGroup())
+        self._is_paused = False
+        self._heard_at = time.monotonic()
+
+    @property
+    def running_since(self) -> float:
+        """Time since which the simulation is known to be running, monotonic clock.
+
+        During a pause it is the present time.
+        """
+        while (data := self._input.take()) is not None:
+            try:
+                self._is_paused = bool(decode(data, topics.SIMULATION_PAUSED.type).data)
+            except MessageError:
+                continue
+            self._heard_at = time.monotonic()
+        return time.monotonic() if self._is_paused else self._heard_at

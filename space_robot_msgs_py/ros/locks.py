@@ -1,7 +1,8 @@
-"""Locks of ROS domains, nodes and topics, released by the kernel when their holder ends.
+"""Locks of ROS domains and nodes, released by the kernel when their holder ends.
 
-Discovery is too slow, and lists a killed node for another 20 s. Each lock is a file in the
-temporary folder with the name of its holder; the file remains after the release.
+Two plants or two controllers in one domain would answer each other's ticks. Discovery is too slow
+to prevent that, and lists a killed node for another 20 s. Each lock is a file in the temporary
+folder with the name of its holder; the file remains after the release.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ from typing import NamedTuple
 
 from ..errors import InputError
 from ..topics import ROOT
-from .lifeline import starter
+from .process import starter
 
 TRIES, PAUSE_S = 5, 0.01
 """Time to retry: a lock that is only being inspected is free again at once."""
@@ -39,14 +40,9 @@ class HeldError(InputError):
         self.holder = holder
 
 
-def topic_lock(domain: int, topic: str) -> Path:
-    """Return the lock file of the publisher of a topic, given by full name."""
-    # ROS names contain neither dots nor @, so all topics and nodes have different files
-    return _path(f"{domain}{topic.replace('/', '.')}")
-
-
 def node_lock(domain: int, node: str) -> Path:
     """Return the lock file of a node, given by full name."""
+    # ROS names contain neither dots nor @, so all nodes have different files
     return _path(f"{domain}@{node.replace('/', '.')}")
 
 
@@ -135,14 +131,7 @@ def _holders(paths: Iterable[Path]) -> list[Holder]:
 
 def is_held(path: Path) -> bool:
     """Return True if a lock is held."""
-    try:
-        descriptor = _open(path)
-    except InputError:
-        return False
-    try:
-        return not _try(descriptor, fcntl.LOCK_SH)
-    finally:
-        os.close(descriptor)
+    return bool(_holders([path]))
 
 
 def _try(descriptor: int, kind: int) -> bool:

@@ -7,30 +7,29 @@ has succeeded. Nothing is sent before activate.
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any, Generic, TypeVar
 
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rcl_interfaces.msg import ParameterDescriptor, ParameterType
+from rclpy.duration import Duration
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
+from rclpy.node import Node
 
+from .. import topics
 from ..config.settings import NodeSettings
 from ..errors import InputError, SpaceRobotError
 from ..samples import Timebase
-from .diagnostics import Diagnostics
-from .exclusive import TopicClaim, claim_name, foreign_publishers
-from .health import SENT, Health, Level
-from .locks import FileLock
-from .loop import Loop
+from .locks import FileLock, HeldError, node_lock
+from .loop import SENT, Health, Level, Loop
 from .parameters import declare_settings, refuse_unknown
 from .rclpy_internals import declared_parameters, forget_parameters, guard_change_state
-from .service_calls import ServiceCalls
+from .service_calls import ServiceCalls, change_state
 
 Schema = TypeVar("Schema", bound=NodeSettings)
+REPORT_S = 1.0
+FLUSH_S = 0.5
 AUTOSTART = "autostart"
-DISCOVERY_S = 0.3
-LOOK_AGAIN_S = 0.3
-LOOK_PERIOD_S = 1.0
-"""Period of checks for foreign publishers, which take as long as the rest of a report."""
 PAUSE_S = 1e-3
 NO_TIME = Timebase(1)
 """Timebase of a node that has never been configured: it is at tick 0."""
@@ -56,10 +55,6 @@ class ManagedNode(LifecycleNode, Generic[Schema]):
         """Number of successful configurations."""
         self.let_others_work: Callable[[], None] = lambda: time.sleep(PAUSE_S)
         """Called by a loop while it waits for another node during deactivation."""
-        self._topics: list[str] = []
-        self._foreign, self._look_at = "", 0.0
-        """Last found foreign publishers, and time of the next check."""
-        self._claim: TopicClaim | None = None
         self._name: FileLock | None = None
         self.error: SpaceRobotError | None = None
         """Reason why the last transition failed."""
@@ -101,22 +96,22 @@ class ManagedNode(LifecycleNode, Generic[Schema]):
         values = {**health.values, **sent, "service_calls": self.calls.count}
         if not self.is_active:
             return Health("inactive", values=values)
-        if (now := time.monotonic()) >= self._look_at:
-            self._look_at = now + LOOK_PERIOD_S
-            self._foreign = self._foreign_publishers()
-        if health.level is Level.OK and self._foreign:
-            return Health(self._foreign, Level.WARN, values)
-        if health.level is Level.OK and self.calls.is_overloaded:
-            return Health("more service calls than can be answered in flight", Level.WARN, values)
         return Health(health.mode, health.level, values)
 
     def claim_name(self) -> None:
-        """Claim the node's name in the domain, before any service is offered.
+        """Claim the node's name, so that service calls by name reach one node only.
 
         Raises:
-            InputError: another node of this project has the name.
+            InputError: another node of this project in the domain has it.
         """
-        self._name = claim_name(self)
+        domain, name = self.context.get_domain_id(), self.get_fully_qualified_name()
+        try:
+            self._name = FileLock(node_lock(domain, name), self.get_name())
+        except HeldError as error:
+            raise InputError(
+                f"ROS domain {domain} has a {name} already: {error.holder.name}; end that one, "
+                "or use another domain (ROS_DOMAIN_ID) or name (--ros-args -r __node:=...)"
+            ) from None
 
     def destroy_node(self) -> None:
         """Release all resources, the executor before the node."""
@@ -126,23 +121,36 @@ class ManagedNode(LifecycleNode, Generic[Schema]):
             self._name.release()
 
     def start(self) -> None:
-        """Configure and activate.
-
-        Raises:
-            SpaceRobotError: the transition failed.
-        """
+        """Configure and activate; a `SpaceRobotError` says why that failed."""
         self._insist(self.trigger_configure())
-        time.sleep(DISCOVERY_S)  # to discover other nodes
         self._insist(self.trigger_activate())
 
     def stop(self) -> None:
-        """Deactivate and clean up, the reverse of `start`.
-
-        Raises:
-            SpaceRobotError: the transition failed.
-        """
+        """Deactivate and clean up; a `SpaceRobotError` says why that failed."""
         self._insist(self.trigger_deactivate())
         self._insist(self.trigger_cleanup())
+
+    async def restart(self, others: Sequence[str]) -> None:
+        """Deactivate and clean up this node and others, then configure and activate all again.
+
+        They read their parameters and files again, as at their first start. To be awaited by a
+        service callback.
+
+        Args:
+            others: names of the others in its namespace, in the order of activation.
+
+        Raises:
+            FlightError: a node refuses or does not answer; the flight then stops.
+            SpaceRobotError: this node itself cannot be started.
+        """
+        self.stop()
+        for transition in ("deactivate", "cleanup"):
+            for name in reversed(others):
+                await change_state(self, name, transition)
+        for transition in ("configure", "activate"):
+            for name in others:
+                await change_state(self, name, transition)
+        self.start()
 
     def _insist(self, outcome: TransitionCallbackReturn) -> None:
         if outcome is not TransitionCallbackReturn.SUCCESS:
@@ -173,26 +181,18 @@ class ManagedNode(LifecycleNode, Generic[Schema]):
                 refuse_unknown(self)
             self.loop = self._make_loop(self, self.settings)
             refuse_unknown(self)
-            self._topics = [output.topic.name for output in self.loop.outputs]
-            own = {*self._topics, *(topic.name for topic in self._schema.sends)}
-            self._claim = TopicClaim(self, sorted(own))  # claimed even if never published
             self.times_configured += 1
 
         return self._try(configure, undo=self._release)
 
     def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Start the loop, unless another node publishes this one's topics."""
-
-        def activate() -> None:
-            if foreign := self._lasting_foreign_publishers():
-                raise InputError(foreign)
-            self.is_active = True
-
-        return self._try(activate)
+        """Start the loop."""
+        self.is_active = True
+        return TransitionCallbackReturn.SUCCESS
 
     def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Stop the loop."""
-        return self._try(self._stand_down)
+        return self._try(self._deactivate)
 
     def on_cleanup(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Remove topics and parameters; the next configure reads the files again."""
@@ -203,7 +203,7 @@ class ManagedNode(LifecycleNode, Generic[Schema]):
 
         def shut_down() -> None:
             self.is_shut_down = True
-            self._stand_down()
+            self._deactivate()
             self._release()
 
         return self._try(shut_down)
@@ -212,22 +212,6 @@ class ManagedNode(LifecycleNode, Generic[Schema]):
         """Finalize the node after an unexpected error in a transition."""
         self.is_shut_down = True
         return TransitionCallbackReturn.FAILURE
-
-    def _foreign_publishers(self) -> str:
-        """Describe foreign publishers of this node's topics; empty if there are none."""
-        crowded = [
-            topic
-            for topic in self._topics
-            if self.count_publishers(self.resolve_topic_name(topic)) > 1
-        ]
-        foreign = foreign_publishers(self, crowded)
-        return "; ".join(f"{t} is also published by {', '.join(n)}" for t, n in foreign.items())
-
-    def _lasting_foreign_publishers(self) -> str:
-        """Check twice for foreign publishers: discovery first shows them without node name."""
-        if self._foreign_publishers():
-            time.sleep(LOOK_AGAIN_S)
-        return self._foreign_publishers()
 
     def _try(
         self, action: Callable[[], None], undo: Callable[[], None] | None = None
@@ -248,7 +232,7 @@ class ManagedNode(LifecycleNode, Generic[Schema]):
             return TransitionCallbackReturn.ERROR
         return TransitionCallbackReturn.SUCCESS
 
-    def _stand_down(self) -> None:
+    def _deactivate(self) -> None:
         if self.is_active and self.loop is not None:
             self.is_active = False
             self.loop.deactivate()
@@ -260,8 +244,6 @@ class ManagedNode(LifecycleNode, Generic[Schema]):
             if loop is not None:
                 loop.close()
         finally:
-            if self._claim:
-                self._claim.release()
             publishers, subscriptions, parameters = self._entities()
             for publisher in publishers - self._own[0]:
                 self.destroy_publisher(publisher)
@@ -275,3 +257,68 @@ class ManagedNode(LifecycleNode, Generic[Schema]):
     def _refuse_transition(self) -> None:
         self.error = InputError("this transition is not possible in the present state")
         self.get_logger().error(str(self.error))
+
+
+class Diagnostics:
+    """Publishes the health of a node on /diagnostics: each second, and at every change of mode.
+
+    Stamps are simulated times, as on all other topics.
+    """
+
+    def __init__(self, node: Node) -> None:
+        self._node = node
+        self._publisher = node.create_publisher(DiagnosticArray, topics.DIAGNOSTICS.name, 10)
+        self._last: Health | None = None
+        self._last_s = -REPORT_S
+        self._last_tick: tuple[float, float] | None = None
+
+    def report(self, health: Health, timebase: Timebase, now_or_never: bool = False) -> None:
+        """Publish if a second has passed or the mode has changed.
+
+        Args:
+            health: its value ``tick``, by default 0, gives the message's stamp.
+            timebase: conversion between ticks and stamps.
+            now_or_never: True for the last report: publish always, and wait for delivery.
+        """
+        now = time.monotonic()
+        changed = self._last is None or (health.mode, health.level) != (
+            self._last.mode,
+            self._last.level,
+        )
+        if not (changed or now_or_never) and now - self._last_s < REPORT_S:
+            return
+        if changed:
+            if health.level is Level.OK:  # two lines: rclpy allows one severity per calling line
+                self._node.get_logger().info(health.mode)
+            else:
+                self._node.get_logger().warning(health.mode)
+        values = {**health.values, **self._rate(health, now)}
+        self._last, self._last_s = health, now
+        status = DiagnosticStatus(
+            level=bytes([health.level]),
+            name=self._node.get_fully_qualified_name().lstrip("/"),
+            message=health.mode,
+            hardware_id="space_robot",
+            values=[KeyValue(key=key, value=_text(value)) for key, value in values.items()],
+        )
+        message = DiagnosticArray(status=[status])
+        tick = health.values.get("tick", 0)
+        seconds, rest_ns = divmod(timebase.stamp_ns(max(0, int(tick))), 1_000_000_000)
+        message.header.stamp.sec, message.header.stamp.nanosec = seconds, rest_ns
+        self._publisher.publish(message)
+        if now_or_never:
+            self._publisher.wait_for_all_acked(Duration(seconds=FLUSH_S))
+
+    def _rate(self, health: Health, now: float) -> dict[str, float]:
+        """Return the ticks per second of wall-clock time since the last report."""
+        tick = health.values.get("tick")
+        if not isinstance(tick, int):
+            return {}
+        last, self._last_tick = self._last_tick, (tick, now)
+        if last is None or now <= last[1]:
+            return {}
+        return {"rate_hz": (tick - last[0]) / (now - last[1])}
+
+
+def _text(value: float | str) -> str:
+    return f"{value:.6g}" if isinstance(value, float) else str(value)

@@ -14,7 +14,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, Generic, NoReturn, TypeVar
 
-from .process_environment import set_defaults
+from .process import set_defaults
 
 set_defaults()
 
@@ -25,10 +25,10 @@ from rclpy.signals import SignalHandlerOptions  # noqa: E402
 from ..config.settings import NodeSettings, leaves  # noqa: E402
 from ..config.validation import short  # noqa: E402
 from ..errors import InputError, SpaceRobotError  # noqa: E402
-from .lifeline import hold_to_standard_input  # noqa: E402
 from .loop import Loop  # noqa: E402
 from .managed_node import AUTOSTART, ManagedNode  # noqa: E402
 from .node_scheduler import NodeScheduler  # noqa: E402
+from .process import hold_to_standard_input  # noqa: E402
 
 Schema = TypeVar("Schema", bound=NodeSettings)
 ENDING_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT)

@@ -8,13 +8,15 @@ import time
 from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
+from .endpoints import Waiter
 from .loop import Loop, Wait
 from .managed_node import ManagedNode
-from .service_calls import ServiceCalls
-from .waiting import SPIN_S, Waiter
 
+SPIN_S = 300e-6
+"""Time of polling and yielding before sleeping in the wait set. Not under SCHED_FIFO, where
+yielding has no effect and sleeping threads wake without delay."""
 LISTENER_PERIOD_S = 0.02
 REMIND_S = 5.0
 UPKEEP_GAP_S = 2e-3
@@ -33,22 +35,13 @@ SERVICE_SHARE = 0.1
 LONGEST_PAUSE_S = 1.0
 
 
-class Served(Protocol):
-    """Interface of a node for `Upkeep`."""
-
-    calls: ServiceCalls
-
-    def report(self) -> None:
-        """Report the health if it is due."""
-
-
 class Upkeep:
     """Executes a node's service calls and reports its health, each when due.
 
     In flight only one of the two at a time, since both together take longer than a tick allows.
     """
 
-    def __init__(self, node: Served) -> None:
+    def __init__(self, node: ManagedNode[Any]) -> None:
         self.node = node
         self._next_call = self._next_report = 0.0
 

@@ -7,10 +7,9 @@ from typing import Any, TypeVar
 from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
 from rclpy.node import Node
 
-from ..config.choices import choices
-from ..config.files import QOS_OVERRIDES
+from ..config.files import QOS_OVERRIDES, flatten
 from ..config.settings import NodeSettings, leaves
-from ..config.trees import flatten
+from ..config.text import choices
 from ..errors import InputError
 from .rclpy_internals import declared_parameters, parameter_overrides
 

@@ -3,58 +3,54 @@
 from __future__ import annotations
 
 import time
+import types
+from collections.abc import Callable, Generator
 from typing import Any
 
+from lifecycle_msgs.msg import Transition
+from lifecycle_msgs.srv import ChangeState
+from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.executors import ShutdownException, SingleThreadedExecutor, TimeoutException
 from rclpy.node import Node
 
+from ..errors import FlightError
 from .rclpy_internals import ServiceWaitSet
 
-OVERLOADED_S = 1.0
-"""Time of uninterrupted waiting calls after which a node is overloaded."""
-COUNTED_S = 0.1
-"""Maximum counted time per call, so that a few slow ones, such as transitions, are no overload."""
-FULL_LOOK_S = 5.0
+FULL_CHECK_S = 5.0
+FIND_S = 5.0
+ANSWER_S = 180.0
+"""Timeout of a transition, in which a node may compile code."""
 
 
 class ServiceCalls(SingleThreadedExecutor):
-    """Executes the callbacks of one node, counts them, and detects overload."""
+    """Executes the callbacks of one node, and counts them."""
 
     def __init__(self, node: Node) -> None:
         super().__init__()
         self.add_node(node)
         self._requests = ServiceWaitSet(node)
-        self._full_look_at = 0.0
+        self._full_check_at = 0.0
         """Time of the next check of all entities, including the middleware's events."""
         self.count = 0
         """Number of executed calls."""
-        self.is_overloaded = False
-        """True if calls arrive faster than they are executed; more than 1000 of a kind are lost."""
         self._unfinished: list[Any] = []
         """Calls whose callback waits for the node's loop."""
-        self._created: list[Any] = []
-        """Tasks of rclpy's own, as of an action's goals and results, that have not ended."""
-        self._began_at: float | None = None
-        """Start time of the last call; None if no further call waited."""
-        self._busy_s = 0.0
-        """Time without idle moment, s."""
+        self._own_tasks: list[Any] = []
+        """Unfinished tasks of rclpy, such as those of an action's goals and results."""
 
     def run_one(self, timeout_s: float = 0.0) -> bool:
         """Execute a call that waits or arrives in time; return True if there was one."""
-        if not timeout_s and not self._is_worth_a_look():
-            return self._take_a_break()
+        if not timeout_s and not self._may_be_called():
+            return False
         # the end of a call wakes the executor, so its next wait returns at once without result
-        callback = self._next(timeout_s) or (self._next(0.0) if self._began_at else None)
+        callback = self._next(timeout_s) or self._next(0.0)
         if callback is None:
-            return self._take_a_break()
-        if callback in self._unfinished:
-            return self._go_on(callback)
-        now = time.monotonic()
-        self._busy_s += min(now - (self._began_at or now), COUNTED_S)
-        self._began_at = now
-        self.is_overloaded = self._busy_s > OVERLOADED_S
+            return False
         callback()
-        self.count += 1
+        if callback in self._unfinished:
+            self._unfinished.remove(callback)
+        else:
+            self.count += 1
         if not callback.done():
             self._unfinished.append(callback)
         elif error := callback.exception():
@@ -63,37 +59,21 @@ class ServiceCalls(SingleThreadedExecutor):
 
     def create_task(self, callback: Any, *args: Any, **kwargs: Any) -> Any:
         """Execute a callback by one of the next calls of `run_one`."""
-        self._created.append(super().create_task(callback, *args, **kwargs))
-        return self._created[-1]
-
-    def _take_a_break(self) -> bool:
-        """Reset the measure of overload, since no call waits."""
-        self._began_at, self._busy_s, self.is_overloaded = None, 0.0, False
-        return False
-
-    def _go_on(self, callback: Any) -> bool:
-        """Resume a waiting call; this does not count as overload."""
-        self._began_at, self._busy_s = None, 0.0
-        callback()
-        if callback.done():
-            self._unfinished.remove(callback)
-            if error := callback.exception():
-                raise error
-        return True
+        self._own_tasks.append(super().create_task(callback, *args, **kwargs))
+        return self._own_tasks[-1]
 
     def finish(self) -> None:
         """Resume all waiting callbacks after the end of the loop."""
         for callback in self._unfinished:
             callback()
 
-    def _is_worth_a_look(self) -> bool:
-        """Return True if a task or request waits, or if the slow check of all entities is due."""
-        self._created = [task for task in self._created if not task.done()]
-        if self._unfinished or self._created:
+    def _may_be_called(self) -> bool:
+        self._own_tasks = [task for task in self._own_tasks if not task.done()]
+        if self._unfinished or self._own_tasks:
             return True
-        if (now := time.monotonic()) < self._full_look_at:
+        if (now := time.monotonic()) < self._full_check_at:
             return self._requests.is_called()
-        self._full_look_at = now + FULL_LOOK_S
+        self._full_check_at = now + FULL_CHECK_S
         return True
 
     def _next(self, timeout_s: float) -> Any:
@@ -101,3 +81,42 @@ class ServiceCalls(SingleThreadedExecutor):
             return self.wait_for_ready_callbacks(timeout_sec=timeout_s)[0]
         except (TimeoutException, ShutdownException):
             return None
+
+
+@types.coroutine
+def until(condition: Callable[[], bool]) -> Generator[None, None, None]:
+    """Yield to the node until a condition holds; for service callbacks."""
+    while not condition():
+        yield
+
+
+async def change_state(node: Node, name: str, transition: str) -> None:
+    """Request a lifecycle transition of another node, from within a service callback.
+
+    Args:
+        node: that asks.
+        name: of the other node in its namespace.
+        transition: ``configure``, ``activate``, ``deactivate`` or ``cleanup``.
+
+    Raises:
+        FlightError: the other node refuses or does not answer.
+    """
+    client = node.create_client(
+        ChangeState, f"{name}/change_state", callback_group=ReentrantCallbackGroup()
+    )
+    try:
+        await _in_time(client.service_is_ready, FIND_S, f"{name} is not available to {transition}")
+        number = getattr(Transition, f"TRANSITION_{transition.upper()}")
+        answer = client.call_async(ChangeState.Request(transition=Transition(id=number)))
+        await _in_time(answer.done, ANSWER_S, f"{name} does not answer to {transition}")
+        if not answer.result().success:
+            raise FlightError(f"{name} refuses to {transition}: see its log")
+    finally:
+        node.destroy_client(client)
+
+
+async def _in_time(condition: Callable[[], bool], seconds: float, complaint: str) -> None:
+    deadline = time.monotonic() + seconds
+    await until(lambda: condition() or time.monotonic() > deadline)
+    if not condition():
+        raise FlightError(complaint)

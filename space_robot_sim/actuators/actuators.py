@@ -19,45 +19,31 @@ scale and bias make the reported one. A base without actuators receives no torqu
 
 from __future__ import annotations
 
-from typing import Annotated
-
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field
 
 from space_robot_model.hardware.base_actuators import BaseActuatorSettings
-from space_robot_model.hardware.drives import DriveSettings
+from space_robot_model.hardware.drives import (
+    CommandDelaySettings,
+    DriveSettings,
+    TorqueEchoSettings,
+    TorqueLimitSettings,
+)
 from space_robot_model.robot import Robot
 from space_robot_msgs_py.compiled.kernels import kernel
 from space_robot_msgs_py.compiled.lanes import uniform, whole
-from space_robot_msgs_py.compiled.records import Record, assign, nested, shaped
-from space_robot_msgs_py.config.validation import StrictModel
+from space_robot_msgs_py.compiled.records import nested, shaped
 from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.samples import MOST_THRUSTERS, MOST_TORQUERS, MOST_WHEELS, State
 
-from ..faults.schedule import PartFault, Schedule
-from .drive import Drive, WrongDrive, drive_torque
+from ..component import Component, Installation
+from ..faults.schedule import Schedule
+from .drive import Drive, TorqueEcho, TorqueLimit, drive_torque, limit_torque, report_torque
 from .magnetic_torquers import MagneticTorquers, magnetise
-from .thrusters import StuckThruster, Thrusters, fire
-from .torque_echo import TorqueEcho, TorqueEchoSettings, WrongEcho, report_torque
-from .torque_limit import (
-    SATURATE_BASE,
-    TorqueLimit,
-    TorqueLimitSettings,
-    WeakActuators,
-    limit_torque,
-)
-from .wheels import DeadWheel, Wheels, drive_wheels
+from .thrusters import Thrusters, fire
+from .wheels import Wheels, drive_wheels
 
 Array = NDArray[np.float64]
-
-
-class CommandDelaySettings(StrictModel):
-    """Settings of the delay of commands."""
-
-    command_latency_ticks: Annotated[int, Field(ge=0, le=1000)] = Field(
-        0, description="delay of commands, ticks"
-    )
 
 
 def ring_of(latency: Array) -> Array:
@@ -95,11 +81,7 @@ class ActuatorSettings(
     """Settings of the actuators."""
 
     def check(self, robot: Robot, file: str) -> None:
-        """Check the settings, see `BaseActuatorSettings.check`.
-
-        Raises:
-            InputError: the settings do not fit.
-        """
+        """Check the settings, see `BaseActuatorSettings.check`."""
         super().check(robot, file)
         if self.base_actuation != "ideal" and self.base_torque_limit:
             raise InputError(
@@ -108,7 +90,17 @@ class ActuatorSettings(
             )
 
 
-class Actuators(Record):
+def _latency(settings: ActuatorSettings, at: Installation) -> Array:
+    numbers = at.n + 3 + MOST_WHEELS + MOST_THRUSTERS + MOST_TORQUERS
+    latency = np.full(numbers, float(settings.command_latency_ticks))
+    if settings.thruster_count:
+        first = at.n + 3 + settings.wheel_count
+        delays = settings.thrusters.ticks("delay", at.period)
+        latency[first : first + settings.thruster_count] += delays
+    return latency
+
+
+class Actuators(Component):
     """Record of the actuators of one robot, for the plant's kernels."""
 
     torque_limit: TorqueLimit = nested(TorqueLimit)
@@ -117,53 +109,22 @@ class Actuators(Record):
     wheels: Wheels = nested(Wheels)
     thrusters: Thrusters = nested(Thrusters)
     magnetic_torquers: MagneticTorquers = nested(MagneticTorquers)
-    base_is_ideal: float = shaped(lambda n: (), uniform=True)
+    base_is_ideal: float = shaped(
+        lambda n: (), uniform=True, origin=lambda s, at: s.base_actuation == "ideal"
+    )
     """1 if the base receives the commanded torque; 0 if it has hardware or no actuators."""
     saturated_ticks: float = shaped(lambda n: ())
     """Number of ticks in which a torque was at its limit."""
     latency: Array = shaped(
-        lambda n: (n + 3 + MOST_WHEELS + MOST_THRUSTERS + MOST_TORQUERS,), uniform=True
+        lambda n: (n + 3 + MOST_WHEELS + MOST_THRUSTERS + MOST_TORQUERS,),
+        uniform=True,
+        origin=_latency,
     )
     """Ticks by which each number of a command is late."""
     due: Array = shaped(lambda n: (n + 3 + MOST_WHEELS + MOST_THRUSTERS + MOST_TORQUERS,))
     """The command due at the current tick."""
     base_wrench: Array = shaped(lambda n: (6,))
     """Force, N, and torque, N m, on base axes, of all that acts on the base but the wheels."""
-
-    @classmethod
-    def build(cls, n: int, settings: ActuatorSettings, period: float) -> Actuators:
-        """Read the numbers of the settings for a robot of ``n`` joints and ticks of ``period``, s.
-
-        Raises:
-            InputError: see `per_axis`.
-        """
-        actuators = cls.allocate(n)
-        assign(
-            actuators,
-            torque_limit=TorqueLimit.build(n, settings),
-            drive=Drive.build(n, settings, period),
-            torque_echo=TorqueEcho.build(n, settings),
-            wheels=Wheels.build(n, settings.wheels),
-            thrusters=Thrusters.build(n, settings.thrusters, period),
-            magnetic_torquers=MagneticTorquers.build(n, settings.magnetic_torquers),
-            base_is_ideal=settings.base_actuation == "ideal",
-            latency=settings.command_latency_ticks,
-        )
-        if settings.thruster_count:
-            first = n + 3 + settings.wheel_count
-            delays = settings.thrusters.ticks("delay", period)
-            actuators.latency[first : first + settings.thruster_count] += delays
-        return actuators
-
-
-FAULTS: dict[str, type[PartFault]] = {
-    "torque_limit": WeakActuators,
-    "drive": WrongDrive,
-    "torque_echo": WrongEcho,
-    "wheels": DeadWheel,
-    "thrusters": StuckThruster,
-}
-"""The faults of each field of `Actuators`."""
 
 
 def check_faults(schedule: Schedule, settings: BaseActuatorSettings) -> None:
@@ -172,9 +133,9 @@ def check_faults(schedule: Schedule, settings: BaseActuatorSettings) -> None:
     Raises:
         InputError: a fault limits the torque of a base that is not ideal.
     """
-    if settings.base_actuation != "ideal" and schedule.of(SATURATE_BASE):
+    if settings.base_actuation != "ideal" and schedule.of("saturate_base"):
         raise InputError(
-            f"fault {SATURATE_BASE.name} is for base_actuation ideal, got "
+            f"fault saturate_base is for base_actuation ideal, got "
             f"{settings.base_actuation!r}: wheels and thrusters have faults of their own"
         )
 

@@ -1,4 +1,4 @@
-"""Errors of the drives between commanded and given torque.
+"""Drives of the axes: limits, errors between commanded and given torque, and the reported torque.
 
 A torque ``u`` that has passed the limits is given as the following, axis by axis:
 
@@ -11,76 +11,89 @@ is given over the tick is the mean of that, so the angular momentum that it brin
 
     mean = u + (y_0 - u) tau / T (1 - exp(-T / tau)),    y_1 = u + (y_0 - u) exp(-T / tau)
 
-A scale error multiplies and a bias is added last, as errors of a drive's amplifier do.
+A scale error multiplies and a bias is added last, as errors of a drive's amplifier do. The flight
+software receives a report on the torque:
+
+    reported = scale * source + bias
+
+The source is the command within its limits, as a drive's computer has it, or the torque that is
+given, as a sensor on the shaft has it. A time-delay estimate is made of this echo, so its scale is
+critical: under ``reported = b * command``, ``given = a * command`` the error of the estimate obeys
+``b E - a H_S^-1 H_bar`` in place of ``E - H_S^-1 H_bar``, which grows where b exceeds 1 by more
+than the smallest eigenvalue of ``a H_S^-1 H_bar``. What the drives give (a) matters less.
 """
 
 from __future__ import annotations
 
 from decimal import Decimal
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from space_robot_model.elementary.steps import in_steps
-from space_robot_model.hardware.drives import DriveSettings
-from space_robot_model.hardware.per_axis import per_axis
+from space_robot_model.elementary.functions import in_steps
+from space_robot_model.hardware.sheets import per_axis
 from space_robot_msgs_py.compiled.kernels import kernel
-from space_robot_msgs_py.compiled.lanes import all_lanes, any_lane, where
-from space_robot_msgs_py.compiled.records import Record, assign, shaped
+from space_robot_msgs_py.compiled.lanes import all_lanes, any_lane, uniform, where
+from space_robot_msgs_py.compiled.records import Origin, assign, shaped
 
-from ..faults.axes import About
-from ..faults.grammar import Argument, Kind
-from ..faults.schedule import Schedule, ScheduledFault, TemporaryChange
+from ..component import Component
+from ..faults.grammar import About, Argument, Kind
 
 Array = NDArray[np.float64]
 
-
-class Drive(Record):
-    """The drives of one robot, an axis each: base x, y, z (base frame), then joints."""
-
-    scale: Array = shaped(lambda n: (n + 3,))
-    """Torque given per torque commanded."""
-    bias: Array = shaped(lambda n: (n + 3,))
-    """N m."""
-    step: Array = shaped(lambda n: (n + 3,))
-    """N m; 0: any torque can be given."""
-    dead_band: Array = shaped(lambda n: (n + 3,))
-    """N m."""
-    decay: Array = shaped(lambda n: (n + 3,))
-    """``exp(-T / tau)`` of the lag; 0 without one."""
-    mean_decay: Array = shaped(lambda n: (n + 3,))
-    """``tau / T (1 - exp(-T / tau))``; 0 without a lag."""
-    lagging: Array = shaped(lambda n: (n + 3,))
-    """The lag's output at the current tick, N m."""
-    is_exact: float = shaped(lambda n: ())
-    """1 if the drive is exact, so that its kernel is skipped; see `judge`."""
-
-    @classmethod
-    def build(cls, n: int, settings: DriveSettings, period: float) -> Drive:
-        """Read the settings for a robot of ``n`` joints and ticks of ``period``, s.
-
-        Raises:
-            InputError: see `per_axis`.
-        """
-        names = ("scale", "bias", "step", "dead_band")
-        lags = per_axis(settings, "drive_lag", n)
-        decays = np.array([lag_decays(lag, period) for lag in lags])
-        drive = cls.allocate(n)
-        assign(
-            drive,
-            **{name: per_axis(settings, f"drive_{name}", n) for name in names},
-            decay=decays[:, 0],
-            mean_decay=decays[:, 1],
-        )
-        judge(drive)
-        return drive
+LIMIT = Argument("TORQUE", "N m", 0.0, 1e6)
+TORQUE = Argument("TORQUE", "N m", -1e6, 1e6, About.AXIS)
 
 
-def judge(drive: Drive) -> None:
-    """Update ``is_exact``; to be called after any parameter has changed."""
-    errors = (drive.scale - 1.0, drive.bias, drive.step, drive.dead_band, drive.mean_decay)
-    assign(drive, is_exact=not np.any(errors))
+def _axes(name: str) -> Origin:
+    return lambda sheet, at: per_axis(sheet, name, at.n)
+
+
+class TorqueLimit(Component):
+    """The torque limits of one robot's actuators."""
+
+    limit: Array = shaped(
+        lambda n: (n + 3,),
+        origin=lambda s, at: np.array(
+            3 * [s.base_torque_limit or np.inf] + at.n * [s.joint_torque_limit or np.inf]
+        ),
+    )
+    """Largest torque of each axis, N m: base x, y, z (base frame), then joints."""
+
+    FAULTS: ClassVar[tuple[Kind, ...]] = (
+        Kind(
+            "saturate_base",
+            LIMIT,
+            "torque limit of an ideal base",
+            "limit",
+            np.minimum,
+            group="base",
+        ),
+        Kind(
+            "saturate_joints",
+            LIMIT,
+            "torque limit of the joints' motors",
+            "limit",
+            np.minimum,
+            group="joints",
+        ),
+    )
+
+
+@kernel
+def limit_torque(limits: TorqueLimit, torque: Array) -> float:
+    """Limit ``torque`` (n+3,) N m in place.
+
+    Returns:
+        1 if it exceeded one, else 0.
+    """
+    limit, saturated = limits.limit, 0.0
+    for i in range(torque.size):
+        wanted = torque[i]
+        torque[i] = min(max(wanted, -limit[i]), limit[i])
+        saturated = where(torque[i] != wanted, 1.0, saturated)
+    return saturated
 
 
 def lag_decays(lag: float, period: float) -> tuple[float, float]:
@@ -93,6 +106,53 @@ def lag_decays(lag: float, period: float) -> tuple[float, float]:
     ratio = Decimal(period) / Decimal(lag)
     decay = (-ratio).exp()
     return float(decay), float((1 - decay) / ratio)
+
+
+def _decays(which: int) -> Origin:
+    def decays(sheet: Any, at: Any) -> list[float]:
+        return [lag_decays(lag, at.period)[which] for lag in per_axis(sheet, "drive_lag", at.n)]
+
+    return decays
+
+
+class Drive(Component):
+    """The drives of one robot, an axis each: base x, y, z (base frame), then joints."""
+
+    scale: Array = shaped(lambda n: (n + 3,), origin=_axes("drive_scale"))
+    """Torque given per torque commanded."""
+    bias: Array = shaped(lambda n: (n + 3,), origin=_axes("drive_bias"))
+    """N m."""
+    step: Array = shaped(lambda n: (n + 3,), origin=_axes("drive_step"))
+    """N m; 0: any torque can be given."""
+    dead_band: Array = shaped(lambda n: (n + 3,), origin=_axes("drive_dead_band"))
+    """N m."""
+    decay: Array = shaped(lambda n: (n + 3,), origin=_decays(0))
+    """``exp(-T / tau)`` of the lag; 0 without one."""
+    mean_decay: Array = shaped(lambda n: (n + 3,), origin=_decays(1))
+    """``tau / T (1 - exp(-T / tau))``; 0 without a lag."""
+    lagging: Array = shaped(lambda n: (n + 3,))
+    """The lag's output at the current tick, N m."""
+    is_exact: float = shaped(lambda n: ())
+    """1 if the drive is exact, so that its kernel is skipped."""
+
+    FAULTS: ClassVar[tuple[Kind, ...]] = (
+        Kind(
+            "drive_scale",
+            Argument("FACTOR", "1", -100.0, 100.0, About.AXIS),
+            "the applied torque is FACTOR times the commanded torque",
+            "scale",
+            np.multiply,
+        ),
+        Kind(
+            "drive_bias", TORQUE, "the applied torque is TORQUE plus the commanded torque", "bias"
+        ),
+    )
+
+    @staticmethod
+    def refresh(record: Any) -> None:
+        """Update ``is_exact``."""
+        errors = (record.scale - 1.0, record.bias, record.step, record.dead_band, record.mean_decay)
+        assign(record, is_exact=not np.any(errors))
 
 
 @kernel
@@ -113,39 +173,52 @@ def drive_torque(drive: Drive, asked: Array, applied: Array) -> None:
         applied[i] = where(is_exact, asked[i], drive.scale[i] * u + drive.bias[i])
 
 
-DRIVE_SCALE = Kind(
-    "drive_scale",
-    Argument("FACTOR", "1", -100.0, 100.0, about=About.AXIS),
-    None,
-    "the applied torque is FACTOR times the commanded torque",
-)
-DRIVE_BIAS = Kind(
-    "drive_bias",
-    Argument("TORQUE", "N m", -1e6, 1e6, about=About.AXIS),
-    None,
-    "the applied torque is TORQUE plus the commanded torque",
-)
+class TorqueEcho(Component):
+    """Report of torques, one per axis: base x, y, z (base frame), then joints."""
+
+    is_of_given: float = shaped(
+        lambda n: (), uniform=True, origin=lambda s, at: s.torque_echo == "given"
+    )
+    """1 if the torque given is reported, 0 if the command within its limits is."""
+    scale: Array = shaped(lambda n: (n + 3,), origin=_axes("echo_scale"))
+    """Reported torque per torque of the source."""
+    bias: Array = shaped(lambda n: (n + 3,), origin=_axes("echo_bias"))
+    """N m."""
+    is_exact: float = shaped(lambda n: ())
+    """1 if the source itself is reported, so that the kernel is skipped."""
+
+    FAULTS: ClassVar[tuple[Kind, ...]] = (
+        Kind(
+            "torque_scale",
+            Argument("FACTOR", "1", 1e-3, 1e3, About.AXIS),
+            "the applied torque is FACTOR times the reported torque",
+            "scale",
+            np.divide,
+        ),
+        Kind(
+            "torque_bias",
+            TORQUE,
+            "the applied torque is TORQUE plus the reported torque",
+            "bias",
+            np.subtract,
+        ),
+    )
+
+    @staticmethod
+    def refresh(record: Any) -> None:
+        """Update ``is_exact``."""
+        assign(record, is_exact=not np.any((record.scale - 1.0, record.bias)))
 
 
-class WrongDrive:
-    """Fault: temporary change of scale or bias of some axes."""
+@kernel
+def report_torque(echo: TorqueEcho, applied: Array, reported: Array) -> None:
+    """Write into ``reported`` (n+3,) the report on ``applied`` (n+3,), N m.
 
-    KINDS: ClassVar[tuple[Kind, ...]] = (DRIVE_SCALE, DRIVE_BIAS)
-
-    def __init__(self, schedule: Schedule) -> None:
-        self._scale = TemporaryChange(schedule.of(DRIVE_SCALE))
-        self._bias = TemporaryChange(schedule.of(DRIVE_BIAS))
-
-    def apply(self, tick: int, part: Drive) -> None:
-        """Apply the faults of the drives from ``tick`` to the next."""
-        is_scaled = self._scale.apply(tick, part.scale, _multiply)
-        if self._bias.apply(tick, part.bias, _add) or is_scaled:
-            judge(part)
-
-
-def _multiply(scale: Array, fault: ScheduledFault) -> None:
-    scale[list(fault.axes)] *= fault.value
-
-
-def _add(bias: Array, fault: ScheduledFault) -> None:
-    bias[list(fault.axes)] += fault.value
+    ``reported`` holds the command within its limits before.
+    """
+    is_exact, is_of_command = echo.is_exact != 0.0, uniform(echo.is_of_given) == 0.0
+    if is_of_command and all_lanes(is_exact):
+        return
+    for i in range(applied.size):
+        source = reported[i] if is_of_command else applied[i]
+        reported[i] = where(is_exact, source, echo.scale[i] * source + echo.bias[i])

@@ -9,32 +9,26 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from space_robot_model.hardware.magnetic_torquers import MagneticTorquerSettings
 from space_robot_msgs_py.compiled.kernels import kernel
 from space_robot_msgs_py.compiled.lanes import where, whole
-from space_robot_msgs_py.compiled.records import Record, assign, shaped
+from space_robot_msgs_py.compiled.records import shaped
 from space_robot_msgs_py.samples import MOST_TORQUERS
+
+from ..component import Component
 
 Array = NDArray[np.float64]
 
 
-class MagneticTorquers(Record):
+class MagneticTorquers(Component):
     """Magnetic torquers of one base; entries beyond the last one are zero."""
 
-    count: float = shaped(lambda n: (), uniform=True)
-    axis: Array = shaped(lambda n: (MOST_TORQUERS, 3))
+    count: float = shaped(lambda n: (), uniform=True, origin="count")
+    axis: Array = shaped(lambda n: (MOST_TORQUERS, 3), origin="unit_axes")
     """Unit vectors of the dipoles, base frame."""
-    max_dipole: Array = shaped(lambda n: (MOST_TORQUERS,))
+    max_dipole: Array = shaped(
+        lambda n: (MOST_TORQUERS,), origin=lambda s, at: s.values("max_dipole")
+    )
     """A m2."""
-
-    @classmethod
-    def build(cls, n: int, settings: MagneticTorquerSettings) -> MagneticTorquers:
-        """Read the settings for a robot of ``n`` joints."""
-        torquers, count = cls.allocate(n), settings.count
-        assign(torquers, count=count)
-        torquers.axis[:count] = settings.unit_axes
-        torquers.max_dipole[:count] = settings.largest
-        return torquers
 
 
 @kernel

@@ -12,32 +12,37 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from space_robot_model.hardware.thrusters import ThrusterSettings
 from space_robot_msgs_py.compiled.kernels import kernel
 from space_robot_msgs_py.compiled.lanes import where, whole
-from space_robot_msgs_py.compiled.records import Record, assign, shaped
+from space_robot_msgs_py.compiled.records import shaped
 from space_robot_msgs_py.samples import MOST_THRUSTERS
 
-from ..faults.axes import About
-from ..faults.grammar import Argument, Kind
-from ..faults.schedule import Schedule, ScheduledFault, TemporaryChange
+from ..component import Component
+from ..faults.grammar import About, Argument, Kind, switch_on
 
 Array = NDArray[np.float64]
 
+ONE = Argument(about=About.THRUSTER)
 
-class Thrusters(Record):
+
+class Thrusters(Component):
     """Thrusters of one base; entries beyond the last thruster are zero."""
 
-    count: float = shaped(lambda n: (), uniform=True)
-    force: Array = shaped(lambda n: (MOST_THRUSTERS,))
+    count: float = shaped(lambda n: (), uniform=True, origin="count")
+    force: Array = shaped(lambda n: (MOST_THRUSTERS,), origin=lambda s, at: s.values("force"))
     """Force of an open thruster, N."""
-    direction: Array = shaped(lambda n: (MOST_THRUSTERS, 3))
+    direction: Array = shaped(lambda n: (MOST_THRUSTERS, 3), origin="unit_directions")
     """Unit vectors of the force on the base, base frame."""
-    lever: Array = shaped(lambda n: (MOST_THRUSTERS, 3))
+    lever: Array = shaped(
+        lambda n: (MOST_THRUSTERS, 3), origin=lambda s, at: s.torques / s.values("force")[:, None]
+    )
     """Torque about the base's CoM by force, m, base frame: position x direction."""
-    flow: Array = shaped(lambda n: (MOST_THRUSTERS,))
+    flow: Array = shaped(lambda n: (MOST_THRUSTERS,), origin="mass_flow")
     """Propellant that an open thruster burns, kg/s."""
-    shortest_pulse: Array = shaped(lambda n: (MOST_THRUSTERS,))
+    shortest_pulse: Array = shaped(
+        lambda n: (MOST_THRUSTERS,),
+        origin=lambda s, at: np.maximum(1.0, s.ticks("shortest_pulse", at.period)),
+    )
     """Ticks, at least one."""
     stuck_on: Array = shaped(lambda n: (MOST_THRUSTERS,))
     """1 for a valve that cannot be closed."""
@@ -49,31 +54,15 @@ class Thrusters(Record):
     """Ticks for which a valve must stay open."""
     pulses: Array = shaped(lambda n: (MOST_THRUSTERS,))
     """Number of times that a valve has opened."""
-    propellant: float = shaped(lambda n: ())
+    propellant: float = shaped(lambda n: (), origin=lambda s, at: s.propellant or np.inf)
     """Propellant in the tank, kg; inf: unlimited."""
     burnt: float = shaped(lambda n: ())
     """Propellant used so far, kg."""
 
-    @classmethod
-    def build(cls, n: int, settings: ThrusterSettings, period: float) -> Thrusters:
-        """Read settings that fit one another, see `ThrusterSettings.check`, for ticks of a period.
-
-        Args:
-            n: joints of the robot.
-            settings: of the thrusters.
-            period: s.
-        """
-        thrusters, count = cls.allocate(n), settings.count
-        assign(thrusters, count=count, propellant=settings.propellant or np.inf)
-        if count:
-            force = settings.values("force")
-            thrusters.force[:count] = force
-            thrusters.direction[:count] = settings.unit_directions
-            thrusters.lever[:count] = settings.torques / force[:, None]
-            thrusters.flow[:count] = settings.mass_flow
-            ticks = settings.ticks("shortest_pulse", period)
-            thrusters.shortest_pulse[:count] = np.maximum(1.0, ticks)
-        return thrusters
+    FAULTS: ClassVar[tuple[Kind, ...]] = (
+        Kind("thruster_stuck_on", ONE, "a thruster's valve stays open", "stuck_on", switch_on),
+        Kind("thruster_stuck_off", ONE, "a thruster's valve stays closed", "stuck_off", switch_on),
+    )
 
 
 @kernel
@@ -109,27 +98,3 @@ def fire(
         for i in range(3):
             base_wrench[i] += thrust * thrusters.direction[k, i]
             base_wrench[3 + i] += thrust * thrusters.lever[k, i]
-
-
-_THRUSTER = Argument("", "", 0.0, 0.0, about=About.THRUSTER)
-THRUSTER_STUCK_ON = Kind("thruster_stuck_on", _THRUSTER, None, "a thruster's valve stays open")
-THRUSTER_STUCK_OFF = Kind("thruster_stuck_off", _THRUSTER, None, "a thruster's valve stays closed")
-
-
-class StuckThruster:
-    """Fault: some valves stay open or closed for a while."""
-
-    KINDS: ClassVar[tuple[Kind, ...]] = (THRUSTER_STUCK_ON, THRUSTER_STUCK_OFF)
-
-    def __init__(self, schedule: Schedule) -> None:
-        self._on = TemporaryChange(schedule.of(THRUSTER_STUCK_ON))
-        self._off = TemporaryChange(schedule.of(THRUSTER_STUCK_OFF))
-
-    def apply(self, tick: int, part: Thrusters) -> None:
-        """Apply the faults of the valves from ``tick`` to the next."""
-        self._on.apply(tick, part.stuck_on, _stick)
-        self._off.apply(tick, part.stuck_off, _stick)
-
-
-def _stick(stuck: Array, fault: ScheduledFault) -> None:
-    stuck[list(fault.axes)] = 1.0

@@ -17,30 +17,34 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from space_robot_model.hardware.wheels import WheelSettings
 from space_robot_msgs_py.compiled.kernels import kernel
 from space_robot_msgs_py.compiled.lanes import where, whole
-from space_robot_msgs_py.compiled.records import Record, assign, shaped
+from space_robot_msgs_py.compiled.records import shaped
 from space_robot_msgs_py.samples import MOST_WHEELS
 
-from ..faults.axes import About
-from ..faults.grammar import Argument, Kind
-from ..faults.schedule import Schedule, ScheduledFault, TemporaryChange
+from ..component import Component
+from ..faults.grammar import About, Argument, Kind, switch_on
 
 Array = NDArray[np.float64]
 
 
-class Wheels(Record):
+class Wheels(Component):
     """Wheel motors of one base; entries beyond the last wheel are zero."""
 
-    count: float = shaped(lambda n: (), uniform=True)
-    axis: Array = shaped(lambda n: (MOST_WHEELS, 3))
+    count: float = shaped(lambda n: (), uniform=True, origin="count")
+    axis: Array = shaped(lambda n: (MOST_WHEELS, 3), origin="unit_axes")
     """Unit vectors in the base frame."""
-    inertia: Array = shaped(lambda n: (MOST_WHEELS,))
+    inertia: Array = shaped(
+        lambda n: (MOST_WHEELS,), origin=lambda s, at: s.values("rotor_inertia")
+    )
     """J of each rotor about its axis, kg m2."""
-    max_torque: Array = shaped(lambda n: (MOST_WHEELS,))
+    max_torque: Array = shaped(
+        lambda n: (MOST_WHEELS,), origin=lambda s, at: s.limits("max_torque")
+    )
     """N m."""
-    max_momentum: Array = shaped(lambda n: (MOST_WHEELS,))
+    max_momentum: Array = shaped(
+        lambda n: (MOST_WHEELS,), origin=lambda s, at: s.limits("max_momentum")
+    )
     """h, N m s."""
     failed: Array = shaped(lambda n: (MOST_WHEELS,))
     """1 for a wheel with a failed motor."""
@@ -49,17 +53,15 @@ class Wheels(Record):
     saturated_ticks: Array = shaped(lambda n: (MOST_WHEELS,))
     """Number of ticks with a saturated wheel."""
 
-    @classmethod
-    def build(cls, n: int, settings: WheelSettings) -> Wheels:
-        """Read settings that fit one another, see `WheelSettings.check`."""
-        wheels, count = cls.allocate(n), settings.count
-        assign(wheels, count=count)
-        if count:
-            wheels.axis[:count] = settings.unit_axes
-            wheels.inertia[:count] = settings.values("rotor_inertia")
-            for name in ("max_torque", "max_momentum"):
-                getattr(wheels, name)[:count] = settings.limits(name)
-        return wheels
+    FAULTS: ClassVar[tuple[Kind, ...]] = (
+        Kind(
+            "wheel_fail",
+            Argument(about=About.WHEEL),
+            "the motor of a reaction wheel has no torque: the wheel turns freely",
+            "failed",
+            switch_on,
+        ),
+    )
 
 
 @kernel
@@ -96,28 +98,3 @@ def drive_wheels(
         for i in range(3):
             base[i] -= wheels.axis[k, i] * torque
     return any_saturated
-
-
-WHEEL_FAIL = Kind(
-    "wheel_fail",
-    Argument("", "", 0.0, 0.0, about=About.WHEEL),
-    None,
-    "the motor of a reaction wheel has no torque: the wheel turns freely",
-)
-
-
-class DeadWheel:
-    """Fault: motors of some wheels give no torque for a while."""
-
-    KINDS: ClassVar[tuple[Kind, ...]] = (WHEEL_FAIL,)
-
-    def __init__(self, schedule: Schedule) -> None:
-        self._change = TemporaryChange(schedule.of(WHEEL_FAIL))
-
-    def apply(self, tick: int, part: Wheels) -> None:
-        """Apply the faults of the motors from ``tick`` to the next."""
-        self._change.apply(tick, part.failed, _kill)
-
-
-def _kill(failed: Array, fault: ScheduledFault) -> None:
-    failed[list(fault.axes)] = 1.0

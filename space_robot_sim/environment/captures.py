@@ -16,10 +16,9 @@ from space_robot_model.robot.dynamics import generalised_rows
 from space_robot_msgs_py.simulated_time import tick_from
 
 from .events import Capture, Event, in_order
-from .grasp import Grasp
-from .impact import Impact
+from .impact import Grasp, Impact
 from .neighbouring_orbit import Meeting, meet
-from .orbit_settings import OrbitSettings
+from .orbit import OrbitSettings
 from .target import TargetMotion
 
 Array = NDArray[np.float64]

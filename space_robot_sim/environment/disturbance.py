@@ -8,12 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import AfterValidator, Field
 
-from space_robot_model.elementary.sine import sin_cos
+from space_robot_model.elementary.functions import sin_cos
 from space_robot_msgs_py.compiled.kernels import kernel
 from space_robot_msgs_py.compiled.lanes import any_lane, where
-from space_robot_msgs_py.compiled.records import Record, assign, shaped
+from space_robot_msgs_py.compiled.records import shaped
 from space_robot_msgs_py.config.validation import StrictModel
 
+from ..component import Component
 from .disturbance_table import check_table_text
 
 Array = NDArray[np.float64]
@@ -51,27 +52,23 @@ class DisturbanceSettings(StrictModel):
     )
 
 
-class Disturbance(Record):
+class Disturbance(Component):
     """Sinusoidal disturbances in three groups: base, joints 1 to 3, joints 4 and up."""
 
-    amplitude: Array = shaped(lambda n: (3,))
+    amplitude: Array = shaped(
+        lambda n: (3,),
+        origin=lambda s, at: (
+            s.scale * np.array([s.base_amplitude, s.inner_amplitude, s.outer_amplitude])
+        ),
+    )
     """N m; on the base about inertial axes."""
-    angular_frequency: Array = shaped(lambda n: (3, 2))
+    angular_frequency: Array = shaped(
+        lambda n: (3, 2),
+        origin=lambda s, at: (
+            2.0 * np.pi * np.array([s.base_frequencies, s.inner_frequencies, s.outer_frequencies])
+        ),
+    )
     """rad/s, of the two sines of each group."""
-
-    @classmethod
-    def build(cls, n: int, settings: DisturbanceSettings) -> Disturbance:
-        """Read the numbers of the settings for a robot of ``n`` joints."""
-        s = settings
-        amplitudes = [s.base_amplitude, s.inner_amplitude, s.outer_amplitude]
-        frequencies = [s.base_frequencies, s.inner_frequencies, s.outer_frequencies]
-        disturbance = cls.allocate(n)
-        assign(
-            disturbance,
-            amplitude=s.scale * np.array(amplitudes),
-            angular_frequency=2.0 * np.pi * np.array(frequencies),
-        )
-        return disturbance
 
 
 @kernel

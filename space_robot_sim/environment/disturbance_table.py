@@ -20,9 +20,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from space_robot_msgs_py.config.choices import choices
 from space_robot_msgs_py.config.columns import missing_column, read_columns
-from space_robot_msgs_py.config.text import parse_json
+from space_robot_msgs_py.config.text import choices, parse_json
 from space_robot_msgs_py.config.validation import short
 from space_robot_msgs_py.errors import InputError
 

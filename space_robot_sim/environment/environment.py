@@ -3,26 +3,43 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Annotated
 
 from pydantic import Field
 
 from space_robot_model.robot import Robot
-from space_robot_msgs_py.compiled.records import Record, assign, nested
+from space_robot_model.robot.inertia import Inertia
+from space_robot_msgs_py.compiled.records import nested
 from space_robot_msgs_py.config.validation import StrictModel
 
-from ..faults.schedule import PartFault
+from ..component import Component
 from .disturbance import Disturbance, DisturbanceSettings
 from .events import Event, EventTexts, parse_events
-from .friction import Friction, FrictionSettings, StuckJoint
-from .orbit import Orbit
-from .orbit_settings import OrbitSettings
-from .payload import PayloadSettings
-from .prescribed_loads import PrescribedLoads
+from .friction import Friction, FrictionSettings
+from .loads import PrescribedLoads
+from .orbit import Orbit, OrbitSettings
 from .surfaces import Surfaces
 
 
-class EnvironmentSettings(StrictModel):
-    """Settings of the environment."""
+class PayloadSettings(StrictModel):
+    """A payload as the last link's new mass and inertia; unknown to every controller."""
+
+    mass: Annotated[float, Field(ge=0.0, le=1e6)] = Field(
+        0.0, description="mass of the last link with its payload, kg (0: nominal)"
+    )
+    inertia: Inertia = Field(
+        [1.0, 1.0, 1.0, 0.0, 0.0, 0.0],
+        description="Ixx, Iyy, Izz, Ixy, Ixz, Iyz of the last link with payload, kg m2",
+    )
+
+
+def with_payload(robot: Robot, payload: PayloadSettings) -> Robot:
+    """Return the robot that the plant integrates: nominal, or loaded on its last link."""
+    return robot.with_last_link(payload.mass, payload.inertia) if payload.mass else robot
+
+
+class EnvironmentSettings(OrbitSettings):
+    """Settings of the environment, in an orbit or not."""
 
     friction: FrictionSettings = FrictionSettings()
     disturbance: DisturbanceSettings = DisturbanceSettings()
@@ -48,7 +65,7 @@ class EnvironmentSettings(StrictModel):
         return Path()
 
 
-class Environment(Record):
+class Environment(Component):
     """Record of the environment of one robot, for the plant's kernels."""
 
     friction: Friction = nested(Friction)
@@ -56,26 +73,3 @@ class Environment(Record):
     orbit: Orbit = nested(Orbit)
     surfaces: Surfaces = nested(Surfaces)
     loads: PrescribedLoads = nested(PrescribedLoads)
-
-    @classmethod
-    def build(
-        cls, robot: Robot, settings: EnvironmentSettings, orbit: OrbitSettings
-    ) -> Environment:
-        """Read the numbers of the settings for a robot.
-
-        Raises:
-            InputError: see `Surfaces`.
-        """
-        environment = cls.allocate(robot.n)
-        assign(
-            environment,
-            friction=Friction.build(robot, settings.friction),
-            disturbance=Disturbance.build(robot.n, settings.disturbance),
-            orbit=Orbit.build(robot.n, orbit),
-            **({"surfaces": Surfaces.build(robot)} if orbit.has_surfaces else {}),
-        )
-        return environment
-
-
-FAULTS: dict[str, type[PartFault]] = {"friction": StuckJoint}
-"""The faults of each field of `Environment`."""

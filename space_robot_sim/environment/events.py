@@ -117,11 +117,7 @@ def check_events(texts: list[str]) -> list[str]:
     """
     for text in texts:
         if text.strip():
-            kind, _, argument = _split(text)
-            if kind == "release":
-                _speed(text, argument)
-            elif argument.startswith("{"):
-                _inline(text, argument)
+            _split(text)
     return texts
 
 
@@ -131,27 +127,30 @@ def named_targets(texts: Iterable[str]) -> list[str]:
     Raises:
         InputError: a text is not a valid event.
     """
-    parts = [_split(text) for text in texts if text.strip()]
-    return [name for kind, _, name in parts if kind == "capture" and not name.startswith("{")]
+    arguments = [_split(text)[1] for text in texts if text.strip()]
+    return [argument for argument in arguments if isinstance(argument, str)]
 
 
 EventTexts = Annotated[Texts, AfterValidator(check_events)]
 
 
 def _read(text: str, folder: Path) -> Event:
-    kind, time_s, argument = _split(text)
-    if kind == "release":
-        return Release(time_s, _speed(text, argument))
-    if argument.startswith("{"):
-        return Capture(time_s, _inline(text, argument))
+    time_s, argument = _split(text)
+    if isinstance(argument, float):
+        return Release(time_s, argument)
+    if isinstance(argument, Target):
+        return Capture(time_s, argument)
     try:
         return Capture(time_s, find_target(argument, folder))
     except InputError as error:
         raise InputError(f"event {short(text)}: {error}") from None
 
 
-def _split(text: str) -> tuple[str, float, str]:
-    """Return kind, time (s) and argument of an event."""
+def _split(text: str) -> tuple[float, float | Target | str]:
+    """Return the time (s) of an event, and the speed (m/s) of a release or the target of a capture.
+
+    The target is a name or path where the text does not hold it.
+    """
     where = f"event {short(text)}"
     match = _EVENT.fullmatch(text.strip())
     if match is None:
@@ -160,30 +159,25 @@ def _split(text: str) -> tuple[str, float, str]:
     time_s, argument = float(match["time"]), (match["argument"] or "").strip()
     try:
         check_time(time_s)
-    except InputError as error:
+        if kind == "release":
+            return time_s, _speed(argument)
+        if not argument.startswith("{"):
+            if not argument:
+                raise InputError("a target is needed: capture@T:TARGET")
+            return time_s, argument
+        content = parse_yaml(argument)
+    except (InputError, YamlTextError) as error:
         raise InputError(f"{where}: {error}") from None
-    if kind == "capture" and not argument:
-        raise InputError(f"{where}: a target is needed: capture@T:TARGET")
-    return kind, time_s, argument
+    return time_s, Target.from_dict({"target": content}, where)
 
 
-def _speed(text: str, argument: str) -> float:
+def _speed(argument: str) -> float:
     try:
         speed = float(argument or 0.0)
     except ValueError:
         speed = -1.0
     if not 0.0 <= speed <= FASTEST:
         raise InputError(
-            f"event {short(text)}: SPEED must be a number from 0 to {FASTEST:g} (m/s), "
-            f"got {short(argument)}"
+            f"SPEED must be a number from 0 to {FASTEST:g} (m/s), got {short(argument)}"
         )
     return speed
-
-
-def _inline(text: str, argument: str) -> Target:
-    where = f"event {short(text)}"
-    try:
-        content = parse_yaml(argument)
-    except YamlTextError as error:
-        raise InputError(f"{where}: {error}") from None
-    return Target.from_dict({"target": content}, where)

@@ -17,13 +17,11 @@ from space_robot_model.dynamics.model import MOST_JOINTS, MOST_MOVING
 from space_robot_model.robot import Robot
 from space_robot_msgs_py.compiled.kernels import kernel
 from space_robot_msgs_py.compiled.lanes import uniform, whole
-from space_robot_msgs_py.compiled.records import Record, assign, shaped
+from space_robot_msgs_py.compiled.records import Origin, shaped
 from space_robot_msgs_py.config.validation import StrictModel
-from space_robot_msgs_py.topics import BASE_AXES
 
-from ..faults.axes import About
-from ..faults.grammar import Argument, Kind
-from ..faults.schedule import Schedule, ScheduledFault, TemporaryChange
+from ..component import Component, Installation
+from ..faults.grammar import About, Argument, Kind
 
 Array = NDArray[np.float64]
 Coefficient = Annotated[float, Field(ge=0.0, le=1e6)]
@@ -54,38 +52,37 @@ def coefficients(robot: Robot, settings: FrictionSettings) -> Array:
     return np.where(np.isnan(own), usual, own)
 
 
-class Friction(Record):
+def _in_model_order(column: int) -> Origin:
+    def values(settings: FrictionSettings, at: Installation) -> Array:
+        return np.asarray(coefficients(at.robot, settings)[list(at.robot.order), column])
+
+    return values
+
+
+class Friction(Component):
     """Friction of a robot's joints, then of its wheels."""
 
-    count: float = shaped(lambda n: (), uniform=True)
+    count: float = shaped(lambda n: (), uniform=True, origin=lambda s, at: at.robot.joint_count)
     """Number of joints and wheels; the rest of the arrays is unused."""
-    row: Array = shaped(lambda n: (MOST_JOINTS,))
+    row: Array = shaped(lambda n: (MOST_JOINTS,), origin=lambda s, at: np.argsort(at.robot.order))
     """Row of each joint in the other arrays, which are in the order of `Model`."""
-    coulomb: Array = shaped(lambda n: (MOST_MOVING,))
+    coulomb: Array = shaped(lambda n: (MOST_MOVING,), origin=_in_model_order(0))
     """f_C, N m."""
-    viscous: Array = shaped(lambda n: (MOST_MOVING,))
+    viscous: Array = shaped(lambda n: (MOST_MOVING,), origin=_in_model_order(1))
     """f_V, N m s/rad."""
-    set_valued: float = shaped(lambda n: (), uniform=True)
+    set_valued: float = shaped(lambda n: (), uniform=True, origin="set_valued")
     """0 for the sign alone, 1 for friction that holds joints at rest."""
 
-    @classmethod
-    def build(cls, robot: Robot, settings: FrictionSettings) -> Friction:
-        """Build from each joint's own friction, or the settings (passive joints: own only)."""
-        friction = cls.allocate(robot.n)
-        assign(friction, count=robot.joint_count, set_valued=settings.set_valued)
-        values = coefficients(robot, settings)
-        for row, joint in enumerate(robot.order):
-            friction.row[joint] = row
-            friction.coulomb[row], friction.viscous[row] = values[joint]
-        return friction
-
-    @staticmethod
-    def add_wheels(friction: Friction, coulomb: Array, viscous: Array) -> None:
-        """Append wheels with friction (W,), N m and N m s/rad, after the joints."""
-        joints = int(friction.count)
-        stop = joints + coulomb.size
-        assign(friction, count=stop)
-        friction.coulomb[joints:stop], friction.viscous[joints:stop] = coulomb, viscous
+    FAULTS: ClassVar[tuple[Kind, ...]] = (
+        Kind(
+            "stuck_joint",
+            Argument("TORQUE", "N m", 0.0, 1e3, About.JOINT),
+            "a joint's Coulomb friction is raised to TORQUE",
+            "coulomb",
+            np.maximum,
+            rows="row",
+        ),
+    )
 
 
 @kernel
@@ -103,30 +100,3 @@ def friction_torque(friction: Friction, velocities: Array, directions: Array, ou
         rate = velocities[i]
         direction = directions[i] if uniform(friction.set_valued) != 0.0 else np.sign(rate)
         out[i] = friction.coulomb[i] * direction + friction.viscous[i] * rate
-
-
-class StuckJoint:
-    """Fault: higher Coulomb friction of a joint for a while."""
-
-    KINDS: ClassVar[tuple[Kind, ...]] = (
-        Kind(
-            "stuck_joint",
-            Argument("TORQUE", "N m", 0.0, 1e3, about=About.JOINT),
-            None,
-            "a joint's Coulomb friction is raised to TORQUE",
-        ),
-    )
-
-    def __init__(self, schedule: Schedule) -> None:
-        self._change = TemporaryChange(schedule.of(*self.KINDS))
-
-    def apply(self, tick: int, part: Friction) -> None:
-        """Apply the faults of the joints from ``tick`` to the next."""
-        rows = part.row
-
-        def stick(coulomb: Array, fault: ScheduledFault) -> None:
-            for axis in fault.axes:
-                row = int(rows[axis - len(BASE_AXES)])
-                coulomb[row] = max(coulomb[row], fault.value)
-
-        self._change.apply(tick, part.coulomb, stick)

@@ -8,6 +8,7 @@ below that from the Earth's centre its motion is that of Hill's equations (Clohe
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -16,11 +17,11 @@ from numpy.typing import NDArray
 from space_robot_model.dynamics.attitude import quaternion_rate, rotation_matrix
 from space_robot_model.elementary.matrices import norm, product, solve
 from space_robot_model.orbit.elements import MU, hill_axes, state_of
-from space_robot_model.orbit.gravity import gravity
+from space_robot_model.orbit.propagation import gravity
 from space_robot_model.robot.inertia import inertia_tensor
 from space_robot_msgs_py.errors import InputError
 
-from .orbit_settings import OrbitSettings
+from .orbit import OrbitSettings
 from .target import Target, TargetMotion
 
 Array = NDArray[np.float64]
@@ -49,11 +50,7 @@ def meet(target: Target, orbit: OrbitSettings, time: float) -> Meeting:
     Raises:
         InputError: there is no orbit, or the target turns too fast to be followed for so long.
     """
-    x = _at_tick_0(target, orbit)
-    inertia, has_j2 = inertia_tensor(target.inertia), float(orbit.gravity.j2)
-    steps = _steps(target, time)
-    for _ in range(steps):
-        x = _step(x, time / steps, inertia, has_j2)
+    (x,) = _states(target, orbit, np.array([time]))
     rotation = np.empty((3, 3))
     rotation_matrix(x[12:16], rotation)
     return Meeting(
@@ -77,20 +74,20 @@ def fall(target: Target, orbit: OrbitSettings, times: Array) -> tuple[Array, Arr
 
     Returns:
         (K, 3) centre of mass, m, inertial frame; (K, 4) attitude ``[w, x, y, z]``.
-
-    Raises:
-        InputError: there is no orbit, or the target turns too fast to be followed for so long.
     """
+    states = np.array([*_states(target, orbit, times)]).reshape(-1, 19)
+    return states[:, 6:9], states[:, 12:16]
+
+
+def _states(target: Target, orbit: OrbitSettings, times: Array) -> Iterator[Array]:
     x, now = _at_tick_0(target, orbit), 0.0
     inertia, has_j2 = inertia_tensor(target.inertia), float(orbit.gravity.j2)
-    poses = np.empty((len(times), 7))
-    for k, time in enumerate(times):
-        steps = _steps(target, float(time) - now)
+    for time in times.tolist():
+        steps = _steps(target, time - now)
         for _ in range(steps):
-            x = _step(x, (float(time) - now) / steps, inertia, has_j2)
-        now = float(time)
-        poses[k, :3], poses[k, 3:] = x[6:9], x[12:16]
-    return poses[:, :3], poses[:, 3:]
+            x = _step(x, (time - now) / steps, inertia, has_j2)
+        now = time
+        yield x
 
 
 def relative_state(target: Target, orbit: OrbitSettings) -> tuple[Array, Array]:
@@ -106,11 +103,6 @@ def relative_state(target: Target, orbit: OrbitSettings) -> tuple[Array, Array]:
 
 
 def _at_tick_0(target: Target, orbit: OrbitSettings) -> Array:
-    """Return the state at tick 0, as in `_rates`.
-
-    Raises:
-        InputError: there is no orbit.
-    """
     if not orbit.has_orbit:
         raise InputError(
             f"target {target.name!r}: motion.relative_to orbit needs an orbit: --orbit NAME"
@@ -130,11 +122,6 @@ def _at_tick_0(target: Target, orbit: OrbitSettings) -> Array:
 
 
 def _steps(target: Target, time: float) -> int:
-    """Return the number of steps to ``time``, s.
-
-    Raises:
-        InputError: even the most of them are too long.
-    """
     rate = norm(target.motion.angular_velocity)
     usual = min(STEP, TURN / rate) if rate else STEP
     steps = math.ceil(time / usual)

@@ -26,6 +26,7 @@ from space_robot_model.dynamics.algebra import (
     add,
     cross,
     dot,
+    load_frame,
     scale,
     store,
     subtract,
@@ -33,15 +34,16 @@ from space_robot_model.dynamics.algebra import (
     transform_transposed,
     vector,
 )
-from space_robot_model.dynamics.branches import kept_frame
 from space_robot_model.dynamics.model import MOST_JOINTS, Data, Model
-from space_robot_model.robot import Robot
 from space_robot_model.robot.parts import MOST_PLATES
 from space_robot_model.robot.shapes import plates_of
 from space_robot_msgs_py.compiled.kernels import kernel, subroutine
 from space_robot_msgs_py.compiled.lanes import whole
-from space_robot_msgs_py.compiled.records import Record, assign, shaped
+from space_robot_msgs_py.compiled.records import shaped
 from space_robot_msgs_py.errors import InputError
+
+from ..component import Component, Installation
+from .orbit import OrbitSettings
 
 Array = NDArray[np.float64]
 
@@ -49,13 +51,40 @@ AREA, NORMAL, CENTRE, DRAG_COEFFICIENT, SPECULAR, DIFFUSE = 0, 1, 4, 7, 8, 9
 """Columns of `Surfaces.plates`."""
 
 
-class Surfaces(Record):
+def _body_plates(settings: OrbitSettings, at: Installation) -> tuple[Array, list[list[float]]]:
+    """Return the first plate of each body, and the plates, body by body.
+
+    Raises:
+        InputError: the robot has too many.
+    """
+    robot = at.robot
+    plates = plates_of(robot)
+    if len(plates) > MOST_PLATES:
+        raise InputError(
+            f"robot {robot.name!r}: its shapes have {len(plates)} plates for drag and "
+            f"sunlight, at most {MOST_PLATES} are allowed: give it its own (robot.plates)"
+        )
+    first, rows = np.zeros(MOST_JOINTS + 2), []
+    for place, body in enumerate([0, *(joint + 1 for joint in robot.order)]):
+        for plate in plates:
+            if plate.body == body:
+                coefficients = plate.drag_coefficient, plate.specular, plate.diffuse
+                rows.append([plate.area, *plate.normal, *plate.centre, *coefficients])
+        first[place + 1 :] = len(rows)
+    return first, rows
+
+
+class Surfaces(Component):
     """Plates of a robot, body by body, and the wrenches on its bodies."""
 
-    count: float = shaped(lambda n: (), uniform=True)
-    first: Array = shaped(lambda n: (MOST_JOINTS + 2,), uniform=True)
+    count: float = shaped(
+        lambda n: (), uniform=True, origin=lambda s, at: len(_body_plates(s, at)[1])
+    )
+    first: Array = shaped(
+        lambda n: (MOST_JOINTS + 2,), uniform=True, origin=lambda s, at: _body_plates(s, at)[0]
+    )
     """First plate of each body; that of the body behind the last is `count`."""
-    plates: Array = shaped(lambda n: (MOST_PLATES, 10))
+    plates: Array = shaped(lambda n: (MOST_PLATES, 10), origin=lambda s, at: _body_plates(s, at)[1])
     """Area, normal, centre, coefficients, in body axes; see the columns' names."""
     wrench: Array = shaped(lambda n: (MOST_JOINTS + 1, 6))
     """Moment about the base's CoM, N m, and force, N, on each body; inertial axes."""
@@ -64,32 +93,10 @@ class Surfaces(Record):
     sunlight: Array = shaped(lambda n: (6,))
     """The same of sunlight."""
 
-    @classmethod
-    def build(cls, robot: Robot) -> Surfaces:
-        """Read the plates of a robot.
-
-        Raises:
-            InputError: it has too many.
-        """
-        surfaces, plates = cls.allocate(robot.n), plates_of(robot)
-        if len(plates) > MOST_PLATES:
-            raise InputError(
-                f"robot {robot.name!r}: its shapes have {len(plates)} plates for drag and "
-                f"sunlight, at most {MOST_PLATES} are allowed: give it its own (robot.plates)"
-            )
-        assign(surfaces, count=len(plates))
-        bodies = [0, *(joint + 1 for joint in robot.order)]
-        k = 0
-        for row, body in enumerate(bodies):
-            surfaces.first[row] = k
-            for plate in plates:
-                if plate.body != body:
-                    continue
-                coefficients = plate.drag_coefficient, plate.specular, plate.diffuse
-                surfaces.plates[k] = (plate.area, *plate.normal, *plate.centre, *coefficients)
-                k += 1
-        surfaces.first[len(bodies) :] = k
-        return surfaces
+    @staticmethod
+    def is_fitted(sheet: OrbitSettings) -> bool:
+        """Return whether there is air or sunlight."""
+        return sheet.has_surfaces
 
 
 @kernel
@@ -118,7 +125,7 @@ def press_on_surfaces(
     air = vector(velocity, 0)
     to_sun = vector(sun, 0)
     for i in range(whole(model.joint_count) + 1):
-        axes, origin = kept_frame(data.frame[i])
+        axes, origin = load_frame(data.frame[i])
         u, s = transform_transposed(axes, air), transform_transposed(axes, to_sun)
         area, arm = 0.0, (0.0, 0.0, 0.0)
         force, moment = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)

@@ -1,4 +1,4 @@
 """Text form and schedule of faults, and faults of messages between plant and controller.
 
-The faults of a sensor, an actuator or the environment stand beside it. Independent of ROS.
+The faults of a component are declared in its file. Independent of ROS.
 """

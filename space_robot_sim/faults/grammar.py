@@ -1,21 +1,29 @@
-"""Text form of faults: ``KIND@T[-END][:ARGUMENT]``, times in simulated seconds.
+"""Kinds of faults, and their text form ``KIND@T[-END][:ARGUMENT]``, times in simulated seconds.
 
-A `Kind` is declared beside the class that brings it about; this module knows none by name.
+A `Kind` is declared by the component that it changes, in its table ``FAULTS``; this module knows
+none by name. Grammar, help, reference page, schedule and application follow from the table.
 """
 
 from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
-from typing import NamedTuple
+from enum import Enum
+from typing import Any, NamedTuple
 
-from space_robot_msgs_py.config.validation import one_of
+import numpy as np
+
+from space_robot_msgs_py.config.text import choices
+from space_robot_msgs_py.config.validation import one_of, short
 from space_robot_msgs_py.errors import InputError
+from space_robot_msgs_py.samples import RobotNames
 from space_robot_msgs_py.simulated_time import check_time, shortest
+from space_robot_msgs_py.topics import BASE_AXES
 
-from .axes import About
+Change = Callable[[Any, float], Any]
+"""From the sound numbers of an array, and the fault's argument, to those with the fault."""
 
 NUMBER = r"(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
 _FAULT = re.compile(
@@ -24,18 +32,30 @@ _FAULT = re.compile(
 _AXIS_AND_NUMBER = re.compile(r"(?P<axis>(?!0+=).+)=(?P<number>[^=]+)", re.ASCII)
 
 
+class About(Enum):
+    """Kind of axes or base actuators that a kind of fault can affect."""
+
+    AXIS = "AXIS a name, a joint counted from 1, base, joints or all"
+    JOINT = "JOINT a name, counted from 1, or joints"
+    BASE_AXIS = "BASE_AXIS a name, or base"
+    WHEEL = "WHEEL a name, counted from 1, or wheels"
+    THRUSTER = "THRUSTER a name, counted from 1, or thrusters"
+
+
 class Argument(NamedTuple):
     """A fault's number beside its time; behind the axes it is about, if ``about`` is set.
 
     Without a ``symbol`` there is no number: the axes alone are given.
     """
 
-    symbol: str
-    unit: str
-    low: float
-    high: float
-    whole: bool = False
+    symbol: str = ""
+    unit: str = ""
+    low: float = 0.0
+    high: float = 0.0
     about: About | None = None
+    whole: bool = False
+    default: float | None = None
+    """The number when none is given; None: it must be given."""
 
     @property
     def form(self) -> str:
@@ -58,11 +78,21 @@ class Kind(NamedTuple):
 
     name: str
     argument: Argument | None
-    default: float | None
-    """The argument when none is given; None: it must be given."""
     description: str
+    field: str = ""
+    """Array of the component's record that it changes; empty: it changes no component."""
+    change: Change = np.add
     lasts: bool = True
     """The fault acts over a stretch of time, so that an end may be given."""
+    group: str = ""
+    """Axes that it is about where none is named: "base" or "joints"."""
+    rows: str = ""
+    """Field of the record with the place of each joint in the array; empty: they are in order."""
+
+    @property
+    def default(self) -> float | None:
+        """The argument's number when none is given; None: it must be given, if there is one."""
+        return self.argument.default if self.argument else None
 
     @property
     def form(self) -> str:
@@ -180,8 +210,53 @@ def parse_faults(texts: Iterable[str], kinds: Kinds) -> list[Fault]:
     return [parse_fault(text, kinds) for text in texts if text.strip()]
 
 
-PROBABILITY = Argument("P", "probability per tick", 0.0, 1.0)
-TICKS = Argument("TICKS", "ticks", 0.0, 1e6, whole=True)
+def axes_of(name: str, about: About, names: RobotNames) -> tuple[int, ...]:
+    """Return the indices of a fault's ``name`` among all axes, wheels or thrusters.
+
+    A thing of that name comes first, then a group of them, then a number.
+
+    Args:
+        name: as written in the fault.
+        about: the things that are allowed.
+        names: of what there is.
+
+    Raises:
+        InputError: the name does not exist; the message lists the names.
+    """
+    base, every = len(BASE_AXES), range(len(names.axes))
+    of_base, of_joints = {"base": tuple(every[:base])}, {"joints": tuple(every[base:])}
+    those = names.axes
+    match about:
+        case About.AXIS:
+            meant, counted = every, every[base:]
+            groups = {**of_base, **of_joints, "all": tuple(every)}
+        case About.JOINT:
+            meant, counted, groups = every[base:], every[base:], of_joints
+        case About.BASE_AXIS:
+            meant, counted, groups = every[:base], every[:0], of_base
+        case _:
+            group = f"{about.name.lower()}s"
+            those = names.wheels if about is About.WHEEL else names.thrusters
+            meant = counted = range(len(those))
+            groups = {group: tuple(meant)} if those else {}
+    numbers = {str(1 + place - counted.start): (place,) for place in counted}
+    known = {those[place]: (place,) for place in meant}
+    axes = {**numbers, **groups, **known}.get(name)
+    if axes is None:
+        also = [*([f"1 to {len(numbers)}"] if numbers else []), *groups]
+        advice = choices(name, known, f", {', '.join(also)}") if known else "there is none"
+        raise InputError(f"no {about.name.lower().replace('_', ' ')} {short(name)}: {advice}")
+    return axes
+
+
+def add_in_quadrature(sigma: Any, value: float) -> Any:
+    """Add white noise to a standard deviation."""
+    return np.sqrt(sigma * sigma + value * value)
+
+
+def switch_on(flags: Any, value: float) -> Any:
+    """Set flags to 1."""
+    return np.ones_like(flags)
 
 
 def help_lines(kinds: Kinds) -> list[str]:

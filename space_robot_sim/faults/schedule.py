@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from typing import Any, ClassVar, Protocol
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,8 +11,7 @@ from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.samples import RobotNames
 from space_robot_msgs_py.simulated_time import tick_from
 
-from .axes import axes_of
-from .grammar import Fault, Kind
+from .grammar import About, Fault, axes_of
 
 Array = NDArray[np.float64]
 
@@ -42,7 +40,9 @@ class ScheduledFault:
         self.axes: tuple[int, ...] = ()
         """Places of what it is about: of axes 0 to 2 of the base, then the joints; of wheels or
         thrusters among their like."""
-        if fault.kind.argument and (about := fault.kind.argument.about):
+        if fault.kind.group:
+            self.axes = axes_of(fault.kind.group, About.AXIS, names)
+        elif fault.kind.argument and (about := fault.kind.argument.about):
             try:
                 self.axes = axes_of(fault.axis, about, names)
             except InputError as error:
@@ -63,22 +63,17 @@ class ScheduledFault:
 
     def happens_at(self, tick: int) -> bool:
         """Return whether the fault acts and its draw is below its value, a probability."""
-        return self.acts_at(tick) and bool(self._row(tick, 2, normal=False)[0] < self.value)
+        return self.acts_at(tick) and bool(self._draw(tick)[0] < self.value)
 
     def choose(self, tick: int, count: int) -> int:
         """Draw one of ``range(count)``, any as likely; independent of `happens_at`."""
-        return int(self._row(tick, 2, normal=False)[1] * count)
+        return int(self._draw(tick)[1] * count)
 
-    def noise(self, tick: int, size: int) -> Array:
-        """Draw normal numbers (size,); the fault's value is their standard deviation."""
-        return self.value * self._row(tick, size, normal=True)
-
-    def _row(self, tick: int, size: int, normal: bool) -> Array:
+    def _draw(self, tick: int) -> Array:
         block, row = divmod(tick, BLOCK_TICKS)
         if block != self._block:
             rng = np.random.default_rng((*self._key, block))
-            draw = rng.standard_normal if normal else rng.random
-            self._rows, self._block = draw((BLOCK_TICKS, size)), block
+            self._rows, self._block = rng.random((BLOCK_TICKS, 2)), block
         numbers: Array = self._rows[row]
         return numbers
 
@@ -98,45 +93,6 @@ class Schedule:
             ScheduledFault(fault, index, seed, period, names) for index, fault in enumerate(faults)
         ]
 
-    def of(self, *kinds: Kind) -> list[ScheduledFault]:
-        """Return the faults of the given kinds, in the order of the flight."""
-        return [fault for fault in self.faults if fault.kind in kinds]
-
-
-class PartFault(Protocol):
-    """Fault of a part of the plant: an actuator, or a part of the environment."""
-
-    KINDS: ClassVar[tuple[Kind, ...]]
-
-    def __init__(self, schedule: Schedule) -> None:
-        """Select the faults of these kinds from a flight's."""
-
-    def apply(self, tick: int, part: Any) -> None:
-        """Apply the faults to the part's record from ``tick`` to the next, or restore it."""
-
-
-class TemporaryChange:
-    """Change of an array of the plant while faults act, restored afterwards."""
-
-    def __init__(self, faults: Sequence[ScheduledFault]) -> None:
-        self._faults = faults
-        self._acting: list[ScheduledFault] = []
-
-    def apply(
-        self, tick: int, values: Array, change: Callable[[Array, ScheduledFault], None]
-    ) -> bool:
-        """Let ``change`` spoil the sound ``values`` in place for each fault that acts at a tick.
-
-        Returns:
-            Whether the values are others than at the last tick.
-        """
-        acting = [fault for fault in self._faults if fault.acts_at(tick)]
-        if acting == self._acting:
-            return False
-        if not self._acting:
-            self._sound = values.copy()
-        values[:] = self._sound
-        for fault in acting:
-            change(values, fault)
-        self._acting = acting
-        return True
+    def of(self, *kinds: str) -> list[ScheduledFault]:
+        """Return the faults of the kinds of these names, in the order of the flight."""
+        return [fault for fault in self.faults if fault.kind.name in kinds]

@@ -12,7 +12,7 @@ from space_robot_model.robot.placements import XYZW, base_axes, to_base
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.ros.endpoints import RawPublisher
 from space_robot_msgs_py.samples import RobotState
-from space_robot_msgs_py.wire.base_messages import BaseMessages
+from space_robot_msgs_py.wire.viewers import BaseMessages
 
 from .settings import PlantNodeSettings
 

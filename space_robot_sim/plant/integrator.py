@@ -7,10 +7,9 @@ from numpy.typing import NDArray
 
 from space_robot_model.dynamics.aba import aba
 from space_robot_model.dynamics.attitude import quaternion_rate, rotate
-from space_robot_model.dynamics.kinematics import forward_kinematics, spatial_velocities
+from space_robot_model.dynamics.kinematics import forward_kinematics, rotor_row, spatial_velocities
 from space_robot_model.dynamics.model import MOST_JOINTS, MOST_MOVING, Data, Model
-from space_robot_model.dynamics.rotors import rotor_row
-from space_robot_model.orbit.gravity import gravity
+from space_robot_model.orbit.propagation import gravity
 from space_robot_msgs_py.compiled.kernels import kernel, subroutine
 from space_robot_msgs_py.compiled.lanes import uniform, whole
 from space_robot_msgs_py.compiled.records import Record, nested, shaped
@@ -20,7 +19,7 @@ from ..environment.disturbance import disturbance_torque
 from ..environment.environment import Environment
 from ..environment.friction import friction_torque
 from ..environment.gravity_gradient import add_gravity_gradient
-from ..environment.prescribed_loads import add_loads
+from ..environment.loads import add_loads
 from ..environment.surfaces import add_surface_wrenches
 
 Array = NDArray[np.float64]

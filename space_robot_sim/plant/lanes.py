@@ -113,3 +113,12 @@ def _hold_alone(in_lanes: Environment, alone: Environment, bodies: int, lane: in
             for k in range(6):
                 wrench = lane_of(in_lanes.surfaces.wrench[i, k], lane)
                 alone.surfaces.wrench[i, k] = wrench
+
+
+@subroutine
+def spread(values: Array, rows: Array) -> None:
+    """Write the first c ``values``, in lanes, into ``rows`` (8, c), one of each flight."""
+    for i in range(rows.shape[1]):
+        value = values[i]
+        for lane in range(WIDTH):
+            rows[lane, i] = lane_of(value, lane)

@@ -15,32 +15,33 @@ from space_robot_model.robot.find import robot_source
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.errors import MessageError
 from space_robot_msgs_py.ros.endpoints import (
+    PausedOutput,
     PolledCallbackGroup,
     RawPublisher,
     RawSubscription,
     flush,
 )
-from space_robot_msgs_py.ros.health import Health, Level
-from space_robot_msgs_py.ros.loop import Wait
+from space_robot_msgs_py.ros.loop import Health, Level, Wait
 from space_robot_msgs_py.ros.managed_node import ManagedNode
-from space_robot_msgs_py.ros.paused import PausedOutput
 from space_robot_msgs_py.samples import Command
-from space_robot_msgs_py.wire.clock import ClockCodec
 from space_robot_msgs_py.wire.codecs import CommandCodec, StateCodec
+from space_robot_msgs_py.wire.telemetry import ClockCodec
 
-from .actuator_health import ActuatorHealth
 from .base_output import BaseOutput
-from .command_guard import CommandGuard
-from .description import plant_description
-from .late_listeners import LateListeners
-from .messages import NONE, SentState, exchange_of
-from .own_controller import OwnController
+from .messages import NONE, CommandGuard, SentState, exchange_of
+from .pacing import (
+    PAUSED,
+    SPIN_BEFORE_DEADLINE_S,
+    LateListeners,
+    OwnController,
+    RunControl,
+    WallClock,
+)
 from .plant import Plant
-from .run_control import PAUSED, RunControl
+from .report import ActuatorHealth, plant_description
 from .scene_output import SceneOutput
 from .settings import PlantNodeSettings
 from .truth_output import TruthOutput
-from .wall_clock import SPIN_BEFORE_DEADLINE_S, WallClock
 
 TIMEOUT_S = 0.02
 ASK_AGAIN_S = 0.2

@@ -6,15 +6,80 @@ for it, `PlantMessages.end`; then `CommandGuard.act` says which command acts.
 
 from __future__ import annotations
 
+import math
+from collections import Counter
 from collections.abc import Iterable, Iterator
 from typing import NamedTuple
 
-from space_robot_msgs_py.samples import RobotNames, RobotState
+import numpy as np
+
+from space_robot_msgs_py.samples import Command, RobotNames, RobotState
 from space_robot_msgs_py.wire.codecs import StateCodec
 
-from ..faults.link import awaited_stamp
-from .command_guard import CommandGuard
-from .faults import FaultSettings, MessageFaults
+from ..faults.messages import MessageFaults, awaited_stamp
+from .faults import FaultSettings
+
+
+class CommandGuard:
+    """Guard of the command in force. Independent of ROS.
+
+    A command is good if it is finite, and answers a state that has been sent and is newer than the
+    one answered before.
+    It acts until ``hold_ticks`` after the state it answers, however late it came; then, without a
+    newer one, the torque is zero.
+    """
+
+    def __init__(self, axes: int, hold_ticks: int) -> None:
+        self._hold_ticks = hold_ticks
+        self._accepted, self.offered = (Command(-1, np.zeros(axes)) for _ in range(2))
+        """``offered``: to be filled with a command that has come, for `accept`."""
+        self._none = Command(-1, np.zeros(axes))
+        self.acting = self._none
+        """The command that acts at the tick last given to `act`."""
+        self.refused: Counter[str] = Counter()
+        """Number of refused commands by reason."""
+
+    @property
+    def answered(self) -> int:
+        """Tick of the last accepted command; -1 if none."""
+        return self._accepted.tick
+
+    @property
+    def is_safe(self) -> bool:
+        """True if commands have failed for so long that the torque is zero."""
+        return self.acting is self._none
+
+    def held_ticks(self, now: int) -> int:
+        """Return the age at ``now`` of the state that the last good command answers, ticks."""
+        return now - self._accepted.tick
+
+    def accept(self, now: int) -> bool:
+        """Take the command in `offered` at tick ``now``; False, and counted, if it is not good."""
+        if not self._accepted.tick < self.offered.tick <= now:
+            self.refused["stamp"] += 1
+            return False
+        torque = self.offered.torque
+        # the sum is had in a third of the time, and finite unless something is wrong
+        if not (math.isfinite(sum(torque.tolist())) or np.isfinite(torque).all()):
+            self.refused["not finite"] += 1
+            return False
+        self._accepted, self.offered = self.offered, self._accepted
+        return True
+
+    def refuse(self, reason: str) -> None:
+        """Count a command that could not be read."""
+        self.refused[reason] += 1
+
+    def release(self) -> None:
+        """Set the torque to zero until the next valid command."""
+        self._accepted.torque[:] = 0.0
+
+    def act(self, now: int) -> Command:
+        """Return the command for tick ``now``."""
+        held = self.answered >= 0 and self.held_ticks(now) <= self._hold_ticks
+        self.acting = self._accepted if held else self._none
+        return self.acting
+
 
 NONE = -1
 """No tick."""
@@ -74,7 +139,7 @@ class FaultyExchange(PlantMessages):
     def take(self, tick: int) -> None:
         """See `PlantMessages.take`; the command may act in a later tick, or never."""
         faults, offered = self._faults, self._guard.offered
-        faults.corruption.corrupt_command(offered, tick)
+        faults.corrupt_command(offered, tick)
         faults.commands.send(tick, offered.torque.copy(), offered.tick)
 
     def end(self, tick: int) -> None:

@@ -28,24 +28,20 @@ from ..actuators.actuators import (
     command_delay_buffer,
     reports_given,
 )
+from ..component import ComponentFaults, Installation, kinds_of
 from ..environment.captures import Captures
-from ..environment.environment import Environment, EnvironmentSettings
-from ..environment.load_schedule import LoadSchedule
-from ..environment.orbit_settings import OrbitSettings
-from ..environment.payload import with_payload
+from ..environment.environment import Environment, EnvironmentSettings, with_payload
+from ..environment.loads import LoadSchedule
 from ..sensors.sensors import Sensors
-from .faults import FaultSettings, PartFaults
-from .gear_mounting import MOST_SUBSTEPS, check_springs, measured_motors, mount_gears
+from .faults import FaultSettings
+from .mounting import MOST_SUBSTEPS, check_springs, measured_motors, mount_gears, mount_wheels
 from .tick import RATE_LIMIT, PlantMemory, measure, step, update_true_state
-from .wheel_mounting import mount_wheels
 
 Array = NDArray[np.float64]
 Block = NDArray[Any]
 
 
-class PlantSettings(
-    ActuatorSettings, EnvironmentSettings, OrbitSettings, SensorSettings, FaultSettings
-):
+class PlantSettings(ActuatorSettings, EnvironmentSettings, SensorSettings, FaultSettings):
     """Settings of the plant's world, beside the robot's own file."""
 
     initial_joints_deg: list[float] = Field(
@@ -65,11 +61,7 @@ class PlantSettings(
     )
 
     def check(self, robot: Robot, file: str) -> None:
-        """Check the actuators and what they need, see `ActuatorSettings.check`.
-
-        Raises:
-            InputError: the settings do not fit.
-        """
+        """Check the actuators and what they need, see `ActuatorSettings.check`."""
         super().check(robot, file)
         if self.torquer_count and not (self.has_orbit and self.magnetism.strength):
             raise InputError(
@@ -86,7 +78,7 @@ class PlantSnapshot(NamedTuple):
     """Record of a `PlantMemory`."""
     command_delay_buffer: Array
     next_change: float
-    part_faults: PartFaults
+    faults: ComponentFaults
     misses: dict[float, float]
     """See `space_robot_sim.environment.captures.Captures`."""
 
@@ -96,7 +88,7 @@ class Plant(RecordOwner):
 
     `truth` is the true state at the current tick, `state` what the sensors tell of it; `step`
     applies a command until the next one. Parts fail as ``settings.faults`` says. Momentum and
-    energy follow from `truth` alone (`space_robot_sim.plant.conservation`). A copy, also one by
+    energy follow from `truth` alone (`space_robot_model.robot.momentum`). A copy, also one by
     `pickle`, flies on to the same bits.
     """
 
@@ -126,11 +118,15 @@ class Plant(RecordOwner):
         self.block = PlantMemory.block(n)
         """The plant's `PlantMemory`, for compiled loops."""
         memory = self.memory
+        motors = measured_motors(robot)
+        at = Installation(
+            n, period, memory.truth, robot, robot.is_prismatic[:n], motors, settings.fault_seed
+        )
         assign(
             memory,
             model=robot.model,
-            environment=Environment.build(robot, settings, settings),
-            actuators=Actuators.build(n, settings, period),
+            environment=Environment.build(settings, at),
+            actuators=Actuators.build(settings, at),
             substeps=settings.substeps,
         )
         self.command_delay_buffer = command_delay_buffer(
@@ -161,22 +157,26 @@ class Plant(RecordOwner):
         # so that no tick has to wait for it
         if turns or self.captures.exchanges or settings.has_orbit:
             update_true_state(self.block, 0, period)
-        motors = measured_motors(robot)
-        sensors = Sensors.build(
-            n, settings, period, memory.truth, robot.is_prismatic[:n], settings.fault_seed, motors
-        )
+        try:
+            assign(memory, sensors=Sensors.build(settings, at))
+        except InputError as error:
+            file = getattr(settings, "sensors", "given")  # the plant node's settings name it
+            raise InputError(f"sensors {file}: {error}") from None
         schedule = settings.schedule(self.names, period)
         check_faults(schedule, settings)
-        self._part_faults = PartFaults(schedule)
+        self._faults = ComponentFaults(schedule, PlantMemory)
+        has_faults = {
+            record: bool(schedule.of(*(kind.name for kind in kinds_of(record))))
+            for record in (Sensors, Actuators)
+        }
         self._loads = LoadSchedule.of(settings.disturbance, self.names.joints, period)
-        if self._part_faults.are_in("sensors"):
-            assign(sensors, are_ideal=False)
-        assign(memory, sensors=sensors)
+        if has_faults[Sensors]:
+            assign(memory.sensors, are_ideal=False)
         self.measures_truth = (
-            bool(sensors.are_ideal)
+            bool(memory.sensors.are_ideal)
             and not any(motors)
             and reports_given(memory.actuators)
-            and not self._part_faults.are_in("actuators")
+            and not has_faults[Actuators]
             and not settings.has_message_faults
         )
         """True if what comes of `state` can never differ from `truth`."""
@@ -287,7 +287,7 @@ class Plant(RecordOwner):
         if self.captures.apply(tick, memory.model, memory.x):
             update_true_state(self.block, tick, self.period)
         self.next_change = min(
-            self._part_faults.apply(tick, memory),
+            self._faults.apply(tick, memory),
             self.captures.next_tick(tick),
             self._loads.apply(tick, memory.environment.loads),
         )
@@ -299,7 +299,7 @@ class Plant(RecordOwner):
             self.block.copy(),
             self.command_delay_buffer.copy(),
             self.next_change,
-            copy.deepcopy(self._part_faults),
+            copy.deepcopy(self._faults),
             dict(self.captures.misses),
         )
 
@@ -309,7 +309,7 @@ class Plant(RecordOwner):
         self.command_delay_buffer[:] = snapshot.command_delay_buffer
         self.state.tick = self.truth.tick = snapshot.tick
         self.next_change = snapshot.next_change
-        self._part_faults = copy.deepcopy(snapshot.part_faults)
+        self._faults = copy.deepcopy(snapshot.faults)
         self.captures.misses = dict(snapshot.misses)
 
     def diverged(self, fastest: float) -> DivergedError:

@@ -14,9 +14,7 @@ from space_robot_model.robot.placements import RobotPoses, tool_poses
 from space_robot_model.robot.urdf_text import urdf_text
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.samples import RobotState, Timebase
-from space_robot_msgs_py.wire.carrier import wrap
-from space_robot_msgs_py.wire.robot_description import robot_description
-from space_robot_msgs_py.wire.tf import Frame, TransformsCodec
+from space_robot_msgs_py.wire.viewers import Frame, TransformsCodec, robot_description, wrap
 
 PERIOD_NS = 10_000_000
 """Least time between two messages on /tf: 100 Hz."""

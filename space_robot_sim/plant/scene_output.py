@@ -12,8 +12,7 @@ from space_robot_model.robot.placements import RobotPoses
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.ros.endpoints import RawPublisher
 from space_robot_msgs_py.samples import RobotState, Timebase
-from space_robot_msgs_py.wire.carrier import unwrap
-from space_robot_msgs_py.wire.markers import no_markers
+from space_robot_msgs_py.wire.viewers import no_markers, unwrap
 
 from .scene import Messages, SceneWriter
 

@@ -12,12 +12,11 @@ from typing_extensions import Self
 from space_robot_model.robot.find import mission_layers
 from space_robot_model.robot.mission_document import mission_layer
 from space_robot_msgs_py import topics
-from space_robot_msgs_py.config.files import named_layers
+from space_robot_msgs_py.config.files import Tree, named_layers
 from space_robot_msgs_py.config.settings import NodeSettings, Texts
-from space_robot_msgs_py.config.trees import Tree
 
 from ..environment.disturbance_table import table_text
-from ..environment.orbit_file import orbit_layers
+from ..environment.orbit import orbit_layers
 from .plant import PlantSettings
 
 MOST_TICKS = 10**10

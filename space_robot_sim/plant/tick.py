@@ -7,23 +7,143 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from space_robot_model.dynamics.model import Model
-from space_robot_msgs_py.compiled.kernels import kernel
+from space_robot_model.dynamics.algebra import (
+    Vector,
+    add,
+    cross,
+    dot,
+    scale,
+    store,
+    subtract,
+    vector,
+)
+from space_robot_model.dynamics.attitude import rotate, rotate_back, rotation_matrix
+from space_robot_model.dynamics.kinematics import forward_kinematics
+from space_robot_model.dynamics.model import Data, Model
+from space_robot_msgs_py.compiled.kernels import kernel, subroutine
 from space_robot_msgs_py.compiled.lanes import uniform, where, whole
 from space_robot_msgs_py.compiled.records import Record, nested, shaped
 from space_robot_msgs_py.samples import State
 
 from ..actuators.actuators import Actuators, actuate
 from ..environment.environment import Environment
-from ..environment.prescribed_loads import begin_loads
+from ..environment.gravity_gradient import add_gravity_gradient
+from ..environment.loads import begin_loads
+from ..environment.orbit import density_at, light, magnetic_field, wind
+from ..environment.surfaces import press_on_surfaces
 from ..sensors.sensors import Sensors, sense
-from .integrator import MOST_NUMBERS, Stages, first_motor_angle
+from .integrator import MOST_NUMBERS, Stages, first_motor_angle, first_orbit_number
 from .stick_slip import integrate
-from .surroundings import meet_surroundings
-from .truth import write_truth
 
 Array = NDArray[np.float64]
 Block = NDArray[Any]
+
+
+@kernel
+def write_truth(model: Model, x: Array, rotation: Array, truth: State) -> None:
+    """Write the plant's state into ``truth``; the torque in there is left alone.
+
+    Args:
+        model: of the plant's robot.
+        x: the state, see `space_robot_sim.plant.integrator.Stages`.
+        rotation: (3, 3) scratch.
+        truth: angular velocity on base axes.
+    """
+    n, actuated = whole(model.joint_count), truth.joint_positions.size
+    truth.base_position[:] = x[:3]
+    truth.quaternion[:] = x[3:7]
+    truth.base_velocity[:] = x[7 + n : 10 + n]
+    rotation_matrix(truth.quaternion, rotation)
+    rotate_back(rotation, x[10 + n : 13 + n], truth.omega_base)
+    positions, velocities = x[7 : 7 + n], x[13 + n : 13 + 2 * n]
+    for i in range(actuated):
+        j = whole(model.row[i])
+        truth.joint_positions[i], truth.joint_velocities[i] = positions[j], velocities[j]
+    for i in range(actuated, n):
+        j, k = whole(model.row[i]), i - actuated
+        truth.passive_positions[k], truth.passive_velocities[k] = positions[j], velocities[j]
+    for k in range(whole(model.wheel_count)):
+        truth.wheel_velocities[k] = x[13 + 2 * n + k]
+    velocity = 13 + 2 * n + whole(model.wheel_count)
+    angle = velocity + whole(model.rotor_count)
+    for k in range(whole(model.rotor_count)):
+        truth.motor_positions[k], truth.motor_velocities[k] = x[angle + k], x[velocity + k]
+
+
+REPORT_TICKS = 20
+"""Ticks between two looks at the torque of gravity, which costs as much as a stage of the step."""
+
+
+@kernel
+def meet_surroundings(
+    model: Model,
+    environment: Environment,
+    x: Array,
+    data: Data,
+    tick: int,
+    period: float,
+    truth: State,
+) -> None:
+    """Find what acts over the tick that begins, and write it into ``truth``.
+
+    Args:
+        model: of the plant's robot.
+        environment: its orbit and surfaces; field and wrenches are written.
+        x: the state, see `space_robot_sim.plant.integrator.Stages`.
+        data: scratch.
+        tick: the tick.
+        period: s.
+        truth: with the base's attitude.
+    """
+    orbit, surfaces = environment.orbit, environment.surfaces
+    if uniform(orbit.is_on) == 0.0:
+        return
+    n, at = whole(model.joint_count), first_orbit_number(model)
+    position, velocity = x[at : at + 3], x[at + 3 : at + 6]
+    truth.orbit_position[:] = position
+    truth.orbit_velocity[:] = velocity
+    forward_kinematics(model, x[3:7], x[7 : 7 + n], data)
+    torques = truth.external_torques
+    com = centre_of_mass(model, data)
+    if uniform(surfaces.count) > 0.0:
+        place = add(vector(position, 0), vector(x, 0))
+        motion = add(vector(velocity, 0), vector(x, 7 + n))
+        store(wind(place, motion), orbit.wind, 0)
+        density = density_at(orbit, np.sqrt(dot(place, place)))
+        pressure = orbit.pressure * light(orbit, place)
+        press_on_surfaces(surfaces, model, orbit.wind, density, orbit.sun, pressure, data)
+        store(_about(com, surfaces.drag), torques, 3)
+        store(_about(com, surfaces.sunlight), torques, 6)
+    magnetic_field(orbit, position, tick * period, orbit.field)
+    rotate_back(data.rotation, orbit.field, truth.magnetic_field)
+    torque = cross(vector(orbit.residual_dipole, 0), vector(truth.magnetic_field, 0))
+    store(torque, orbit.magnetic_torque, 0)
+    rotate(data.rotation, orbit.magnetic_torque, torques[9:12])
+    if uniform(orbit.has_gradient) != 0.0 and tick % REPORT_TICKS == 0:
+        data.bias[: n + 1] = 0.0
+        add_gravity_gradient(model, position, x[:3], orbit.has_j2, data)
+        moment, force = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
+        for i in range(n + 1):
+            moment = subtract(moment, vector(data.bias[i], 0))
+            force = subtract(force, vector(data.bias[i], 3))
+        store(subtract(moment, cross(com, force)), torques, 0)
+
+
+@subroutine
+def _about(com: Vector, wrench: Array) -> Vector:
+    """Return the moment about ``com`` of a wrench (6,) about the base's CoM."""
+    return subtract(vector(wrench, 0), cross(com, vector(wrench, 3)))
+
+
+@subroutine
+def centre_of_mass(model: Model, data: Data) -> Vector:
+    """Return the robot's centre of mass from the base's, inertial axes, m."""
+    mass, moment = 0.0, (0.0, 0.0, 0.0)
+    for i in range(whole(model.joint_count) + 1):
+        mass = mass + model.mass[i]
+        moment = add(moment, vector(data.first_moment[i], 0))
+    return scale(moment, 1.0 / mass)
+
 
 RATE_LIMIT = 1e4
 """rad/s; a body that turns faster has left the physics (a diverged loop)."""
@@ -68,8 +188,8 @@ def step(
 
 @kernel
 def update_true_state(block: Block, tick: int, period: float) -> None:
-    """Call `look` from Python."""
-    look(block[0], tick, period)
+    """Call `write_true_state` from Python."""
+    write_true_state(block[0], tick, period)
 
 
 @kernel
@@ -123,7 +243,7 @@ def begin_interval(
 
 
 @kernel
-def look(memory: PlantMemory, tick: int, period: float) -> None:
+def write_true_state(memory: PlantMemory, tick: int, period: float) -> None:
     """Write the true state of ``tick``, and what the robot meets there."""
     write_truth(memory.model, memory.x, memory.rotation, memory.truth)
     meet_surroundings(
@@ -134,7 +254,7 @@ def look(memory: PlantMemory, tick: int, period: float) -> None:
 @kernel
 def end_interval(memory: PlantMemory, tick: int, period: float) -> float:
     """Write the true state of ``tick``, which is reached, and return its `fastest_rate`."""
-    look(memory, tick, period)
+    write_true_state(memory, tick, period)
     fastest: float = fastest_rate(memory.model, memory.x)
     return fastest
 

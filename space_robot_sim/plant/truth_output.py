@@ -6,7 +6,7 @@ from rclpy.node import Node
 
 from space_robot_msgs_py.ros.endpoints import RawPublisher
 from space_robot_msgs_py.samples import RobotState, Timebase
-from space_robot_msgs_py.wire.truth_writer import Messages, TruthWriter
+from space_robot_msgs_py.wire.telemetry import Messages, TruthWriter
 
 from .plant import Plant
 

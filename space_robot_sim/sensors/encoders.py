@@ -5,95 +5,102 @@ The angle of a prismatic joint is its position; m stands in the place of rad the
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
 from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from space_robot_model.elementary.steps import in_steps
-from space_robot_model.hardware.encoders import MOST_DIFFERENCED, EncoderSettings
+from space_robot_model.elementary.functions import in_steps
+from space_robot_model.hardware.sensors import MOST_DIFFERENCED, EncoderSettings
 from space_robot_msgs_py.compiled.kernels import kernel
 from space_robot_msgs_py.compiled.lanes import where, whole
-from space_robot_msgs_py.compiled.records import Record, assign, shaped
+from space_robot_msgs_py.compiled.records import shaped
 from space_robot_msgs_py.samples import State
-from space_robot_msgs_py.topics import BASE_AXES
 
-from ..faults.axes import About
-from ..faults.grammar import Argument, Kind
-from ..faults.schedule import BLOCK_TICKS, ScheduledFault
-from .faults import (
-    SIGMA_RAD,
-    SIGMA_RAD_PER_S,
-    STEP_RAD,
-    STEP_RAD_PER_S,
-    Change,
-    SensorFault,
-    add_noise,
-    coarsen,
-)
-from .noise import row_of
+from ..component import Component, Installation
+from ..faults.grammar import About, Argument, Kind, add_in_quadrature, switch_on
+from ..faults.schedule import BLOCK_TICKS
 
 Array = NDArray[np.float64]
 
 
-class Encoders(Record):
+def _steps(sheet: EncoderSettings, at: Installation) -> Array:
+    """Return the distance of two angles of each joint (n,), rad or m (0: continuous)."""
+    slides = np.zeros(at.n, np.bool_)
+    slides[: len(at.is_prismatic)] = at.is_prismatic
+    return np.where(slides, sheet.step(1.0), sheet.step(2.0 * np.pi))
+
+
+def _at_rest(sheet: EncoderSettings, at: Installation) -> Array:
+    """Return the angles measured before tick 0 (MOST_DIFFERENCED, n)."""
+    angles, steps = at.truth.joint_positions, _steps(sheet, at)
+    measured = steps * np.floor(angles / steps + 0.5) if sheet.bits else angles
+    return np.broadcast_to(measured, (MOST_DIFFERENCED, at.n))
+
+
+class Encoders(Component):
     """Parameters of a robot's encoders, and their measured angles.
 
     The measured angle is ``step round((theta + sigma n) / step)``; a rate differenced over N ticks
     is the difference of two measured angles N ticks apart, divided by N periods.
     """
 
-    sigma: Array = shaped(lambda n: (n,))
+    sigma: Array = shaped(lambda n: (n,), origin="noise")
     """White noise of each angle, rad."""
-    step: Array = shaped(lambda n: (n,))
+    step: Array = shaped(lambda n: (n,), origin=_steps)
     """Distance of two angles, rad (0: none)."""
-    difference_ticks: float = shaped(lambda n: (), uniform=True)
+    difference_ticks: float = shaped(lambda n: (), uniform=True, origin="difference_ticks")
     """N; 0: rates are measured."""
-    velocity_sigma: Array = shaped(lambda n: (n,))
+    velocity_sigma: Array = shaped(lambda n: (n,), origin="velocity_noise")
     """White noise of each rate, rad/s."""
-    velocity_step: Array = shaped(lambda n: (n,))
+    velocity_step: Array = shaped(lambda n: (n,), origin="velocity_step")
     """Distance of two rates, rad/s (0: none)."""
-    motor: Array = shaped(lambda n: (n,), uniform=True)
+    motor: Array = shaped(lambda n: (n,), uniform=True, origin=lambda s, at: at.motors)
     """Number from 1 of the motor that a joint's encoder measures; 0: it measures the link."""
     stuck: Array = shaped(lambda n: (n,))
     """1 for each joint with a stuck encoder."""
     draws: Array = shaped(lambda n: (BLOCK_TICKS, 2, n))
     """Standard normal numbers, a row a tick: of the angles, of the rates."""
-    history: Array = shaped(lambda n: (MOST_DIFFERENCED, n))
+    history: Array = shaped(lambda n: (MOST_DIFFERENCED, n), origin=_at_rest)
     """The last measured angles, by tick modulo `MOST_DIFFERENCED`, rad."""
 
-    @classmethod
-    def build(
-        cls,
-        n: int,
-        settings: EncoderSettings,
-        period: float,
-        truth: State,
-        is_prismatic: Sequence[bool] | NDArray[np.bool_] = (),
-        motors: Sequence[int] = (),
-    ) -> Encoders:
-        """Read the settings; before tick 0 the robot was at rest at ``truth``.
-
-        ``is_prismatic`` (n,): which joints slide (empty: none); ``motors`` (n,): see ``motor``
-        (empty: all are 0).
-        """
-        encoders = cls.allocate(n)
-        whole = np.full(n, 2.0 * np.pi)
-        whole[: len(is_prismatic)][np.asarray(is_prismatic, np.bool_)] = 1.0
-        step = whole / 2.0**settings.bits if settings.bits else np.zeros(n)
-        at_rest = truth.joint_positions
-        assign(
-            encoders,
-            sigma=settings.noise,
-            step=step,
-            difference_ticks=settings.difference_ticks,
-            velocity_sigma=settings.velocity_noise,
-            velocity_step=settings.velocity_step,
-            motor=motors if len(motors) else np.zeros(n),
-            history=step * np.floor(at_rest / step + 0.5) if settings.bits else at_rest,
-        )
-        return encoders
+    FAULTS: ClassVar[tuple[Kind, ...]] = (
+        Kind(
+            "noise_joint_position",
+            Argument("SIGMA", "rad", 0.0, 1e3),
+            "noise on the measured joint angles",
+            "sigma",
+            add_in_quadrature,
+        ),
+        Kind(
+            "noise_joint_velocity",
+            Argument("SIGMA", "rad/s", 0.0, 1e3),
+            "noise on the measured joint velocities",
+            "velocity_sigma",
+            add_in_quadrature,
+        ),
+        Kind(
+            "encoder_stuck",
+            Argument(about=About.JOINT),
+            "the measured joint angle is constant, its rate is zero",
+            "stuck",
+            switch_on,
+        ),
+        Kind(
+            "quantise_joint_position",
+            Argument("STEP", "rad", 1e-12, 1e3),
+            "the measured joint angles are quantised",
+            "step",
+            np.maximum,
+        ),
+        Kind(
+            "quantise_joint_velocity",
+            Argument("STEP", "rad/s", 1e-12, 1e3),
+            "the measured joint velocities are quantised",
+            "velocity_step",
+            np.maximum,
+        ),
+    )
 
 
 @kernel
@@ -104,7 +111,7 @@ def read_encoders(
 
     A stuck encoder reports the angle of the tick before, and rate zero.
     """
-    draws, lag = encoders.draws[row_of(tick)], whole(encoders.difference_ticks)
+    draws, lag = encoders.draws[tick % BLOCK_TICKS], whole(encoders.difference_ticks)
     before = encoders.history[(tick - 1) % MOST_DIFFERENCED]
     then = encoders.history[(tick - lag) % MOST_DIFFERENCED]
     now = encoders.history[tick % MOST_DIFFERENCED]
@@ -133,48 +140,3 @@ def see_motors(encoders: Encoders, truth: State, measured: State) -> None:
         if motor > 0:
             measured.joint_positions[i] = truth.motor_positions[motor - 1]
             measured.joint_velocities[i] = truth.motor_velocities[motor - 1]
-
-
-def _hold(stuck: Array, fault: ScheduledFault) -> None:
-    stuck[[axis - len(BASE_AXES) for axis in fault.axes]] = 1.0
-
-
-class EncoderFault(SensorFault):
-    """Faults of encoders: more noise, coarser steps, or stuck."""
-
-    CHANGES: ClassVar[Mapping[str, Mapping[Kind, Change]]] = {
-        "sigma": {
-            Kind(
-                "noise_joint_position", SIGMA_RAD, None, "noise on the measured joint angles"
-            ): add_noise
-        },
-        "velocity_sigma": {
-            Kind(
-                "noise_joint_velocity",
-                SIGMA_RAD_PER_S,
-                None,
-                "noise on the measured joint velocities",
-            ): add_noise
-        },
-        "stuck": {
-            Kind(
-                "encoder_stuck",
-                Argument("", "", 0.0, 0.0, about=About.JOINT),
-                None,
-                "the measured joint angle is constant, its rate is zero",
-            ): _hold
-        },
-        "step": {
-            Kind(
-                "quantise_joint_position", STEP_RAD, None, "the measured joint angles are quantised"
-            ): coarsen
-        },
-        "velocity_step": {
-            Kind(
-                "quantise_joint_velocity",
-                STEP_RAD_PER_S,
-                None,
-                "the measured joint velocities are quantised",
-            ): coarsen
-        },
-    }

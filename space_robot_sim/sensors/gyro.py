@@ -2,28 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from space_robot_model.elementary.steps import in_steps
-from space_robot_model.hardware.gyro import GyroSettings
+from space_robot_model.elementary.functions import in_steps
 from space_robot_msgs_py.compiled.kernels import kernel
-from space_robot_msgs_py.compiled.records import Record, assign, shaped
+from space_robot_msgs_py.compiled.records import shaped
 from space_robot_msgs_py.samples import State
 
-from ..faults.axes import About
-from ..faults.grammar import Argument, Kind
-from ..faults.schedule import BLOCK_TICKS, ScheduledFault
-from .faults import SIGMA_RAD_PER_S, STEP_RAD_PER_S, Change, SensorFault, add_noise, coarsen
-from .noise import row_of
+from ..component import Component
+from ..faults.grammar import About, Argument, Kind, add_in_quadrature
+from ..faults.schedule import BLOCK_TICKS
 
 Array = NDArray[np.float64]
 
+SIGMA = Argument("SIGMA", "rad/s", 0.0, 1e3)
+STEP = Argument("STEP", "rad/s", 1e-12, 1e3)
+BIAS = Argument("RATE", "rad/s", -10.0, 10.0, About.BASE_AXIS)
 
-class Gyro(Record):
+
+class Gyro(Component):
     """Parameters and state of a gyro.
 
     A period h after the last sample the bias b and the measured rate are (Farrenkopf 1978;
@@ -36,43 +36,34 @@ class Gyro(Record):
     with standard normal n_u, n_v. The noise of each sample adds to this sigma in quadrature.
     """
 
-    sigma: Array = shaped(lambda n: (3,))
+    sigma: Array = shaped(lambda n: (3,), origin="noise")
     """White noise of each sample, rad/s."""
-    angle_random_walk: float = shaped(lambda n: ())
+    angle_random_walk: float = shaped(lambda n: (), origin="angle_random_walk")
     """sigma_v, rad/s^1/2."""
-    rate_random_walk: float = shaped(lambda n: ())
+    rate_random_walk: float = shaped(lambda n: (), origin="rate_random_walk")
     """sigma_u, rad/s^3/2."""
-    offset: Array = shaped(lambda n: (3,))
+    offset: Array = shaped(lambda n: (3,), origin="initial_bias")
     """Constant bias, rad/s."""
     bias: Array = shaped(lambda n: (3,))
     """Random-walk bias, rad/s: b without the offset."""
-    scale: Array = shaped(lambda n: (3,))
+    scale: Array = shaped(lambda n: (3,), origin=lambda s, at: 1.0 + np.array(s.scale_factor_error))
     """1 + e."""
-    step: Array = shaped(lambda n: (1,))
+    step: Array = shaped(lambda n: (1,), origin="step")
     """rad/s (0: none)."""
     draws: Array = shaped(lambda n: (BLOCK_TICKS, 6))
     """Standard normal numbers, a row a tick: n_v (3), n_u (3)."""
 
-    @classmethod
-    def build(cls, n: int, settings: GyroSettings, period: float, truth: State) -> Gyro:
-        """Read the settings."""
-        gyro = cls.allocate(n)
-        assign(
-            gyro,
-            sigma=settings.noise,
-            angle_random_walk=settings.angle_random_walk,
-            rate_random_walk=settings.rate_random_walk,
-            offset=settings.initial_bias,
-            scale=1.0 + np.array(settings.scale_factor_error),
-            step=settings.step,
-        )
-        return gyro
+    FAULTS: ClassVar[tuple[Kind, ...]] = (
+        Kind("noise_gyro", SIGMA, "noise on the measured base rate", "sigma", add_in_quadrature),
+        Kind("gyro_bias", BIAS, "RATE is added to the measured base rate about an axis", "offset"),
+        Kind("quantise_gyro", STEP, "the measured base rate is quantised", "step", np.maximum),
+    )
 
 
 @kernel
 def read_gyro(gyro: Gyro, truth: State, tick: int, period: float, measured: State) -> None:
     """Write the measured rate of the base into ``measured``; the bias walks from tick to tick."""
-    draws = gyro.draws[row_of(tick)]
+    draws = gyro.draws[tick % BLOCK_TICKS]
     sigma_v, sigma_u = gyro.angle_random_walk, gyro.rate_random_walk
     white = sigma_v * sigma_v / period + sigma_u * sigma_u * period / 12.0
     walk = sigma_u * np.sqrt(period) if tick > 0 else 0.0
@@ -83,30 +74,3 @@ def read_gyro(gyro: Gyro, truth: State, tick: int, period: float, measured: Stat
         noise = np.sqrt(white + gyro.sigma[i] * gyro.sigma[i]) * draws[i]
         rate = gyro.scale[i] * truth.omega_base[i] + bias + noise
         measured.omega_base[i] = in_steps(rate, gyro.step[0])
-
-
-def _add_bias(offset: Array, fault: ScheduledFault) -> None:
-    offset[list(fault.axes)] += fault.value
-
-
-class GyroFault(SensorFault):
-    """Faults of the gyro: more noise, coarser steps, or another bias."""
-
-    CHANGES: ClassVar[Mapping[str, Mapping[Kind, Change]]] = {
-        "sigma": {
-            Kind("noise_gyro", SIGMA_RAD_PER_S, None, "noise on the measured base rate"): add_noise
-        },
-        "offset": {
-            Kind(
-                "gyro_bias",
-                Argument("RATE", "rad/s", -10.0, 10.0, about=About.BASE_AXIS),
-                None,
-                "RATE is added to the measured base rate about an axis",
-            ): _add_bias
-        },
-        "step": {
-            Kind(
-                "quantise_gyro", STEP_RAD_PER_S, None, "the measured base rate is quantised"
-            ): coarsen
-        },
-    }

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import zlib
-from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,80 +11,46 @@ from space_robot_model.elementary.normal import normal_numbers
 from space_robot_model.hardware.sensors import SensorSettings
 from space_robot_msgs_py.compiled.kernels import kernel
 from space_robot_msgs_py.compiled.lanes import uniform
-from space_robot_msgs_py.compiled.records import Record, assign, nested, shaped
-from space_robot_msgs_py.errors import InputError
+from space_robot_msgs_py.compiled.records import nested, shaped
 from space_robot_msgs_py.samples import State
 
-from ..faults.schedule import BLOCK_TICKS, PartFault
-from .encoders import EncoderFault, Encoders, read_encoders, see_motors
-from .gyro import Gyro, GyroFault, read_gyro
-from .star_tracker import StarTracker, StarTrackerFault, track_stars
+from ..component import Component
+from ..faults.schedule import BLOCK_TICKS
+from .encoders import Encoders, read_encoders, see_motors
+from .gyro import Gyro, read_gyro
+from .magnetometer import Magnetometer, read_magnetometer
+from .star_tracker import StarTracker, track_stars
 
 Array = NDArray[np.float64]
-
-
-class Sensors(Record):
-    """Record of the sensors of one robot, for the plant's kernels."""
-
-    star_tracker: StarTracker = nested(StarTracker)
-    gyro: Gyro = nested(Gyro)
-    encoders: Encoders = nested(Encoders)
-    are_ideal: float = shaped(lambda n: (), uniform=True)
-    """1 if all sensors are without error."""
-    seed: float = shaped(lambda n: ())
-    """Of the random numbers."""
-    drawn: float = shaped(lambda n: (), uniform=True)
-    """The block of ticks whose random numbers have been drawn; -1: none yet."""
-
-    @classmethod
-    def build(
-        cls,
-        n: int,
-        settings: SensorSettings,
-        period: float,
-        truth: State,
-        is_prismatic: Sequence[bool] | NDArray[np.bool_] = (),
-        seed: int = 0,
-        motors: Sequence[int] = (),
-    ) -> Sensors:
-        """Read the numbers of the settings for a robot of ``n`` joints, at rest at ``truth``.
-
-        ``is_prismatic`` (n,): which joints slide (empty: none); ``seed``: of the random numbers,
-        below 2**32; ``motors`` (n,): see `Encoders`.
-
-        Raises:
-            InputError: they do not fit one another or the period.
-        """
-        sensors = cls.allocate(n)
-        try:
-            assign(
-                sensors,
-                star_tracker=StarTracker.build(n, settings.star_tracker, period, truth),
-                gyro=Gyro.build(n, settings.gyro, period, truth),
-                encoders=Encoders.build(n, settings.encoders, period, truth, is_prismatic, motors),
-                are_ideal=all(getattr(settings, name) == default for name, default in IDEAL),
-                seed=seed,
-                drawn=-1.0,
-            )
-        except InputError as error:
-            file = getattr(settings, "sensors", "given")  # the plant node's settings name it
-            raise InputError(f"sensors {file}: {error}") from None
-        return sensors
 
 
 IDEAL = [(name, getattr(SensorSettings(), name)) for name in SensorSettings.model_fields]
 """The settings of each sensor without error."""
 
-STAR_TRACKER, GYRO, ENCODERS = (
-    zlib.crc32(name.encode()) for name in ("star_tracker", "gyro", "encoders")
+
+class Sensors(Component):
+    """Record of the sensors of one robot, for the plant's kernels."""
+
+    star_tracker: StarTracker = nested(StarTracker)
+    gyro: Gyro = nested(Gyro)
+    encoders: Encoders = nested(Encoders)
+    magnetometer: Magnetometer = nested(Magnetometer)
+    are_ideal: float = shaped(
+        lambda n: (),
+        uniform=True,
+        origin=lambda s, at: all(getattr(s, name) == default for name, default in IDEAL),
+    )
+    """1 if all sensors are without error."""
+    seed: float = shaped(lambda n: (), origin=lambda s, at: at.seed)
+    """Of the random numbers."""
+    drawn: float = shaped(lambda n: (), uniform=True, origin=lambda s, at: -1.0)
+    """The block of ticks whose random numbers have been drawn; -1: none yet."""
+
+
+STAR_TRACKER, GYRO, ENCODERS, MAGNETOMETER = (
+    zlib.crc32(name.encode()) for name in SensorSettings.model_fields
 )
 """Keys of the sensors' random numbers."""
-FAULTS: dict[str, type[PartFault]] = {
-    "star_tracker": StarTrackerFault,
-    "gyro": GyroFault,
-    "encoders": EncoderFault,
-}
-"""The faults of each field of `Sensors`."""
 
 
 @kernel
@@ -93,8 +58,8 @@ def sense(sensors: Sensors, truth: State, tick: int, period: float, measured: St
     """Write the measurements of ``truth`` at ``tick`` into ``measured``; call once a tick.
 
     The torques in ``measured`` are left alone; position and velocity of the base, the speeds of its
-    wheels, the motion of joints without motors and of motors behind gears, and what there is to
-    know of an orbit have no error.
+    wheels, the motion of joints without motors and of motors behind gears, place and velocity in an
+    orbit and torques from outside have no error.
     """
     measured.base_position[:] = truth.base_position
     measured.base_velocity[:] = truth.base_velocity
@@ -118,6 +83,7 @@ def sense(sensors: Sensors, truth: State, tick: int, period: float, measured: St
         track_stars(sensors.star_tracker, truth, tick, measured)
         read_gyro(sensors.gyro, truth, tick, period, measured)
         read_encoders(sensors.encoders, truth, tick, period, measured)
+        read_magnetometer(sensors.magnetometer, truth, tick, measured)
 
 
 @kernel
@@ -134,3 +100,4 @@ def _draw(sensors: Sensors, tick: int) -> None:
     normal_numbers(sensors.star_tracker.draws, sensors.seed, STAR_TRACKER, block)
     normal_numbers(sensors.gyro.draws, sensors.seed, GYRO, block)
     normal_numbers(sensors.encoders.draws, sensors.seed, ENCODERS, block)
+    normal_numbers(sensors.magnetometer.draws, sensors.seed, MAGNETOMETER, block)

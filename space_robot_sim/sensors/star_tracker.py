@@ -2,104 +2,33 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from space_robot_model.elementary.functions import in_steps, sin_cos
 from space_robot_model.elementary.matrices import norm
-from space_robot_model.elementary.series import plain_sin_cos
-from space_robot_model.elementary.sine import sin_cos
-from space_robot_model.elementary.steps import in_steps
-from space_robot_model.hardware.star_tracker import LEAST_RATE, MOST_UNDER_WAY, StarTrackerSettings
+from space_robot_model.elementary.rotations import plain_sin_cos
+from space_robot_model.hardware.sensors import MOST_UNDER_WAY, StarTrackerSettings
 from space_robot_msgs_py.compiled.kernels import kernel, subroutine
 from space_robot_msgs_py.compiled.lanes import any_lane, where, whole
-from space_robot_msgs_py.compiled.records import Record, assign, shaped
-from space_robot_msgs_py.errors import InputError
+from space_robot_msgs_py.compiled.records import shaped
 from space_robot_msgs_py.samples import State
 
-from ..faults.grammar import Argument, Kind
-from ..faults.schedule import BLOCK_TICKS, ScheduledFault
-from .faults import SIGMA_RAD, Change, SensorFault, add_noise, coarsen
-from .noise import row_of
+from ..component import Component, Installation
+from ..faults.grammar import Argument, Kind, add_in_quadrature, switch_on
+from ..faults.schedule import BLOCK_TICKS
 
 Array = NDArray[np.float64]
 
 
-class StarTracker(Record):
-    """Parameters of a star tracker, and its measurements.
-
-    The noise is a small rotation on base axes, ``n`` (3,) being standard normal numbers and ``b``
-    the boresight: ``sigma_across n + (sigma_about - sigma_across) (b . n) b``, so that it has the
-    standard deviation ``sigma_about`` about ``b`` and ``sigma_across`` about all axes across it.
-    """
-
-    sigma: Array = shaped(lambda n: (2,))
-    """rad: across the boresight, about it."""
-    boresight: Array = shaped(lambda n: (3,))
-    """Unit vector on base axes."""
-    interval: float = shaped(lambda n: (), uniform=True)
-    """Ticks between two measurements; the first is taken at tick 0."""
-    delay: float = shaped(lambda n: (), uniform=True)
-    """Ticks from a measurement to its release."""
-    step: Array = shaped(lambda n: (1,))
-    """The quaternion's numbers come in steps of half of it, rad (0: none)."""
-    blind: Array = shaped(lambda n: (1,))
-    """1 while no measurement can be taken."""
-    draws: Array = shaped(lambda n: (BLOCK_TICKS, 3))
-    """Standard normal numbers, a row a tick."""
-    taken: Array = shaped(lambda n: (MOST_UNDER_WAY,))
-    """1 for each measurement under way that could be taken."""
-    under_way: Array = shaped(lambda n: (MOST_UNDER_WAY, 4))
-    """Measurements in transit, by number modulo `MOST_UNDER_WAY`."""
-    held: Array = shaped(lambda n: (4,))
-    """The measurement released last."""
-
-    @classmethod
-    def build(
-        cls, n: int, settings: StarTrackerSettings, period: float, truth: State
-    ) -> StarTracker:
-        """Read the settings; before tick 0 the base turned as at ``truth``, at a constant rate.
-
-        Raises:
-            InputError: the settings do not fit one another or the period.
-        """
-        if 0.0 < settings.rate < LEAST_RATE:
-            raise InputError(
-                f"star_tracker.rate must be 0 (a measurement every tick) or at least "
-                f"{LEAST_RATE:g} Hz, got {settings.rate:g}"
-            )
-        if settings.rate * period > 1.0 + 1e-9:
-            raise InputError(
-                f"star_tracker.rate must be at most one measurement a tick, "
-                f"{1.0 / period:g} Hz, got {settings.rate:g}"
-            )
-        interval = max(1, round(1.0 / (settings.rate * period))) if settings.rate else 1
-        delay = round(settings.delay / period)
-        if delay // interval >= MOST_UNDER_WAY:
-            raise InputError(
-                f"star_tracker.delay holds {delay // interval} measurements, "
-                f"at most {MOST_UNDER_WAY - 1} can be under way: measure at a lower rate"
-            )
-        tracker = cls.allocate(n)
-        assign(
-            tracker,
-            sigma=[settings.noise_across, settings.noise_about],
-            step=settings.step,
-            boresight=np.array(settings.boresight) / norm(settings.boresight),
-            interval=interval,
-            delay=delay,
-            held=_turned_back(truth, delay * period),
-        )
-        return tracker
-
-
-def _turned_back(truth: State, time: float) -> Array:
-    """Return the attitude (4,) so many s before a state whose rate is constant."""
-    turn = -time * truth.omega_base
+def _before(sheet: StarTrackerSettings, at: Installation) -> Array:
+    """Return the attitude (4,) shown at tick 0: a delay before it, at a rate that was constant."""
+    truth, delay = at.truth, sheet.ticks(at.period)[1]
+    turn = -delay * at.period * truth.omega_base
     if (angle := norm(turn)) == 0.0:
-        return truth.quaternion
+        return np.asarray(truth.quaternion)
     sine, cosine = plain_sin_cos(0.5 * angle)
     x, y, z = turn * (sine / angle)
     a, b, c, d = truth.quaternion
@@ -113,22 +42,79 @@ def _turned_back(truth: State, time: float) -> Array:
     )
 
 
+class StarTracker(Component):
+    """Parameters of a star tracker, and its measurements.
+
+    The noise is a small rotation on base axes, ``n`` (3,) being standard normal numbers and ``b``
+    the boresight: ``sigma_across n + (sigma_about - sigma_across) (b . n) b``, so that it has the
+    standard deviation ``sigma_about`` about ``b`` and ``sigma_across`` about all axes across it.
+    """
+
+    sigma: Array = shaped(lambda n: (2,), origin=lambda s, at: [s.noise_across, s.noise_about])
+    """rad: across the boresight, about it."""
+    boresight: Array = shaped(
+        lambda n: (3,), origin=lambda s, at: np.array(s.boresight) / norm(s.boresight)
+    )
+    """Unit vector on base axes."""
+    interval: float = shaped(lambda n: (), uniform=True, origin=lambda s, at: s.ticks(at.period)[0])
+    """Ticks between two measurements; the first is taken at tick 0."""
+    delay: float = shaped(lambda n: (), uniform=True, origin=lambda s, at: s.ticks(at.period)[1])
+    """Ticks from a measurement to its release."""
+    step: Array = shaped(lambda n: (1,), origin="step")
+    """The quaternion's numbers come in steps of half of it, rad (0: none)."""
+    blind: Array = shaped(lambda n: (1,))
+    """1 while no measurement can be taken."""
+    draws: Array = shaped(lambda n: (BLOCK_TICKS, 3))
+    """Standard normal numbers, a row a tick."""
+    taken: Array = shaped(lambda n: (MOST_UNDER_WAY,))
+    """1 for each measurement under way that could be taken."""
+    under_way: Array = shaped(lambda n: (MOST_UNDER_WAY, 4))
+    """Measurements in transit, by number modulo `MOST_UNDER_WAY`."""
+    held: Array = shaped(lambda n: (4,), origin=_before)
+    """The measurement released last."""
+
+    FAULTS: ClassVar[tuple[Kind, ...]] = (
+        Kind(
+            "noise_attitude",
+            Argument("SIGMA", "rad", 0.0, 1e3),
+            "noise of standard deviation SIGMA about each axis of the measured attitude",
+            "sigma",
+            add_in_quadrature,
+        ),
+        Kind(
+            "tracker_blind",
+            None,
+            "no attitude is measured; the last one is held",
+            "blind",
+            switch_on,
+        ),
+        Kind(
+            "quantise_attitude",
+            Argument("STEP", "rad", 1e-12, 1.0),
+            "the measured quaternion is quantised in steps of STEP / 2",
+            "step",
+            np.maximum,
+        ),
+    )
+
+
 @kernel
 def track_stars(tracker: StarTracker, truth: State, tick: int, measured: State) -> None:
     """Write the attitude released last at ``tick`` into ``measured``.
 
     Measurement k shows the attitude of tick ``k interval``, is released ``delay`` ticks later and
     held until the next one; while the tracker is blind, none is taken. The one that is there at
-    tick 0 shows the attitude that `StarTracker.build` has put into ``held``.
+    tick 0 shows the attitude that stands in ``held`` before.
     """
     interval, delay = whole(tracker.interval), whole(tracker.delay)
     if tick % interval == 0:
         place = (tick // interval) % MOST_UNDER_WAY
         tracker.taken[place] = 1.0 - tracker.blind[0]
+        draws = tracker.draws[tick % BLOCK_TICKS]
         if tick == 0:
-            expose(tracker, tracker.held, tracker.draws[row_of(tick)], tracker.under_way[place])
+            expose(tracker, tracker.held, draws, tracker.under_way[place])
             _release(tracker, place)
-        expose(tracker, truth.quaternion, tracker.draws[row_of(tick)], tracker.under_way[place])
+        expose(tracker, truth.quaternion, draws, tracker.under_way[place])
     exposed = tick - delay
     if exposed >= 0 and exposed % interval == 0:
         _release(tracker, (exposed // interval) % MOST_UNDER_WAY)
@@ -167,35 +153,3 @@ def expose(tracker: StarTracker, quaternion: Array, draws: Array, out: Array) ->
         length = np.sqrt(out[0] * out[0] + out[1] * out[1] + out[2] * out[2] + out[3] * out[3])
         for i in range(4):
             out[i] /= where(step > 0.0, length, 1.0)
-
-
-def _blind(blind: Array, fault: ScheduledFault) -> None:
-    blind[:] = 1.0
-
-
-class StarTrackerFault(SensorFault):
-    """Faults of the star tracker: more noise, coarser steps, or blind."""
-
-    CHANGES: ClassVar[Mapping[str, Mapping[Kind, Change]]] = {
-        "sigma": {
-            Kind(
-                "noise_attitude",
-                SIGMA_RAD,
-                None,
-                "noise of standard deviation SIGMA about each axis of the measured attitude",
-            ): add_noise
-        },
-        "blind": {
-            Kind(
-                "tracker_blind", None, None, "no attitude is measured; the last one is held"
-            ): _blind
-        },
-        "step": {
-            Kind(
-                "quantise_attitude",
-                Argument("STEP", "rad", 1e-12, 1.0),
-                None,
-                "the measured quaternion is quantised in steps of STEP / 2",
-            ): coarsen
-        },
-    }

@@ -31,6 +31,13 @@ OWN_KEYS = ("why", "besides", "also", "lacking")
 ADVICE = "If new bits are wanted: python tests/matrix --write, and say so in the commit"
 BLOCKS = 10
 """Parts of a flight that have digests of their own."""
+ORDER = (
+    *("base_position", "quaternion", "base_velocity", "omega_base", "joint_positions"),
+    *("joint_velocities", "applied_torque", "reference_joints", "reference_base"),
+    *("wheel_velocities", "wheel_torques", "thrusts", "actuator_commands"),
+    *("passive_positions", "passive_velocities", "motor_positions", "motor_velocities"),
+)
+"""The first columns of a digest; the others follow in the order of the log."""
 OF_THE_CLOCK = {"latency_s"}
 """Columns that are no flight's own."""
 OF_THE_PROCESS = {"telemetry"}
@@ -105,6 +112,7 @@ PLANS = read_scenarios()
 def columns_of(log: FlightLog) -> dict[str, NDArray[np.float64]]:
     """Return all columns of a log by name, without those of the wall clock."""
     columns = {name: c for name, c in log.columns.items() if name not in OF_THE_CLOCK}
+    columns = {name: columns[name] for name in dict.fromkeys([*ORDER, *columns])}
     if log.measured is not None:
         columns |= {f"measured.{name}": c for name, c in log.measured.columns.items()}
     return columns

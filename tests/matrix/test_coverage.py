@@ -14,11 +14,12 @@ from matrix.scenarios import CELLS, PLANS, in_root
 from space_robot.flight.plan import Flight
 from space_robot.scenario.faults import KINDS, PROCESS_KINDS
 from space_robot.scenario.option_table import names
-from space_robot_control.guidance.pointing import Point
+from space_robot_control.guidance.goals import Frame, Point
 from space_robot_control.guidance.segments import (
     KINDS_OF_BASE,
-    Frame,
+    SEGMENT_KINDS,
     Segment,
+    ToolSegment,
     read_pointing,
     read_segments,
 )
@@ -110,23 +111,27 @@ def test_every_event_happens() -> None:
 
 def begun(flight: Flight) -> Iterator[Segment]:
     """The segments that have begun before the flight is over."""
-    time = flight.mission_settings.waypoint_times[-1]
+    time = 0.0
     for segment in read_segments(flight.mission_settings.segments):
         if time < flight.ticks * flight.period:
             yield segment
-        time += segment.hold or segment.duration or 0.0
+        time += segment.span or 0.0
 
 
 def test_every_kind_of_segment_is_flown() -> None:
     settings = [flight.mission_settings for flight in flights().values()]
     segments = [segment for flight in flights().values() for segment in begun(flight)]
-    for name in Segment.model_fields:
-        if name != "trajectory":  # what a file becomes
-            assert any(getattr(segment, name) for segment in segments), name
-    tools = [segment.tool for segment in segments if segment.tool]
+    for kind in SEGMENT_KINDS.values():
+        if kind.key != "trajectory":  # what a file becomes
+            flown = [segment for segment in segments if type(segment) is kind]
+            for key in {*kind.allowed_keys()} - {"base", "duration"}:
+                assert any(getattr(segment, key) for segment in flown), (kind.key, key)
+    assert any(segment.span is None for segment in segments), "fast"
+    assert any(segment.is_base_free for segment in segments)
+    tools = [segment.tool for segment in segments if isinstance(segment, ToolSegment)]
     assert lacking(get_args(Frame), (tool.frame for tool in tools)) == []
     assert {tool.least for tool in tools} == {"motion", "momentum"}
-    bases = [segment.base for segment in segments if segment.base]
+    bases = [s.base for s in segments if s.base and not s.is_base_free]
     bases += [read_pointing(s.base_point, "start") for s in settings if s.base_point.strip()]
     assert lacking(KINDS_OF_BASE.values(), map(type, bases)) == []
     assert lacking(get_args(Point), (getattr(base, "point", "") for base in bases)) == []

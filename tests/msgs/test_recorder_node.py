@@ -16,16 +16,15 @@ from bags import read_accounts
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.bag.recorder_settings import RecorderNodeSettings
 from space_robot_msgs_py.errors import FlightError, InputError
-from space_robot_msgs_py.wire.clock import ClockCodec
 from space_robot_msgs_py.wire.definitions import jazzy
+from space_robot_msgs_py.wire.telemetry import ClockCodec
 
 pytest.importorskip("rclpy")
 
 from space_robot_msgs_py import recorder_node
 from space_robot_msgs_py.recorder_node import LOOK_PERIOD_S, REPORTS, TIMEOUT_S, TURN, RecorderLoop
 from space_robot_msgs_py.ros.endpoints import Received
-from space_robot_msgs_py.ros.health import SENT, Level
-from space_robot_msgs_py.ros.loop import Wait
+from space_robot_msgs_py.ros.loop import SENT, Level, Wait
 
 OPTIONAL = [topic for topic in topics.RECORDED if topic.is_optional]
 PERIOD_NS = 500_000

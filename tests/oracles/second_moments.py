@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from oracles import attitude_jacobian_inertial, rotation_of, skew
-from space_robot_model.dynamics.second_moments import (
+from space_robot_model.dynamics.regressor import (
     MassCoordinates,
     mass_coordinates_into,
     second_moments_into,

@@ -18,11 +18,9 @@ from plant import flight_of
 
 from space_robot.export.software import export
 from space_robot_control.controller.supervisor import Supervisor
-from space_robot_control.flight_code.c99.functions import Function
-from space_robot_control.flight_code.c99.program import CALL
-from space_robot_control.flight_code.compiler import build_library, write_sources
+from space_robot_control.flight_code.c99.program import CALL, Function
 from space_robot_control.flight_code.folder import FLAGS, Exported
-from space_robot_control.flight_code.library import fill_measurement, measurement_of
+from space_robot_control.flight_code.library import build_library, fill_measurement, write_sources
 from space_robot_control.laws import CompiledLaw, laws
 from space_robot_msgs_py.samples import Reference
 
@@ -66,7 +64,7 @@ def _fly(plan: dict[str, Any], exported: Exported) -> tuple[Any, ...]:
     flight = flight_of(**plan)
     references = flight.mission.chunk(0, TICKS).references()
     states = np.zeros(TICKS, flight.plant.state.block.dtype)
-    measurements = np.zeros(TICKS, measurement_of(exported).dtype)
+    measurements = np.zeros(TICKS, exported.measurement_type)
     wanted = np.zeros(TICKS, np.dtype(exported.translated.dtype(Reference)))
     for name in wanted.dtype.names or ():
         wanted[name] = references[name]

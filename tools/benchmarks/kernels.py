@@ -5,13 +5,12 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from space_robot_control.controller.kernels import controller_tick
-from space_robot_control.controller.supervision import NEW, answer_state, judge
-from space_robot_control.laws.compiled import LawCode
+from space_robot_control.controller.tick import NEW, answer_state, controller_tick, judge_stamp
+from space_robot_control.laws.base import LawCode
 from space_robot_model.dynamics.aba import aba
 from space_robot_model.dynamics.kinematics import forward_kinematics, spatial_velocities
 from space_robot_msgs_py.compiled.kernels import RecordFunction, kernel
-from space_robot_msgs_py.compiled.lane_words import as_lanes
+from space_robot_msgs_py.compiled.lanes import as_lanes
 from space_robot_msgs_py.compiled.records import Block
 from space_robot_sim.plant.lanes import advance_lanes
 from space_robot_sim.plant.tick import advance
@@ -91,6 +90,6 @@ def answered_states(
 ) -> None:
     """What the flight software answers to states, from tick 0 on."""
     for k in range(states.size):
-        if judge(supervision, k) == NEW:
+        if judge_stamp(supervision, k) == NEW:
             state, reference = states[k : k + 1], references[k : k + 1]
             answer_state(supervision, controller, law, allocate, k, state, reference, period)

@@ -24,7 +24,7 @@ from space_robot.processes.node_modules import MODULES
 from space_robot_msgs_py.bag.folder import open_bag
 from space_robot_msgs_py.bag.reader import read_flight
 from space_robot_msgs_py.errors import SpaceRobotError
-from space_robot_msgs_py.ros.process_environment import DEFAULTS
+from space_robot_msgs_py.ros.process import DEFAULTS
 
 MARK = "SPACE_ROBOT_HOSTILE_TRIAL"
 """Environment variable by which the processes of a trial are found, whoever started them."""

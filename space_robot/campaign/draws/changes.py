@@ -12,12 +12,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from typing_extensions import Self
 
+from space_robot_model.elementary.linear_algebra import principal_axes
 from space_robot_model.elementary.matrices import product, rotate_tensor
-from space_robot_model.elementary.symmetric import principal_axes
 from space_robot_model.robot import Robot
 from space_robot_model.robot.parts import Plate
 from space_robot_model.robot.shapes import plates_of
-from space_robot_msgs_py.config.trees import flatten
+from space_robot_msgs_py.config.files import flatten
 from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.samples import RobotNames
 

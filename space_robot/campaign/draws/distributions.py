@@ -10,9 +10,9 @@ from typing import Annotated, Any, ClassVar
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 from typing_extensions import Self
 
-from space_robot_model.elementary.exponential import exp, log
-from space_robot_model.elementary.normal import normal_cdf, quantile
-from space_robot_msgs_py.config.choices import nearest
+from space_robot_model.elementary.functions import exp, log
+from space_robot_model.elementary.normal import quantile
+from space_robot_msgs_py.config.text import nearest
 from space_robot_msgs_py.config.validation import StrictModel, short, validate
 from space_robot_msgs_py.errors import InputError
 
@@ -89,8 +89,10 @@ class Normal(Distribution):
 
     @cached_property
     def _probabilities(self) -> tuple[float, float]:
+        from scipy.special import ndtr  # slow to import
+
         low, high = (
-            otherwise if bound is None else normal_cdf((bound - self.normal) / self.sigma)
+            otherwise if bound is None else float(ndtr((bound - self.normal) / self.sigma))
             for bound, otherwise in ((self.low, 0.0), (self.high, 1.0))
         )
         return low, high

@@ -10,7 +10,7 @@ from typing import Annotated, Any
 import numpy as np
 from pydantic import Field
 
-from space_robot_model.elementary.exponential import exp
+from space_robot_model.elementary.functions import exp
 from space_robot_model.robot import Robot
 from space_robot_msgs_py.config.validation import StrictModel, one_of, validate
 from space_robot_msgs_py.errors import InputError

@@ -12,8 +12,7 @@ from typing import Any
 from space_robot_msgs_py.config.validation import one_of, short
 from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.samples import RobotNames
-from space_robot_sim.faults.axes import About, axes_of
-from space_robot_sim.faults.grammar import Kind
+from space_robot_sim.faults.grammar import About, Kind, axes_of
 from space_robot_sim.plant.faults import PLANT_KINDS
 
 from ..study import Study

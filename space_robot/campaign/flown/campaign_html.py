@@ -7,7 +7,7 @@ from typing import Any
 
 import yaml
 
-from space_robot_msgs_py.config.html import html_table
+from space_robot_msgs_py.config.text import html_table
 
 from ..study import Requirement, Study
 from ..verdicts.requirements import Verdict

@@ -10,7 +10,11 @@ from typing import TYPE_CHECKING
 
 from typing_extensions import Self
 
-from space_robot_control.laws.trust import NotTrustedError, check_file, check_law
+from space_robot_control.laws.names import (
+    NotTrustedError,
+    require_shipped_file,
+    require_shipped_law,
+)
 from space_robot_msgs_py.config.arguments import as_path, as_whole_number
 from space_robot_msgs_py.config.validation import one_of, validate
 from space_robot_msgs_py.errors import InputError
@@ -206,10 +210,10 @@ def check_study(study: Study) -> None:
     controller = study.scenario.get("parameters", {}).get("controller", {})
     named = [Law.parse(law).controller for law in study.laws]
     for name in (*named, *filter(None, [controller.get("controller")])):
-        check_law(str(name), CAMPAIGN)
+        require_shipped_law(str(name), CAMPAIGN)
     laws = [Law.parse(law).gains for law in study.laws]
     for text in texts_of([laws, study.scenario, study.vary]):
-        check_file("value of an option", text, CAMPAIGN)
+        require_shipped_file("value of an option", text, CAMPAIGN)
     if study.metrics:
         raise NotTrustedError(
             f"the {CAMPAIGN} has metrics of its own ({', '.join(study.metrics)}): --trust imports "

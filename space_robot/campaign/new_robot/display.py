@@ -15,7 +15,7 @@ def rms_table(made: NewRobot) -> Table:
     keys = list(dict.fromkeys(key for rms in of_laws.values() for key in rms))
     columns = [Column("law", is_label=True), *(Column(named(k), unit_of(k), ".3g") for k in keys)]
     rows = [[law, *(rms.get(k, "ended") for k in keys)] for law, rms in of_laws.items()]
-    seconds = made.mission.waypoint_times[-1]
+    seconds = made.duration
     title = f"{made.robot.name}, {made.robot.n} joints, {seconds:g} s: RMS, mean of axes"
     table = Table.of(title, columns, rows)
     return Table(table.title, table.columns, table.groups, made.remarks)

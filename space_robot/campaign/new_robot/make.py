@@ -14,7 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from space_robot_control.controller.settings import DEFAULT_SETS, OF_THE_SET
+from space_robot_control.guidance.limits import MissionLimits
 from space_robot_control.guidance.mission import MissionSettings
+from space_robot_control.guidance.segments import read_segments
 from space_robot_control.laws import laws
 from space_robot_model.robot import Robot
 from space_robot_model.robot.description import unit_remarks
@@ -91,39 +93,36 @@ def rest_to_rest(robot: Robot) -> MissionSettings:
 
 
 def mission_text(robot: Robot, mission: MissionSettings, command: str) -> str:
-    """Return the text of a mission's file, one waypoint per line.
+    """Return the text of a mission's file, one posture per line.
 
     Args:
         robot: whose joints the mission moves.
         mission: to be written.
         command: the user's command, for the header.
     """
-    rows = np.reshape(mission.waypoints_deg, (-1, robot.n))
-    lines = [f"[{', '.join(f'{value:g}' for value in row)}]" for row in rows.tolist()]
     joints = ", ".join(
         f"{name} (m)" if slides else name
         for name, slides in zip(robot.joint_names, robot.is_prismatic, strict=False)
     )
-    waypoints = ",\n                    ".join(line[1:-1] for line in lines)
-    times = ", ".join(f"{time:g}" for time in mission.waypoint_times)
+    start = ", ".join(f"{value:g}" for value in mission.joints_deg)
+    segments = "".join(f"    - {text}\n" for text in mission.segments)
     return (
         f"# Made by `{command}`: from rest to rest within the limits of the joints. Collisions\n"
-        f"# are not checked. A line is a waypoint: {joints}.\n"
-        "mission_node:\n"
-        "  ros__parameters:\n"
-        f"    waypoint_times: [{times}]\n"
-        f"    waypoints_deg: [{waypoints}]\n"
-        "plant_node:\n"
-        "  ros__parameters:\n"
-        f"    initial_joints_deg: {lines[0]}\n"
+        f"# are not checked. Joints: {joints}.\n"
+        "mission:\n"
+        f"  start: {{joints_deg: [{start}]}}\n"
+        f"  segments:\n{segments}"
+        "  limits: {check_actuators: false}\n"
     )
 
 
 def _mission(robot: Robot, points: Array, leg: float) -> MissionSettings:
-    degrees = np.round(robot.to_degrees(points), 3)
+    start, *goals = np.round(robot.to_degrees(points), 3).tolist()
+    rows = (", ".join(f"{value:g}" for value in goal) for goal in goals)
     return MissionSettings(
-        waypoint_times=[index * leg for index in range(len(points))],
-        waypoints_deg=degrees.ravel().tolist(),
+        joints_deg=start,
+        segments=[f"{{joints_deg: [{row}], duration: {leg:g}}}" for row in rows],
+        limits=MissionLimits(check_actuators=False),
     )
 
 
@@ -156,6 +155,11 @@ class NewRobot:
     remarks: tuple[str, ...] = ()
     """Remarks on failures and weak laws, on tools and joints that may be passive, in sentences."""
 
+    @property
+    def duration(self) -> float:
+        """Of the mission, s."""
+        return sum(segment.span or 0.0 for segment in read_segments(self.mission.segments))
+
     def report(self) -> dict[str, Any]:
         """Return the content as data for JSON."""
         return {
@@ -166,7 +170,7 @@ class NewRobot:
             "repaired": list(self.robot.repairs),
             "default_law": self.default_law,
             "remarks": list(self.remarks),
-            "duration": self.mission.waypoint_times[-1],
+            "duration": self.duration,
             "laws": {
                 law: {"failure": flown.failure} if flown.failure else {"rms": flown.rms}
                 for law, flown in self.flights.items()

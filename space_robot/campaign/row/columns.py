@@ -42,7 +42,7 @@ class Columns(NamedTuple):
     drift: tuple[str, ...] = ()
     """`DRIFT` if nothing controls the base's attitude."""
     tool: tuple[str, ...] = ()
-    """`TOOL` if the mission has segments: the tool's error, see `ToolError`."""
+    """`TOOL` if the mission leads the tool: its error, see `ToolError`."""
 
     @property
     def angles(self) -> tuple[str, ...]:
@@ -55,7 +55,7 @@ class Columns(NamedTuple):
         robot = flight.robot
         kinds = robot.n + 3, flight.controls_base, tuple(robot.is_prismatic), robot.branches
         drift = () if flight.controls_base else (DRIFT,)
-        tool = TOOL if flight.mission_settings.has_segments else ()
+        tool = TOOL if flight.mission.leads_tool else ()
         return cls(error_columns(*kinds), torque_columns(*kinds), drift, tool)
 
     @classmethod

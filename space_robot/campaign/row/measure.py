@@ -13,7 +13,7 @@ from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.config.validation import one_of
 from space_robot_msgs_py.errors import InputError
 from space_robot_sim.environment.captures import Captures
-from space_robot_sim.environment.payload import with_payload
+from space_robot_sim.environment.environment import with_payload
 
 from ...analysis.attitude_drift import attitude_drift
 from ...analysis.metrics import tracking_error

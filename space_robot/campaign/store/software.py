@@ -9,7 +9,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from space_robot_control.laws.law_file import law_file
+from space_robot_control.laws.names import law_file
 
 from ...flight.plan import Flight
 from ...processes.software import installed_version, versions

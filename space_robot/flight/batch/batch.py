@@ -7,8 +7,8 @@ from collections.abc import Callable, Generator, Sequence
 from typing import NamedTuple
 
 from space_robot_control.controller.controller import unusable
-from space_robot_control.controller.law_changes import LawChanges
-from space_robot_control.controller.signal_kernels import USABLE
+from space_robot_control.controller.law_choice import LawChoice
+from space_robot_control.controller.signals import USABLE
 from space_robot_msgs_py.bag.blocks import block_bounds
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.compiled.records import assign
@@ -49,7 +49,7 @@ class FlightBatch:
         first = self.flights[0]
         self._law = LawInLanes([flight.controller.law for flight in flights], first.robot.n)
         self._memory = memory_of(self.flights)
-        self._changes = [LawChanges() for _ in flights]
+        self._choices = [LawChoice(flight.law, flight.swaps) for flight in flights]
         self._laws: list[tuple[LawInForce, ...]] = [() for _ in flights]
 
     @property
@@ -112,11 +112,7 @@ class FlightBatch:
         cuts = {*range(first, last, STRETCH_TICKS), *swaps, last}
         for start, stop in itertools.pairwise(sorted(cuts)):
             progress(start)
-            self._swap_laws(start)
-            for k in self._flying:
-                law = self.flights[k].controller.law
-                if change := self._changes[k].at(start, law):
-                    logs.logs[k].laws += (change.law,)
+            self._choose_laws(logs, start)
             tick = start
             while tick < stop and self._flying:
                 plants = [self.flights[k].plant for k in self._flying]
@@ -142,14 +138,15 @@ class FlightBatch:
             begin_tick(self.flights[k].plant, memory.plants, k, end)
         measure_lanes(memory.plants.block, end, first.period)
 
-    def _swap_laws(self, tick: int) -> None:
-        """Let the laws of a planned swap take over."""
-        changed = False
-        for flight in self.flights:
-            law = dict(flight.swaps).get(tick)
-            if law and law.name != flight.controller.law.name:
-                flight.controller.law, changed = law, True
-        if not changed:
+    def _choose_laws(self, logs: LogsInLanes, tick: int) -> None:
+        """Let the laws of a planned swap take over, and log changes."""
+        is_swapped = False
+        for k, (flight, choice) in enumerate(zip(self.flights, self._choices, strict=True)):
+            change = choice.change_at(tick)
+            if change and self._memory.flies[0, k]:
+                logs.logs[k].laws += (change.law,)
+            is_swapped |= flight.controller.use(choice.chosen)
+        if not is_swapped:
             return
         laws = [flight.controller.law for flight in self.flights]
         self._law = LawInLanes(laws, self.flights[0].robot.n)

@@ -6,8 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from space_robot_msgs_py.compiled.kernels import kernel
-from space_robot_msgs_py.compiled.lane_words import as_lanes
-from space_robot_msgs_py.compiled.lanes import WIDTH, lane_of
+from space_robot_msgs_py.compiled.lanes import WIDTH, as_lanes, lane_of
 from space_robot_msgs_py.compiled.records import Block
 from space_robot_sim.plant.lanes import advance_lanes
 from space_robot_sim.plant.tick import RATE_LIMIT

@@ -7,16 +7,13 @@ from typing import Any
 import numpy as np
 from numba import types
 
-from space_robot_control.controller.kernels import apply_transfer
-from space_robot_control.controller.memory import ControllerMemory
-from space_robot_control.controller.signal_kernels import compute_signals
+from space_robot_control.controller.signals import ControllerMemory, compute_signals
+from space_robot_control.controller.tick import apply_transfer
 from space_robot_control.laws import CompiledLaw, laws
-from space_robot_msgs_py.compiled.block_type import block_type
 from space_robot_msgs_py.compiled.lane_type import MASK, array_of_lanes
 from space_robot_msgs_py.compiled.lanes import WIDTH
-from space_robot_msgs_py.compiled.record_type import record_type
-from space_robot_msgs_py.ros.lifeline import hold_to_standard_input
-from space_robot_msgs_py.ros.run_module import module_command
+from space_robot_msgs_py.compiled.record_type import block_type, record_type
+from space_robot_msgs_py.ros.process import hold_to_standard_input, module_command
 from space_robot_msgs_py.samples import Reference, State
 from space_robot_sim.plant.lanes import advance_lanes
 from space_robot_sim.plant.tick import PlantMemory

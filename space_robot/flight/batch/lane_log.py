@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from space_robot_msgs_py.compiled.lanes import WIDTH
-from space_robot_msgs_py.samples import ALL_FIELDS, ReferenceChunk
+from space_robot_msgs_py.samples import ALL_FIELDS, ReferenceChunk, State
+from space_robot_sim.plant.tick import PlantMemory
 
 from ..flown_log import columns_of, empty_log
 from ..plan import Flight
@@ -47,6 +48,7 @@ class LogsInLanes:
         self.lanes = LaneLog(
             tuple(common(getattr(log, name)) for name in ALL_FIELDS),
             tuple(common(measured.get(name)) for name in ALL_FIELDS),
+            np.stack([_places(part, flights[0].robot.n) for part in ("truth", "measured")]),
             common(log.commanded_torque),
             common(log.actuator_commands),
             np.empty((WIDTH, 0, 4, 0)) if log.telemetry is None else common(log.telemetry),
@@ -74,6 +76,14 @@ def _columns(flight: Flight, ticks: int, is_brief: bool) -> list[Array]:
     counts = [WIDTH * ticks * int(np.prod(shape, dtype=int)) for shape in shapes]
     parts = np.split(np.empty(sum(counts)), np.cumsum(counts)[:-1])
     return [part.reshape(WIDTH, ticks, *shape) for part, shape in zip(parts, shapes, strict=True)]
+
+
+def _places(state: str, n: int) -> NDArray[np.int64]:
+    """Return where the signals of a state begin in a `PlantMemory`."""
+    fields, signals = PlantMemory.dtype(n).fields, State.dtype(n).fields
+    assert fields is not None
+    assert signals is not None
+    return np.array([(fields[state][1] + signals[name][1]) // 8 for name in ALL_FIELDS])
 
 
 def _next(columns: Iterator[Array], shape: tuple[int, ...]) -> Array:

@@ -7,17 +7,22 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from space_robot_control.controller.kernels import apply_transfer
-from space_robot_control.controller.signal_kernels import USABLE, compute_signals
-from space_robot_control.laws.compiled import LawCode
+from space_robot_control.controller.signals import USABLE, compute_signals
+from space_robot_control.controller.tick import apply_transfer
+from space_robot_control.laws.base import LawCode
 from space_robot_model.dynamics.rho_space import force_for
 from space_robot_msgs_py.compiled.kernels import RecordFunction, kernel
-from space_robot_msgs_py.compiled.lane_rows import spread
-from space_robot_msgs_py.compiled.lane_words import as_lanes
-from space_robot_msgs_py.compiled.lanes import WIDTH, any_lane, lane_of, negated, where, with_lane
+from space_robot_msgs_py.compiled.lanes import (
+    WIDTH,
+    any_lane,
+    as_lanes,
+    lane_of,
+    negated,
+    where,
+    with_lane,
+)
 from space_robot_msgs_py.compiled.records import Block
-from space_robot_msgs_py.samples import State
-from space_robot_sim.plant.lanes import advance_lanes
+from space_robot_sim.plant.lanes import advance_lanes, spread
 from space_robot_sim.plant.tick import RATE_LIMIT
 from space_robot_sim.sensors.sensors import sense
 
@@ -80,6 +85,8 @@ class LaneLog(NamedTuple):
     """Columns of true states, (8, N, c) each, in the order of `State`."""
     measured: Any
     """The same of measured states; without rows if they are the true ones."""
+    places: NDArray[np.int64]
+    """(2, ...) of the signals in `PlantMemory`: of true and of measured states."""
     commanded_torque: Array
     actuator_commands: Array
     telemetry: Array
@@ -125,9 +132,9 @@ def fly_lanes(
         k = row + tick - start
         if tick > start:
             sense(plant.sensors, plant.truth, tick, period, plant.measured)
-        _log_state(log.truth, k, plant.truth)
+        _log_state(log.truth, k, log.places[0], memory.plants.numbers)
         if log.measured[0].shape[1] > 0:
-            _log_state(log.measured, k, plant.measured)
+            _log_state(log.measured, k, log.places[1], memory.plants.numbers)
         _refer(references, k, memory.reference_numbers)
         status = compute_signals(
             controllers,
@@ -203,25 +210,13 @@ def _refer(references: References, row: int, numbers: Array) -> None:
 
 
 @kernel
-def _log_state(columns: Any, row: int, state: State) -> None:
-    spread(state.base_position, columns[0][:, row])
-    spread(state.quaternion, columns[1][:, row])
-    spread(state.base_velocity, columns[2][:, row])
-    spread(state.omega_base, columns[3][:, row])
-    spread(state.joint_positions, columns[4][:, row])
-    spread(state.joint_velocities, columns[5][:, row])
-    spread(state.applied_torque, columns[6][:, row])
-    spread(state.wheel_velocities, columns[7][:, row])
-    spread(state.wheel_torques, columns[8][:, row])
-    spread(state.thrusts, columns[9][:, row])
-    spread(state.passive_positions, columns[10][:, row])
-    spread(state.passive_velocities, columns[11][:, row])
-    spread(state.motor_positions, columns[12][:, row])
-    spread(state.motor_velocities, columns[13][:, row])
-    spread(state.orbit_position, columns[14][:, row])
-    spread(state.orbit_velocity, columns[15][:, row])
-    spread(state.magnetic_field, columns[16][:, row])
-    spread(state.external_torques, columns[17][:, row])
+def _log_state(columns: Any, row: int, places: NDArray[np.int64], numbers: Array) -> None:
+    """Write the signals of a state, at their places in ``numbers`` (N, 8), into their columns."""
+    for k in range(len(places)):
+        column = columns[k]
+        for lane in range(WIDTH):
+            for i in range(column.shape[2]):
+                column[lane, row, i] = numbers[places[k] + i, lane]
 
 
 @kernel

@@ -8,10 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from space_robot_control.controller.controller import Controller
-from space_robot_control.controller.memory import ControllerMemory
+from space_robot_control.controller.signals import ControllerMemory
 from space_robot_control.laws import ControlLaw
-from space_robot_control.laws.base import LawMemory
-from space_robot_control.laws.compiled import CompiledLaw, LawCode, SomeGains
+from space_robot_control.laws.base import CompiledLaw, LawCode, LawMemory, SomeGains
 from space_robot_msgs_py.compiled.lanes import WIDTH
 from space_robot_msgs_py.compiled.records import Block, Record, prefix
 from space_robot_msgs_py.samples import Reference

@@ -6,8 +6,8 @@ from collections.abc import Hashable, Iterable, Iterator
 from functools import cache
 from typing import Any
 
-from space_robot_control.controller.memory import ControllerMemory
-from space_robot_control.laws.compiled import CompiledLaw
+from space_robot_control.controller.signals import ControllerMemory
+from space_robot_control.laws.base import CompiledLaw
 from space_robot_msgs_py.compiled.lanes import WIDTH
 from space_robot_msgs_py.errors import InputError
 from space_robot_sim.plant.plant import Plant

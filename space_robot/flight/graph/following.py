@@ -8,13 +8,13 @@ from functools import partial
 from typing import Any, NamedTuple
 
 from space_robot_msgs_py.errors import FlightError
-from space_robot_sim.plant.run_control import PAUSED
+from space_robot_sim.plant.pacing import PAUSED
 
 from ...console.progress import FlightProgress, flight_progress
 from ...processes.interruption import exit_code
 from ...scenario.faults import NODE_OF
 from ..plan import Flight
-from .foreign import ForeignNodes
+from .domain import refuse_publishers
 from .injection import Injector
 from .listeners import wait_for
 from .monitor import Event, Monitor
@@ -131,7 +131,7 @@ class _Follower:
         self._graph, self._monitor, self._stopped = graph, monitor, stopped
         options = flight.scenario.options
         self._names = started_nodes(options.without)
-        self._foreign = ForeignNodes(monitor.node, self._names, topics_of(options.without))
+        self._topics_of_others = topics_of(options.without)
         self._own = OwnNodes(monitor.node, options.without, options.join_timeout)
         self._fault_kinds = frozenset(fault.kind.name for fault in flight.scenario.process_faults)
         self._realtime = flight.plant_settings.realtime
@@ -159,7 +159,8 @@ class _Follower:
         show(0.0, "configuring the nodes")
         self._change(self._names, "configure")
         if not nobody_was_there:
-            self._foreign.wait(self._check_start)
+            node, of_others = self._monitor.node, self._topics_of_others
+            refuse_publishers(node, self._names, of_others, self._check_start)
         for name in self._names:
             self._change([name], "activate")
         show.say(
@@ -185,7 +186,6 @@ class _Follower:
             time.sleep(INJECTING_POLL_S if injector.is_busy else POLL_S)
             news = [*monitor.poll(), *injector.poll(monitor.simulated_s)]
             news += self._watch.poll(monitor.simulated_s)
-            self._foreign.watch()
             if arrived := self._own.arrived():
                 show.say(arrived)
             self._show_progress(show)

@@ -11,15 +11,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from space_robot_msgs_py import topics
-from space_robot_msgs_py.config.namespace import relative
+from space_robot_msgs_py.config.validation import relative
 from space_robot_msgs_py.errors import MessageError
-from space_robot_msgs_py.wire.controller_telemetry import SIGNALS, TelemetryCodec
 from space_robot_msgs_py.wire.definitions import decode
+from space_robot_msgs_py.wire.messages import TELEMETRY_ROWS
+from space_robot_msgs_py.wire.telemetry import TelemetryCodec
 
 from .temporary_node import TemporaryNode
 
 Array = NDArray[np.float64]
 
+MONITOR = "flight_monitor"
+"""Name of the node with which a flight is followed."""
 MOST_AT_ONCE = 1_000
 """Messages of a topic read in one poll, in case of a flood."""
 
@@ -40,11 +43,7 @@ class Monitor:
     """Simulated time from /clock, errors from telemetry, the nodes' modes from /diagnostics."""
 
     def __init__(
-        self,
-        domain: int,
-        namespace: str = topics.ROOT,
-        name: str = "flight_monitor",
-        period: float = 0.0,
+        self, domain: int, namespace: str = topics.ROOT, name: str = MONITOR, period: float = 0.0
     ) -> None:
         """Join the graph.
 
@@ -101,8 +100,8 @@ class Monitor:
 
     def _read_telemetry(self, data: bytes) -> list[Event]:
         _, rows = TelemetryCodec.decode(data)
-        if rows.ndim == 2 and len(rows) == len(SIGNALS) and rows.shape[1] > 3:
-            self.error = rows[SIGNALS.index("e")]
+        if rows.ndim == 2 and len(rows) == len(TELEMETRY_ROWS) and rows.shape[1] > 3:
+            self.error = rows[TELEMETRY_ROWS.index("e")]
         return []
 
     def _read_diagnostics(self, data: bytes) -> list[Event]:

@@ -13,15 +13,14 @@ from typing import Any
 import click
 import yaml
 
-from space_robot_control.allocation.assumed_actuators import OWNER
 from space_robot_model.robot.find import robot_files
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.bag.folder import open_bag
 from space_robot_msgs_py.bag.reader import read_flight
 from space_robot_msgs_py.bag.selection import Selection
-from space_robot_msgs_py.config.extras import install_command
 from space_robot_msgs_py.config.files import GIVEN
+from space_robot_msgs_py.config.installation import install_command
 from space_robot_msgs_py.errors import FlightError, InputError, SpaceRobotError
 
 from ...processes.interruption import handled_signals
@@ -33,8 +32,10 @@ from .composed import NAME, composed_command, write_parameters
 from .domain import is_quiet, ros_domain
 from .following import follow
 from .listeners import reset_with, wait_for
+from .monitor import MONITOR
 from .node_server import Program
 from .processes import Command, Graph, node_command, node_environment
+from .temporary_node import own_name
 
 COMPOSED_DRAIN_S = 0.002
 """Period of the recorder in one process with the other nodes, which wait while it writes."""
@@ -79,6 +80,8 @@ def fly(
             for remark in remarks:
                 _say(remark)
             parameters = flight_parameters(flight, bag)
+            if flight.scenario.process_faults:  # injected by the clock that the monitor hears
+                parameters["plant"]["wait_for"].append(f"{own_name(MONITOR)}:{topics.CLOCK.name}")
             with ScratchFolder() as scratch:
                 folder = Path(scratch)
                 parameters = with_files(parameters, flight, folder)
@@ -235,7 +238,7 @@ def with_files(parameters: Parameters, flight: Flight, folder: Path) -> dict[str
             named[node]["robot"] = _write(folder / f"{option}.yaml", numbers[option])
     if named["controller"].get("actuators") == GIVEN or "assumed_actuators" in numbers:
         assumed = flight.scenario.assumed_actuators.model_dump(mode="json")
-        content = {f"{OWNER}_node": {"ros__parameters": assumed}}
+        content = {"plant_node": {"ros__parameters": assumed}}
         named["controller"]["actuators"] = _write(folder / "assumed_actuators.yaml", content)
     return named
 

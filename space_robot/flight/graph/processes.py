@@ -16,9 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from space_robot_msgs_py.errors import FlightError
-from space_robot_msgs_py.ros import lifeline
-from space_robot_msgs_py.ros.process_environment import defaults
-from space_robot_msgs_py.ros.run_module import clean_environment
+from space_robot_msgs_py.ros.process import clean_environment, defaults, lifeline
 from space_robot_msgs_py.topics import ROOT
 
 from ...processes.node_modules import MODULES
@@ -52,7 +50,7 @@ def begin_loading() -> None:
 
 def node_environment(domain: int) -> dict[str, str]:
     """Return a node's environment: the project's defaults unless the user set others."""
-    return {**defaults(), **clean_environment(), **lifeline.held(), "ROS_DOMAIN_ID": str(domain)}
+    return {**defaults(), **clean_environment(), **lifeline(), "ROS_DOMAIN_ID": str(domain)}
 
 
 def node_command(node: str, parameters: Mapping[str, Any], namespace: str = ROOT) -> Command:

@@ -6,7 +6,7 @@ import time
 import uuid
 from typing import Any
 
-from space_robot_msgs_py.config.namespace import full_namespace
+from space_robot_msgs_py.config.validation import full_namespace
 from space_robot_msgs_py.errors import FlightError, InputError
 from space_robot_msgs_py.ros.locks import is_held, living_nodes, node_lock
 from space_robot_sim.plant.settings import MOST_TICKS

@@ -5,8 +5,13 @@ from __future__ import annotations
 import os
 
 from space_robot_msgs_py.errors import FlightError
-from space_robot_msgs_py.ros.process_environment import set_defaults
+from space_robot_msgs_py.ros.process import set_defaults
 from space_robot_msgs_py.topics import ROOT
+
+
+def own_name(name: str) -> str:
+    """Return the name of this process's node of a ``name``."""
+    return f"{name}_{os.getpid()}"
 
 
 class TemporaryNode:
@@ -34,7 +39,7 @@ class TemporaryNode:
         except Exception as error:  # RCLError is private
             raise FlightError(f"ROS does not start: {str(error).splitlines()[0]}") from None
         self.node = rclpy.create_node(
-            f"{name}_{os.getpid()}",
+            own_name(name),
             context=self._context,
             namespace=namespace,
             start_parameter_services=False,

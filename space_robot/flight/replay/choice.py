@@ -9,7 +9,7 @@ from typing import Any
 
 import yaml
 
-from space_robot_control.allocation.assumed_actuators import OWNER, assumed_actuators
+from space_robot_control.allocation.settings import assumed_actuators
 from space_robot_control.controller.gains import (
     build_law,
     build_laws,
@@ -17,14 +17,13 @@ from space_robot_control.controller.gains import (
     gains_as_path,
     split_gains,
 )
-from space_robot_control.controller.plain_laws import NoLaw
+from space_robot_control.controller.law_choice import NoLaw, parse_swaps
 from space_robot_control.controller.settings import DEFAULT, ControllerNodeSettings
-from space_robot_control.controller.swaps import parse_swaps
 from space_robot_control.laws import ControlLaw, find_law
-from space_robot_control.laws.trust import check_file, check_law, is_plain
+from space_robot_control.laws.names import is_plain, require_shipped_file, require_shipped_law
 from space_robot_model.robot import Robot
 from space_robot_model.robot.find import OWN, find_robot
-from space_robot_msgs_py.config.trees import Tree, flatten
+from space_robot_msgs_py.config.files import Tree, flatten
 from space_robot_msgs_py.config.validation import one_of
 from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.samples import LawInForce, RobotNames
@@ -133,16 +132,16 @@ class ControllerChoice:
     def _check_laws(self, named: str, flown: Mapping[str, Any]) -> None:
         """Check that no law but those shipped, or given by the user, is imported."""
         if "controller" not in self._said:
-            check_law(named)
+            require_shipped_law(named)
         if "swaps" not in self._said:
             for swap in self._flown_swaps:
-                check_law(_law_of_swap(swap))
+                require_shipped_law(_law_of_swap(swap))
 
     def _check_files(self, flown: Mapping[str, Any]) -> None:
         """Check that no file is read whose path the bag tells."""
         for what in ("robot", "gains", "navigation_sensors", "actuators"):
             if what not in self._said and self.parameters.get(what) == flown.get(what, ""):
-                check_file(what, str(flown[what]))
+                require_shipped_file(what, str(flown[what]))
 
     def _robot(self, flown: Mapping[str, Any]) -> dict[str, str]:
         """The recorded robot as a file of its name, which also chooses its gains."""
@@ -162,7 +161,7 @@ class ControllerChoice:
             return {}
         name = Path(str(flown.get("actuators", ""))).stem
         path = self._folder / f"actuators_{name if is_plain(name) else 'recorded'}.yaml"
-        _write(path, {f"{OWNER}_node": {"ros__parameters": content}})
+        _write(path, {"plant_node": {"ros__parameters": content}})
         return {"actuators": str(path)}
 
     def _gains(self, of_laws: Mapping[str, Tree]) -> dict[str, Any]:

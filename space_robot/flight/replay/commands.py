@@ -13,10 +13,9 @@ from space_robot_msgs_py import topics
 from space_robot_msgs_py.errors import MessageError
 from space_robot_msgs_py.samples import Timebase
 from space_robot_msgs_py.wire.cdr import header_stamp_ns
-from space_robot_msgs_py.wire.command import Commands
-from space_robot_msgs_py.wire.compiled_codec import FOREIGN, CompiledCodec
+from space_robot_msgs_py.wire.codecs import FOREIGN, CompiledCodec
 from space_robot_msgs_py.wire.definitions import decode
-from space_robot_msgs_py.wire.message import name_order
+from space_robot_msgs_py.wire.messages import describe, name_order
 
 Array = NDArray[np.float64]
 Ticks = NDArray[np.int64]
@@ -59,9 +58,7 @@ class CommandList:
 
     def __init__(self, axis_names: tuple[str, ...], timebase: Timebase) -> None:
         self._names, self._timebase = axis_names, timebase
-        own, former = (Commands(axis_names, timebase) for _ in range(2))
-        former.frame_id = topics.FORMER_BASE_FRAME
-        self._usual = (CompiledCodec(own), CompiledCodec(former))
+        self._usual = CompiledCodec(describe(topics.COMMAND, axis_names, timebase))
         self._torque = np.zeros(len(axis_names))
         usual = Form(topics.BASE_FRAME, str(list(axis_names)))
         self._forms: dict[Form, int] = {usual: 0}
@@ -70,12 +67,9 @@ class CommandList:
 
     def add(self, data: bytes) -> int | None:
         """Take a message; the tick it answers, or None if it is not readable."""
-        form, stamp_ns = 0, FOREIGN
+        form = 0
         try:
-            for codec in self._usual:
-                if (stamp_ns := codec.read(data, self._torque)) != FOREIGN:
-                    break
-            if stamp_ns == FOREIGN:
+            if (stamp_ns := self._usual.read(data, self._torque)) == FOREIGN:
                 stamp_ns, form = self._read_foreign(data)
             tick = self._timebase.tick(stamp_ns)
         except MessageError:

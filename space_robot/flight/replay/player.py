@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from space_robot_msgs_py import topics
-from space_robot_msgs_py.errors import FlightError, InputError
+from space_robot_msgs_py.errors import FlightError
 
 from ..graph.temporary_node import TemporaryNode
 from .commands import CommandList, Ticks
@@ -51,27 +51,17 @@ class Player:
             domain: to join.
             answers: to add the controller's to.
             parts: of a state, in the order in which they are sent.
-
-        Raises:
-            InputError: a plant or a mission is in this domain.
         """
         from space_robot_msgs_py.ros.endpoints import (
             PolledCallbackGroup,
             RawPublisher,
             RawSubscription,
+            Waiter,
         )
-        from space_robot_msgs_py.ros.exclusive import TopicClaim
-        from space_robot_msgs_py.ros.waiting import Waiter, take_or_wait
 
-        self._take_or_wait = take_or_wait
         self._visitor = TemporaryNode("replay_node", domain)
         self.node = self._visitor.node
         self._outs = {t.name: RawPublisher(self.node, t) for t in (*parts, *REFERENCES)}
-        try:
-            self._claim = TopicClaim(self.node, list(self._outs))
-        except InputError:
-            self._visitor.leave()
-            raise
         self._parts_out = [self._outs[topic.name] for topic in parts]
         self._commands = RawSubscription(self.node, topics.COMMAND, PolledCallbackGroup())
         self._waiter = Waiter(self.node)
@@ -90,7 +80,6 @@ class Player:
         error: BaseException | None,
         traceback: TracebackType | None,
     ) -> None:
-        self._claim.release()
         self._visitor.leave()
 
     @property
@@ -102,22 +91,14 @@ class Player:
         """Return when the controller listens to all topics.
 
         Raises:
-            InputError: somebody else publishes states or references here.
             FlightError: it does not come.
         """
-        from space_robot_msgs_py.ros.exclusive import foreign_publishers
-
         until = time.monotonic() + LISTENER_TIMEOUT_S
         while any(out.missing_listeners([CONTROLLER]) for out in self._outs.values()):
             self.check()
             if time.monotonic() > until:
                 raise FlightError(f"{CONTROLLER} does not listen for {LISTENER_TIMEOUT_S:.0f} s")
             time.sleep(POLL_S)
-        if foreign := foreign_publishers(self.node, list(self._outs)):
-            topic, names = next(iter(foreign.items()))
-            raise InputError(
-                f"{topic} is also published by {', '.join(names)}: take another domain"
-            )
 
     def resend_pending(self) -> None:
         """Send the current reference again, as a mission does for new subscribers."""
@@ -216,7 +197,10 @@ class Player:
         begin = time.monotonic()
         ask_again = begin + ASK_AGAIN_S
         while True:
-            data = self._take_or_wait(self._commands, self._waiter, POLL_S)
+            data = self._commands.take()
+            if data is None:
+                self._waiter.wait((self._commands,), POLL_S)
+                data = self._commands.take()
             if data is not None:
                 if self._answers.add(data) == state.tick:
                     return True

@@ -13,19 +13,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from space_robot_msgs_py import topics
-from space_robot_msgs_py.bag.accounts import noted_accounts
 from space_robot_msgs_py.bag.description import read_description
 from space_robot_msgs_py.bag.folder import open_bag
-from space_robot_msgs_py.bag.message_accounting import message_tick, topics_with_allowed_gaps
+from space_robot_msgs_py.bag.message_accounting import (
+    message_tick,
+    noted_accounts,
+    topics_with_allowed_gaps,
+)
 from space_robot_msgs_py.bag.reader import first_states, missing, read_flight, timebase_of
-from space_robot_msgs_py.bag.robots import REQUIRED
-from space_robot_msgs_py.bag.rows import stamps_of
-from space_robot_msgs_py.bag.selection import Selection
+from space_robot_msgs_py.bag.selection import REQUIRED, Selection
 from space_robot_msgs_py.config.text import printable
 from space_robot_msgs_py.errors import InputError, MessageError
 from space_robot_msgs_py.samples import LawInForce, in_order
 from space_robot_msgs_py.topics import Topic
-from space_robot_msgs_py.wire.controller_law import LawCodec
+from space_robot_msgs_py.wire.telemetry import LawCodec
 
 from .commands import CommandList, ReplayedCommands
 
@@ -82,7 +83,7 @@ class Recording:
             for topic, batch in self._selection.batches():
                 counts[topic] += len(batch)
                 if topic is topics.JOINT_STATES:
-                    states.take(stamps_of(batch))
+                    states.take(batch.stamps)
             for topic in REQUIRED:
                 if not counts[topic]:
                     raise missing(topic, self._bag, self._selection)

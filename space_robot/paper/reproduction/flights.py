@@ -6,8 +6,8 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
-from space_robot_control.navigation.settings import Mode
-from space_robot_msgs_py.config.directory import config_directory
+from space_robot_control.navigation.settings import NavigationMode
+from space_robot_msgs_py.config.installation import config_directory
 from space_robot_msgs_py.config.validation import read_yaml
 from space_robot_msgs_py.errors import DivergedError, InputError
 
@@ -82,7 +82,7 @@ class Equipment(NamedTuple):
 
     sensors: str = "ideal"
     """Name of a file in config/sensors, or a path."""
-    navigation: Mode = "direct"
+    navigation: NavigationMode = "direct"
     actuators: str = "ideal"
     """Name of a file in config/actuators, or a path."""
 
@@ -186,7 +186,7 @@ def parameters(flight: Flight) -> dict[str, Any]:
         "plant": flight.plant_settings.model_dump(exclude={"mission", "wait_for"}),
         "gains": flight.scenario.gains_used,
         "mission": {
-            "waypoint_times_s": flight.mission_settings.waypoint_times,
-            "waypoints_deg": flight.mission_settings.waypoints_deg,
+            "start_deg": flight.mission_settings.joints_deg,
+            "segments": flight.mission_settings.segments,
         },
     }

@@ -10,7 +10,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-from space_robot_msgs_py.config.directory import config_directory
+from space_robot_msgs_py.config.installation import config_directory
 from space_robot_msgs_py.errors import InputError
 
 from ...analysis.figures.figure_set import FigureFolder

@@ -17,7 +17,7 @@ from contextlib import contextmanager, suppress
 from queue import Empty, SimpleQueue
 from typing import TYPE_CHECKING, Any
 
-from space_robot_msgs_py.config.extras import install_command
+from space_robot_msgs_py.config.installation import install_command
 from space_robot_msgs_py.errors import InputError, SpaceRobotError
 
 from ..software import versions

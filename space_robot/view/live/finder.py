@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from space_robot_msgs_py import topics
-from space_robot_msgs_py.config.namespace import full_namespace
+from space_robot_msgs_py.config.validation import full_namespace
 from space_robot_msgs_py.ros.locks import newest_node, nodes_in
 
 from ...flight.graph.domain import domain_asked_for

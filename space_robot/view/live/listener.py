@@ -13,21 +13,13 @@ from space_robot_model.orbit.elements import state_of
 from space_robot_model.robot import Robot
 from space_robot_model.robot.find import find_robot
 from space_robot_msgs_py import topics
+from space_robot_msgs_py.config.files import nest
 from space_robot_msgs_py.config.settings import leaves
-from space_robot_msgs_py.config.trees import nest
 from space_robot_msgs_py.config.validation import StrictModel, validate
 from space_robot_msgs_py.errors import InputError, MessageError
 from space_robot_msgs_py.samples import RobotNames, RobotState, Timebase
-from space_robot_msgs_py.wire.base_state import BaseState
-from space_robot_msgs_py.wire.controller_law import LawCodec
-from space_robot_msgs_py.wire.joint_states import JointStates
-from space_robot_msgs_py.wire.message import MessageDescription
-from space_robot_msgs_py.wire.thrusters_state import ThrustersState
-from space_robot_msgs_py.wire.truth_base import TruthBase
-from space_robot_msgs_py.wire.truth_joints import TruthJoints
-from space_robot_msgs_py.wire.truth_orbit import TruthOrbit
-from space_robot_msgs_py.wire.wheels_state import WheelsState
-from space_robot_sim.environment.orbit_settings import OrbitSettings
+from space_robot_msgs_py.wire.telemetry import LawCodec
+from space_robot_sim.environment.orbit import OrbitSettings
 
 from ...flight.graph.monitor import Event, Monitor
 from ...flight.graph.node_names import PLANT
@@ -38,8 +30,7 @@ from .state_topic import StateTopic
 Array = NDArray[np.float64]
 Schema = TypeVar("Schema", bound=StrictModel)
 
-MEASURED: tuple[type[MessageDescription], ...] = (JointStates, BaseState)
-TRUE: tuple[type[MessageDescription], ...] = (TruthJoints, TruthBase)
+MEASURED = (topics.JOINT_STATES, topics.BASE_STATE)
 
 
 class Sample(NamedTuple):
@@ -84,10 +75,10 @@ class Listener:
 
         self._monitor = Monitor(place.domain, place.namespace, "viewer")
         self._group = PolledCallbackGroup()
-        self._topics: dict[type[MessageDescription], StateTopic] = {}
+        self._topics: dict[topics.Topic, StateTopic] = {}
         try:
             # before the request: a short flight may be over when the plant has answered
-            for kind in (*MEASURED, *TRUE):
+            for kind in (*MEASURED, *topics.TRUTH):
                 self._topics[kind] = StateTopic(self._monitor.node, self._group, kind)
             self._law = RawSubscription(self._monitor.node, topics.LAW, self._group)
             self.robot, period = self._ask_plant(robot, check)
@@ -101,7 +92,7 @@ class Listener:
         for topic in self._topics.values():
             topic.describe(self._names, self._timebase)
         self._hardware_names = self.actuators.robot_names(self.robot)
-        self._newest_topics: dict[type[MessageDescription], StateTopic] = {}
+        self._newest_topics: dict[topics.Topic, StateTopic] = {}
         """Topics of which the newest row is taken, whatever its tick."""
         self._state = RobotState.allocate(self.robot.n)
         if self.orbit:
@@ -177,10 +168,9 @@ class Listener:
 
     def _take_newest(self) -> None:
         """Take what changes little in a few ticks: orbit, wheels and thrusters."""
-        kinds: list[type[MessageDescription]] = []
-        kinds += [TruthOrbit] if self.orbit else []
-        kinds += [WheelsState] if self.actuators.wheel_count else []
-        kinds += [ThrustersState] if self.actuators.thruster_count else []
+        kinds = [topics.TRUTH_ORBIT] if self.orbit else []
+        kinds += [topics.WHEELS_STATE] if self.actuators.wheel_count else []
+        kinds += [topics.THRUSTERS_STATE] if self.actuators.thruster_count else []
         for kind in kinds:
             if kind not in self._newest_topics:
                 topic = StateTopic(self._monitor.node, self._group, kind)
@@ -207,9 +197,10 @@ class Listener:
         """Subscribe to the true states if they are published, else to the measured ones."""
         for topic in self._topics.values():
             topic.take()
-        heard = TruthBase in self._topics and bool(self._topics[TruthBase].rows)
+        truth = self._topics.get(topics.TRUTH_BASE)
+        heard = truth is not None and bool(truth.rows)
         is_sent = bool(self._monitor.node.count_publishers(topics.TRUTH_BASE.name))
-        kinds = (TRUE if is_sent or heard else MEASURED) if with_states else ()
+        kinds = (topics.TRUTH if is_sent or heard else MEASURED) if with_states else ()
         for kind in [kind for kind in self._topics if kind not in kinds]:
             self._topics.pop(kind).close()
         while self._newest_topics and not with_states:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from space_robot_model.orbit.elements import state_of
 from space_robot_model.robot import Robot
-from space_robot_sim.environment.orbit_settings import OrbitSettings
+from space_robot_sim.environment.orbit import OrbitSettings
 
 from ..arrows import ArrowSize, BaseArrows, arrow_directions, arrow_kinds
 from ..earth import Earth

@@ -28,7 +28,7 @@ from .window import Curves
 if TYPE_CHECKING:
     from viser import LineSegmentsHandle, SceneApi, ViserServer
 
-    from space_robot_sim.environment.orbit_settings import OrbitSettings
+    from space_robot_sim.environment.orbit import OrbitSettings
 
     from .listener import Listener, Sample
 

@@ -1,21 +1,122 @@
-"""Expressions of kernels as expressions of C."""
+"""Expressions of kernels as expressions of C.
+
+The functions that kernels may call beside one another are exact in IEEE arithmetic, so C's library
+cannot differ: square root, remainder, rounding to an integer, sign. Where Python, Numba and C
+differ (minimum and maximum of NaN, the sign of an integer division, an integer from a large float)
+``templates/kernels.h.j2`` has what Numba does.
+"""
 
 from __future__ import annotations
 
 import ast
 import builtins
+import math
 import operator
 from collections.abc import Callable
 from dataclasses import replace
+from functools import reduce
 from types import ModuleType
 from typing import Any
 
+import numpy as np
+
+from space_robot_msgs_py.compiled import lanes
 from space_robot_msgs_py.compiled.records import Field as RecordField
 
 from . import language as lang
 from .language import ArrayOf, Known, Pointer, RefusedError, Value, cast, number_of
-from .words import WORDS, chosen, negated
 
+Word = Callable[[tuple[Value, ...]], Value]
+
+
+def _exact(name: str, kind: Any = lang.FLOAT) -> Word:
+    def word(arguments: tuple[Value, ...]) -> Value:
+        texts = ", ".join(cast(argument, lang.FLOAT).text for argument in arguments)
+        return Value(kind, f"{name}({texts})", lang.ATOM, calls=max(a.calls for a in arguments))
+
+    return word
+
+
+def _absolute(arguments: tuple[Value, ...]) -> Value:
+    if arguments[0].type != lang.FLOAT:
+        raise RefusedError("abs() of an integer", "write a conditional expression")
+    return _exact("fabs")(arguments)
+
+
+def _extreme(name: str) -> Word:
+    def word(arguments: tuple[Value, ...]) -> Value:
+        kind = reduce(lang.joined, (argument.type for argument in arguments))
+        calls = max(argument.calls for argument in arguments)
+        pair = Value(kind, f"{name}{'_int' if kind == lang.INT else ''}", calls=calls)
+        values = [cast(argument, kind) for argument in arguments]
+        if all(value.constant is not None for value in values):
+            function = max if name == "py_max" else min
+            return number_of(function(value.constant for value in values))
+        return reduce(lambda a, b: replace(pair, text=f"{pair.text}({a.text}, {b.text})"), values)
+
+    return word
+
+
+def _integer(arguments: tuple[Value, ...]) -> Value:
+    (value,) = arguments
+    if value.type == lang.INT:
+        return value
+    if value.constant is not None:
+        return number_of(int(value.constant))
+    if value.type == lang.BOOL:
+        return cast(value, lang.INT)
+    return replace(value, type=lang.INT, text=f"py_int({value.text})", rank=lang.ATOM)
+
+
+def negated(arguments: tuple[Value, ...]) -> Value:
+    """Return ``not x``."""
+    value = cast(arguments[0], lang.BOOL)
+    constant = None if value.constant is None else not value.constant
+    return replace(value, text=f"!{value.at(lang.UNARY)}", rank=lang.UNARY, constant=constant)
+
+
+def chosen(arguments: tuple[Value, ...]) -> Value:
+    """Return ``then if condition else otherwise``."""
+    condition, then, otherwise = arguments
+    condition = cast(condition, lang.BOOL)
+    kind = lang.joined(then.type, otherwise.type)
+    if not isinstance(kind, lang.TupleOf):
+        then, otherwise = cast(then, kind), cast(otherwise, kind)
+    if condition.constant is not None:
+        return then if condition.constant else otherwise
+    if then.text == otherwise.text:
+        return then
+    calls = max(condition.calls, then.calls, otherwise.calls)
+    both = f"{then.at(lang.TERNARY + 1)} : {otherwise.at(lang.TERNARY + 1)}"
+    text = f"{condition.at(lang.UNARY)} ? {both}"
+    return Value(kind, text, lang.TERNARY, calls=calls)
+
+
+WORDS: dict[Any, Word] = {
+    abs: _absolute,
+    min: _extreme("py_min"),
+    max: _extreme("py_max"),
+    int: _integer,
+    float: lambda a: cast(a[0], lang.FLOAT),
+    bool: lambda a: cast(a[0], lang.BOOL),
+    math.sqrt: _exact("sqrt"),
+    np.sqrt: _exact("sqrt"),
+    np.floor: _exact("floor"),
+    np.fmod: _exact("fmod"),
+    math.copysign: _exact("copysign"),
+    np.copysign: _exact("copysign"),
+    np.sign: _exact("py_sign"),
+    np.isfinite: _exact("py_isfinite", lang.BOOL),
+    np.isnan: _exact("py_isnan", lang.BOOL),
+    math.isnan: _exact("py_isnan", lang.BOOL),
+    lanes.where: chosen,
+    lanes.uniform: lambda a: a[0],
+    lanes.whole: _integer,
+    lanes.any_lane: lambda a: cast(a[0], lang.BOOL),
+    lanes.all_lanes: lambda a: cast(a[0], lang.BOOL),
+    lanes.negated: negated,
+}
+"""Functions that kernels may call beside one another."""
 ARITHMETIC: dict[type[ast.operator], tuple[str, int, Callable[[Any, Any], Any]]] = {
     ast.Add: ("+", lang.SUM, operator.add),
     ast.Sub: ("-", lang.SUM, operator.sub),
@@ -117,11 +218,9 @@ class Expressions:
         text = f"{owner.at(lang.POSTFIX)}{arrow}«{id(record)}:{name}»"
         if not isinstance(declared, RecordField):
             return Value(Pointer(declared), text, lang.POSTFIX, roots=owner.roots, is_pointer=False)
-        shape = self.program.shape(record, name)
-        constant = self.program.constants.get(field)
-        if not shape:
-            return Value(lang.FLOAT, text, lang.POSTFIX, constant, owner.roots, frozenset({field}))
-        return Value(ArrayOf(shape), text, lang.POSTFIX, constant, owner.roots, frozenset({field}))
+        shape, constant = self.program.shape(record, name), self.program.constants.get(field)
+        kind = ArrayOf(shape) if shape else lang.FLOAT
+        return Value(kind, text, lang.POSTFIX, constant, owner.roots, frozenset({field}))
 
     @staticmethod
     def length(array: Value) -> Value:
@@ -182,14 +281,11 @@ class Expressions:
     def element(owner: Value, place: Value) -> Value:
         """Return an element, or a row, of an array."""
         text = place.text
-        if owner.offset:
-            text = (
-                owner.offset
-                if place.constant == 0
-                else f"{owner.offset} + {place.at(lang.PRODUCT)}"
-            )
-            if place.constant is not None and owner.offset.isdigit():
-                text = str(int(owner.offset) + place.constant)
+        if owner.offset and place.constant is not None and owner.offset.isdigit():
+            text = str(int(owner.offset) + place.constant)
+        elif owner.offset:
+            rest = "" if place.constant == 0 else f" + {place.at(lang.PRODUCT)}"
+            text = f"{owner.offset}{rest}"
         rest = owner.type.shape[1:]
         kind = ArrayOf(rest) if rest else lang.FLOAT
         element = f"{owner.at(lang.POSTFIX)}[{text}]"
@@ -211,15 +307,11 @@ class Expressions:
         return replace(owner, type=ArrayOf((known,)), offset=offset)
 
     def _tuple(self, node: ast.Tuple) -> Value:
-        return self.tuple_of([self.translate(item) for item in node.elts])
-
-    def tuple_of(self, items: list[Value]) -> Value:
-        """Return a tuple of values."""
+        items = [self.translate(item) for item in node.elts]
         items = [cast(item, lang.FLOAT) if item.type == lang.INT else item for item in items]
         kind = lang.TupleOf(tuple(item.type for item in items))
-        texts = ", ".join(item.text for item in items)
-        inside = f"{{{{{texts}}}}}" if kind.is_uniform else f"{{{texts}}}"
-        text = f"({self.program.tuple_name(kind)}){inside}"
+        texts, name = ", ".join(item.text for item in items), self.program.tuple_name(kind)
+        text = self.program.target.tuple_of(name, texts, kind.is_uniform)
         lang.check_order(items)
         calls = max((item.calls for item in items), default=0)
         return Value(kind, text, lang.POSTFIX, parts=tuple(items), calls=calls)
@@ -281,7 +373,6 @@ class Expressions:
         return self._logic(isinstance(op, ast.BitAnd), [left, right])
 
     def _logic(self, is_and: bool, values: list[Value]) -> Value:
-        """Return a conjunction or disjunction; C evaluates no more of it than Python."""
         rest: list[Value] = []
         for value in (cast(value, lang.BOOL) for value in values):
             if value.constant is None:

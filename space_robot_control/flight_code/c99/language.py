@@ -166,6 +166,19 @@ class Value:
         return self.text
 
 
+class C99:
+    """What of the text is C99's own; another target is a subclass with its differences."""
+
+    local_function = "static "
+    """Before the head of a function that only its own file calls."""
+    shared_function = ""
+    """Before that of any other one."""
+
+    def tuple_of(self, name: str, items: str, is_uniform: bool) -> str:
+        """Return a value of the struct ``name`` that stands for a tuple."""
+        return f"({name}){{{{{items}}}}}" if is_uniform else f"({name}){{{items}}}"
+
+
 def literal(number: float) -> str:
     """Return a number in C, with all its bits."""
     if isinstance(number, bool):

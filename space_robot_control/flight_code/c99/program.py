@@ -1,10 +1,18 @@
-"""All functions, structs and constants of an export, found from its first kernels on."""
+"""All functions, structs and constants of an export, found from its first kernels on.
+
+A function is one kernel, for one set of argument types.
+"""
 
 from __future__ import annotations
 
+import ast
+import inspect
 import re
+import textwrap
 from collections.abc import Callable, Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from functools import cache
+from pathlib import Path
 from types import FunctionType
 from typing import Any, NamedTuple
 
@@ -12,11 +20,119 @@ from space_robot_msgs_py.compiled.records import Field as RecordField
 from space_robot_msgs_py.compiled.records import Record
 
 from . import language as lang
-from .functions import Function, kind_of_argument, passed, syntax_of, translated
-from .language import RefusedError, Value
+from .language import ArrayOf, Known, Pointer, RefusedError, Value
+from .statements import Statements, declared
 
+MOST_PASSES = 5
+"""Passes over a function until the types of its names have settled; two are usual."""
 FIELD, CALL, CONSTANT = map(re.compile, (r"«(\d+):(\w+)»", r"¤(\d+)\(", r"¶(\d+);"))
 """Markers of fields, calls and constants, whose names are decided at the end."""
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """An argument in C."""
+
+    name: str
+    type: lang.Type
+    is_written: bool
+    """Whether the memory that it points to is written."""
+
+
+@dataclass(frozen=True)
+class Function:
+    """A translated kernel."""
+
+    body: Callable[..., Any]
+    """The kernel as plain Python."""
+    label: str
+    """Of a bundle that it was made for; empty if for none."""
+    parameters: tuple[Parameter, ...]
+    arguments: tuple[tuple[str, ...], ...]
+    """Names of the parameters that each argument in Python becomes in C."""
+    result: lang.Type
+    lines: tuple[str, ...]
+    stores: frozenset[lang.FieldName]
+    """Fields of records that it writes."""
+
+
+@cache
+def syntax_of(body: Callable[..., Any]) -> tuple[ast.FunctionDef, str]:
+    """Return the syntax tree of a function, and its file from the package's folder on."""
+    tree = ast.parse(textwrap.dedent(inspect.getsource(body))).body[0]
+    path = Path(inspect.getsourcefile(body) or "?")
+    packages = [k for k, part in enumerate(path.parts) if part.startswith("space_robot_")]
+    file = "/".join(path.parts[packages[-1] :]) if packages else str(path)
+    if not isinstance(tree, ast.FunctionDef):
+        line = body.__code__.co_firstlineno
+        raise lang.NotInSubsetError(file, line, "a lambda", "write a kernel with def")
+    return tree, file
+
+
+def translated(
+    program: Any, body: Callable[..., Any], kinds: tuple[lang.Type, ...], label: str
+) -> Function:
+    """Translate a kernel of a program for types of arguments; ``label`` is a bundle's.
+
+    Raises:
+        NotInSubsetError: a construct has no translation.
+    """
+    types: dict[str, lang.Type] = {}
+    result: lang.Type = None
+    for _ in range(MOST_PASSES):
+        translation = Statements(program, body, *syntax_of(body), kinds)
+        translation.types |= types
+        translation.result = result
+        translation.body()
+        if translation.types == types and translation.result == result:
+            break
+        types, result = dict(translation.types), translation.result
+    written = set(translation.written)
+    for value in translation.names.values():
+        if isinstance(value.type, ArrayOf) and len(value.type.shape) > 1:
+            written |= value.roots  # C99 cannot pass variable rows as constant ones
+    lines = declared(translation.lines, _declarations(translation, written))
+    text = "\n".join(lines)
+    is_used = {p: bool(re.search(rf"\b{p}\b", text)) for p, _ in translation.parameters}
+    own = {argument.arg for argument in translation.tree.args.args}
+    kept = [(p, kind) for p, kind in translation.parameters if is_used[p] or p in own]
+    ignored = [f"    (void){p};" for p, _ in kept if not is_used[p]]
+    return Function(
+        body,
+        label,
+        tuple(Parameter(p, kind, p in written) for p, kind in kept),
+        tuple(tuple(p for p in names if p in dict(kept)) for names in translation.arguments),
+        translation.result or lang.NOTHING,
+        tuple(ignored + lines),
+        frozenset(translation.stores),
+    )
+
+
+def _declarations(translation: Statements, written: set[str]) -> dict[str, str]:
+    return {
+        name: translation.program.declaration(kind, name, name in written)
+        for name, kind in translation.types.items()
+        if name not in translation.own and not isinstance(kind, Known)
+    }
+
+
+def passed(function: Function, arguments: tuple[Value, ...]) -> list[Value]:
+    """Return the value of each parameter in a call."""
+    values: list[Value] = []
+    for names, argument in zip(function.arguments, arguments, strict=True):
+        if isinstance(argument.type, lang.Bundle):
+            items = zip(argument.type.items, argument.parts, strict=True)
+            by_name = {f"_{item}": part for (item, _), part in items}
+            values += [next(v for end, v in by_name.items() if n.endswith(end)) for n in names]
+        elif names:
+            values.append(argument)
+    return values
+
+
+def kind_of_argument(value: Value) -> lang.Type:
+    """Return the type of a parameter for an argument; a truth value that is known is bound."""
+    is_bound = value.is_bound or (value.type == lang.BOOL and value.constant is not None)
+    return Known(value.constant) if is_bound else value.type
 
 
 def _names(function: Function) -> list[tuple[str, bool]]:
@@ -37,14 +153,17 @@ class KernelProgram:
     a branch that they decide is left out, and so is what only that branch needs.
     """
 
-    def __init__(self, sizes: Mapping[str, int], joints: int) -> None:
+    def __init__(
+        self, sizes: Mapping[str, int], joints: int, target: lang.C99 | None = None
+    ) -> None:
         """Begin.
 
         Args:
             sizes: numbers that stand for constants of modules, by name, as capacities of arrays.
             joints: n, of which the shapes of records are functions.
+            target: the language that is written; None: C99.
         """
-        self.sizes, self.joints = dict(sizes), joints
+        self.sizes, self.joints, self.target = dict(sizes), joints, target or lang.C99()
         self.constants: dict[lang.FieldName, float] = {}
         """Fields that never change; of an array, all of its numbers are the same."""
         self.functions: list[Function] = []
@@ -94,6 +213,34 @@ class KernelProgram:
             name = str(len(inner)) if kind.is_uniform else "".join(inner)
             self.tuples[kind] = f"{lang.PREFIX}tuple_{name}"
         return self.tuples[kind]
+
+    def type_name(self, kind: lang.Type) -> str:
+        """Return the name of a scalar's or tuple's type."""
+        name: str = self.tuple_name(kind) if isinstance(kind, lang.TupleOf) else kind.name
+        return name
+
+    def declaration(self, kind: lang.Type, name: str, is_written: bool = True) -> str:
+        """Return the declaration of a local name; a pointer is to constants if not written."""
+        const = "" if is_written else "const "
+        if isinstance(kind, (Pointer, lang.BlockOf)):
+            return f"{const}{self.struct_name(kind.record)} *{name}"
+        if isinstance(kind, ArrayOf) and len(kind.shape) == 1:
+            return f"{const}double *{name}"
+        if isinstance(kind, ArrayOf):
+            sizes = "".join(f"[{size}]" for size in kind.shape[1:])
+            return f"{const}double (*{name}){sizes}"
+        return f"{self.type_name(kind)} {name}"
+
+    def parameter(self, parameter: Parameter) -> str:
+        """Return the declaration of a parameter, with the sizes of an array."""
+        kind = parameter.type
+        if not isinstance(kind, ArrayOf):
+            return self.declaration(kind, parameter.name, parameter.is_written)
+        first, *rest = ("" if size is None else size for size in kind.shape)
+        # C99 cannot pass variable rows as constant ones
+        const = "const " if not rest and not parameter.is_written else ""
+        sizes = "".join(f"[{size}]" for size in rest)
+        return f"{const}double {parameter.name}[{first}]{sizes}"
 
     def call(self, body: Callable[..., Any], arguments: tuple[Value, ...], inside: Any) -> Value:
         """Return the call of a kernel by a translation, ``inside`` which it stands."""

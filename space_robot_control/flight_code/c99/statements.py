@@ -1,17 +1,26 @@
-"""Statements of kernels as statements of C."""
+"""Statements of kernels as statements of C, and where C declares the local names."""
 
 from __future__ import annotations
 
 import ast
-from collections.abc import Sequence
+import re
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
+from functools import cache
 from typing import Any
 
 from . import language as lang
-from .declarations import INDENT, MARK, assigned_in, names_in
 from .expressions import Expressions
 from .language import ArrayOf, Known, Pointer, RefusedError, Value, cast, number_of
 
+RESERVED = re.compile(
+    "auto|case|char|const|default|do|double|enum|extern|goto|inline|long|register|restrict|short|"
+    "signed|sizeof|static|struct|switch|typedef|union|unsigned|void|volatile"
+)
+INDENT = "    "
+MARK = "§"
+"""Stands around a local name where it gets a value."""
 TRANSPARENT = ("any_lane", "all_lanes", "uniform", "bool")
 """Words that give a truth value as it is."""
 
@@ -19,8 +28,18 @@ TRANSPARENT = ("any_lane", "all_lanes", "uniform", "bool")
 class Statements(Expressions):
     """Translator of the statements of one function."""
 
-    def __init__(self, program: Any, function: Any, tree: ast.FunctionDef, file: str) -> None:
-        """Translate the body of ``tree``, the syntax of ``function``, which stands in ``file``."""
+    def __init__(
+        self,
+        program: Any,
+        function: Any,
+        tree: ast.FunctionDef,
+        file: str,
+        kinds: Sequence[lang.Type],
+    ) -> None:
+        """Translate the body of ``tree``, the syntax of ``function``, which stands in ``file``.
+
+        ``kinds`` are the types of the arguments.
+        """
         super().__init__(program, function)
         self.tree, self.file = tree, file
         self.first_line = function.__code__.co_firstlineno
@@ -38,6 +57,33 @@ class Statements(Expressions):
         self._roots: dict[str, frozenset[str]] = {}
         self._depth = 1
         self._counter: dict[str, int] = {}
+        self.parameters: list[tuple[str, lang.Type]] = []
+        self.arguments: list[tuple[str, ...]] = []
+        """Names of the parameters in C that each argument becomes."""
+        for argument, kind in zip(tree.args.args, kinds, strict=True):
+            before = len(self.parameters)
+            self.names[argument.arg] = self._parameter(argument.arg, kind)
+            self.types[argument.arg] = kind
+            self.arguments.append(tuple(name for name, _ in self.parameters[before:]))
+
+    def _parameter(self, name: str, kind: lang.Type) -> Value:
+        if isinstance(kind, Known):
+            is_number = isinstance(kind.value, (bool, int))
+            bound = number_of(kind.value) if is_number else Value(kind, name)
+            return replace(bound, is_bound=is_number)
+        if isinstance(kind, lang.Bundle):
+            parts: dict[str, Value] = {}
+            for item, of in kind.items:
+                if isinstance(of, lang.FieldOf):
+                    owner = parts[of.item]
+                    pointer = replace(owner, type=Pointer(owner.type.record))
+                    parts[item] = self.field(pointer, of.name)
+                else:
+                    parts[item] = self._parameter(f"{name}_{item}", of)
+            return Value(kind, name, parts=tuple(parts.values()))
+        if kind != lang.EMPTY:  # C has no such arrays
+            self.parameters.append((name, kind))
+        return Value(kind, name, roots=frozenset({name}))
 
     def body(self) -> None:
         """Translate all statements.
@@ -61,7 +107,6 @@ class Statements(Expressions):
         self.lines.append(f"{INDENT * self._depth}{line}")
 
     def _block(self, statements: Sequence[ast.stmt]) -> bool:
-        """Translate statements until one leaves the block; return whether one does."""
         before, is_left = self.facts, False
         for statement in statements:
             kind = type(statement).__name__.lower()
@@ -78,7 +123,6 @@ class Statements(Expressions):
         return is_left
 
     def _learn(self, test: ast.expr, is_true: bool) -> None:
-        """Note that a condition of names that never change is true or false from here on."""
         while True:
             if isinstance(test, ast.UnaryOp) and isinstance(test.op, ast.Not):
                 test, is_true = test.operand, not is_true
@@ -92,21 +136,8 @@ class Statements(Expressions):
             self.facts = {**self.facts, ast.dump(test): is_true}
 
     def _is_steady_name(self, name: str) -> bool:
-        """Return whether a truth value has the same value wherever it is read."""
         most = 0 if name in self.own else 1
         return self.names[name].type == lang.BOOL and self.assigned[name] <= most
-
-    def declared(self, kind: lang.Type, name: str) -> str:
-        """Return C's declaration of a name of a type."""
-        if isinstance(kind, (Pointer, lang.BlockOf)):
-            return f"{self.program.struct_name(kind.record)} *{name}"
-        if isinstance(kind, ArrayOf):
-            if len(kind.shape) == 1:
-                return f"double *{name}"
-            return f"double (*{name}){''.join(f'[{size}]' for size in kind.shape[1:])}"
-        if isinstance(kind, lang.TupleOf):
-            return f"{self.program.tuple_name(kind)} {name}"
-        return f"{kind.name} {name}"
 
     # assignments
 
@@ -116,9 +147,7 @@ class Statements(Expressions):
             return
         value = self.translate(node.value)
         if len(node.targets) > 1 and (value.calls or isinstance(value.type, lang.TupleOf)):
-            name = self._fresh("value")
-            self.emit(f"const {self.declared(value.type, name)} = {value.text};")
-            value = replace(value, text=name, rank=lang.ATOM, calls=0)
+            value = self._named("value", value)
         for target in node.targets:
             self._assign(target, value)
 
@@ -127,15 +156,13 @@ class Statements(Expressions):
             self._assign(node.target, self.translate(node.value))
 
     def _assign_together(self, target: ast.Tuple, source: ast.expr) -> None:
-        """Assign a tuple to several targets; all values are there before the first is stored."""
         if not isinstance(source, ast.Tuple):
             value = self.translate(source)
             if not isinstance(value.type, lang.TupleOf):
                 raise RefusedError(f"unpacking {lang.described(value.type)}", "return tuples")
             name = value.text
             if value.calls or not name.isidentifier():
-                name = self._fresh("result")
-                self.emit(f"const {self.declared(value.type, name)} = {value.text};")
+                name = self._named("result", value).text
             for k, (part, kind) in enumerate(zip(target.elts, value.type.items, strict=True)):
                 item = f"{name}.at[{k}]" if value.type.is_uniform else f"{name}.item_{k}"
                 self._assign(part, Value(kind, item, lang.POSTFIX))
@@ -148,9 +175,7 @@ class Statements(Expressions):
             loads = values[k].calls or "[" in values[k].text or "->" in values[k].text
             touched = bool(mentioned & set(written)) or (stores and loads)
             if touched and not isinstance(values[k].type, (Pointer, ArrayOf)):
-                name = self._fresh("new")
-                self.emit(f"const {self.declared(values[k].type, name)} = {values[k].text};")
-                values[k] = replace(values[k], text=name, rank=lang.ATOM, calls=0)
+                values[k] = self._named("new", values[k])
         for part, value in zip(target.elts, values, strict=True):
             self._assign(part, value)
 
@@ -191,7 +216,6 @@ class Statements(Expressions):
         self.stores |= place.fields
 
     def _store(self, place: Value, value: Value) -> None:
-        """Write a number into a number or into a whole array, or an array into an array."""
         self.write(place)
         if not isinstance(place.type, ArrayOf):
             self.emit(f"{place.text} = {cast(value, lang.FLOAT).text};")
@@ -302,7 +326,6 @@ class Statements(Expressions):
 
     @staticmethod
     def _is_steady(bound: ast.expr, loop: ast.For) -> bool:
-        """Return whether a bound is made of names that the loop leaves alone."""
         nodes = list(ast.walk(bound))
         if any(isinstance(n, (ast.Attribute, ast.Subscript, ast.Call)) for n in nodes):
             return False
@@ -361,10 +384,101 @@ class Statements(Expressions):
 
     _break_statement = _continue_statement = _leave_statement
 
+    def _named(self, name: str, value: Value) -> Value:
+        fresh = self._fresh(name)
+        self.emit(f"const {self.program.declaration(value.type, fresh)} = {value.text};")
+        return replace(value, text=fresh, rank=lang.ATOM, calls=0)
+
     def _fresh(self, name: str) -> str:
-        """Return a name that the function does not have yet."""
         while True:
             count = self._counter[name] = self._counter.get(name, 0) + 1
             fresh = name if count == 1 else f"{name}_{count}"
             if fresh not in self._taken:
                 return fresh
+
+
+def names_in(nodes: Iterable[ast.AST], stored: bool = False) -> Counter[str]:
+    """Return how often names are mentioned; ``stored``: how often they get a value."""
+    counted: Counter[str] = Counter()
+    for node in nodes:
+        counted.update(_names_in(node, stored))
+    return counted
+
+
+@cache
+def _names_in(node: ast.AST, stored: bool) -> Counter[str]:
+    names = (n for n in ast.walk(node) if isinstance(n, ast.Name))
+    return Counter(n.id for n in names if not stored or isinstance(n.ctx, ast.Store))
+
+
+@cache
+def assigned_in(tree: ast.FunctionDef) -> Counter[str]:
+    """Return how often names get a value in a function.
+
+    Raises:
+        RefusedError: what a loop counts is mentioned outside of it, where it differs in C.
+    """
+    inside: Counter[str] = Counter()
+    for loop in (n for n in ast.walk(tree) if isinstance(n, ast.For)):
+        for name in names_in([loop.target]):
+            if name in names_in(loop.body, stored=True):
+                raise RefusedError(f"{name!r} set beside its loop", "use another name")
+            inside[name] += names_in([loop])[name]
+    mentioned = names_in([tree])
+    for name in filter(RESERVED.fullmatch, mentioned):
+        raise RefusedError(f"the name {name!r}", "C has it: use another one")
+    for name, count in inside.items():
+        if mentioned[name] != count and name != "_":
+            raise RefusedError(f"{name!r} outside of its loop", "use another name")
+    return names_in([tree], stored=True)
+
+
+def declared(lines: Sequence[str], declarations: Mapping[str, str]) -> list[str]:
+    """Return lines in which each name is declared in the innermost block that has it.
+
+    Args:
+        lines: of a function, indented, with a `MARK` around a name that gets a value.
+        declarations: of each local name.
+    """
+    done = list(lines)
+    for name, declaration in declarations.items():
+        value = f"{MARK}{name}{MARK} = "
+        mention = re.compile(rf"(?<![\w.>:]){name}\b")
+        places = [k for k, line in enumerate(done) if mention.search(line)]
+        for place in reversed(places):  # what nobody reads
+            _, is_value, source = done[place].partition(value)
+            if len(places) == 1 and is_value and "(" not in source:
+                del done[place]
+                places = []
+        if not places:
+            continue
+        first, level = places[0], _level(done[places[0]])
+        while not _is_in_block(done, first, level, places[-1]):
+            level -= 1
+            first = _beginning(done, first, level)
+        is_in_loop = any(_is_loop_around(done, k, first) for k in range(first))
+        if first == places[0] and done[first].strip().startswith(value):
+            done[first] = done[first].replace(value, f"{declaration} = ")
+        else:
+            place, level = (0, 1) if is_in_loop else (first, level)
+            done.insert(place, f"{INDENT * level}{declaration};")
+    return [line.replace(MARK, "") for line in done]
+
+
+def _level(line: str) -> int:
+    return (len(line) - len(line.lstrip())) // len(INDENT)
+
+
+def _is_in_block(lines: Sequence[str], first: int, level: int, last: int) -> bool:
+    return all(_level(line) >= level for line in lines[first : last + 1])
+
+
+def _beginning(lines: Sequence[str], place: int, level: int) -> int:
+    while _level(lines[place]) > level or lines[place].strip().startswith("}"):
+        place -= 1
+    return place
+
+
+def _is_loop_around(lines: Sequence[str], head: int, place: int) -> bool:
+    level, is_loop = _level(lines[head]), lines[head].strip().startswith(("for (", "while ("))
+    return is_loop and all(_level(line) > level for line in lines[head + 1 : place + 1])

@@ -80,7 +80,7 @@ def test_demand_that_is_no_number_is_not_owed(wrong: float) -> None:
     bench.allocation.wheels.healthy.beyond[:] = np.eye(3)  # as without wheels
     bench.allocation.wheels.healthy.rank = 0.0
     bench.step([0.3, wrong, 0.1])
-    assert np.isfinite(bench.allocation.modulation.owed).all()
+    assert np.isfinite(bench.allocation.thrusters.owed).all()
     assert np.isfinite(bench.command[4:]).all()
 
 
@@ -98,9 +98,9 @@ def test_thrusters_unload_the_wheels_which_hold_the_base() -> None:
     np.testing.assert_allclose(given, 0.0, atol=1e-12)
     assert np.abs(bench.momenta).max() < 12.1
     assert bench.allocation.unloading.is_active == 0.0
-    pulses = bench.allocation.modulation.pulses.sum()
+    pulses = bench.allocation.thrusters.pulses.sum()
     bench.fly(np.zeros(3), 1000)
-    assert bench.allocation.modulation.pulses.sum() == pulses
+    assert bench.allocation.thrusters.pulses.sum() == pulses
 
 
 @pytest.mark.parametrize("side", [1.0, -1.0])

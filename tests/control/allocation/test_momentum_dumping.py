@@ -11,9 +11,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from space_robot_control.allocation.magnetic_torquers import AssumedTorquers, dump_momentum
 from space_robot_control.allocation.settings import AllocationSettings
-from space_robot_model.hardware.magnetic_torquers import MagneticTorquerSettings
+from space_robot_control.allocation.unloading import AssumedTorquers, dump_momentum
+from space_robot_model.hardware.base_actuators import MagneticTorquerSettings
 from space_robot_msgs_py.samples import MOST_TORQUERS
 
 Array = NDArray[np.float64]
@@ -37,7 +37,7 @@ def torquers_of(
 def dumped(torquers: AssumedTorquers, momentum: Array, field: Array) -> tuple[Array, Array]:
     """Return the dipole of each torquer, A m2, and their torque, N m."""
     torquers.magnetic_field[:] = field
-    dump_momentum(torquers, *momentum)
+    dump_momentum(torquers, tuple(momentum))
     return torquers.dipole[: int(torquers.count)].copy(), torquers.torque.copy()
 
 

@@ -10,13 +10,13 @@ from allocation_bench import PERIOD, couples
 from numpy.typing import NDArray
 from scipy.optimize import linprog, nnls
 
-from space_robot_control.allocation.modulation import Modulation, modulate
 from space_robot_control.allocation.non_negative import NonNegative, solve
 from space_robot_control.allocation.settings import AllocationSettings
 from space_robot_control.allocation.thrusters import (
     AssumedThrusters,
     expect_torque,
     find_times,
+    modulate,
     within_reach,
 )
 from space_robot_model.hardware.thrusters import ThrusterSettings
@@ -77,13 +77,12 @@ class Bench:
         self.torques = assumed.torques
         self.forces = assumed.unit_directions * 10.0
         self.thrusters = AssumedThrusters.build(1, assumed, settings, PERIOD)
-        self.modulation = Modulation.build(1, self.thrusters, settings, PERIOD)
 
     def fly(self, demands: Array, first: int = 0) -> Array:
         """(ticks, T), 1 where open, from a tick on."""
         rows = []
         for tick, demand in enumerate(demands, first):
-            modulate(self.modulation, self.thrusters, tick, demand)
+            modulate(self.thrusters, tick, demand)
             rows.append(self.thrusters.is_open[: self.count].copy())
         return np.array(rows)
 
@@ -105,7 +104,7 @@ def test_mean_torque_follows_the_demand(kind: str, layout: Any) -> None:
     one = np.linalg.norm(bench.torques, axis=1).max() * 0.1 / 2.0  # a whole pulse of 0.1 s in 2 s
     np.testing.assert_allclose(mean, demand, atol=one)
     owed = (4000 * demand - opened.sum(axis=0) @ bench.torques) * PERIOD
-    np.testing.assert_allclose(bench.modulation.owed[:3], owed, atol=1e-9)
+    np.testing.assert_allclose(bench.thrusters.owed[:3], owed, atol=1e-9)
 
 
 @pytest.mark.parametrize("layout", [couples, slanted])
@@ -117,7 +116,7 @@ def test_no_pulse_is_shorter_than_allowed(kind: str, layout: Any) -> None:
     pulses = np.concatenate([lengths(row) for row in opened.T])
     assert pulses.size > 5
     assert pulses.min() >= 40
-    assert bench.modulation.pulses.sum() >= pulses.size
+    assert bench.thrusters.pulses.sum() >= pulses.size
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -150,14 +149,14 @@ def test_after_a_gap_all_begins_anew(kind: str, gap: int) -> None:
     later = rng.normal(size=(400, 3)) * 4.0
     bench, fresh = Bench(kind), Bench(kind)
     last = 99
-    while last < 180 or not np.any(bench.modulation.open_for > 0.0):  # amid a pulse
+    while last < 180 or not np.any(bench.thrusters.open_for > 0.0):  # amid a pulse
         last += 1
         bench.fly(demands[last - 100 : last - 99], first=last)
-    pulses = bench.modulation.pulses.copy()
+    pulses = bench.thrusters.pulses.copy()
     opened = bench.fly(later, first=last + gap)
     np.testing.assert_array_equal(opened, fresh.fly(later))
-    np.testing.assert_array_equal(bench.modulation.owed, fresh.modulation.owed)
-    np.testing.assert_array_equal(bench.modulation.pulses - pulses, fresh.modulation.pulses)
+    np.testing.assert_array_equal(bench.thrusters.owed, fresh.thrusters.owed)
+    np.testing.assert_array_equal(bench.thrusters.pulses - pulses, fresh.thrusters.pulses)
 
 
 @pytest.mark.parametrize("after", [1, 20, 300])
@@ -169,7 +168,7 @@ def test_after_a_gap_what_is_under_way_is_expected_and_nothing_else(after: int) 
     ticks = [*range(60), *range(60 + after, 60 + after + first)]
     for tick in ticks:
         demand = np.array([12.0, -8.0, 5.0]) if tick < 60 else np.zeros(3)
-        modulate(bench.modulation, bench.thrusters, tick, demand)
+        modulate(bench.thrusters, tick, demand)
         expect_torque(bench.thrusters, tick, torque)
         given[tick + delay] = bench.thrusters.is_open[: bench.count] @ bench.torques
         np.testing.assert_allclose(torque, given.get(tick, np.zeros(3)), atol=1e-12)
@@ -179,12 +178,12 @@ def test_an_impulse_beyond_a_period_is_cut_in_its_direction_and_forgotten() -> N
     """Pulse width: 50 N m s are owed, a period of 0.1 s pays 2 N m s of them."""
     bench = Bench("pwm")
     bench.fly(np.zeros((1, 3)))
-    bench.modulation.slot_left = 0.0
-    bench.modulation.owed[:3] = [50.0, -25.0, 5.0]
+    bench.thrusters.slot_left = 0.0
+    bench.thrusters.owed[:3] = [50.0, -25.0, 5.0]
     opened = bench.fly(np.zeros((600, 3)), first=1)
     np.testing.assert_allclose(opened[:200].sum(axis=0) @ bench.torques * PERIOD, [2, -1, 0.2])
     assert opened[200:].sum() == 0.0
-    np.testing.assert_allclose(bench.modulation.owed, 0.0, atol=1e-9)
+    np.testing.assert_allclose(bench.thrusters.owed, 0.0, atol=1e-9)
 
 
 @pytest.mark.parametrize("kind", KINDS)

@@ -10,8 +10,8 @@ from allocation_bench import PERIOD, PYRAMID, AllocationBench, unit, wheel_set
 from numpy.typing import NDArray
 from scipy.optimize import linprog
 
-from space_robot_control.allocation.diagnosis import diagnose
-from space_robot_control.allocation.least_largest import least_largest
+from space_robot_control.allocation.allocation import diagnose
+from space_robot_control.allocation.wheel_set import least_largest
 from space_robot_control.allocation.wheels import FULL
 from space_robot_msgs_py.samples import MOST_WHEELS
 
@@ -65,7 +65,7 @@ def test_tables_are_those_of_weighted_least_squares(count: int) -> None:
 
 def loads_of(axes: Array, full: Array, wanted: Array, out: tuple[int, ...] = ()) -> Array:
     torque = np.zeros(MOST_WHEELS)
-    least_largest(wheel_set(axes, full, out), len(axes), wanted, torque)
+    least_largest(wheel_set(axes, full, out), len(axes), tuple(wanted), torque)
     return np.asarray(torque[: len(axes)] / full)
 
 

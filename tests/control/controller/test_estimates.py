@@ -23,7 +23,7 @@ from strategies import Case, cases
 
 from space_robot_control.controller.controller import Controller
 from space_robot_control.controller.gains import NOMINAL, check_gains, read_gains
-from space_robot_control.controller.law_set import LawSet
+from space_robot_control.controller.loop import LawSet
 from space_robot_control.controller.settings import ControllerNodeSettings
 from space_robot_control.laws import ControlLaw, find_law, laws
 from space_robot_model.hardware.base_actuators import BaseActuatorSettings

@@ -22,14 +22,13 @@ from space_robot_msgs_py import topics
 from space_robot_msgs_py.errors import FlightError, MessageError
 from space_robot_msgs_py.samples import Reference, ReferenceChunk, RobotNames, RobotState, Timebase
 from space_robot_msgs_py.wire.codecs import StateCodec
-from space_robot_msgs_py.wire.reference_codec import ReferenceCodec
+from space_robot_msgs_py.wire.telemetry import ReferenceCodec
 
 pytest.importorskip("rclpy")
 
 
-from space_robot_control.controller import reference_input, state_input
-from space_robot_control.controller.reference_input import WAIT_TOLD_S, ReferenceInput
-from space_robot_control.controller.state_input import StateInput
+from space_robot_control.controller import inputs
+from space_robot_control.controller.inputs import WAIT_TOLD_S, ReferenceInput, StateInput
 
 TIMEBASE = Timebase(500_000)
 ROBOT = Robot.from_yaml(CONFIG / "robots" / "paper.yaml")
@@ -46,7 +45,7 @@ class States:
         self._wheels = wheels
         names = RobotNames(robot.joint_names, tuple(f"wheel_{k + 1}" for k in range(wheels)))
         with pytest.MonkeyPatch.context() as patch:
-            patch.setattr(state_input, "RawSubscription", QueuedInput)
+            patch.setattr(inputs, "RawSubscription", QueuedInput)
             no_node: Any = None
             self.input = StateInput(no_node, names, TIMEBASE)
         self._codec = StateCodec(names, TIMEBASE)
@@ -97,7 +96,7 @@ def test_a_state_that_was_sent_without_a_part_is_passed_over(
     """The ones behind it are not, though their parts are heard while its own is looked for."""
     bench = States(ROBOT, wheels=4)
     parts = [queue.topic for queue in bench.input.inputs]
-    monkeypatch.setattr(state_input, "TIMEOUT_S", 0.0)
+    monkeypatch.setattr(inputs, "TIMEOUT_S", 0.0)
     found = []
     for tick in range(10):
         bench.send(tick, *(topic for k, topic in enumerate(parts) if k != part or tick != 5))
@@ -153,8 +152,8 @@ class References:
     def __init__(self, monkeypatch: pytest.MonkeyPatch, join_timeout_s: float = 0.0) -> None:
         self.now = 100.0
         clock = SimpleNamespace(monotonic=lambda: self.now)
-        monkeypatch.setattr(reference_input, "time", clock)
-        monkeypatch.setattr(reference_input, "RawSubscription", QueuedInput)
+        monkeypatch.setattr(inputs, "time", clock)
+        monkeypatch.setattr(inputs, "RawSubscription", QueuedInput)
         no_node: Any = None
         self.input = ReferenceInput(no_node, ROBOT, TIMEBASE, TIMEOUT_S, join_timeout_s)
         self._codec = ReferenceCodec(ROBOT.joint_names, TIMEBASE)

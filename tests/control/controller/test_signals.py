@@ -23,8 +23,8 @@ from space_robot_control.controller.controller import Controller
 from space_robot_control.controller.time_delay_estimation import LONGEST_GAP
 from space_robot_control.laws import ControlLaw, find_law, laws
 from space_robot_control.laws.base import CONSTANT_INERTIA, NO_ESTIMATE, NOMINAL_INERTIA
-from space_robot_control.navigation.low_pass import low_pass_weight
 from space_robot_control.navigation.navigation import Navigation, navigate
+from space_robot_control.navigation.rate_filters import low_pass_weight
 from space_robot_model.dynamics.attitude import attitude_error_into
 from space_robot_model.hardware.base_actuators import BaseActuatorSettings
 from space_robot_model.robot import Robot

@@ -14,7 +14,8 @@ from space_robot_control.controller.controller import Controller
 from space_robot_control.controller.law_choice import LawChoice
 from space_robot_control.controller.reference_buffer import ReferenceBuffer
 from space_robot_control.controller.settings import ControllerNodeSettings
-from space_robot_control.controller.state_responder import StampStatus, StateResponder
+from space_robot_control.controller.supervisor import StateResponder, Supervisor
+from space_robot_control.controller.tick import ANSWERED, NEW, REFUSED
 from space_robot_control.laws import ControlLaw
 from space_robot_model.robot import Robot
 from space_robot_msgs_py import topics
@@ -83,7 +84,8 @@ class Bench:
         self.choice = LawChoice(
             self.controller.law, [(tick, law_of(name)) for name, tick in swaps.items()]
         )
-        self.answering = StateResponder(self.controller, self.choice, self.references, settings)
+        supervisor = Supervisor(self.controller, settings.hold_ticks, settings.longest_jump)
+        self.answering = StateResponder(supervisor, self.choice, self.references, settings)
         self._codec = CommandCodec(self.controller.names.commanded, settings.timebase)
         self._state = RobotState.allocate(robot.n)
         self._state.quaternion[:] = [0.9, 0.3, -0.1, 0.3]
@@ -101,20 +103,20 @@ class Bench:
 
 def test_a_state_is_answered_once_and_a_new_time_believed_late(paper_robot: Robot) -> None:
     bench = Bench(paper_robot)
-    judge = bench.answering.judge
+    judge = bench.answering.judge_stamp
     for tick in (3, 4, 53):
-        assert judge(tick) is StampStatus.NEW
-        assert judge(tick) is StampStatus.NEW, "it waits for its reference"
+        assert judge(tick) == NEW
+        assert judge(tick) == NEW, "it waits for its reference"
         bench.answer(tick)
-        assert judge(tick) is StampStatus.ANSWERED
+        assert judge(tick) == ANSWERED
         assert bench.references.now == tick
     for other in (1000, 2, 104):
-        assert judge(other) is StampStatus.REFUSED
+        assert judge(other) == REFUSED
     assert bench.references.now == 53
     begun: list[int] = []
     bench.references.begin = begun.append  # type: ignore[method-assign]
     verdicts = [judge(tick) for tick in range(7, 7 + AGREEING)]
-    assert verdicts == [StampStatus.REFUSED] * (AGREEING - 1) + [StampStatus.NEW]
+    assert verdicts == [REFUSED] * (AGREEING - 1) + [NEW]
     assert begun == [6 + AGREEING]
 
 

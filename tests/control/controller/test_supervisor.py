@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 
 from space_robot_control.controller.controller import Controller
 from space_robot_control.controller.reference_buffer import ReferenceBuffer
-from space_robot_control.controller.signal_kernels import LARGEST
-from space_robot_control.controller.supervision import NOMINAL_FROM_ETA, SAFE_BELOW_ETA
+from space_robot_control.controller.signals import LARGEST
 from space_robot_control.controller.supervisor import Mode, Supervisor
+from space_robot_control.controller.tick import NOMINAL_FROM_ETA, SAFE_BELOW_ETA
 from space_robot_control.controller.time_delay_estimation import LONGEST_GAP
 from space_robot_control.laws import ControlLaw, LawGains, Signals
 from space_robot_model.hardware.base_actuators import BaseActuatorSettings

@@ -16,7 +16,7 @@ from space_robot.flight.flown_log import empty_log
 from space_robot.flight.plan import Flight, FlightPlan, resolve
 from space_robot_control.controller.controller import TRANSFER_S, Controller
 from space_robot_control.controller.gains import build_law
-from space_robot_control.controller.swaps import Swap, parse_swaps
+from space_robot_control.controller.law_choice import Swap, parse_swaps
 from space_robot_control.laws import laws
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.errors import InputError

@@ -12,8 +12,9 @@ from hypothesis import strategies as st
 
 from space_robot.export.software import export
 from space_robot.flight.plan import Flight, FlightPlan, resolve
-from space_robot_control.controller.signal_kernels import USABLE
-from space_robot_control.controller.supervision import (
+from space_robot_control.controller.signals import USABLE
+from space_robot_control.controller.supervisor import Supervisor
+from space_robot_control.controller.tick import (
     NEW,
     NO_REFERENCE,
     NOMINAL_FROM_ETA,
@@ -21,9 +22,13 @@ from space_robot_control.controller.supervision import (
     SAFE_BELOW_ETA,
     STATUSES,
 )
-from space_robot_control.controller.supervisor import Supervisor
+from space_robot_control.flight_code.acceptance import (
+    hostile_ticks,
+    shake,
+    spoil,
+    spoiled_reference,
+)
 from space_robot_control.flight_code.folder import Exported
-from space_robot_control.flight_code.hostile import hostile_ticks, shake, spoil, spoiled_reference
 from space_robot_control.flight_code.library import CONDITION, FlightLibrary
 from space_robot_control.flight_code.supervisors import bits
 from space_robot_msgs_py.samples import Reference, RobotState
@@ -54,8 +59,8 @@ def test_c_answers_like_python(seed: int, law: str, share: float) -> None:
     references = flight.mission.chunk(0, TICKS).references()
     wheels = len(flight.plant.names.wheels)
     for k, tick in enumerate(hostile_ticks(TICKS, random)):
-        standing = supervisor.judge(tick)
-        assert code.judge(tick) == standing
+        standing = supervisor.judge_stamp(tick)
+        assert code.judge_stamp(tick) == standing
         if standing == NEW:
             state, reference = flight.plant.state.copy(), references[k : k + 1]
             state.tick = tick

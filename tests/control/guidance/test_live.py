@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from types import SimpleNamespace
 from typing import Any
 
@@ -12,10 +13,9 @@ from hypothesis import strategies as st
 from scipy.interpolate import BPoly
 
 from space_robot_control.guidance.courses import Piece, QuinticLeg, Slew
-from space_robot_control.guidance.goal_tolerances import GoalTolerances
-from space_robot_control.guidance.live import BRAKE_S, TrajectoryPoint
+from space_robot_control.guidance.live import BRAKE_S, GoalTolerances, TrajectoryPoint
 from space_robot_control.guidance.mission import Mission, MissionSettings
-from space_robot_model.elementary.quintic_spline import QuinticSpline
+from space_robot_model.elementary.splines import QuinticSpline
 from space_robot_model.robot.find import find_robot
 from space_robot_msgs_py.errors import InputError
 
@@ -25,9 +25,11 @@ START = [0.0, 120.0, 220.0, 0.0, -10.0, 0.0]
 GOAL = [15.0, 110.0, 185.0, 45.0, 10.0, -25.0]
 
 
-def mission(**settings: Any) -> Mission:
-    waypoints = {"waypoint_times": [0.0, 10.0], "waypoints_deg": [*START, *GOAL]}
-    return Mission(ROBOT, MissionSettings.model_validate({**waypoints, **settings}), PERIOD)
+def mission(segments: Sequence[str] = (), **settings: Any) -> Mission:
+    """A leg of the joints of 10 s, then the segments."""
+    texts = [f"{{joints_deg: {GOAL}, duration: 10}}", *segments]
+    own = {"joints_deg": START, "segments": texts, **settings}
+    return Mission(ROBOT, MissionSettings.model_validate(own), PERIOD)
 
 
 def rows_of(flown: Mission, seconds: float = 21.0) -> tuple[np.ndarray, np.ndarray]:
@@ -165,7 +167,7 @@ def test_a_trajectory_starts_at_its_stamp_or_is_joined_on_its_way(
 
 def test_a_late_trajectory_is_joined_where_the_joints_can_reach_it() -> None:
     robot = find_robot("dual_arm")  # 20 degrees/s at most
-    settings = {"waypoint_times": [0.0], "waypoints_deg": [0.0] * robot.n}
+    settings = {"joints_deg": [0.0] * robot.n}
     flown = Mission(robot, MissionSettings.model_validate(settings), PERIOD)
     times = np.arange(0, 31) / 10.0
     ramp = [TrajectoryPoint(t, np.full(robot.n, 0.1 * t).tolist(), [], []) for t in times]

@@ -11,12 +11,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from space_robot_control.guidance.settings import MissionNodeSettings
+from space_robot_control.guidance.mission import MissionNodeSettings
 from space_robot_model.robot import Robot
 from space_robot_msgs_py import topics
-from space_robot_msgs_py.ros.health import Level
-from space_robot_msgs_py.wire.clock import ClockCodec
-from space_robot_msgs_py.wire.reference_codec import ReferenceCodec
+from space_robot_msgs_py.ros.loop import Level
+from space_robot_msgs_py.wire.telemetry import ClockCodec, ReferenceCodec
 
 pytest.importorskip("rclpy")
 

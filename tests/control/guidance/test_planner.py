@@ -14,8 +14,7 @@ from scipy.spatial.transform import Rotation
 from strategies import random_robot
 
 from space_robot_control.guidance.demand import MotionDemand, demand
-from space_robot_control.guidance.mission import Mission, MissionSettings
-from space_robot_control.guidance.trajectory_file import with_columns
+from space_robot_control.guidance.mission import Mission, MissionSettings, with_columns
 from space_robot_model.robot import Robot
 from space_robot_model.robot.find import find_robot
 from space_robot_model.robot.kinematics import tool_state
@@ -30,7 +29,7 @@ STARTS = {
 
 def planned(*segments: dict[str, Any], robot: str = "paper", **settings: Any) -> Mission:
     texts = [json.dumps(segment) for segment in segments]
-    start = {"waypoints_deg": STARTS[robot], "segments": texts, **settings}
+    start = {"joints_deg": STARTS[robot], "segments": texts, **settings}
     return Mission(find_robot(robot), MissionSettings.model_validate(start), PERIOD)
 
 
@@ -190,9 +189,7 @@ def test_trajectories_of_files(tmp_path: Path) -> None:
     lines += [",".join(map(repr, row)) for row in numbers]
     (tmp_path / "path.csv").write_text("\n".join(lines))
     text = with_columns(json.dumps({"file": "path.csv"}), tmp_path)
-    mission = Mission(
-        robot, MissionSettings(waypoints_deg=STARTS["paper"], segments=[text]), PERIOD
-    )
+    mission = Mission(robot, MissionSettings(joints_deg=STARTS["paper"], segments=[text]), PERIOD)
     joints, _ = whole(mission)
     assert_consistent(joints, 1.0)
     np.testing.assert_allclose(joints[::200, 0], rows, atol=1e-12)
@@ -235,7 +232,7 @@ def as_text(value: Any) -> str:
 @pytest.mark.filterwarnings("error")
 def test_a_mission_is_refused_in_one_line(row: dict[str, Any]) -> None:
     """InputError and Pydantic's ValidationError are both ValueErrors."""
-    settings = {"waypoints_deg": AT} | row
+    settings = {"joints_deg": AT} | row
     robot, said = robot_of(settings.pop("robot", "paper")), settings.pop("said")
     if settings.pop("orbit", False):
         settings["assumed_orbit"] = ISS
@@ -272,7 +269,7 @@ def test_a_closed_path_returns_the_joints_with_the_attitude_held_alone(base: Any
     pose = {"rpy_deg": [0.0, 0.0, 0.0]}
     square = planned(
         *({"tool": {"xyz": side, **pose}, "duration": 3, **base} for side in sides),
-        waypoints_deg=[10.0, 100.0, 200.0, 20.0, 30.0, 10.0],
+        joints_deg=[10.0, 100.0, 200.0, 20.0, 30.0, 10.0],
     )
     joints, attitudes = whole(square)
     if base:

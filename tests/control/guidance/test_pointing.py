@@ -13,8 +13,9 @@ from oracles.orbit import EARTH_RADIUS, MU
 from scipy.spatial.transform import Rotation
 
 from space_robot_control.guidance.courses import Course, Slew, turn_between
+from space_robot_control.guidance.goals import PointingGoal
 from space_robot_control.guidance.matched_slew import MatchedSlew
-from space_robot_control.guidance.pointing import PointingCourse, PointingGoal
+from space_robot_control.guidance.pointing import PointingCourse
 from space_robot_model.orbit.ephemeris import AssumedOrbit, Ephemeris
 from space_robot_msgs_py.config.validation import validate
 from space_robot_msgs_py.errors import InputError
@@ -75,7 +76,7 @@ def direction(known: Ephemeris, name: str | list[float], time: float) -> Array:
     """Return a direction (3,), inertial axes."""
     motion = known.motion(np.array([time]))
     r, v = motion.position[0], motion.velocity[0]
-    target = known.target_motion(np.array([time])).position[0]
+    target = known.motion(np.array([time]), of_target=True).position[0]
     named = {"nadir": -r, "velocity": v, "normal": np.cross(r, v), "sun": known.sun}
     named["target"] = target
     return named[name] if isinstance(name, str) else np.array(name)

@@ -14,10 +14,11 @@ from scipy.spatial.transform import Rotation
 from strategies import random_quaternion
 
 from space_robot_control.guidance.courses import Slew
+from space_robot_control.guidance.goals import PointingGoal
 from space_robot_control.guidance.live import TrajectoryPoint
 from space_robot_control.guidance.mission import Mission, MissionSettings, pointing_start
-from space_robot_control.guidance.pointing import PointingCourse, PointingGoal
-from space_robot_control.guidance.tool_courses import JOIN_S
+from space_robot_control.guidance.pointing import PointingCourse
+from space_robot_control.guidance.tool_paths import JOIN_S
 from space_robot_model.orbit.ephemeris import AssumedOrbit, Ephemeris
 from space_robot_model.robot.find import find_robot
 from space_robot_model.robot.kinematics import tool_state
@@ -37,7 +38,7 @@ IDENTITY = np.array([1.0, 0.0, 0.0, 0.0])
 
 def planned(*segments: dict[str, Any], orbit: bool = True, **settings: Any) -> Mission:
     texts = [json.dumps(segment) for segment in segments]
-    numbers = {"waypoints_deg": START, "segments": texts, **settings}
+    numbers = {"joints_deg": START, "segments": texts, **settings}
     if orbit:
         numbers["assumed_orbit"] = ISS
     return Mission(ROBOT, MissionSettings.model_validate(numbers), PERIOD)
@@ -116,14 +117,14 @@ def test_a_mode_goes_on_after_the_missions_end_and_is_not_slewed_to_again() -> N
     once = planned({"hold": 20}, base_point=NADIR)
     thrice = planned({"hold": 5}, {"base": "nadir", "hold": 5}, {"hold": 2}, base_point=NADIR)
     assert np.array_equal(whole(once)[1], whole(thrice, beyond=8.0)[1])
-    waypoints = {"waypoint_times": [0.0, 5.0], "waypoints_deg": [*START, *NEAR]}
-    assert np.array_equal(whole(once)[1], whole(planned(**waypoints, base_point=NADIR), 15.0)[1])
+    moved = planned({"joints_deg": NEAR, "duration": 5}, base_point=NADIR)
+    assert np.array_equal(whole(once)[1], whole(moved, 15.0)[1])
     still = planned(base_point=NADIR)
     assert np.array_equal(still.chunk(0, 100).base, once.chunk(0, 100).base)
 
 
 def test_a_mission_that_starts_pointing_begins_on_its_course() -> None:
-    settings = MissionSettings(waypoints_deg=START, base_point=NADIR, assumed_orbit=ISS)
+    settings = MissionSettings(joints_deg=START, base_point=NADIR, assumed_orbit=ISS)
     attitude, rate_deg_s = pointing_start(settings)
     row = Mission(ROBOT, settings, PERIOD).chunk(0, 1).base[0]
     np.testing.assert_array_equal(attitude, row[:4])

@@ -18,7 +18,7 @@ from flights import COMMAND, ended, ros_environment, space_robot_here, wait_for_
 
 from space_robot_model.robot.find import find_robot
 from space_robot_msgs_py.bag.reader import read_flight
-from space_robot_msgs_py.ros.process_environment import set_defaults
+from space_robot_msgs_py.ros.process import set_defaults
 
 set_defaults()
 pytest.importorskip("rclpy")

@@ -24,10 +24,10 @@ from space_robot.processes.interruption import Interrupted
 from space_robot.scenario.objects import law_parameter
 from space_robot_control.controller.gains import split_gains
 from space_robot_control.laws import ControlLaw, LawGains, find_law, importable_name, laws
-from space_robot_control.laws.checked import LawError, force_of
-from space_robot_control.laws.trust import NotTrustedError, is_plain
+from space_robot_control.laws.base import LawError, force_of
+from space_robot_control.laws.names import NotTrustedError, is_plain
 from space_robot_msgs_py.bag.reader import read_flight
-from space_robot_msgs_py.config.trees import flatten
+from space_robot_msgs_py.config.files import flatten
 from space_robot_msgs_py.errors import InputError
 
 

@@ -9,18 +9,16 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy.linalg import solve_discrete_are
 
-from space_robot_control.navigation.joint_filter import (
+from space_robot_control.navigation.rate_filters import (
     JointFilter,
+    LowPass,
     begin_joints,
+    begin_low_pass,
     filter_joints,
     jerk_density,
-    tune,
-)
-from space_robot_control.navigation.low_pass import (
-    LowPass,
-    begin_low_pass,
     low_pass_weight,
     pass_low,
+    tune,
 )
 from space_robot_msgs_py.compiled.records import assign
 

@@ -18,15 +18,15 @@ from oracles import quaternion_of, rotation_of
 from scipy.spatial.transform import Rotation
 from strategies import random_quaternion
 
-from space_robot_control.navigation.assumed_sensors import (
+from space_robot_control.navigation.attitude_filter import multiply, small_angle, turn
+from space_robot_control.navigation.navigation import LONGEST_BRIDGE, Navigation, navigate
+from space_robot_control.navigation.settings import (
     LEAST,
     LEAST_ANGLE,
+    NavigationFilterSettings,
     assumed_numbers,
     completed,
 )
-from space_robot_control.navigation.navigation import LONGEST_BRIDGE, Navigation, navigate
-from space_robot_control.navigation.quaternions import multiply, small_angle, turn
-from space_robot_control.navigation.settings import NavigationFilterSettings
 from space_robot_model.hardware.sensors import SensorSettings
 from space_robot_model.robot import Robot
 from space_robot_msgs_py.errors import InputError, UnusableStateError

@@ -24,7 +24,7 @@ from space_robot.cli.main import cli
 from space_robot.console.files import whole_file
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.errors import InputError
-from space_robot_msgs_py.samples import Timebase
+from space_robot_msgs_py.samples import RobotNames, Timebase
 
 
 @pytest.fixture(scope="module")
@@ -99,7 +99,8 @@ def test_every_column_has_one_name_and_what_is_not_known_has_none() -> None:
 
 
 def test_every_actuator_has_its_columns(tmp_path: Path) -> None:
-    log = FlightLog.allocate(3, ("a",), Timebase(500_000), wheels=2, thrusters=1, torquers=3)
+    names = RobotNames(("a",), ("w1", "w2"), ("t1",), torquers=("m1", "m2", "m3"))
+    log = FlightLog.allocate(3, names, Timebase(500_000))
     log.commanded_torque = np.zeros((3, 4))
     for k, values in enumerate(log.columns.values()):
         values[:] = np.arange(values.size).reshape(values.shape) + 100.0 * k

@@ -74,7 +74,10 @@ def flown(
     """A log with a real mission, errors of a size, and torques with noise of the size ripple."""
     random = np.random.default_rng(7)
     angles = random.uniform(-90.0, 90.0, (len(times), n))
-    settings = MissionSettings(waypoint_times=list(times), waypoints_deg=angles.ravel().tolist())
+    start, *goals = angles.tolist()
+    rows = zip(goals, np.diff(times).tolist(), strict=True)
+    segments = [f"{{joints_deg: {goal}, duration: {span}}}" for goal, span in rows]
+    settings = MissionSettings(joints_deg=start, segments=segments)
     ticks = round((times[-1] if duration is None else duration) / PERIOD)
     chunk = Mission(random_robot(np.random.default_rng(n), n), settings, PERIOD).chunk(0, ticks)
     joints = names or tuple(f"joint{i + 1}" for i in range(n))

@@ -36,7 +36,7 @@ from space_robot_msgs_py.bag.recorder import BagRecorder
 from space_robot_msgs_py.samples import SOURCES
 from space_robot_sim.environment.captures import Captures
 from space_robot_sim.environment.disturbance import DisturbanceSettings
-from space_robot_sim.environment.orbit_settings import OrbitSettings
+from space_robot_sim.environment.orbit import OrbitSettings
 
 Array = NDArray[np.float64]
 POSTURE = np.array([0.3, -0.8, 1.1, 0.2, -0.5, 0.9])

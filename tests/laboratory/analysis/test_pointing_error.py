@@ -36,7 +36,7 @@ from space_robot_model.robot.placements import tool_pose
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.samples import Timebase
 from space_robot_sim.environment.captures import Captures
-from space_robot_sim.environment.orbit_settings import OrbitSettings
+from space_robot_sim.environment.orbit import OrbitSettings
 
 SEEDS = st.integers(0, 2**32 - 1)
 
@@ -302,7 +302,7 @@ def test_a_line_is_flown_within_a_micrometre_and_a_payload_moves_it() -> None:
     assert tool["rms_deg"] <= tool["largest_deg"] < 1e-5
     loaded = scenario.replace(case={"payload": {"mass": 20.0}}).fly()
     assert loaded.report()["tool"]["largest_m"] > 1e-3
-    plain = sr.Scenario(duration=0.1).fly().log  # waypoints lead no tool
+    plain = sr.Scenario(duration=0.1).fly().log  # joints alone lead no tool
     assert not leads_tool(plain)
     for column in (plain.reference_joints[-1, 0], plain.reference_base[-1, :4]):
         before = column.copy()

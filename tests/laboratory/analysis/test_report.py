@@ -27,7 +27,7 @@ from space_robot.console.tables import NONE
 from space_robot_model.robot.gears import geared_joints
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.bag.reader import read_flight
-from space_robot_msgs_py.samples import Timebase
+from space_robot_msgs_py.samples import RobotNames, Timebase
 
 Array = NDArray[np.float64]
 Report = dict[str, Any]
@@ -174,7 +174,7 @@ def test_the_attitude_is_shown_in_degrees_and_a_divergence_with_exponents(report
 
 
 def test_the_deflection_is_motor_less_link_of_joints_with_gears() -> None:
-    log = FlightLog.allocate(500, tuple("abcd"), Timebase(500_000), geared_names=("b", "d"))
+    log = FlightLog.allocate(500, RobotNames(tuple("abcd"), geared=("b", "d")), Timebase(500_000))
     rng = np.random.default_rng(3)
     log.joint_positions[:] = rng.uniform(-3.0, 3.0, (500, 4))
     log.motor_positions[:] = log.joint_positions[:, [1, 3]] + rng.normal(size=(500, 2)) * [1, 9]

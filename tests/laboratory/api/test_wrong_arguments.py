@@ -90,7 +90,7 @@ def test_what_is_no_option(option: str) -> None:
         ({"robot": 3.5j}, "robot: a name, a path or a Robot (an object or a mapping) was expected"),
         ({"controller": int}, "Scenario: controller: a name, a path or a ControlLaw (class or"),
         ({"sensors": {"gyros": {}}}, "Scenario: sensors: numbers given: gyros: unknown key"),
-        ({"mission": {"waypoint_times": []}}, "mission: numbers given: waypoint_times"),
+        ({"mission": {"joints_deg": [None]}}, "mission: numbers given: joints_deg"),
         ({"gains": [1.0]}, "Scenario: gains: a name, a path or a mapping of gains"),
         ({"gains": {"k_9": 1.0}}, "unknown gain of tde_stc 'k_9'"),
         ({"gains": {"k_1": "much"}}, "tde_stc.k_1: numbers were expected, got ['much']"),

@@ -27,7 +27,7 @@ from space_robot.campaign.store.schema import Schema
 from space_robot.campaign.store.software import file_digests, source_digest
 from space_robot.campaign.study import Study
 from space_robot.campaign.verdicts.requirements import verdicts
-from space_robot_control.laws.trust import NotTrustedError
+from space_robot_control.laws.names import NotTrustedError
 from space_robot_msgs_py.errors import InputError
 
 pytest.importorskip("pyarrow")

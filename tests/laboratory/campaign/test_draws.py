@@ -113,7 +113,7 @@ def test_all_laws_fly_the_same_robot_and_noise() -> None:
     factors = [values[f"robot.links[{name}].mass"] for name in nominal.joint_names]
     assert flight.robot.mass[1:] == pytest.approx(nominal.mass[1:] * factors, rel=1e-15)
     start = [values[f"mission.start_deg[{name}]"] for name in nominal.joint_names]
-    begins = flight.mission_settings.waypoints_deg[:6]
+    begins = flight.mission_settings.joints_deg
     assert flight.plant_settings.initial_joints_deg == [
         a + float(b) for a, b in zip(begins, start, strict=True)
     ]

@@ -12,7 +12,7 @@ from space_robot import Campaign, FlownCampaign
 from space_robot.campaign.report.findings import Findings
 from space_robot.campaign.report.subject import subject_of
 from space_robot.campaign.row import fly
-from space_robot_control.laws.trust import NotTrustedError
+from space_robot_control.laws.names import NotTrustedError
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.config.validation import read_yaml
 from space_robot_msgs_py.errors import InputError

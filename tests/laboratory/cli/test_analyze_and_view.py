@@ -27,7 +27,7 @@ from space_robot.flight.plan import Flight, FlightPlan, resolve
 from space_robot.flight.simulate import simulate
 from space_robot.view.flights import shown_robot
 from space_robot_msgs_py.bag.reader import read_flight
-from space_robot_msgs_py.config.extras import install_command
+from space_robot_msgs_py.config.installation import install_command
 
 LARGEST = 2e6
 """Bytes of a page of a short flight."""
@@ -147,7 +147,8 @@ def flown_arm(tmp_path: Path) -> Path:
     spring = {"slide": {"stiffness": 50.0, "damping": 1.0}}
     robot.write_text(json.dumps({"robot": {"urdf": "arm.urdf", "passive": spring}}))
     gains = {"k_p": [1e4], "k_d": [200.0]}
-    mission = {"waypoint_times": [0.0, 1.0], "waypoints_deg": [0.0, 5.0]}
+    segments = [{"joints_deg": [5.0], "duration": 4.0}]
+    mission = {"start": {"joints_deg": [0.0]}, "segments": segments}
     plan = {"robot": str(robot), "mission": mission, "gains": gains, "controller": "ctc"}
     simulate(Flight(resolve(FlightPlan(**plan, duration=0.1))), tmp_path / "flown")
     return urdf

@@ -126,8 +126,8 @@ def test_a_set_for_segments_is_in_the_bag_and_may_be_overruled(tmp_path: Path) -
     assert over.controller_settings.acceleration_filter_hz == 7.0
     alone = ControllerNodeSettings.resolve({"gains": str(tmp_path)})  # as a node by itself has it
     assert alone.acceleration_filter_hz == corner
-    here = "mission.waypoints_deg=[0.0, 90.0, 200.0, 20.0, 30.0, 10.0]"
-    still = tune(tmp_path, "--set", "mission.waypoint_times=[0.0]", "--set", here)
+    here = "mission.joints_deg=[0.0, 90.0, 200.0, 20.0, 30.0, 10.0]"
+    still = tune(tmp_path, "--set", "mission.segments=['']", "--set", here)
     assert "moves neither joints nor base" in str(still.exception)
 
 
@@ -185,7 +185,9 @@ def test_springs_and_laws_are_in_the_report(motor: str) -> None:
 
     Within a tick a motor is moved without its link: h_bar is below twice its inertia, H_S is not.
     """
-    quick = ("--set", "mission.waypoint_times=[0.0, 2.0, 4.0]")
+    goals = (15, 110, 185, 45, 10, -25), (30, 100, 150, 90, 30, -50)
+    segments = [f"{{joints_deg: {list(goal)}, duration: 2}}" for goal in goals]
+    quick = ("--set", f"mission.segments={json.dumps(segments)}")
     result = check_gears("--robot", "paper", "--plant-robot", motor, *quick, "--json")
     assert str(result.exception) == "indi: small oscillations of the gears' springs grow"
     report = json.loads(result.stdout)

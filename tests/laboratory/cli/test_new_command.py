@@ -148,14 +148,16 @@ def test_a_urdf_stays_one_and_has_a_mission_within_its_limits() -> None:
     assert len(read.visuals) == len(Robot.from_urdf(ARM).visuals)
 
     mission = rest_to_rest(robot)
-    written = yaml.safe_load(mission_text(robot, mission, "a command"))["mission_node"]
-    assert written["ros__parameters"]["waypoints_deg"] == mission.waypoints_deg
-    chunk = Mission(robot, mission, 0.05).chunk(0, int(mission.waypoint_times[-1] / 0.05) + 1)
+    written = yaml.safe_load(mission_text(robot, mission, "a command"))["mission"]
+    assert written["start"]["joints_deg"] == mission.joints_deg
+    assert written["segments"] == [yaml.safe_load(text) for text in mission.segments]
+    planned = Mission(robot, mission, 0.05)
+    chunk = planned.chunk(0, int(planned.duration / 0.05) + 1)
     positions, velocities, _ = np.moveaxis(chunk.joints, 1, 0)
     for joint, limit in enumerate(robot.limits):
         assert limit.lower <= positions[:, joint].min() < positions[:, joint].max() <= limit.upper
         assert np.abs(velocities[:, joint]).max() <= 0.51 * limit.velocity
-    assert mission.waypoint_times[1] > 10.0, "its joints are slow"
+    assert planned.pieces[0].end > 10.0, "its joints are slow"
 
 
 def test_a_joint_is_made_passive_in_one_step(tmp_path: Path) -> None:
@@ -219,7 +221,7 @@ def test_files_for_other_joints_name_the_command_that_mends_them(stale: str) -> 
         resolve(FlightPlan(robot="mine", controller="ctc"))
     command = "`space-robot new mine/ --out mine --force` makes mission and gains anew"
     assert command in str(caught.value)
-    said = {"mission": "mine/mission.yaml: waypoints_deg has", "gains": "were expected, got 5: ["}
+    said = {"mission": "mine/mission.yaml: the start has", "gains": "were expected, got 5: ["}
     assert said[stale] in str(caught.value)
 
 

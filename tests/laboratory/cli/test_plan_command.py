@@ -14,8 +14,7 @@ import yaml
 from click.testing import CliRunner, Result
 
 from space_robot.cli.main import cli
-from space_robot_control.guidance.mission import Mission
-from space_robot_control.guidance.settings import MissionNodeSettings
+from space_robot_control.guidance.mission import Mission, MissionNodeSettings
 from space_robot_model.robot.find import find_robot
 from space_robot_model.robot.kinematics import tool_state
 from space_robot_msgs_py.errors import FlightError

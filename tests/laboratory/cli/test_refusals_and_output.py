@@ -25,7 +25,7 @@ from space_robot.flight.simulate import simulate
 from space_robot_model.robot.parts import MOST_PLATES
 from space_robot_msgs_py.errors import InputError
 from space_robot_sim.environment import surfaces
-from space_robot_sim.plant.gear_mounting import MOST_SUBSTEPS
+from space_robot_sim.plant.mounting import MOST_SUBSTEPS
 from space_robot_sim.plant.plant import PlantSettings
 
 TABLE = DATA / "refusals/commands.yaml"

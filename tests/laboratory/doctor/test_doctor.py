@@ -16,7 +16,7 @@ from space_robot.doctor.ros import check_distribution, check_domain, check_middl
 from space_robot.doctor.storage import check_disk, check_kernels, check_memory
 from space_robot.doctor.tools import check_tools
 from space_robot.flight.graph.domain import ros_domain
-from space_robot_msgs_py.config.extras import requirements
+from space_robot_msgs_py.config.installation import requirements
 from space_robot_msgs_py.ros.locks import FileLock, domain_lock
 
 

@@ -20,7 +20,7 @@ from space_robot.flight.simulate import simulate
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.bag.reader import read_flight
 from space_robot_msgs_py.errors import InputError
-from space_robot_sim.environment.orbit_settings import OrbitSettings
+from space_robot_sim.environment.orbit import OrbitSettings
 from space_robot_sim.environment.target import Target
 
 EVENTS = ["capture@0.1:tumbling_satellite", "release@0.2:0.05", "capture@0.2001:small_satellite"]

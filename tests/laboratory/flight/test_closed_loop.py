@@ -24,7 +24,7 @@ from space_robot_msgs_py import topics
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.errors import FlightError, InputError
 from space_robot_sim.environment.friction import FrictionSettings
-from space_robot_sim.plant.faults import MESSAGE_KINDS
+from space_robot_sim.faults.messages import MESSAGE_KINDS
 
 Array = NDArray[np.float64]
 

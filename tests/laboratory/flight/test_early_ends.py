@@ -25,7 +25,7 @@ from space_robot.flight.plan import Flight
 from space_robot.flight.simulate import fly_blocks, simulate
 from space_robot.processes import memory
 from space_robot_control.laws import Signals
-from space_robot_control.laws.checked import LawError
+from space_robot_control.laws.base import LawError
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.bag.folder import open_bag

@@ -46,7 +46,8 @@ FLIGHTS = {
         "quantise_attitude@0.45-0.5:1e-5 quantise_gyro@0.55-0.6:1e-6 "
         "quantise_joint_position@0.65-0.7:1e-5 quantise_joint_velocity@0.75-0.8:1e-6 "
         "gyro_bias@0.81-0.83:base_x=1e-6 tracker_blind@0.84-0.85 "
-        "encoder_stuck@0.86-0.865:3",
+        "encoder_stuck@0.86-0.865:3 noise_magnetometer@0.87-0.88:1e-6 "
+        "magnetometer_bias@0.89-0.9:base_y=1e-6",
         "bad actuators": "saturate_base@0.1-0.2:0.001 saturate_joints@0.3-0.4:0.01 "
         "stuck_joint@0.6-0.9:3=15 drive_scale@0.42-0.45:all=0.9 "
         "drive_bias@0.46-0.49:base_x=0.01 torque_scale@0.5-0.53:all=1.001 "

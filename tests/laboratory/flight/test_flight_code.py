@@ -19,8 +19,7 @@ from matrix.scenarios import difference
 from paths import ROOT
 
 from space_robot.export.software import export
-from space_robot_control.flight_code.compiler import write_sources
-from space_robot_control.flight_code.library import FlightLibrary
+from space_robot_control.flight_code.library import FlightLibrary, write_sources
 from space_robot_control.flight_code.remote import BEGIN, FlightComputer
 from space_robot_control.flight_code.supervisors import ShadowError, bits
 from space_robot_msgs_py.bag.flight_log import FlightLog
@@ -65,8 +64,10 @@ def test_a_difference_ends_the_flight_and_is_named(monkeypatch: pytest.MonkeyPat
 
 @needs_compiler
 def test_a_judgement_that_differs_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
-    judge = FlightLibrary.judge
-    monkeypatch.setattr(FlightLibrary, "judge", lambda self, tick: judge(self, tick) + (tick == 9))
+    judge = FlightLibrary.judge_stamp
+    monkeypatch.setattr(
+        FlightLibrary, "judge_stamp", lambda self, tick: judge(self, tick) + (tick == 9)
+    )
     with pytest.raises(ShadowError, match="at tick 9 Python judges the stamp as 1, C as 2"):
         flown(shadow="c")
 
@@ -168,4 +169,4 @@ def test_one_that_falls_silent_ends_the_flight(monkeypatch: pytest.MonkeyPatch) 
         computer = FlightComputer(exported, "127.0.0.1", server.getsockname()[1])
         thread.join()
         with pytest.raises(FlightError, match="the flight computer does not answer"):
-            computer.judge(0)
+            computer.judge_stamp(0)

@@ -28,7 +28,7 @@ from space_robot_model.hardware.base_actuators import BaseActuatorSettings
 from space_robot_model.robot import Robot
 from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.samples import SOURCES
-from space_robot_sim.environment.orbit_settings import OrbitSettings
+from space_robot_sim.environment.orbit import OrbitSettings
 
 POSTURE = [0, 90, 200, 20, 30, 10]
 LINE = {"tool": {"xyz": [0.3, 0.0, -0.4]}}
@@ -168,7 +168,7 @@ def test_a_free_base_under_a_mission_that_holds_it_is_remarked(
             sr.Scenario(**{**flown.scenario.tree, "duration": 0.01}).fly()
 
 
-def test_waypoints_beyond_the_wheels_are_warned_of_if_they_are_flown() -> None:
+def test_missions_that_are_not_refused_are_warned_of_if_they_are_flown() -> None:
     remarks = [
         demand_remark(resolve(FlightPlan(actuators=actuators, duration=duration)))
         for actuators, duration in (("small_wheels", None), ("small_wheels", 0.1), ("wheels", None))

@@ -28,21 +28,20 @@ from space_robot.processes import software
 from space_robot.processes.node_modules import MODULES
 from space_robot.scenario.faults import KINDS
 from space_robot.scenario.node_settings import NODES, SCHEMAS
-from space_robot_control.allocation.assumed_actuators import assumed_actuators
+from space_robot_control.allocation.settings import assumed_actuators
 from space_robot_control.controller.controller import Controller
 from space_robot_control.controller.gains import build_laws, split_gains
+from space_robot_control.controller.law_choice import parse_swaps
 from space_robot_control.controller.settings import ControllerNodeSettings
-from space_robot_control.controller.swaps import parse_swaps
-from space_robot_control.guidance.mission import Mission
-from space_robot_control.guidance.settings import MissionNodeSettings
+from space_robot_control.guidance.mission import Mission, MissionNodeSettings
 from space_robot_control.laws import laws
 from space_robot_model.robot import Robot
 from space_robot_model.robot.find import find_robot
 from space_robot_model.robot.placements import RobotPoses, frame_names
 from space_robot_msgs_py import topics
-from space_robot_msgs_py.bag.accounts import noted_accounts
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.bag.folder import open_bag
+from space_robot_msgs_py.bag.message_accounting import noted_accounts
 from space_robot_msgs_py.bag.reader import read_flight
 from space_robot_msgs_py.config.settings import leaves
 from space_robot_msgs_py.config.validation import validate

@@ -27,7 +27,7 @@ HELPER = [
     sys.executable,
     "-c",
     "import os, sys, time\n"
-    "from space_robot_msgs_py.ros.lifeline import hold_to_standard_input\n"
+    "from space_robot_msgs_py.ros.process import hold_to_standard_input\n"
     "hold_to_standard_input()\n"
     "print(os.environ.get('EXTRA', ''), flush=True)\n"
     "time.sleep(600)\n",

@@ -20,7 +20,7 @@ from space_robot.flight.plan import Flight
 from space_robot.flight.simulate import simulate
 from space_robot.scenario.node_settings import NODES, NOT_TO_BE_SET, SCHEMAS, FlightSettings
 from space_robot_msgs_py.bag.message_accounting import topics_with_allowed_gaps
-from space_robot_msgs_py.config.directory import GRAPH_FILE, config_directory
+from space_robot_msgs_py.config.installation import GRAPH_FILE, config_directory
 from space_robot_msgs_py.config.settings import leaves
 from space_robot_msgs_py.errors import InputError
 

@@ -76,7 +76,7 @@ def test_the_worst_case_counts_axis_by_axis(paper_robot: Robot, order: int) -> N
 def test_a_base_that_turns_asks_what_the_planner_says(paper_robot: Robot) -> None:
     """A segment that turns the base by 40 degrees; eps is half of an angle, so F is 2 torques."""
     segments = ["{base: {rpy_deg: [10, 40, -20]}, duration: 12}"]
-    turning = MissionSettings(waypoints_deg=[0, 90, 200, 20, 30, 10], segments=segments)
+    turning = MissionSettings(joints_deg=[0, 90, 200, 20, 30, 10], segments=segments)
     found = demand(paper_robot, turning, [case()])
     flown = Mission(paper_robot, turning, SAMPLING)
     (planned,) = planned_segments(paper_robot, flown)
@@ -97,9 +97,7 @@ def test_disturbances_about_inertial_axes_are_turned_to_the_bases(vector: list[f
     attitude = Rotation.from_rotvec(vector)
     x, y, z, w = attitude.as_quat()
     place = [10.0, 50.0, 90.0, 20.0, 30.0, 40.0]
-    still = MissionSettings(
-        waypoint_times=[0.0, 4.0], waypoints_deg=place * 2, base_quaternion=[w, x, y, z]
-    )
+    still = MissionSettings(joints_deg=place, segments=["{hold: 4}"], base_quaternion=[w, x, y, z])
     found = demand(find_robot("paper"), still, [case(disturbance={"scale": 1.0})])
     time = 0.05 * np.arange(81)
     wave = np.sin(2 * np.pi * 0.5 * time) + np.sin(2 * np.pi * 0.75 * time)
@@ -136,11 +134,11 @@ def test_both_ends_of_a_mission_are_looked_at() -> None:
     flight = Flight(resolve(FlightPlan(robot="seven_joint")))
     found = inertia_along(flight.robot, flight.mission_settings, step=7.0)
     assert found.shape == (6, 10, 10)  # 0, 7, ... 28 and beyond the end at 30 s
-    waypoints = np.radians(flight.mission_settings.waypoints_deg).reshape(3, 7)
-    for row, theta in ((0, waypoints[0]), (-1, waypoints[-1])):
+    ends = np.radians(flight.mission_settings.joints_deg), flight.mission.pieces[-1].goal
+    for row, theta in zip((0, -1), ends, strict=True):
         expected = rho_space_inertia(flight.robot, UPRIGHT, theta)
         np.testing.assert_allclose(found[row], expected, rtol=1e-10, atol=1e-8)
-    with pytest.raises(ValueError, match="need 21"):
+    with pytest.raises(ValueError, match="the start has 6 joints; the robot has 7"):
         inertia_along(flight.robot, mission())
 
 
@@ -175,7 +173,7 @@ def test_loose_joints_give_way_and_locked_ones_do_not() -> None:
         assert np.linalg.eigvalsh(locked - found).min() > -1e-12
     both = inertia_along(robot, flight.mission_settings, step=2.0)
     assert both.shape == (10, 9, 9)
-    start = robot.from_degrees(flight.mission_settings.waypoints_deg[:6])[np.newaxis]
+    start = robot.from_degrees(flight.mission_settings.joints_deg)[np.newaxis]
     for row, inertia in (
         (0, semi_floating_inertia(robot.nominal, start)),
         (5, loose_inertia(robot, start)),

@@ -114,11 +114,7 @@ def held_flight(
 
     ``base_rate``: of the base at the start about each axis, rad/s.
     """
-    mission = {
-        "waypoint_times": [0.0],
-        "waypoints_deg": POSTURE_DEG,
-        "base_quaternion": quaternion.tolist(),
-    }
+    mission = {"joints_deg": POSTURE_DEG, "base_quaternion": quaternion.tolist()}
     plan = FlightPlan(
         controller=law,
         gains=dict(gains),

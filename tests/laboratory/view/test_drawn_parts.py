@@ -34,13 +34,13 @@ from space_robot.view.wheels import (
     slowdown_of,
     wheel_places,
 )
-from space_robot_control.allocation.assumed_actuators import assumed_actuators
+from space_robot_control.allocation.settings import assumed_actuators
 from space_robot_model.hardware.wheels import WheelSettings
 from space_robot_model.robot import Robot
 from space_robot_model.robot.parts import Plate, Visual
 from space_robot_model.robot.shapes import BASE_COLOUR, PANEL_COLOUR
 from space_robot_msgs_py.bag.flight_log import FlightLog
-from space_robot_msgs_py.samples import Timebase
+from space_robot_msgs_py.samples import RobotNames, Timebase
 
 EDGES = st.tuples(st.floats(0.1, 5.0), st.floats(0.1, 5.0), st.floats(0.1, 5.0))
 
@@ -214,7 +214,7 @@ def test_a_drawn_wheel_neither_blurs_nor_seems_to_turn_back(speed: float, frame_
 
 
 def test_a_wheel_at_a_limit_between_two_frames_is_marked() -> None:
-    log = FlightLog.allocate(31, (), PERIOD, wheels=2)
+    log = FlightLog.allocate(31, RobotNames((), ("w1", "w2")), PERIOD)
     log.wheel_velocities[:], log.wheel_torques[:] = 0.0, 0.0
     log.wheel_torques[13, 0] = -2.0  # the motor's largest
     log.wheel_velocities[25:, 1] = 100.0  # 10 N m s
@@ -282,7 +282,7 @@ def test_the_page_turns_the_wheels_and_colours_those_at_a_limit(paper_robot: Rob
 
 def test_between_two_frames_the_mean_thrust_counts() -> None:
     """So that a pulse that is shorter than a frame is seen, and impulse is neither lost nor won."""
-    log = FlightLog.allocate(101, (), Timebase(1_000_000), thrusters=3)
+    log = FlightLog.allocate(101, RobotNames((), (), ("t1", "t2", "t3")), Timebase(1_000_000))
     log.thrusts[:] = np.random.default_rng(1).uniform(size=(101, 3))
     log.thrusts[7] = np.nan
     rows = [0, 10, 35, 100]

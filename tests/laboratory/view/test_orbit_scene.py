@@ -37,7 +37,8 @@ from space_robot.view.marks import Mark, marks_of
 from space_robot.view.orbit_frames import OrbitFrames, shadow_intervals, sun_direction
 from space_robot.view.stage import DIRECTION, FIELD_OF_VIEW, LAMPS, SIDES, set_stage
 from space_robot_model.robot import Robot
-from space_robot_msgs_py.bag.flight_log import ORBIT_WIDTHS, FlightLog
+from space_robot_msgs_py.bag.flight_log import FlightLog
+from space_robot_msgs_py.samples import ORBIT_FIELDS
 
 Array = NDArray[np.float64]
 SECOND = 1_000_000_000
@@ -295,7 +296,7 @@ def test_side_by_side_each_has_its_arrows_and_over_one_another_the_first(
 def test_a_flight_without_orbit_and_gears_has_nothing_of_them(
     paper_robot: Robot, log: FlightLog
 ) -> None:
-    columns: dict[str, Any] = {name: np.empty((log.ticks, 0)) for name in ORBIT_WIDTHS}
+    columns: dict[str, Any] = {name: np.empty((log.ticks, 0)) for name in ORBIT_FIELDS}
     page = page_of(paper_robot, one=replace(log, **columns))
     scene = Scene(page)
     assert not [n for n in scene.names() if "orbit" in n or n in ("/earth", "/sun")]
@@ -385,8 +386,8 @@ def test_in_orbit_the_camera_sees_every_point_and_the_earth_below(
 def test_the_base_does_not_hide_the_arm(name: str, side: float) -> None:
     """It is on the other side of the Orbiter's z axis."""
     scenario = resolve(FlightPlan(robot=name, controller="ctc"))
-    robot, waypoints = scenario.robots.plant, scenario.settings.mission.waypoints_deg
-    poses = np.radians(np.reshape(waypoints, (-1, robot.n)))
+    robot, start = scenario.robots.plant, np.radians(scenario.settings.mission.joints_deg)
+    poses = np.array([start, *(piece.goal for piece in scenario.reference.pieces)])
     found = clearest_side([(robot, np.tile([1.0, 0.0, 0.0, 0.0], (len(poses), 1)), poses)])
     assert np.array_equal(found, SIDES[0]) is (side > 0.0)
     with local_server() as server:

@@ -19,7 +19,7 @@ from space_robot.view.page import Shown, render
 from space_robot.view.plots import STRETCHES, Plot, Series, extremes, plots_of
 from space_robot.view.plotted_quantity import PlottedQuantity
 from space_robot.view.quantities import quantities_of
-from space_robot_control.allocation.assumed_actuators import assumed_actuators
+from space_robot_control.allocation.settings import assumed_actuators
 from space_robot_model.hardware.base_actuators import BaseActuatorSettings
 from space_robot_model.robot import Robot
 from space_robot_model.robot.find import find_robot

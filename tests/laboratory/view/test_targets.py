@@ -19,7 +19,7 @@ from space_robot.view.free_body import before_capture, held_poses
 from space_robot_model.robot import Robot
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_sim.environment.events import Capture, Release
-from space_robot_sim.environment.grasp import Grasp
+from space_robot_sim.environment.impact import Grasp
 from space_robot_sim.environment.neighbouring_orbit import fall, meet
 from space_robot_sim.environment.target import Target
 

@@ -13,14 +13,17 @@ from hypothesis import strategies as st
 from numpy.typing import ArrayLike, NDArray
 from scipy import interpolate
 from scipy.spatial.transform import Rotation
-from scipy.special import ndtr, ndtri
+from scipy.special import ndtri
 from strategies import RNGS
 
-from space_robot_model.elementary.arctangent import arctan2
-from space_robot_model.elementary.cholesky import cholesky_into, solve_cholesky
-from space_robot_model.elementary.definite import is_positive_definite, move_to_side
-from space_robot_model.elementary.exponential import exp, log
-from space_robot_model.elementary.fourier import squared_spectrum
+from space_robot_model.elementary.functions import arctan2, exp, log, sin_cos, sines_cosines
+from space_robot_model.elementary.linear_algebra import (
+    cholesky_into,
+    is_positive_definite,
+    move_to_side,
+    principal_axes,
+    solve_cholesky,
+)
 from space_robot_model.elementary.matrices import (
     dot_rows,
     norm,
@@ -30,20 +33,19 @@ from space_robot_model.elementary.matrices import (
     solve,
     unit_rows,
 )
-from space_robot_model.elementary.normal import normal_cdf, normal_numbers, normal_quantile
+from space_robot_model.elementary.normal import normal_numbers, quantile
 from space_robot_model.elementary.rotations import (
     exact_sines_cosines,
+    plain_sin_cos,
     rotation_of_rpy,
     rpy_of_rotation,
 )
-from space_robot_model.elementary.series import plain_sin_cos
-from space_robot_model.elementary.sine import sin_cos, sines_cosines
-from space_robot_model.elementary.spline import CubicSpline
-from space_robot_model.elementary.symmetric import principal_axes
+from space_robot_model.elementary.splines import CubicSpline
 
 # Elementary functions against long doubles and SciPy, in units in the last place
 
 RNG = np.random.default_rng(5)
+quantiles = np.vectorize(quantile, otypes=[np.float64])
 
 
 def ulps(found: ArrayLike, exact: NDArray[np.longdouble]) -> float:
@@ -82,7 +84,6 @@ def test_arrays_have_the_bits_of_their_numbers() -> None:
     sines, cosines = sines_cosines(angles)
     assert sines.shape == cosines.shape == angles.shape
     assert sin_cos(angles[1, 2]) == (sines[1, 2], cosines[1, 2])
-    assert normal_quantile(0.3) == normal_quantile([0.1, 0.3])[1]
 
 
 @pytest.mark.parametrize(
@@ -108,19 +109,15 @@ def test_what_is_no_number_is_as_in_the_c_library() -> None:
             np.testing.assert_allclose(exp(x), np.exp(x), rtol=1e-15, err_msg=str(x))
         for x in (-1.0, 0.0, 5e-324, 1.0, math.inf, math.nan):
             np.testing.assert_allclose(log(x), np.log(x), rtol=1e-15, err_msg=str(x))
+        found = quantiles([0.0, 0.5, 1.0, -0.1, 1.1, math.nan])
     for x in (-math.inf, math.inf, math.nan):
         assert np.isnan(sin_cos(x)).all()
-    found = normal_quantile([0.0, 0.5, 1.0, -0.1, 1.1, math.nan])
     np.testing.assert_array_equal(found, [-np.inf, 0.0, np.inf, np.nan, np.nan, np.nan])
 
 
 def test_the_normal_distribution_is_scipys() -> None:
     shares = np.concatenate((RNG.uniform(size=2000), 10.0 ** RNG.uniform(-300, -1, 2000)))
-    np.testing.assert_allclose(normal_quantile(shares), ndtri(shares), rtol=4e-15)
-    z = np.concatenate((RNG.uniform(-37.0, 9.0, 2000), (-3.0, 0.0, 3.0)))
-    np.testing.assert_allclose([normal_cdf(x) for x in z], ndtr(z), rtol=3e-13)
-    assert np.isnan(normal_cdf(math.nan))
-    np.testing.assert_allclose(normal_quantile([normal_cdf(-1.25)]), -1.25, rtol=1e-14)
+    np.testing.assert_allclose(quantiles(shares), ndtri(shares), rtol=4e-15)
 
 
 @given(st.integers(0, 2**32 - 1), st.integers(0, 2**32 - 1), st.integers(0, 2**32 - 1))
@@ -129,7 +126,7 @@ def test_normal_numbers_are_those_of_numpys_generator(seed: int, key: int, block
     shares = ((bits >> np.uint64(12)).astype(float) + 0.5) * 2.0**-52
     draws = np.empty((8, 6))
     normal_numbers(draws, float(seed), key, block)
-    np.testing.assert_array_equal(draws.ravel(), normal_quantile(shares))
+    np.testing.assert_array_equal(draws.ravel(), quantiles(shares))
 
 
 Array = NDArray[np.float64]
@@ -185,14 +182,6 @@ def test_principal_axes_diagonalise(
     np.testing.assert_allclose(found, np.sort(values), rtol=0.0, atol=1e-13 * scale)
     np.testing.assert_allclose(axes.T @ axes, np.eye(size), rtol=0.0, atol=1e-13)
     np.testing.assert_allclose(axes @ np.diag(found) @ axes.T, tensor, atol=1e-12 * scale)
-
-
-@pytest.mark.parametrize("size", [1, 2, 3, 4, 12, 30, 49, 64, 97, 210, 360])
-def test_the_spectrum_is_numpys(size: int) -> None:
-    """Of lengths with one factor and with many, even and odd."""
-    rows = np.random.default_rng(size).normal(size=(size, 2))
-    expected = np.abs(np.fft.rfft(rows, axis=0)) ** 2
-    np.testing.assert_allclose(squared_spectrum(rows), expected, rtol=0.0, atol=1e-11 * size)
 
 
 @given(RNGS, st.integers(1, 7))

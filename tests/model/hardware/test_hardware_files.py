@@ -16,7 +16,7 @@ from paths import CONFIG, DATA
 from scipy.optimize import linprog
 from strategies import SEEDS
 
-from space_robot_model.hardware.base_actuators import BaseActuatorSettings
+from space_robot_model.hardware.base_actuators import BaseActuatorSettings, MagneticTorquerSettings
 from space_robot_model.hardware.capability import (
     ThrusterTorques,
     actuator_load,
@@ -24,7 +24,6 @@ from space_robot_model.hardware.capability import (
     largest_torque,
     wheel_shares,
 )
-from space_robot_model.hardware.magnetic_torquers import MagneticTorquerSettings
 from space_robot_model.hardware.sensors import SensorSettings
 from space_robot_model.robot import Robot
 from space_robot_msgs_py.config.settings import leaves
@@ -160,9 +159,9 @@ def test_axes_of_torquers_are_directions_and_one_dipole_may_stand_for_all() -> N
     axes = [3.0, 0.0, 4.0, 0.0, -0.1, 0.0]
     same = MagneticTorquerSettings(axes=axes, max_dipole=[30.0])
     np.testing.assert_array_equal(same.unit_axes, [[0.6, 0.0, 0.8], [0.0, -1.0, 0.0]])
-    np.testing.assert_array_equal(same.largest, [30.0, 30.0])
+    np.testing.assert_array_equal(same.values("max_dipole"), [30.0, 30.0])
     each = MagneticTorquerSettings(axes=axes, max_dipole=[30.0, 20.0])
-    np.testing.assert_array_equal(each.largest, [30.0, 20.0])
+    np.testing.assert_array_equal(each.values("max_dipole"), [30.0, 20.0])
     assert MagneticTorquerSettings().unit_axes.shape == (0, 3)
     with pytest.raises(ValueError, match="x, y, z of at most 6 vectors were expected"):
         MagneticTorquerSettings(axes=[1.0, 0.0, 0.0] * 7)

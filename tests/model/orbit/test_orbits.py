@@ -113,9 +113,9 @@ def test_acceleration_and_jerk_are_those_of_gravity_at_the_place(
 def test_the_motion_is_the_same_to_the_bit_in_whatever_order_it_is_asked_for() -> None:
     times = np.linspace(0.0, 3000.0, 1001)
     whole, parts = ephemeris(target=TARGET), ephemeris(target=TARGET)
-    expected = np.array(whole.target_motion(times))
+    expected = np.array(whole.motion(times, of_target=True))
     for chunk in (slice(0, 7), slice(400, 500), slice(7, 400), slice(500, None)):
-        got = np.array(parts.target_motion(times[chunk]))
+        got = np.array(parts.motion(times[chunk], of_target=True))
         np.testing.assert_array_equal(got, expected[:, chunk])
 
 
@@ -148,6 +148,7 @@ def test_an_orbit_and_a_target_beside_it_agree_with_scipy(
     expected = free_path(r, v, times, has_j2)
     place, speed = np.array(TARGET["position"]), np.array(TARGET["velocity"])
     apart = free_path(r + place, v + speed, times, has_j2) - expected
-    for motion, path in ((known.motion(times), expected), (known.target_motion(times), apart)):
+    motions = known.motion(times), known.motion(times, of_target=True)
+    for motion, path in zip(motions, (expected, apart), strict=True):
         np.testing.assert_allclose(motion.position, path[:, :3], rtol=0, atol=atol)
         np.testing.assert_allclose(motion.velocity, path[:, 3:], rtol=0, atol=1e-3 * atol)

@@ -31,7 +31,7 @@ from space_robot_model.robot.find import (
     with_choice,
 )
 from space_robot_model.robot.mission_document import mission_layer
-from space_robot_msgs_py.config.trees import Tree
+from space_robot_msgs_py.config.files import Tree
 from space_robot_msgs_py.errors import InputError
 
 ARM = str(DATA / "arm.urdf")

@@ -45,7 +45,7 @@ from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.samples import RobotState, Timebase
 from space_robot_msgs_py.topics import INERTIAL_FRAME
 from space_robot_msgs_py.wire.definitions import decode
-from space_robot_msgs_py.wire.markers import no_markers
+from space_robot_msgs_py.wire.viewers import no_markers
 
 Array = NDArray[np.float64]
 UPRIGHT = [1.0, 0.0, 0.0, 0.0]

@@ -34,7 +34,7 @@ from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.bag.reader import read_flight
 from space_robot_msgs_py.bag.recorder import BagRecorder
 from space_robot_msgs_py.errors import InputError
-from space_robot_msgs_py.wire.clock import ClockCodec
+from space_robot_msgs_py.wire.telemetry import ClockCodec
 
 METADATA = "metadata.yaml"
 _CHUNK_CRC = 9 + 24
@@ -99,11 +99,6 @@ def _edit(change: Callable[[dict[str, Any]], object]) -> Callable[[Path], None]:
     return harm
 
 
-def _joints_count(information: dict[str, Any]) -> None:
-    for entry in information["topics_with_message_count"]:
-        entry["message_count"] -= entry["topic_metadata"]["name"] == "/joint_states"
-
-
 def _second_file(information: dict[str, Any]) -> None:
     information["relative_file_paths"].append("bag_1.mcap")
     for entry in information["topics_with_message_count"]:
@@ -117,12 +112,9 @@ DAMAGES: dict[str, tuple[Callable[[Path], object], list[str]]] = {
     ),
     "longer message": (
         _in_a_chunk(_longer),
-        ["bag_0.mcap: a chunk is unreadable from its byte 0 on (a message that is not whole"],
+        ["bag_0.mcap: a chunk is unreadable (a message that is not whole"],
     ),
-    "no message": (
-        _in_a_chunk(_no_message),
-        ["bag_0.mcap: a chunk is unreadable from its byte 0 on"],
-    ),
+    "no message": (_in_a_chunk(_no_message), ["bag_0.mcap: a chunk is unreadable"]),
     "index": (_flip(lambda bag: -60), ["bag_0.mcap: its index cannot be read (CRC)"]),
     "footer": (
         lambda bag: mcap_file(bag).write_bytes(mcap_file(bag).read_bytes()[:-40]),
@@ -131,18 +123,6 @@ DAMAGES: dict[str, tuple[Callable[[Path], object], list[str]]] = {
     "no text": (lambda bag: (bag / METADATA).write_bytes(b"\xff\xfe\x00"), [METADATA]),
     "odd key": (lambda bag: (bag / METADATA).write_bytes(b"? [a]\n: b"), [METADATA]),
     "deep": (lambda bag: (bag / METADATA).write_bytes(b"[" * 9000), [METADATA]),
-    "count": (
-        _edit(_joints_count),
-        ["metadata.yaml: 399 messages on /joint_states, but 400 in the bag"],
-    ),
-    "duration": (
-        _edit(lambda i: i.update(duration={"nanoseconds": 5_000_000_000})),
-        ["metadata.yaml: messages from 0 to 5 s, but 0 to 0.1995 s in the bag"],
-    ),
-    "version": (
-        _edit(lambda i: i.update(version=99)),
-        ["metadata.yaml: version 99, known are 1 to 9: read as one of those"],
-    ),
     "another file": (
         lambda bag: shutil.copy(mcap_file(bag), bag / "other.mcap"),
         ["metadata.yaml does not name other.mcap: left out"],
@@ -312,8 +292,10 @@ def test_only_files_are_read(bag: Path, name: str, kind: str) -> None:
 @pytest.mark.parametrize(
     ("change", "told"),
     [
-        ("UPDATE topics SET name = x'00ff' WHERE name = '/clock'", "messages that are none"),
-        ("UPDATE messages SET data = 999999999999 WHERE id = 5", "1 messages that are none"),
+        (
+            "UPDATE messages SET data = 999 WHERE id = (SELECT max(id) FROM messages)",
+            "cannot be read to its end",
+        ),
         ("UPDATE messages SET timestamp = 'noon' WHERE id = 7", "cannot be read to its end"),
         ("UPDATE topics SET type = 'a\nb' WHERE name = '/clock'", "left out: of type a?b"),
     ],

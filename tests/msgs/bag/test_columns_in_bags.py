@@ -23,7 +23,7 @@ from space_robot_msgs_py.samples import (
     RobotNames,
 )
 from space_robot_msgs_py.wire.codecs import CommandCodec, StateCodec
-from space_robot_msgs_py.wire.reference_codec import ReferenceCodec
+from space_robot_msgs_py.wire.telemetry import ReferenceCodec
 
 JOINTS = ("a", "b", "c")
 WHEELS, THRUSTERS = ("wheel_1", "wheel_2", "wheel_3"), ("thruster_1", "thruster_2")
@@ -39,16 +39,7 @@ Message = tuple[topics.Topic, int, bytes]
 def flown(names: RobotNames, seed: int = 3) -> FlightLog:
     """A flight by hand, another number everywhere."""
     rng = np.random.default_rng(seed)
-    counts = len(names.wheels), len(names.thrusters)
-    log = FlightLog.allocate(
-        TICKS,
-        names.joints,
-        TIMEBASE,
-        *counts,
-        names.passive,
-        geared_names=names.geared,
-        torquers=len(names.torquers),
-    )
+    log = FlightLog.allocate(TICKS, names, TIMEBASE)
     log.commanded_torque = np.empty((TICKS, len(names.axes)))
     for column in log.columns.values():
         column[:] = rng.normal(size=column.shape)

@@ -19,10 +19,9 @@ from space_robot_msgs_py.bag.flight_log import REFERENCE, FlightLog
 from space_robot_msgs_py.bag.mcap_storage import McapStorage
 from space_robot_msgs_py.bag.reader import fill_gaps, read_flight, timebase_of
 from space_robot_msgs_py.bag.recorder import BagRecorder
-from space_robot_msgs_py.bag.rows import stamps_of
 from space_robot_msgs_py.samples import STATE_FIELDS
 from space_robot_msgs_py.wire.cdr import header_stamp_ns
-from space_robot_msgs_py.wire.clock import ClockCodec
+from space_robot_msgs_py.wire.telemetry import ClockCodec
 
 KEPT_BACK = (30, 31, 150, 250, 251, 252)
 """Ticks whose state a fault keeps back."""
@@ -134,7 +133,7 @@ def test_bad_stamps_between_good_ones_are_kept_at_the_time_of_the_last_good_one(
             expected.append((stamp_ns, good_ns))
     recorder.close()
     (batch,) = McapStorage(tmp_path / "bag" / "bag_0.mcap").batches()
-    assert list(zip(stamps_of(batch).tolist(), batch.log_ns.tolist(), strict=True)) == expected
+    assert list(zip(batch.stamps.tolist(), batch.log_ns.tolist(), strict=True)) == expected
     counted = recorder.accounting[topics.CLOCK.full_name]
     assert (counted.received, counted.invalid_stamps) == (20, len(expected) - 20)
     assert recorder.lost[topics.CLOCK.full_name] == 0

@@ -12,13 +12,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from space_robot_msgs_py import topics
-from space_robot_msgs_py.bag.accounts import noted_accounts
+from space_robot_msgs_py.bag.contents import read_information
 from space_robot_msgs_py.bag.message_accounting import (
     LONGEST_JUMP,
     MessageAccounting,
     SequenceCount,
+    noted_accounts,
 )
-from space_robot_msgs_py.bag.metadata import read_information
 from space_robot_msgs_py.bag.recorder import BagRecorder
 from space_robot_msgs_py.samples import Command, Timebase
 from space_robot_msgs_py.wire.codecs import CommandCodec

@@ -23,16 +23,15 @@ from space_robot.flight.plan import Flight, FlightPlan, resolve
 from space_robot.flight.simulate import simulate
 from space_robot_model.robot import Robot
 from space_robot_msgs_py import topics
-from space_robot_msgs_py.bag.mcap_file import Compression
 from space_robot_msgs_py.bag.message_accounting import MessageAccounting, lost_messages
 from space_robot_msgs_py.bag.reader import read_flight
 from space_robot_msgs_py.bag.recorder import ACCOUNTS_KEY, FLIGHT_KEY, BagRecorder
 from space_robot_msgs_py.bag.rosbag2_yaml import FileSummary, bag_information, to_yaml
-from space_robot_msgs_py.bag.writer import DESCRIPTION
+from space_robot_msgs_py.bag.writer import DESCRIPTION, Compression
 from space_robot_msgs_py.errors import FlightError, InputError
 from space_robot_msgs_py.samples import RobotNames, RobotState, Timebase
-from space_robot_msgs_py.wire.clock import ClockCodec
 from space_robot_msgs_py.wire.codecs import StateCodec
+from space_robot_msgs_py.wire.telemetry import ClockCodec
 
 TIMEBASE = Timebase(500_000)
 FLIGHT = {"controller": "tde_stc", "period": 0.0005}

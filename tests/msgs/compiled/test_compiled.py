@@ -12,8 +12,7 @@ import numba
 import pytest
 from paths import ROOT
 
-from space_robot_msgs_py.compiled.cache import _temporary_cache
-from space_robot_msgs_py.compiled.call_graph import count_compiled, index_files
+from space_robot_msgs_py.compiled.cache import _temporary_cache, count_compiled, index_files
 from space_robot_msgs_py.compiled.kernels import kernel, subroutine
 
 PROGRAM = """
@@ -21,7 +20,7 @@ import sys
 import numpy as np
 from space_robot_msgs_py.compiled.cache import cache_directory
 from space_robot_msgs_py.compiled.kernels import kernel
-from space_robot_msgs_py.bag.kernels import walk_messages
+from space_robot_msgs_py.bag.batch import walk_messages
 exec(compile(open({file!r}).read(), {file!r}, "exec"))
 print(double(np.arange(3.0)).sum(), cache_directory(), *{{"scipy.linalg"}} & set(sys.modules))
 """
@@ -118,7 +117,7 @@ SHOW = "from space_robot_msgs_py.compiled.cache import cache_directory; print(ca
 
 def test_a_kernel_that_changes_has_another_folder_and_other_code_has_not(tmp_path: Path) -> None:
     root = tmp_path / "root"
-    for package in ("space_robot_msgs_py", "space_robot_model"):
+    for package in ("space_robot_msgs_py", "space_robot_model", "space_robot_sim"):
         shutil.copytree(ROOT / package, root / package, ignore=shutil.ignore_patterns("*.pyc"))
 
     def folder() -> str:
@@ -135,14 +134,16 @@ def test_a_kernel_that_changes_has_another_folder_and_other_code_has_not(tmp_pat
 
     first = folder()
     assert Path(first).parent == tmp_path
-    for name, is_kernel in (
-        ("space_robot_model/dynamics/aba.py", True),
-        ("space_robot_msgs_py/compiled/records.py", True),
-        ("space_robot_model/robot/files.py", False),
-        ("space_robot_msgs_py/errors.py", False),
+    for name, old, new, is_kernel in (
+        ("space_robot_model/dynamics/aba.py", "\n", "\n\n", True),
+        ("space_robot_msgs_py/compiled/records.py", "\n", "\n\n", True),
+        ("space_robot_msgs_py/samples.py", " = 8, 24, 6", " = 9, 24, 6", True),
+        ("space_robot_model/robot/files.py", "\n", "\n\n", False),
+        ("space_robot_msgs_py/errors.py", "\n", "\n\n", False),
     ):
         text = (root / name).read_text()
-        (root / name).write_text(text + "\n# one line more\n")
+        assert old in text
+        (root / name).write_text(text.replace(old, new))
         assert (folder() != first) == is_kernel, name
         (root / name).write_text(text)
     assert folder() == first

@@ -17,13 +17,14 @@ from numba.core.errors import NumbaError
 from numpy.typing import NDArray
 from paths import ROOT
 
-from space_robot_model.elementary.sine import sin_cos
+from space_robot_model.elementary.functions import sin_cos
 from space_robot_msgs_py.compiled.kernels import kernel
-from space_robot_msgs_py.compiled.lane_words import as_lanes, as_numbers
 from space_robot_msgs_py.compiled.lanes import (
     WIDTH,
     all_lanes,
     any_lane,
+    as_lanes,
+    as_numbers,
     lane_of,
     negated,
     uniform,

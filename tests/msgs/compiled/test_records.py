@@ -19,9 +19,10 @@ import space_robot_control
 import space_robot_model
 import space_robot_sim
 from space_robot_msgs_py.compiled.kernels import RecordFunction, kernel
-from space_robot_msgs_py.compiled.layouts import Layout, Polynomial
 from space_robot_msgs_py.compiled.records import (
     Block,
+    Layout,
+    Polynomial,
     Record,
     RecordView,
     assign,

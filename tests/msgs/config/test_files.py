@@ -20,7 +20,7 @@ from space_robot_msgs_py.config.yaml_text import (
     DEEPEST,
     LARGEST_FILE,
     YamlTextError,
-    check_file,
+    check_readable,
     parse_yaml,
     read_file,
 )
@@ -116,7 +116,7 @@ def test_what_is_no_readable_file(tmp_path: Path, kind: str, said: str) -> None:
         os.mkfifo(path)
     elif kind != "missing":
         path.write_bytes(b"a: \xff" if kind == "bytes" else bytes(LARGEST_FILE + 1))
-    for read in (read_file, read_yaml, *([check_file] if not path.is_file() else [])):
+    for read in (read_file, read_yaml, *([check_readable] if not path.is_file() else [])):
         with pytest.raises(InputError) as caught:
             read(path)
         assert said in str(caught.value)

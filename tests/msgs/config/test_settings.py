@@ -11,19 +11,21 @@ import yaml
 
 from space_robot_control.controller.gains import build_law, gain_files, read_gains
 from space_robot_control.controller.settings import ControllerNodeSettings
-from space_robot_control.guidance.settings import MissionNodeSettings
+from space_robot_control.guidance.mission import MissionNodeSettings
 from space_robot_control.laws import laws
 from space_robot_msgs_py.bag.recorder_settings import RecorderNodeSettings
-from space_robot_msgs_py.config.directory import config_directory
 from space_robot_msgs_py.config.files import (
     GIVEN,
+    flatten,
     is_named,
+    merge,
     named_file,
     named_layers,
+    nest,
     node_parameters,
 )
+from space_robot_msgs_py.config.installation import config_directory
 from space_robot_msgs_py.config.settings import leaves
-from space_robot_msgs_py.config.trees import flatten, merge, nest
 from space_robot_msgs_py.errors import InputError
 from space_robot_sim.plant.settings import PlantNodeSettings
 

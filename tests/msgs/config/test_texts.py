@@ -17,11 +17,24 @@ from hypothesis import strategies as st
 from pydantic import Field
 
 from space_robot_msgs_py.config.arguments import as_numbers, as_path, as_whole_number, path_text
-from space_robot_msgs_py.config.choices import MOST_LISTED, choices, nearest
-from space_robot_msgs_py.config.extras import extra_packages, install_command
-from space_robot_msgs_py.config.namespace import full_namespace, relative
-from space_robot_msgs_py.config.text import one_line_of, printable, shortened
-from space_robot_msgs_py.config.validation import StrictModel, one_of, read_yaml, short, validate
+from space_robot_msgs_py.config.installation import extra_packages, install_command
+from space_robot_msgs_py.config.text import (
+    MOST_LISTED,
+    choices,
+    nearest,
+    one_line_of,
+    printable,
+    shortened,
+)
+from space_robot_msgs_py.config.validation import (
+    StrictModel,
+    full_namespace,
+    one_of,
+    read_yaml,
+    relative,
+    short,
+    validate,
+)
 from space_robot_msgs_py.errors import InputError
 
 # Texts

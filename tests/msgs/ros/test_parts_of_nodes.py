@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import os
-import re
 import time
 from collections.abc import Callable, Iterator
 from types import SimpleNamespace
@@ -14,8 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from space_robot_msgs_py import topics
-from space_robot_msgs_py.errors import InputError
-from space_robot_msgs_py.ros.process_environment import set_defaults
+from space_robot_msgs_py.ros.process import set_defaults
 from space_robot_msgs_py.samples import Timebase
 
 set_defaults()
@@ -23,19 +20,16 @@ rclpy = pytest.importorskip("rclpy")
 
 from rcl_interfaces.srv import GetParameters  # noqa: E402
 from rclpy.executors import SingleThreadedExecutor  # noqa: E402
-from std_msgs.msg import String  # noqa: E402
 
-from space_robot_msgs_py.ros import service_calls  # noqa: E402
-from space_robot_msgs_py.ros.diagnostics import Diagnostics  # noqa: E402
 from space_robot_msgs_py.ros.endpoints import (  # noqa: E402
     PolledCallbackGroup,
     RawPublisher,
     RawSubscription,
     Received,
 )
-from space_robot_msgs_py.ros.exclusive import TopicClaim, foreign_publishers  # noqa: E402
-from space_robot_msgs_py.ros.health import Health, Level  # noqa: E402
-from space_robot_msgs_py.ros.service_calls import COUNTED_S, OVERLOADED_S, ServiceCalls  # noqa: E402
+from space_robot_msgs_py.ros.loop import Health, Level  # noqa: E402
+from space_robot_msgs_py.ros.managed_node import Diagnostics  # noqa: E402
+from space_robot_msgs_py.ros.service_calls import ServiceCalls  # noqa: E402
 
 TIMEOUT_S = 30.0
 REQUESTS = 8  # a client keeps ten answers
@@ -66,22 +60,6 @@ def make_node(domain: int) -> Iterator[Make]:
 
 
 # Topics and their messages
-
-
-def test_the_publisher_of_a_topic_is_alone(make_node: Make, domain: int) -> None:
-    """A killed one leaves its place at once: its lock does (test_processes.py)."""
-    first, second = make_node("controller"), make_node("controller", namespace="/robot")
-    claim = TopicClaim(first, ["/command"])
-    said = f"/command of ROS domain {domain} is already published by controller"
-    with pytest.raises(InputError, match=re.escape(f"{said} (pid {os.getpid()})")):
-        TopicClaim(second, ["/controller/telemetry", "/command"])
-    # what it had got before the refusal is free again
-    TopicClaim(make_node("other"), ["/controller/telemetry"]).release()
-    first.create_publisher(String, "/command", 1)
-    second.create_publisher(String, "/command", 1)
-    until(lambda: foreign_publishers(second, ["/command", "/x"]) == {"/command": ["/controller"]})
-    claim.release()
-    TopicClaim(second, ["/command"]).release()
 
 
 def _next(entry: RawSubscription) -> Received:
@@ -208,50 +186,3 @@ def test_tasks_of_rclpy_wait_for_no_request(node: Any) -> None:
     assert sorted(done) == [0, 1, 2]
     assert not calls.run_one()
     calls.shutdown()
-
-
-# Overload, by a clock of the test's own
-
-
-@pytest.fixture
-def judged(monkeypatch: pytest.MonkeyPatch, node: Any) -> Iterator[Callable[..., list[bool]]]:
-    """What is said after each call of a row of them, so long after one another; None: a rest."""
-    clock = SimpleNamespace(now=1000.0)
-    monkeypatch.setattr(service_calls, "time", SimpleNamespace(monotonic=lambda: clock.now))
-    calls, waiting = ServiceCalls(node), list[Any]()
-    monkeypatch.setattr(calls, "_is_worth_a_look", lambda: True)
-    monkeypatch.setattr(calls, "_next", lambda timeout_s: waiting.pop(0) if waiting else None)
-
-    class Call:
-        def __call__(self) -> None:
-            pass
-
-        def done(self) -> bool:
-            return True
-
-        def exception(self) -> None:
-            return None
-
-    def run(*after: float | None) -> list[bool]:
-        found = []
-        for seconds in after:
-            clock.now += seconds or 10.0
-            waiting.extend([] if seconds is None else [Call()])
-            assert calls.run_one() == (seconds is not None)
-            found.append(calls.is_overloaded)
-        return found
-
-    yield run
-    calls.shutdown()
-
-
-def test_a_storm_is_known_while_it_lasts(judged: Callable[..., list[bool]]) -> None:
-    """Not by a few slow calls, nor by what comes after a rest."""
-    many = round(OVERLOADED_S / COUNTED_S) + 2
-    said = judged(*[0.9 * COUNTED_S] * 2 * many, None, *[0.9 * COUNTED_S] * 3)
-    first = said.index(True)
-    assert first * 0.9 * COUNTED_S > OVERLOADED_S >= (first - 1) * 0.9 * COUNTED_S
-    assert all(said[first : 2 * many])
-    assert not any(said[2 * many :])
-    assert not any(judged(None, *[5 * OVERLOADED_S] * 3))
-    assert judged(None, *[5 * OVERLOADED_S] * (many + 2))[-1], "many of them are one"

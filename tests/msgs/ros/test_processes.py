@@ -17,7 +17,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from space_robot_msgs_py.ros import lifeline
+from space_robot_msgs_py.ros import process
 from space_robot_msgs_py.ros.locks import (
     FileLock,
     HeldError,
@@ -27,23 +27,27 @@ from space_robot_msgs_py.ros.locks import (
     newest_node,
     node_lock,
     nodes_in,
-    topic_lock,
 )
-from space_robot_msgs_py.ros.process_environment import DEFAULTS, defaults
-from space_robot_msgs_py.ros.run_module import HERE, clean_environment, module_command
+from space_robot_msgs_py.ros.process import (
+    DEFAULTS,
+    FOLDER,
+    clean_environment,
+    defaults,
+    module_command,
+)
 
 HOLDING = """
 import time
-from space_robot_msgs_py.ros.lifeline import hold_to_standard_input
+from space_robot_msgs_py.ros.process import hold_to_standard_input
 hold_to_standard_input()
 print("ready", flush=True)
 time.sleep(60)
 """
 STARTER = """
 import os, subprocess, sys, time
-from space_robot_msgs_py.ros import lifeline
+from space_robot_msgs_py.ros.process import lifeline
 child = subprocess.Popen(
-    sys.argv[1:], stdin=subprocess.PIPE, env={**os.environ, **lifeline.held()},
+    sys.argv[1:], stdin=subprocess.PIPE, env={**os.environ, **lifeline()},
     start_new_session=True,
 )
 time.sleep(60)
@@ -82,12 +86,12 @@ def test_a_killed_starter_takes_its_process_with_it(
 
 
 def test_deaf_process_is_killed(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(lifeline, "TIMEOUT_S", 0.1)
+    monkeypatch.setattr(process, "TIMEOUT_S", 0.1)
     pid = os.fork()
     if not pid:
         signal.signal(signal.SIGTERM, signal.SIG_IGN)
         read_end, write_end = os.pipe()
-        lifeline.hold_to(read_end)
+        process.hold_to(read_end)
         os.close(write_end)
         time.sleep(60)
         os._exit(0)
@@ -99,13 +103,13 @@ def test_standard_input_is_left_alone_unless_it_is_a_lifeline(
 ) -> None:
     """A node by hand reads /dev/null or a terminal; its end means nothing."""
     held: list[int] = []
-    monkeypatch.setattr(lifeline, "hold_to", held.append)
-    monkeypatch.delenv(lifeline.VARIABLE, raising=False)
-    lifeline.hold_to_standard_input()
+    monkeypatch.setattr(process, "hold_to", held.append)
+    monkeypatch.delenv(process.LIFELINE, raising=False)
+    process.hold_to_standard_input()
     assert held == []
-    for name, value in lifeline.held().items():
+    for name, value in process.lifeline().items():
         monkeypatch.setenv(name, value)
-    lifeline.hold_to_standard_input()
+    process.hold_to_standard_input()
     assert len(held) == 1
 
 
@@ -146,12 +150,12 @@ def test_the_current_folder_is_not_searched(
     )
     found = json.loads(done.stdout)
     assert found["argv"] == ["-p", "a:=[1, 2]"]
-    assert not {str(shadows), "", HERE} & {*found["path"]}
+    assert not {str(shadows), "", FOLDER} & {*found["path"]}
     assert str(program) in found["path"]
 
 
 def test_same_tree_is_found_where_it_is_not_installed(tmp_path: Path) -> None:
-    module = module_command("space_robot_msgs_py.ros.lifeline")
+    module = module_command("space_robot_msgs_py.simulated_time")
     subprocess.run([sys.executable, "-I", "-S", *module[1:]], cwd=tmp_path, check=True)
 
 
@@ -197,7 +201,7 @@ print("ready", flush=True)
 time.sleep(60)
 """
 NAMES = st.lists(st.from_regex(r"[a-z][a-z0-9_]{0,5}", fullmatch=True), min_size=1, max_size=3)
-KINDS: list[Callable[[int, str], Path]] = [topic_lock, node_lock, domain_lock]
+KINDS: list[Callable[[int, str], Path]] = [node_lock, domain_lock]
 
 
 @pytest.fixture(autouse=True)
@@ -207,22 +211,22 @@ def own_locks(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_killed_holder_is_named_and_leaves_the_lock_at_once() -> None:
     path = node_lock(42, "/plant_node")
-    process = subprocess.Popen(
+    holding = subprocess.Popen(
         [sys.executable, "-c", HOLDER, str(path)],
         stdout=subprocess.PIPE,
         text=True,
-        env={**os.environ, lifeline.VARIABLE: "1234"},
+        env={**os.environ, process.LIFELINE: "1234"},
     )
-    assert process.stdout is not None
-    assert process.stdout.readline() == "ready\n"
-    holder = Holder(f"plant_node (pid {process.pid})", starter=1234)
+    assert holding.stdout is not None
+    assert holding.stdout.readline() == "ready\n"
+    holder = Holder(f"plant_node (pid {holding.pid})", starter=1234)
     with pytest.raises(HeldError, match=r"plant_node \(pid") as refused:
         FileLock(path, "another")
     assert refused.value.holder == holder
     assert nodes_in(42) == [holder]
     assert nodes_in(4) == nodes_in(421) == []
-    process.kill()
-    process.communicate()
+    holding.kill()
+    holding.communicate()
     assert nodes_in(42) == []
     FileLock(path, "another").release()
 
@@ -245,7 +249,7 @@ def test_nodes_and_commands_are_found_by_domain_and_namespace() -> None:
     st.tuples(st.sampled_from(KINDS), st.integers(0, 232), NAMES),
     st.tuples(st.sampled_from(KINDS), st.integers(0, 232), NAMES),
 )
-def test_every_topic_and_node_of_every_domain_has_its_own_lock(
+def test_every_node_of_every_domain_has_its_own_lock(
     one: tuple[Callable[[int, str], Path], int, list[str]],
     other: tuple[Callable[[int, str], Path], int, list[str]],
 ) -> None:

@@ -18,15 +18,18 @@ from space_robot_msgs_py import topics
 from space_robot_msgs_py.bag.message_accounting import message_tick
 from space_robot_msgs_py.errors import MessageError
 from space_robot_msgs_py.samples import Timebase
-from space_robot_msgs_py.wire.carrier import unwrap, wrap
 from space_robot_msgs_py.wire.cdr import MessageLayout, Slot, header_stamp_ns
-from space_robot_msgs_py.wire.codec import Codec
-from space_robot_msgs_py.wire.compiled_codec import CompiledCodec
-from space_robot_msgs_py.wire.joint_states import JointStates
-from space_robot_msgs_py.wire.poses import POSE
-from space_robot_msgs_py.wire.robot_description import robot_description
+from space_robot_msgs_py.wire.codecs import CompiledCodec
+from space_robot_msgs_py.wire.messages import Codec, MessageDescription, describe
 from space_robot_msgs_py.wire.stamp_guard import AGREEING, StampGuard
-from space_robot_msgs_py.wire.tf import Frame, TransformsCodec
+from space_robot_msgs_py.wire.viewers import (
+    POSE,
+    Frame,
+    TransformsCodec,
+    robot_description,
+    unwrap,
+    wrap,
+)
 
 TIMEBASE = Timebase(500_000)
 ENCAPSULATION = b"\x00\x01\x00\x00"
@@ -74,12 +77,9 @@ def numbers(data: bytes, slot: Slot) -> NDArray[np.float64]:
     return np.frombuffer(data, np.float64, slot.length, slot.offset)
 
 
-class FramedStates(JointStates):
+def framed_states(frame: str, joints: list[str]) -> MessageDescription:
     """With a frame, so that the numbers stand elsewhere."""
-
-    def __init__(self, frame: str, joints: list[str]) -> None:
-        self.frame_id = frame
-        super().__init__(joints, Timebase(1))
+    return describe(topics.JOINT_STATES._replace(frame=frame), joints, Timebase(1))
 
 
 @pytest.mark.parametrize("type_name", [*TYPES, *OTHERS])
@@ -121,12 +121,12 @@ def test_any_names_are_written_as_rosbags_does_and_read(
     header = types["std_msgs/msg/Header"](time, frame)
     theirs = types["sensor_msgs/msg/JointState"](header, joints, *values.reshape(3, -1))
     expected = bytes(STORE.serialize_cdr(theirs, "sensor_msgs/msg/JointState"))
-    for codec in (Codec(FramedStates(frame, joints)), CompiledCodec(FramedStates(frame, joints))):
+    for codec in (Codec(framed_states(frame, joints)), CompiledCodec(framed_states(frame, joints))):
         assert codec.encode(stamp_ns, values) == expected
     back = np.empty_like(values)
-    assert CompiledCodec(FramedStates(frame, joints)).decode(expected, back) == stamp_ns
+    assert CompiledCodec(framed_states(frame, joints)).decode(expected, back) == stamp_ns
     np.testing.assert_array_equal(back, values)
-    stamp, numbers_read = Codec(FramedStates(frame, joints)).decode(expected)
+    stamp, numbers_read = Codec(framed_states(frame, joints)).decode(expected)
     assert stamp == header_stamp_ns(expected) == stamp_ns
     np.testing.assert_array_equal(numbers_read, values)
 

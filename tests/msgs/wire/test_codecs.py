@@ -29,12 +29,14 @@ from space_robot_msgs_py.samples import (
     Timebase,
 )
 from space_robot_msgs_py.wire.cdr import header_stamp_ns
-from space_robot_msgs_py.wire.clock import ClockCodec
 from space_robot_msgs_py.wire.codecs import CommandCodec, StateCodec
-from space_robot_msgs_py.wire.controller_law import LawCodec
-from space_robot_msgs_py.wire.controller_telemetry import TelemetryCodec
-from space_robot_msgs_py.wire.reference_codec import ReferenceCodec
-from space_robot_msgs_py.wire.truth_writer import TruthWriter
+from space_robot_msgs_py.wire.telemetry import (
+    ClockCodec,
+    LawCodec,
+    ReferenceCodec,
+    TelemetryCodec,
+    TruthWriter,
+)
 
 STORE = get_typestore(Stores.ROS2_JAZZY)
 

@@ -24,9 +24,9 @@ from rosbags.typesys import Stores, get_typestore
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.errors import MessageError
 from space_robot_msgs_py.samples import Command, ReferenceChunk, RobotNames, RobotState
-from space_robot_msgs_py.wire import message as general_way
+from space_robot_msgs_py.wire import messages as general_way
 from space_robot_msgs_py.wire.codecs import CommandCodec, StateCodec
-from space_robot_msgs_py.wire.reference_codec import ReferenceCodec
+from space_robot_msgs_py.wire.telemetry import ReferenceCodec
 
 Array = NDArray[np.float64]
 Read = tuple[int, bytes] | None
@@ -329,7 +329,6 @@ def _set(path: str, value: Any) -> Callable[[Any], None]:
 
 SHORT = np.ones(1)
 TWO = list(NAMES)
-ONE_OF = "one transform, twist, wrench"
 APART = "point 1 is not 1 ticks after"
 
 
@@ -350,11 +349,18 @@ APART = "point 1 is not 1 ticks after"
             for topic in ("base/state", "reference/base")
             for names in (["arm"], [], ["base", "base"], ["base", "arm"], ["Base"])
         ),
-        *(("base/state", _set(name, []), ONE_OF) for name in ("transforms", "twist", "wrench")),
+        *(
+            ("base/state", _set(name, []), f"0 values of {name} for 1 names")
+            for name in ("transforms", "twist", "wrench")
+        ),
         ("reference/joints", _names(["a", "c"]), f"expected {TWO!r}"),
         ("reference/joints", _set("points", []), ""),
         *(
-            ("reference/joints", _set(f"points.{k}.{name}", SHORT), f"a point lacks {name} of some")
+            (
+                "reference/joints",
+                _set(f"points.{k}.{name}", SHORT),
+                f"1 values of {name} for 2 names",
+            )
             for k in (0, 2)
             for name in ("positions", "velocities", "accelerations")
         ),

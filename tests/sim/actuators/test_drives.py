@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from benches import NAMES, PERIOD, N
+from benches import PERIOD, N
 from benches import ActuatorBench as Bench
 from hypothesis import given
 from hypothesis import strategies as st
@@ -15,10 +15,7 @@ from strategies import SEEDS
 
 from space_robot_model.robot import Robot
 from space_robot_msgs_py.errors import InputError
-from space_robot_sim.actuators.drive import DRIVE_BIAS, DRIVE_SCALE, WrongDrive, judge
-from space_robot_sim.actuators.torque_echo import TORQUE_BIAS, TORQUE_SCALE, WrongEcho
-from space_robot_sim.faults.grammar import by_name, parse_faults
-from space_robot_sim.faults.schedule import Schedule
+from space_robot_sim.actuators.drive import Drive
 from space_robot_sim.plant.plant import Plant, PlantSettings
 
 Array = NDArray[np.float64]
@@ -86,23 +83,18 @@ def test_effects_come_in_their_order_on_each_axis_by_itself(seed: int) -> None:
         np.testing.assert_allclose(got, scale * mean + bias, rtol=1e-9, atol=1e-9)
 
 
-def faults(*texts: str) -> WrongDrive:
-    kinds = by_name(DRIVE_SCALE, DRIVE_BIAS)
-    return WrongDrive(Schedule(parse_faults(texts, kinds), 0, PERIOD, NAMES))
-
-
 def test_faults_are_wrong_in_their_time_on_their_axes_and_leave_no_trace() -> None:
-    drives = Bench(drive_scale=[1.1], drive_bias=per_axis(4, -1.0, 1.0))
-    sound = drives.block.copy()
-    wrong = faults(
+    drives = Bench(
         "drive_scale@0.005-0.015:base=0.5",
         "drive_scale@0.01-0.015:all=2",
         "drive_bias@0.005-0.01:joint3=-2",
         "drive_bias@0.005-0.01:joints=1",
+        drive_scale=[1.1],
+        drive_bias=per_axis(4, -1.0, 1.0),
     )
+    sound = drives.block.copy()
     bias = sound[0].drive.bias
     for tick, torque in enumerate(torques(5)):
-        wrong.apply(tick, drives.block[0].drive)
         scale, more = np.full(N + 3, 1.1), np.zeros(N + 3)
         if 10 <= tick < 30:
             scale[:3] *= 0.5
@@ -119,7 +111,7 @@ def test_faults_are_wrong_in_their_time_on_their_axes_and_leave_no_trace() -> No
 def test_numbers_changed_in_flight_count_once_judged() -> None:
     drives = Bench()
     drives.block[0].drive.dead_band[4] = 1e9
-    judge(drives.block[0].drive)
+    Drive.refresh(drives.block[0].drive)
     assert np.flatnonzero(drives.act(np.ones(N + 3))[1] == 0.0).tolist() == [4]
 
 
@@ -153,11 +145,8 @@ def test_the_echo_has_a_scale_and_a_bias_of_its_own(source: str) -> None:
 
 def test_faults_of_the_echo_leave_what_is_given() -> None:
     texts = ("torque_scale@0.005-0.015:base=0.5", "torque_bias@0.01-0.015:5=3")
-    kinds = by_name(TORQUE_SCALE, TORQUE_BIAS)
-    faults = WrongEcho(Schedule(parse_faults(texts, kinds), 0, PERIOD, NAMES))
-    actuators = Bench()
+    actuators = Bench(*texts)
     for tick, torque in enumerate(TORQUES):
-        faults.apply(tick, actuators.record.torque_echo)
         reported, given = actuators.act(torque)
         np.testing.assert_array_equal(given, torque)
         scale, bias = np.ones(N + 3), np.zeros(N + 3)

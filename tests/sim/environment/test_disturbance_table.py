@@ -17,25 +17,29 @@ from strategies import KINDS, random_robot, random_tree
 
 from space_robot_model.dynamics.model import MOST_JOINTS
 from space_robot_model.robot import Robot
+from space_robot_msgs_py.compiled.records import assign
 from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.samples import MOST_WHEELS, RobotNames
+from space_robot_sim.component import ComponentFaults, Installation
 from space_robot_sim.environment.disturbance import (
     Disturbance,
     DisturbanceSettings,
     disturbance_torque,
 )
 from space_robot_sim.environment.disturbance_table import DisturbanceTable, table_text
-from space_robot_sim.environment.environment import EnvironmentSettings
+from space_robot_sim.environment.environment import (
+    Environment,
+    EnvironmentSettings,
+    PayloadSettings,
+    with_payload,
+)
 from space_robot_sim.environment.friction import (
     Friction,
     FrictionSettings,
-    StuckJoint,
     coefficients,
     friction_torque,
 )
-from space_robot_sim.environment.load_schedule import LoadSchedule
-from space_robot_sim.environment.payload import PayloadSettings, with_payload
-from space_robot_sim.environment.prescribed_loads import PrescribedLoads, add_loads, begin_loads
+from space_robot_sim.environment.loads import LoadSchedule, PrescribedLoads, add_loads, begin_loads
 from space_robot_sim.faults.grammar import parse_faults
 from space_robot_sim.faults.schedule import Schedule
 from space_robot_sim.plant.faults import PLANT_KINDS
@@ -48,7 +52,7 @@ FOUR = random_robot(np.random.default_rng(4), 4)
 
 def disturbance(n: int, scale: float, time: float) -> Array:
     memory = np.full(n + 12, np.nan)
-    sines = Disturbance.build(n, DisturbanceSettings(scale=scale))
+    sines = Disturbance.build(DisturbanceSettings(scale=scale), Installation(n))
     disturbance_torque(sines, time, memory[: n + 3])
     assert np.isnan(memory[n + 3 :]).all(), "behind a short robot's array"
     return memory[: n + 3]
@@ -56,13 +60,16 @@ def disturbance(n: int, scale: float, time: float) -> Array:
 
 def test_friction_of_the_largest_robot_with_the_most_wheels_is_each_ones_own() -> None:
     robot = random_robot(np.random.default_rng(1), MOST_JOINTS)
-    joints = Friction.build(robot, FrictionSettings(coulomb=0.3, viscous=0.7))
+    joints = Friction.build(
+        FrictionSettings(coulomb=0.3, viscous=0.7), Installation(robot.n, robot=robot)
+    )
     wheels, out = np.arange(1.0, MOST_WHEELS + 1.0), np.full(MOST_JOINTS + MOST_WHEELS, np.nan)
-    Friction.add_wheels(joints, 10.0 * wheels, 100.0 * wheels)
+    joints.coulomb[MOST_JOINTS : out.size] = 10.0 * wheels
+    joints.viscous[MOST_JOINTS : out.size] = 100.0 * wheels
+    assign(joints, count=out.size)
     friction_torque(joints, np.full(out.size, 2.0), np.ones(out.size), out)
     np.testing.assert_array_equal(out[:MOST_JOINTS], 0.3 + 0.7 * 2.0)
     np.testing.assert_array_equal(out[MOST_JOINTS:], 10.0 * wheels + 100.0 * wheels * 2.0)
-    assert joints.count == out.size
 
 
 def equation_61(n: int, k: float, t: float) -> Array:
@@ -103,7 +110,9 @@ def test_a_robots_own_friction_comes_before_the_settings() -> None:
     assert robot.all_joint_names == ("own", "usual", "panel", "rubbing")
     found = coefficients(robot, FrictionSettings(coulomb=0.02, viscous=0.2))
     assert found.tolist() == [[0.3, 0.0], [0.02, 0.2], [0.0, 0.0], [0.0, 2.0]]
-    friction = Friction.build(robot, FrictionSettings(coulomb=0.02, viscous=0.2))
+    friction = Friction.build(
+        FrictionSettings(coulomb=0.02, viscous=0.2), Installation(robot.n, robot=robot)
+    )
     assert friction.viscous[:4].tolist() == [found[j, 1] for j in robot.order]
 
 
@@ -114,23 +123,29 @@ def test_a_stuck_joint_is_the_one_named(seed: int, kinds: list[str]) -> None:
     tree = random_tree(np.random.default_rng(seed), ["revolute", *kinds])
     robot = Robot.of_tree(tree)
     names = RobotNames(robot.joint_names, passive=robot.passive_names)
-    friction = Friction.build(robot, FrictionSettings())
+    environment = Environment.build(EnvironmentSettings(), Installation(robot.n, robot=robot))
+    friction = environment.friction
     sound = friction.coulomb.copy()
     rows = {robot.all_joint_names[joint]: row for row, joint in enumerate(robot.order)}
     for name in robot.joint_names:
         texts = [f"stuck_joint@1-2:{name}=9"]
-        stuck = StuckJoint(Schedule(parse_faults(texts, PLANT_KINDS), 0, 0.5, names))
-        stuck.apply(2, friction)
+        stuck = ComponentFaults(
+            Schedule(parse_faults(texts, PLANT_KINDS), 0, 0.5, names), Environment
+        )
+        stuck.apply(2, environment)
         expected = sound.copy()
         expected[rows[name]] = 9.0
         np.testing.assert_array_equal(friction.coulomb, expected)
-        stuck.apply(4, friction)
+        stuck.apply(4, environment)
         np.testing.assert_array_equal(friction.coulomb, sound)
 
 
 def test_friction_of_a_joint_that_breaks_away_opposes_what_comes() -> None:
     """Not yet turning, it has the whole Coulomb torque; one that stands has none of its own."""
-    joints, out = Friction.build(FOUR, FrictionSettings(coulomb=5.0)), np.empty(4)
+    joints, out = (
+        Friction.build(FrictionSettings(coulomb=5.0), Installation(FOUR.n, robot=FOUR)),
+        np.empty(4),
+    )
     friction_torque(joints, np.zeros(4), np.array([0.0, 1.0, -1.0, 0.0]), out)
     np.testing.assert_array_equal(out, [0.0, 5.0, -5.0, 0.0])
 

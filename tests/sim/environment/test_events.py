@@ -32,9 +32,8 @@ from space_robot_model.robot.parts import Tool
 from space_robot_msgs_py.errors import InputError
 from space_robot_sim.environment.captures import Captures
 from space_robot_sim.environment.events import Capture, Release, named_targets, parse_events
-from space_robot_sim.environment.grasp import Grasp
-from space_robot_sim.environment.impact import Impact
-from space_robot_sim.environment.orbit_settings import OrbitSettings
+from space_robot_sim.environment.impact import Grasp, Impact
+from space_robot_sim.environment.orbit import OrbitSettings
 from space_robot_sim.environment.target import Target
 
 REFUSALS = yaml.safe_load((DATA / "refusals/environment.yaml").read_text("utf-8"))

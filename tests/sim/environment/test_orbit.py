@@ -29,10 +29,15 @@ from space_robot_model.robot import Robot
 from space_robot_msgs_py.compiled.kernels import kernel
 from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.samples import RobotState
+from space_robot_sim.component import Installation
 from space_robot_sim.environment.gravity_gradient import add_gravity_gradient
-from space_robot_sim.environment.orbit import Orbit, light, magnetic_field
-from space_robot_sim.environment.orbit_file import orbit_layers
-from space_robot_sim.environment.orbit_settings import OrbitSettings
+from space_robot_sim.environment.orbit import (
+    Orbit,
+    OrbitSettings,
+    light,
+    magnetic_field,
+    orbit_layers,
+)
 from space_robot_sim.plant.plant import Plant
 
 Array = NDArray[np.float64]
@@ -43,7 +48,7 @@ FIELD = {"strength": 2.98e-5, "tilt_deg": 9.41, "pole_deg": -72.68}
 def orbit_of(**groups: Any) -> Orbit:
     """Return the record of settings by group, on a circular orbit at 400 km."""
     elements = {"orbital_elements": {"height": 400e3}}
-    return Orbit.build(6, OrbitSettings.model_validate({**elements, **groups}))
+    return Orbit.build(OrbitSettings.model_validate({**elements, **groups}), Installation(6))
 
 
 def field(position: ArrayLike, time: float = 0.0, **magnetism: float) -> Array:

@@ -18,16 +18,16 @@ from space_robot_model.robot import Robot
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.errors import FlightError
 from space_robot_msgs_py.samples import Command
-from space_robot_msgs_py.wire.clock import ClockCodec
 from space_robot_msgs_py.wire.codecs import CommandCodec, StateCodec
+from space_robot_msgs_py.wire.telemetry import ClockCodec
+from space_robot_sim.plant.pacing import REMARK_S, SLIP_S, WallClock
 from space_robot_sim.plant.plant import Plant
 from space_robot_sim.plant.settings import PlantNodeSettings
-from space_robot_sim.plant.wall_clock import REMARK_S, SLIP_S, WallClock
 
 pytest.importorskip("rclpy")
 
-from space_robot_msgs_py.ros.health import Level
-from space_robot_sim.plant import base_output, loop, own_controller, scene_output, truth_output
+from space_robot_msgs_py.ros.loop import Level
+from space_robot_sim.plant import base_output, loop, pacing, scene_output, truth_output
 from space_robot_sim.plant.loop import ASK_AGAIN_S, PlantLoop
 
 Array = NDArray[np.float64]
@@ -320,7 +320,7 @@ def test_a_controller_of_others_is_waited_for_and_discovered_by_all_before_the_f
     assert bench.loop.health().mode == "waiting for a node that publishes command"
     bench.publishers = ("mine",)
     bench.run()
-    assert bench.states[0][1] - 1005.0 == pytest.approx(own_controller.DISCOVERY_S, abs=0.1)
+    assert bench.states[0][1] - 1005.0 == pytest.approx(pacing.DISCOVERY_S, abs=0.1)
     np.testing.assert_array_equal(bench.numbers, bench.flown_by_hand(torque))
 
 
@@ -337,7 +337,7 @@ def test_a_controller_of_others_that_does_not_come_ends_the_flight(
     )
     with pytest.raises(FlightError, match=text):
         bench.run()
-    waited = 4.0 + (own_controller.DISCOVERY_S if publishers else 0.0)
+    waited = 4.0 + (pacing.DISCOVERY_S if publishers else 0.0)
     assert bench.now - 1000.0 == pytest.approx(waited, abs=0.1)
 
 

@@ -41,10 +41,10 @@ from space_robot_model.robot import Robot
 from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.samples import RobotState
 from space_robot_sim.environment.neighbouring_orbit import fall, hill_axes, meet
-from space_robot_sim.environment.orbit_settings import OrbitSettings
+from space_robot_sim.environment.orbit import OrbitSettings
 from space_robot_sim.environment.target import Target
 from space_robot_sim.plant.plant import Plant
-from space_robot_sim.plant.surroundings import REPORT_TICKS
+from space_robot_sim.plant.tick import REPORT_TICKS
 
 Array = NDArray[np.float64]
 ROBOT = Robot.from_yaml(CONFIG / "robots/paper.yaml")

@@ -16,9 +16,9 @@ from space_robot_model.robot import Robot
 from space_robot_model.robot.urdf_text import urdf_text
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.samples import Command, RobotState, Timebase
-from space_robot_msgs_py.wire.carrier import unwrap
 from space_robot_msgs_py.wire.definitions import decode
-from space_robot_sim.plant.late_listeners import MOST_S, PERIOD_S, LateListeners
+from space_robot_msgs_py.wire.viewers import unwrap
+from space_robot_sim.plant.pacing import REPEAT_EVERY_S, REPEAT_FOR_S, LateListeners
 from space_robot_sim.plant.plant import Plant
 from space_robot_sim.plant.settings import PlantNodeSettings
 
@@ -215,9 +215,9 @@ def test_messages_are_repeated_for_those_who_join_and_for_nobody_else(which: int
     outputs[1 - which].listener_count -= 1
     repeated = times(late, 3.0, 10.0)
     assert repeated[0] == 3.0, "at once, though another has left"
-    assert np.diff(repeated) == pytest.approx(PERIOD_S, abs=LOOK_S)
-    assert repeated[-1] < 3.0 + MOST_S
-    assert len(repeated) == round(MOST_S / PERIOD_S)
+    assert np.diff(repeated) == pytest.approx(REPEAT_EVERY_S, abs=LOOK_S)
+    assert repeated[-1] < 3.0 + REPEAT_FOR_S
+    assert len(repeated) == round(REPEAT_FOR_S / REPEAT_EVERY_S)
     outputs[which].listener_count -= 1
     assert times(late, 10.0, 12.0) == [], "who leaves needs nothing"
     outputs[which].listener_count += 1

@@ -15,17 +15,18 @@ from space_robot_model.robot import Robot
 from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.samples import STATE_FIELDS, Command, RobotNames, RobotState, Timebase
 from space_robot_msgs_py.wire.codecs import StateCodec
-from space_robot_sim.plant.actuator_health import ActuatorHealth
-from space_robot_sim.plant.command_guard import CommandGuard
-from space_robot_sim.plant.faults import FaultSettings, MessageFaults
+from space_robot_sim.faults.messages import MessageFaults
+from space_robot_sim.plant.faults import FaultSettings
 from space_robot_sim.plant.messages import (
     NONE,
+    CommandGuard,
     FaultyExchange,
     PlantMessages,
     SentState,
     exchange_of,
 )
 from space_robot_sim.plant.plant import Plant, PlantSettings
+from space_robot_sim.plant.report import ActuatorHealth
 from space_robot_sim.plant.settings import PlantNodeSettings
 
 PERIOD = 5e-4

@@ -12,13 +12,12 @@ from typing import Any, cast
 import pytest
 
 from space_robot_msgs_py.errors import InputError
-from space_robot_sim.plant.run_control import RunControl
+from space_robot_sim.plant.pacing import RunControl
 
 pytest.importorskip("rclpy")
 
 from space_robot_sim.plant.loop import PlantLoop
-from space_robot_sim.plant.simulation import Simulation
-from space_robot_sim.plant.simulation_services import StandardServices
+from space_robot_sim.plant.services import Simulation, StandardServices
 
 FEATURES = {
     **{"SIMULATION_RESET": 20, "SIMULATION_RESET_TIME": 21, "SIMULATION_RESET_STATE": 22},

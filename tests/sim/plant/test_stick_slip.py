@@ -25,8 +25,8 @@ from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.samples import Command
 from space_robot_sim.environment.disturbance import DisturbanceSettings
 from space_robot_sim.environment.friction import FrictionSettings
-from space_robot_sim.plant.gear_mounting import STABLE, check_rotors, check_springs
 from space_robot_sim.plant.integrator import Stages
+from space_robot_sim.plant.mounting import STABLE, check_rotors, check_springs
 from space_robot_sim.plant.plant import Plant, PlantSettings
 from space_robot_sim.plant.stick_slip import MOST_CUTS, integrate, slip_or_stick
 

@@ -12,12 +12,14 @@ from numpy.typing import NDArray
 from oracles import rotation_of
 from random_samples import assert_same
 from robots import GearedFlight
+from scipy.stats import kstest
 from strategies import SEEDS, random_robot, rotor_room, with_gears
 
-from space_robot_model.hardware.encoders import EncoderSettings
+from space_robot_model.hardware.sensors import EncoderSettings
 from space_robot_model.robot import Robot
 from space_robot_model.robot.parts import Encoder, Gear
 from space_robot_msgs_py.samples import ACTUATOR_FIELDS, ALL_FIELDS, PASSIVE_FIELDS, RobotState
+from space_robot_sim.component import Installation
 from space_robot_sim.faults.schedule import BLOCK_TICKS
 from space_robot_sim.sensors.encoders import Encoders
 
@@ -36,7 +38,7 @@ def test_the_step_of_a_joint_that_slides_is_a_share_of_a_metre(bits: int) -> Non
     """Beside joints that turn, in the step and in what is told at rest."""
     slides, settings = np.arange(N) % 3 == 1, EncoderSettings(bits=bits)
     rest = a_state().block[0]
-    encoders = Encoders.build(N, settings, PERIOD, rest, slides)
+    encoders = Encoders.build(settings, Installation(N, PERIOD, rest, is_prismatic=slides))
     step = np.where(slides, 1.0, 2.0 * np.pi) / 2**bits if bits else np.zeros(N)
     np.testing.assert_array_equal(encoders.step, step)
     told = encoders.history[0]
@@ -262,7 +264,21 @@ def test_each_sensor_and_each_block_of_ticks_has_numbers_of_its_own() -> None:
         for block in range(3):
             bench.measure(a_state(BLOCK_TICKS * block + 7))
             assert bench.block["drawn"] == block
-            for name in ("star_tracker", "gyro", "encoders"):
+            for name in ("star_tracker", "gyro", "encoders", "magnetometer"):
                 rows.append(bench.block[name]["draws"].ravel()[: 3 * BLOCK_TICKS].copy())
     found = np.corrcoef(rows) - np.eye(len(rows))
     assert np.abs(found).max() < 5.0 / np.sqrt(rows[0].size)
+
+
+def test_a_magnetometer_has_normal_noise_about_its_bias_in_flight() -> None:
+    """By Kolmogorov and Smirnov's test, axis by axis; a fault adds to the bias for a while."""
+    bench = Bench(
+        "magnetometer_bias@1:base_y=3e-6", magnetometer={"noise": 2e-7, "bias": [1e-6, 0.0, -2e-6]}
+    )
+    state = a_state()
+    state.magnetic_field[:] = 1e-5, -2e-5, 3e-5
+    errors = bench.watch(state, 4000, "magnetic_field") - state.magnetic_field
+    errors[2000:, 1] -= 3e-6
+    scores = (errors - [1e-6, 0.0, -2e-6]) / 2e-7
+    check_white(scores, 1.0)
+    assert all(kstest(column, "norm").pvalue > 1e-3 for column in scores.T)

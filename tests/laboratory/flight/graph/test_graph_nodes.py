@@ -19,11 +19,11 @@ from space_robot_model.robot.placements import RobotPoses
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.bag.folder import open_bag
 from space_robot_msgs_py.bag.reader import read_flight
-from space_robot_msgs_py.ros.process_environment import set_defaults
+from space_robot_msgs_py.ros.process import set_defaults
 from space_robot_msgs_py.samples import Timebase
-from space_robot_msgs_py.wire.clock import ClockCodec
-from space_robot_msgs_py.wire.markers import no_markers
-from space_robot_sim.plant.run_control import PAUSED
+from space_robot_msgs_py.wire.telemetry import ClockCodec
+from space_robot_msgs_py.wire.viewers import no_markers
+from space_robot_sim.plant.pacing import PAUSED
 
 set_defaults()
 rclpy = pytest.importorskip("rclpy")
@@ -205,7 +205,7 @@ def test_a_late_listener_of_the_mission_is_told_what_is_needed(
 BAD: tuple[tuple[str, dict[str, object], str], ...] = (
     ("plant", {"comand_latency_ticks": 1}, "unknown parameter 'comand_latency_ticks'"),
     ("controller", {"tde_stc__k_1": "[1.0, 2.0]"}, "9 values (base x, y, z and the joints)"),
-    ("mission", {"waypoint_times": "[0.0]"}, "waypoints_deg has 18 values"),
+    ("mission", {"joints_deg": "[0.0]"}, "the start has 1 joints"),
     ("recorder", {"bag": "/proc/no/bag"}, "no bag can be written there"),
 )
 

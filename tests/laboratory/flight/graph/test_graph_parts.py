@@ -23,7 +23,7 @@ from space_robot.flight.graph.launched import LaunchedGraph
 from space_robot.flight.graph.node_names import NODE_NAMES
 from space_robot.flight.graph.node_server import ForkedProcess, Program, node_server
 from space_robot.flight.graph.processes import TAIL_LINES, NodeProcess
-from space_robot_msgs_py.ros.process_environment import set_defaults
+from space_robot_msgs_py.ros.process import set_defaults
 
 set_defaults()
 pytest.importorskip("rclpy")
