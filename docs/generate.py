@@ -1,4 +1,4 @@
-"""Writes docs/reference from the code: parameters, faults, topics.
+"""Writes docs/reference from the code: parameters, faults, topics; and the overrides of their QoS.
 
     python docs/generate.py
 
@@ -18,7 +18,7 @@ from space_robot_control.controller.settings import ControllerNodeSettings
 from space_robot_control.guidance.mission import MissionNodeSettings
 from space_robot_control.laws import laws
 from space_robot_msgs_py import topics
-from space_robot_msgs_py.bag.recorder_settings import RecorderNodeSettings
+from space_robot_msgs_py.bag.recorder import RecorderNodeSettings
 from space_robot_msgs_py.config.files import flatten
 from space_robot_msgs_py.config.settings import NodeSettings, leaves
 from space_robot_msgs_py.samples import CommandSignals, Reference, State, TelemetrySignals
@@ -28,6 +28,7 @@ from space_robot_sim.plant.faults import PLANT_KINDS
 from space_robot_sim.plant.settings import MOST_TICKS, PlantNodeSettings
 
 REFERENCE = Path(__file__).parent / "reference"
+OVERRIDES = REFERENCE.parents[1] / "config/qos/record_overrides.yaml"
 MADE = "Made by `python docs/generate.py`: change the code, not this page."
 NODES: dict[str, type[NodeSettings]] = {
     "plant": PlantNodeSettings,
@@ -317,11 +318,31 @@ def _occasion(topic: topics.Topic) -> str:
     return "each tick" if topic.per_tick else "at an event" if topic.is_event else "periodically"
 
 
+def overrides() -> str:
+    """The quality of service with which `ros2 bag record` is to listen: the topics' own."""
+    lines = [
+        "# Made by `python docs/generate.py`, for `ros2 bag record --qos-profile-overrides-path`:",
+        "# by default it listens with a queue of ten messages, and loses a fifth to a half of a",
+        "# topic at 2 kHz.",
+    ]
+    for topic in (*topics.RECORDED, *topics.FOR_OTHERS):
+        durability = "transient_local" if topic.transient_local else "volatile"
+        lines += [
+            f"{topic.full_name}:",
+            "  history: keep_last",
+            f"  depth: {topic.depth}",
+            "  reliability: reliable",
+            f"  durability: {durability}",
+        ]
+    return "\n".join(lines) + "\n"
+
+
 def main() -> None:
-    """Write all pages."""
+    """Write all pages, and the overrides."""
     REFERENCE.mkdir(exist_ok=True)
     for name, text in pages().items():
         (REFERENCE / name).write_text(text, "utf-8")
+    OVERRIDES.write_text(overrides(), "utf-8")
 
 
 if __name__ == "__main__":

@@ -5,7 +5,8 @@ from __future__ import annotations
 from functools import partial
 from typing import NoReturn
 
-from space_robot_msgs_py.ros.node_host import NodeKind, run_nodes
+from space_robot_msgs_py.ros.managed_node import NodeKind
+from space_robot_msgs_py.ros.node_host import run_nodes
 
 from .controller.loop import ControllerLoop
 from .controller.settings import ControllerNodeSettings

@@ -11,14 +11,13 @@ from pathlib import Path
 from typing import NoReturn
 
 from . import topics
-from .bag.recorder import BagRecorder
-from .bag.recorder_settings import RecorderNodeSettings
+from .bag.recorder import BagRecorder, RecorderNodeSettings
 from .config.text import parse_json
 from .errors import InputError, MessageError
 from .ros.endpoints import PolledCallbackGroup, RawPublisher, RawSubscription
 from .ros.loop import SENT, Health, Level, Wait
-from .ros.managed_node import ManagedNode
-from .ros.node_host import NodeKind, run_nodes
+from .ros.managed_node import ManagedNode, NodeKind
+from .ros.node_host import run_nodes
 from .wire.definitions import decode
 
 SILENCE_S = 0.3

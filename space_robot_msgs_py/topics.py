@@ -5,7 +5,7 @@ Names are relative: rclpy puts them into the node's namespace and applies its re
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 ROOT = "/"
 """The namespace of nodes that are given none."""
@@ -47,8 +47,9 @@ class Topic(NamedTuple):
     stamp_at: int = 0
     """Bytes of a message before its stamp."""
     carries: Topic | None = None
-    """Its messages are those of this topic as plain bytes (`wire.carrier`), for the recorder: where
-    the type of those is not installed nobody could send them. A bag has them as this topic's."""
+    """Its messages are those of this topic as plain bytes (`wire.viewers.wrap`), for the recorder:
+    where the type of those is not installed nobody could send them. A bag has them as this topic's.
+    """
 
     @property
     def full_name(self) -> str:
@@ -72,139 +73,72 @@ class Topic(NamedTuple):
         return f"/{self.name}" if namespace == ROOT else f"{namespace}/{self.name}"
 
 
-JOINT_STATES = Topic(
-    "joint_states",
-    "sensor_msgs/msg/JointState",
-    10_000,
-    per_tick=True,
-    of="all_joints",
-    is_controlling=True,
-)
-BASE_STATE = Topic(
-    "base/state",
-    "sensor_msgs/msg/MultiDOFJointState",
-    10_000,
-    per_tick=True,
-    frame=INERTIAL_FRAME,
-    of="body",
-    is_controlling=True,
-)
+_JOINTS, _BODY = "sensor_msgs/msg/JointState", "sensor_msgs/msg/MultiDOFJointState"
+_JOINT_POINTS = "trajectory_msgs/msg/JointTrajectory"
+_BODY_POINTS = "trajectory_msgs/msg/MultiDOFJointTrajectory"
+_CARRIER = "std_msgs/msg/UInt8MultiArray"
+_LATCHED = Topic("", "std_msgs/msg/String", 1, transient_local=True, is_event=True, has_stamp=False)
+
+
+def _state(name: str, kind: str, of: str, frame: str = "", **flags: Any) -> Topic:
+    return Topic(name, kind, 10_000, per_tick=True, frame=frame, of=of, **flags)
+
+
+JOINT_STATES = _state("joint_states", _JOINTS, "all_joints", is_controlling=True)
+BASE_STATE = _state("base/state", _BODY, "body", INERTIAL_FRAME, is_controlling=True)
 # What the base's actuators tell of themselves; sent where there are any.
-WHEELS_STATE = Topic(
-    "wheels/state",
-    "sensor_msgs/msg/JointState",
-    10_000,
-    per_tick=True,
-    is_optional=True,
-    frame=BASE_FRAME,
-    of="wheels",
-    is_controlling=True,
+WHEELS_STATE = _state(
+    "wheels/state", _JOINTS, "wheels", BASE_FRAME, is_optional=True, is_controlling=True
 )
-THRUSTERS_STATE = Topic(
-    "thrusters/state",
-    "sensor_msgs/msg/JointState",
-    10_000,
-    per_tick=True,
-    is_optional=True,
-    frame=BASE_FRAME,
-    of="thrusters",
-)
+THRUSTERS_STATE = _state("thrusters/state", _JOINTS, "thrusters", BASE_FRAME, is_optional=True)
 # Motors of joints with gears, seen through them; sent where a robot has any.
-MOTORS_STATE = Topic(
-    "motors/state",
-    "sensor_msgs/msg/JointState",
-    10_000,
-    per_tick=True,
-    is_optional=True,
-    of="geared",
-)
+MOTORS_STATE = _state("motors/state", _JOINTS, "geared", is_optional=True)
 # The magnetic field; sent where the base has magnetic torquers, whose controller needs it.
-MAGNETOMETER = Topic(
+MAGNETOMETER = _state(
     "magnetometer",
     "sensor_msgs/msg/MagneticField",
-    10_000,
-    per_tick=True,
+    "torquers",
+    BASE_FRAME,
     is_optional=True,
-    frame=BASE_FRAME,
-    of="torquers",
     is_controlling=True,
 )
-COMMAND = Topic(
-    "command", "sensor_msgs/msg/JointState", 10_000, per_tick=True, frame=BASE_FRAME, of="commanded"
-)
+COMMAND = _state("command", _JOINTS, "commanded", BASE_FRAME)
 # Reference and clock are not transient local: a late joiner would receive the past, and that a
 # message was lost if one is pushed out meanwhile; at depth 1 a slow one would lose some. The
 # mission says again what is still needed when somebody joins, a plant that waits its time.
-REFERENCE_JOINTS = Topic(
-    "reference/joints", "trajectory_msgs/msg/JointTrajectory", 200, of="joints"
-)
-REFERENCE_BASE = Topic(
-    "reference/base",
-    "trajectory_msgs/msg/MultiDOFJointTrajectory",
-    200,
-    frame=INERTIAL_FRAME,
-    of="body",
-)
+REFERENCE_JOINTS = Topic("reference/joints", _JOINT_POINTS, 200, of="joints")
+REFERENCE_BASE = Topic("reference/base", _BODY_POINTS, 200, frame=INERTIAL_FRAME, of="body")
 TELEMETRY = Topic(
     "controller/telemetry", "std_msgs/msg/Float64MultiArray", 1_000, has_stamp=False, of="axes"
 )
 # The telemetry once more, by name: what viewers plot; nobody here reads it.
-SIGNALS = Topic(
-    "controller/signals",
-    "sensor_msgs/msg/JointState",
-    1_000,
-    is_optional=True,
-    frame=BASE_FRAME,
-    of="axes",
-)
+SIGNALS = Topic("controller/signals", _JOINTS, 1_000, is_optional=True, frame=BASE_FRAME, of="axes")
 LAW = Topic(
     "controller/law", "rcl_interfaces/msg/ParameterEvent", 100, transient_local=True, is_event=True
 )
 CLOCK = Topic("clock", "rosgraph_msgs/msg/Clock", 1_000)
 # The truth is sent where what the sensors tell may differ from it; no flight software listens.
-TRUTH_JOINTS = Topic(
-    "truth/joints", "trajectory_msgs/msg/JointTrajectory", 1_000, is_optional=True, of="all_axes"
-)
+TRUTH_JOINTS = Topic("truth/joints", _JOINT_POINTS, 1_000, is_optional=True, of="all_axes")
 TRUTH_BASE = Topic(
-    "truth/base",
-    "trajectory_msgs/msg/MultiDOFJointTrajectory",
-    1_000,
-    is_optional=True,
-    frame=INERTIAL_FRAME,
-    of="body",
+    "truth/base", _BODY_POINTS, 1_000, is_optional=True, frame=INERTIAL_FRAME, of="body"
 )
-TRUTH_ORBIT = Topic(
-    "truth/orbit",
-    "trajectory_msgs/msg/JointTrajectory",
-    1_000,
-    is_optional=True,
-    frame=INERTIAL_FRAME,
-)
+TRUTH_ORBIT = Topic("truth/orbit", _JOINT_POINTS, 1_000, is_optional=True, frame=INERTIAL_FRAME)
 
 # What viewers need of the robot. ROS has one /tf for all robots: their frames bear the namespace.
 TF = Topic("/tf", "tf2_msgs/msg/TFMessage", 100, stamp_at=4)
 TF_STATIC = Topic("/tf_static", TF.type, 1, transient_local=True, has_stamp=False)
-CARRIER = "std_msgs/msg/UInt8MultiArray"
 # Hidden, as names with an underscore are in ROS: nobody but the recorder can read them.
-TRANSFORMS = Topic("_transforms", CARRIER, 1_000, is_optional=True, carries=TF)
+TRANSFORMS = Topic("_transforms", _CARRIER, 1_000, is_optional=True, carries=TF)
 TRANSFORMS_STATIC = Topic(
     "_transforms/static",
-    CARRIER,
+    _CARRIER,
     1,
     transient_local=True,
     is_event=True,
     is_optional=True,
     carries=TF_STATIC,
 )
-ROBOT_DESCRIPTION = Topic(
-    "robot_description",
-    "std_msgs/msg/String",
-    1,
-    transient_local=True,
-    is_event=True,
-    has_stamp=False,
-    is_optional=True,
-)
+ROBOT_DESCRIPTION = _LATCHED._replace(name="robot_description", is_optional=True)
 
 STATES = (JOINT_STATES, WHEELS_STATE, BASE_STATE, THRUSTERS_STATE, MOTORS_STATE, MAGNETOMETER)
 """The parts of a state, in the order of sending."""
@@ -219,7 +153,7 @@ ALL = (
     CLOCK,
     TRUTH_JOINTS,
     TRUTH_BASE,
-    *(part for part in STATES if part.is_optional),
+    *(part for part in STATES if part not in (JOINT_STATES, BASE_STATE)),
     TRUTH_ORBIT,
 )
 """All that tell of a flight: who reads a bag reads these."""
@@ -237,30 +171,14 @@ ODOMETRY = Topic("base/odometry", "nav_msgs/msg/Odometry", 100, is_optional=True
 IMU = Topic("base/imu", "sensor_msgs/msg/Imu", 100, is_optional=True)
 WRENCH = Topic("base/wrench", "geometry_msgs/msg/WrenchStamped", 100, is_optional=True)
 STANDARD = (ODOMETRY, IMU, WRENCH)
-JOINT_TRAJECTORY = Topic(
-    "joint_trajectory", "trajectory_msgs/msg/JointTrajectory", 10, is_event=True
-)
+JOINT_TRAJECTORY = Topic("joint_trajectory", _JOINT_POINTS, 10, is_event=True)
 """Trajectories that others, as MoveIt, ask the mission to follow; the reference tells what came of
 it."""
 # One for all robots of a domain, as ROS has it: each status tells its node's name.
 DIAGNOSTICS = Topic("/diagnostics", "diagnostic_msgs/msg/DiagnosticArray", 100)
-SIMULATION_PAUSED = Topic(
-    "simulation/paused",
-    "std_msgs/msg/Bool",
-    1,
-    transient_local=True,
-    is_event=True,
-    has_stamp=False,
-)
+SIMULATION_PAUSED = _LATCHED._replace(name="simulation/paused", type="std_msgs/msg/Bool")
 """True while the plant is held: not recorded, for a bag tells nothing of the wall clock's time."""
-PLANT_DESCRIPTION = Topic(
-    "_plant_description",
-    "std_msgs/msg/String",
-    1,
-    transient_local=True,
-    is_event=True,
-    has_stamp=False,
-)
+PLANT_DESCRIPTION = _LATCHED._replace(name="_plant_description")
 """Description of the plant as JSON, which the recorder stores in the bag."""
 ROSOUT = Topic("/rosout", "rcl_interfaces/msg/Log", 1_000, transient_local=True)
 """The log of all nodes of a domain, with the depth that ROS's own publishers have."""

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from typing import NoReturn
 
-from space_robot_msgs_py.ros.node_host import NodeKind, run_nodes
+from space_robot_msgs_py.ros.managed_node import NodeKind
+from space_robot_msgs_py.ros.node_host import run_nodes
 
 from .plant.loop import PlantLoop
 from .plant.services import offer_services

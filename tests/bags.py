@@ -16,8 +16,8 @@ from rosbags.rosbag2 import StoragePlugin, Writer
 from space_robot.flight.plan import Flight, FlightPlan, resolve
 from space_robot.flight.simulate import simulate
 from space_robot_msgs_py import topics
-from space_robot_msgs_py.bag.contents import read_information
 from space_robot_msgs_py.bag.flight_log import REFERENCE, FlightLog
+from space_robot_msgs_py.bag.folder import read_information
 from space_robot_msgs_py.bag.message_accounting import noted_accounts
 from space_robot_msgs_py.bag.reader import read_flight
 from space_robot_msgs_py.bag.recorder import FLIGHT_KEY, BagRecorder

@@ -8,8 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from space_robot_model.robot import Robot
-from space_robot_msgs_py.bag.blocks import Metric, last_rows
-from space_robot_msgs_py.bag.flight_log import FlightLog
+from space_robot_msgs_py.bag.flight_log import FlightLog, Metric, last_rows
 from space_robot_msgs_py.errors import InputError
 
 from .generalised_motion import measured_rows

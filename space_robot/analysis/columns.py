@@ -5,6 +5,7 @@ Names are ``what_axis_unit``. Quaternions are ``[w, x, y, z]`` and have no unit.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Sequence
 from typing import Any
 
@@ -13,6 +14,8 @@ from numpy.typing import NDArray
 
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.bag.law_history import as_data, laws_of
+from space_robot_msgs_py.samples import PASSIVE_FIELDS, STATE_FIELDS, StateSignals
+from space_robot_msgs_py.signals import Each, Signal, signals_of
 
 from .attitude_drift import controls_base
 from .metrics import attitude_angles, tracking_error
@@ -22,6 +25,8 @@ Array = NDArray[np.float64]
 BATCH = 16_384
 """Ticks that are laid out at a time; this bounds the memory of an export."""
 XYZ, WXYZ = "xyz", "wxyz"
+NAMED_ABOVE = (*STATE_FIELDS, *PASSIVE_FIELDS, "wheel_velocities", "wheel_torques", "thrusts")
+"""Signals with names of their own; those of others follow from their declaration."""
 
 
 def column_names(log: FlightLog) -> list[str]:
@@ -113,6 +118,20 @@ def _columns(log: FlightLog) -> Iterator[tuple[list[str], Array]]:
         yield _each("error_q", XYZ), error[:, :3]
         yield _each("error_base", XYZ, "deg"), attitude_angles(log)
     yield _of_joints("error_{}", joints, lengths), error[:, 3:]
+    for name, declared in signals_of(StateSignals).items():
+        values = getattr(log, name)
+        if name not in NAMED_ABOVE and values.shape[1]:
+            unit = re.sub(r"\W", "_", declared.unit).lower()
+            yield _further(name, declared, log.geared_names, unit), values
+
+
+def _further(name: str, declared: Signal, geared: Sequence[str], unit: str) -> list[str]:
+    """Return names of the columns of a signal that only some robots have."""
+    if isinstance(declared.size, Each):
+        return _each(name, geared, unit)
+    if declared.size in (1, 3):
+        return _each(name, XYZ if declared.size == 3 else [""], unit)
+    return _each("", declared.labels, unit)
 
 
 def _of_joints(

@@ -15,8 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from space_robot_msgs_py.bag.blocks import Metric, joined, last_rows
-from space_robot_msgs_py.bag.flight_log import FlightLog
+from space_robot_msgs_py.bag.flight_log import FlightLog, Metric, joined, last_rows
 from space_robot_msgs_py.bag.law_history import laws_of
 from space_robot_msgs_py.errors import InputError
 

@@ -15,8 +15,7 @@ from numpy.typing import NDArray
 
 from space_robot_model.dynamics.attitude import attitude_error_into
 from space_robot_model.elementary.matrices import dot_rows, norm
-from space_robot_msgs_py.bag.blocks import Metric, blocks_of
-from space_robot_msgs_py.bag.flight_log import FlightLog
+from space_robot_msgs_py.bag.flight_log import FlightLog, Metric, blocks_of
 from space_robot_msgs_py.compiled.kernels import kernel
 
 from .spectrum import PowerAbove

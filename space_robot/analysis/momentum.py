@@ -23,8 +23,7 @@ from space_robot_model.robot import Robot
 from space_robot_model.robot.gears import motor_momentum
 from space_robot_model.robot.momentum import Motion, robot_momentum
 from space_robot_model.robot.placements import base_axes, to_inertial
-from space_robot_msgs_py.bag.blocks import Metric, joined, last_rows
-from space_robot_msgs_py.bag.flight_log import FlightLog
+from space_robot_msgs_py.bag.flight_log import FlightLog, Metric, joined, last_rows
 from space_robot_msgs_py.samples import SOURCES
 from space_robot_sim.environment.captures import CaptureEvent, Captures
 from space_robot_sim.environment.disturbance import DisturbanceSettings

@@ -23,8 +23,7 @@ from space_robot_model.elementary.matrices import direction_norm, dot_rows, norm
 from space_robot_model.robot import Robot
 from space_robot_model.robot.mission_document import Vector
 from space_robot_model.robot.placements import tool_pose
-from space_robot_msgs_py.bag.blocks import Metric
-from space_robot_msgs_py.bag.flight_log import FlightLog
+from space_robot_msgs_py.bag.flight_log import FlightLog, Metric
 from space_robot_msgs_py.config.validation import StrictModel
 from space_robot_msgs_py.config.yaml_text import parse_yaml
 

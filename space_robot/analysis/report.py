@@ -7,8 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from space_robot_msgs_py.bag.blocks import Metric, blocks_of
-from space_robot_msgs_py.bag.flight_log import FlightLog
+from space_robot_msgs_py.bag.flight_log import FlightLog, Metric, blocks_of
 from space_robot_msgs_py.bag.law_history import as_data, within
 from space_robot_msgs_py.config.validation import short
 from space_robot_msgs_py.errors import InputError

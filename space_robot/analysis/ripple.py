@@ -18,8 +18,7 @@ from numpy.typing import NDArray
 from space_robot_model.elementary.matrices import unit_rows
 from space_robot_model.robot import Robot
 from space_robot_model.robot.dynamics import free_inverse_dynamics, inverse_dynamics
-from space_robot_msgs_py.bag.blocks import Metric, blocks_of
-from space_robot_msgs_py.bag.flight_log import FlightLog
+from space_robot_msgs_py.bag.flight_log import FlightLog, Metric, blocks_of
 from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.topics import BASE_AXES
 

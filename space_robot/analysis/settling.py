@@ -7,8 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from space_robot_msgs_py.bag.blocks import Metric
-from space_robot_msgs_py.bag.flight_log import FlightLog
+from space_robot_msgs_py.bag.flight_log import FlightLog, Metric
 from space_robot_msgs_py.errors import InputError
 
 from .attitude_drift import controls_base

@@ -15,7 +15,7 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from space_robot_msgs_py.bag.blocks import BLOCK_TICKS
+from space_robot_msgs_py.bag.flight_log import BLOCK_TICKS
 
 Array = NDArray[np.float64]
 

@@ -21,8 +21,7 @@ from space_robot_model.elementary.matrices import norms, unit_rows
 from space_robot_model.robot import Robot
 from space_robot_model.robot.momentum import Motion, robot_momentum
 from space_robot_model.robot.placements import tool_pose
-from space_robot_msgs_py.bag.blocks import Metric
-from space_robot_msgs_py.bag.flight_log import FlightLog
+from space_robot_msgs_py.bag.flight_log import FlightLog, Metric
 from space_robot_msgs_py.config.validation import validate
 from space_robot_msgs_py.errors import InputError
 from space_robot_sim.environment.captures import Captures

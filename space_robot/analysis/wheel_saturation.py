@@ -8,8 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from space_robot_model.hardware.wheels import WheelSettings
-from space_robot_msgs_py.bag.blocks import Metric
-from space_robot_msgs_py.bag.flight_log import FlightLog
+from space_robot_msgs_py.bag.flight_log import FlightLog, Metric
 from space_robot_msgs_py.errors import InputError
 
 Array = NDArray[np.float64]

@@ -14,8 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from space_robot_control.controller.law_choice import LawChoice
-from space_robot_msgs_py.bag.blocks import block_bounds, blocks_of
-from space_robot_msgs_py.bag.flight_log import FlightLog
+from space_robot_msgs_py.bag.flight_log import FlightLog, block_bounds, blocks_of
 from space_robot_msgs_py.bag.reader import read_flight
 from space_robot_msgs_py.errors import FlightError
 from space_robot_msgs_py.samples import LawInForce

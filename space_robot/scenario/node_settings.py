@@ -14,7 +14,7 @@ from space_robot_control.guidance.mission import MissionNodeSettings, pointing_s
 from space_robot_control.laws import ControlLaw
 from space_robot_control.navigation.settings import assumed_numbers
 from space_robot_model.orbit.ephemeris import AssumedOrbit, AssumedTarget
-from space_robot_msgs_py.bag.recorder_settings import RecorderNodeSettings
+from space_robot_msgs_py.bag.recorder import RecorderNodeSettings
 from space_robot_msgs_py.config.files import GIVEN, Tree, flatten, merge, nest
 from space_robot_msgs_py.config.settings import NodeSettings
 from space_robot_msgs_py.config.validation import one_of, validate

@@ -17,7 +17,7 @@ from space_robot_control.guidance.mission import Mission, MissionNodeSettings, M
 from space_robot_control.laws import ControlLaw
 from space_robot_model.hardware.base_actuators import BaseActuatorSettings, MagneticTorquerSettings
 from space_robot_model.hardware.sensors import SensorSettings
-from space_robot_msgs_py.bag.recorder_settings import RecorderNodeSettings
+from space_robot_msgs_py.bag.recorder import RecorderNodeSettings
 from space_robot_msgs_py.config.files import Tree
 from space_robot_msgs_py.errors import InputError
 from space_robot_sim.actuators.actuators import ActuatorSettings

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from space_robot_control.guidance.limits import too_strong, turn_remarks
+from space_robot_control.guidance.limits import effort_remarks, turn_remarks
 from space_robot_control.guidance.mission import Mission, MissionSettings
 from space_robot_control.laws import CompiledLaw, ControlLaw
 from space_robot_control.laws.base import CONSTANT_INERTIA, NO_ESTIMATE
@@ -162,8 +162,4 @@ def limit_remarks(robot: Robot, mission: MissionSettings) -> list[str]:
     joints = sampled_reference(robot, mission, min(COARSE, shortest / A_LEG)).joints
     inertia = semi_floating_inertia(robot.nominal, joints[:, 0])[:, 3:, 3:]
     force = np.einsum("kij,kj->ki", inertia, joints[:, 2])
-    return remarks + [
-        f"warning: mission: {b.joint} needs {b.asked:.3g} {b.unit} and more, its limit is "
-        f"{b.limit:.3g} {b.unit}"
-        for b in too_strong(robot, force)
-    ]
+    return remarks + [f"warning: mission: {text}" for text in effort_remarks(robot, force)]

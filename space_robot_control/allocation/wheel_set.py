@@ -1,7 +1,7 @@
-"""Wheels that share a torque: tables of their axes, and two ways of sharing.
+"""Wheels that share a torque: tables of their axes, and the sharing with the least largest load.
 
 Motor torques u (W,) on wheels with unit axes a_k turn the base with ``-sum a_k u_k = -A u``. Which
-u gives a torque is not unique with more than three wheels: `least_squares` takes the least sum of
+u gives a torque is not unique with more than three wheels: ``u = A^+ torque`` has the least sum of
 squared loads, `least_largest` the least largest load (Markley, Reynolds, Liu & Lebsock, "Maximum
 Torque and Momentum Envelopes for Reaction-Wheel Arrays", J. Guidance 33(5), 2010).
 
@@ -176,13 +176,6 @@ def _null_parts(
 def _sign(wheels: WheelSet, pattern: int, k: int) -> float:
     sign: float = wheels.takes_part[k] * (-1.0 if (pattern >> k) & 1 else 1.0)
     return sign
-
-
-@kernel
-def least_squares(wheels: WheelSet, count: int, wanted: Vector, torque: Array) -> None:
-    """Write ``torque = A^+ wanted`` of the motors, N m."""
-    for k in range(count):
-        torque[k] = dot(vector(wheels.inverse[k], 0), wanted)
 
 
 @kernel

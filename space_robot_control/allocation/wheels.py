@@ -31,7 +31,7 @@ from space_robot_msgs_py.compiled.records import Record, assign, nested, shaped
 from space_robot_msgs_py.samples import MOST_WHEELS
 
 from .settings import AllocationSettings
-from .wheel_set import LEAST_PART, WheelSet, least_largest, least_squares, tabulate
+from .wheel_set import LEAST_PART, WheelSet, least_largest, tabulate
 
 Array = NDArray[np.float64]
 
@@ -153,7 +153,8 @@ def _share_torque(wheels: AssumedWheels, demand: Vector) -> None:
     if wheels.is_least_largest == 1.0 and wheels.healthy.rank == 3.0:
         least_largest(wheels.healthy, count, wanted, torque)
     else:
-        least_squares(wheels.healthy, count, wanted, torque)
+        for k in range(count):
+            torque[k] = dot(vector(wheels.healthy.inverse[k], 0), wanted)
     wheels.is_scaled = 1.0 if scale_down(wheels, torque) else 0.0
     free = wheels.free
     for k in range(count):

@@ -171,23 +171,37 @@ def _numbers(name: str, value: Any) -> Array | None:
 
 
 def build_law(
-    name: str | type[ControlLaw],
+    law: str | type[ControlLaw] | ControlLaw,
     settings: ControllerNodeSettings,
     axes: int,
     overrides: Mapping[str, Any] | None = None,
 ) -> ControlLaw:
-    """Build a law by name (or as `find_law` takes it) with the gains of the settings.
+    """Build a law with the gains of the settings.
 
     Args:
-        name: of the law, or its class.
+        law: its name (as `find_law` takes it) or class; or an object, which brings its gains and is
+            copied.
         settings: they choose its gains.
         axes: m = n+3.
         overrides: gains that come over those.
 
     Raises:
-        InputError: unknown law, gain set without it, or gains that do not fit.
+        InputError: unknown law, gain set without it, gains that do not fit, or an object that is
+            for another robot or period.
     """
-    law = find_law(name) if isinstance(name, str) else name
+    if isinstance(law, str):
+        law = find_law(law)
+    if isinstance(law, ControlLaw):
+        if len(law.memory.s) != axes or law.period != settings.period:
+            raise InputError(
+                f"controller {law.name!r} is for {len(law.memory.s)} axes and ticks of "
+                f"{law.period:g} s, the flight has {axes} and {settings.period:g} s"
+            )
+        copied = copy.deepcopy(law)
+        if overrides:
+            values = {**law.gain_values, **overrides}
+            copied.gain_values = check_gains(values, type(law), axes, PARAMETERS)
+        return copied
     may_lack = settings.gains == DEFAULT and (bool(overrides) or not law.gain_descriptions())
     files = _files_of(settings, may_lack)
     if law.name in files:
@@ -238,34 +252,8 @@ def build_laws(
     for name in overrides:
         one_of(name, wanted, "law", f" in {PARAMETERS} (gains are <law>.<gain>)")
     return {
-        name: _copy_of(law, settings, axes, overrides.get(name))
-        if isinstance(law, ControlLaw)
-        else build_law(law, settings, axes, overrides.get(name))
-        for name, law in wanted.items()
+        name: build_law(law, settings, axes, overrides.get(name)) for name, law in wanted.items()
     }
-
-
-def _copy_of(
-    law: ControlLaw,
-    settings: ControllerNodeSettings,
-    axes: int,
-    overrides: Mapping[str, Any] | None,
-) -> ControlLaw:
-    """Return a copy of ``law`` with its own memory and the gains ``overrides``.
-
-    Raises:
-        InputError: the law is for another robot or another period.
-    """
-    if len(law.memory.s) != axes or law.period != settings.period:
-        raise InputError(
-            f"controller {law.name!r} is for {len(law.memory.s)} axes and ticks of "
-            f"{law.period:g} s, the flight has {axes} and {settings.period:g} s"
-        )
-    copied = copy.deepcopy(law)
-    if overrides:
-        values = {**law.gain_values, **overrides}
-        copied.gain_values = check_gains(values, type(law), axes, PARAMETERS)
-    return copied
 
 
 def _files_of(settings: ControllerNodeSettings, may_lack: bool) -> dict[str, Path]:

@@ -52,18 +52,18 @@ class StateInput:
         """Messages not used, by reason."""
         self.codec = StateCodec(names, timebase)
         group = PolledCallbackGroup()
-        first, *others = (
+        self.inputs = tuple(
             RawSubscription(node, topic, group) for topic in self.codec.control_topics
         )
-        self.inputs = (first, *others)
-        self._first = first
-        self._parts = [_LaterPart(entry, self.codec, timebase) for entry in others]
+        self._first, self._timebase = self.inputs[0], timebase
+        self._ahead: dict[RawSubscription, bytes] = {}
+        """Parts of later ticks than the one that was looked for, whose own were never heard."""
         self._waits = {entry: Wait(TIMEOUT_S, (entry,), is_brief=True) for entry in self.inputs}
         self._newest = -1
         """Tick of the first part that was taken last."""
         self._tick = -1
         """Tick of the first part in `state`, of which others have not come yet; -1: none."""
-        self._lacking: deque[_LaterPart] = deque()
+        self._lacking: deque[RawSubscription] = deque()
         """Parts that have not arrived yet."""
         self._until = 0.0
         """How long they are waited for; 0: none has been looked for in vain yet."""
@@ -71,7 +71,7 @@ class StateInput:
     @property
     def wait(self) -> Wait:
         """Wait after `take` returned no whole state."""
-        return self._waits[self._first if self._tick < 0 else self._lacking[0].input]
+        return self._waits[self._first if self._tick < 0 else self._lacking[0]]
 
     def take(self) -> int | None:
         """Read the newest whole state into `state`; return its tick, or None."""
@@ -79,9 +79,8 @@ class StateInput:
             return None
         tick = self._tick
         while self._lacking:
-            part = self._lacking[0]
             try:
-                taken = part.take(tick, self.state)
+                taken = self._take_part(self._lacking[0], tick)
             except MessageError as error:
                 self._tick = -1
                 self.reject(error.reason)
@@ -97,6 +96,18 @@ class StateInput:
             self._lacking.popleft()
         self._tick = -1
         return tick
+
+    def _take_part(self, entry: RawSubscription, tick: int) -> bool | None:
+        """Decode a part of ``tick``; None if it may still come, False if it never will."""
+        while (data := self._ahead.pop(entry, None) or entry.take()) is not None:
+            stamped = self._timebase.tick(header_stamp_ns(data))
+            if stamped == tick:
+                self.codec.decode(entry.topic, data, self.state)
+                return True
+            if stamped > tick:
+                self._ahead[entry] = data
+                return False
+        return None
 
     def reject(self, reason: str) -> None:
         """Count the state taken last as rejected."""
@@ -115,41 +126,10 @@ class StateInput:
             self.reject(error.reason)
             return False
         if self._tick < self._newest:
-            for part in self._parts:
-                part.forget()
+            self._ahead.clear()  # a new time begins
         self._newest = self._tick
-        self._lacking, self._until = deque(self._parts), 0.0
+        self._lacking, self._until = deque(self.inputs[1:]), 0.0
         return True
-
-
-class _LaterPart:
-    """A part of the state that is read after the first part."""
-
-    def __init__(self, entry: RawSubscription, codec: StateCodec, timebase: Timebase) -> None:
-        self.input, self._codec, self._timebase = entry, codec, timebase
-        self._ahead: bytes | None = None
-        """Of a later tick than the one that was looked for: that one's part was never heard."""
-
-    def take(self, tick: int, state: RobotState) -> bool | None:
-        """Take the part of ``tick`` into ``state``; whether it is there, None if it may still come.
-
-        Raises:
-            MessageError: it does not fit.
-        """
-        while (data := self._ahead or self.input.take()) is not None:
-            self._ahead = None
-            stamped = self._timebase.tick(header_stamp_ns(data))
-            if stamped == tick:
-                self._codec.decode(self.input.topic, data, state)
-                return True
-            if stamped > tick:
-                self._ahead = data
-                return False
-        return None
-
-    def forget(self) -> None:
-        """Discard parts of later ticks, since a new time begins."""
-        self._ahead = None
 
 
 class ReferenceInput:

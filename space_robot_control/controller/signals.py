@@ -170,10 +170,7 @@ def compute_signals_as_desired(
     )
     signals.tick = tick
     signals.time = tick * period
-    _show_state(measured, signals)
-    _compute_errors(measured, signals)
-    if not controls_base:
-        _leave_base_out(signals)
+    _compute_errors(measured, signals, controls_base)
     _observe_pair(memory, tick, state[0], estimate, period)
     if controls_base:
         attitude_jacobian_inverse(near, memory.last_jacobian_inverse)
@@ -325,30 +322,27 @@ def _relative_rate(
 
 
 @kernel
-def _compute_errors(state: State, signals: Signals) -> None:
-    """Write e, edot and rhodd_d into ``signals``, which has rho and rhodot of the base."""
+def _compute_errors(state: State, signals: Signals, controls_base: bool) -> None:
+    """Write rho, e, edot and rhodd_d into ``signals``, which has rhodot and the base's attitude."""
     error, error_rate, reference = signals.error, signals.error_rate, signals.reference
-    for k in range(3):
-        error[k] = 0.0 - signals.rho[k]
-        error_rate[k] = 0.0 - signals.rho_rate[k]
-        signals.acceleration_desired[k] = 0.0
-    for i in range(state.joint_positions.size):
-        error[3 + i] = reference.joint_positions[i] - state.joint_positions[i]
-        error_rate[3 + i] = reference.joint_velocities[i] - signals.rho_rate[3 + i]
-        signals.acceleration_desired[3 + i] = reference.joint_accelerations[i]
-
-
-@kernel
-def _show_state(state: State, signals: Signals) -> None:
     for k in range(4):  # one loop for several arrays: each copy of a slice costs 1 % of a tick
         signals.quaternion[k] = state.quaternion[k]
     for k in range(3):
         signals.omega_base[k] = state.omega_base[k]
         signals.rho[k] = signals.attitude_error[1 + k]
+        error[k] = 0.0 - signals.rho[k]
+        error_rate[k] = 0.0 - signals.rho_rate[k]
+        signals.acceleration_desired[k] = 0.0
+        if not controls_base:
+            error[k] = error_rate[k] = signals.rho[k] = 0.0
+            signals.rho_rate[k] = signals.applied_force[k] = 0.0
     for i in range(state.joint_positions.size):
         signals.joint_positions[i] = state.joint_positions[i]
         signals.joint_velocities[i] = state.joint_velocities[i]
         signals.rho[3 + i] = state.joint_positions[i]
+        error[3 + i] = reference.joint_positions[i] - state.joint_positions[i]
+        error_rate[3 + i] = reference.joint_velocities[i] - signals.rho_rate[3 + i]
+        signals.acceleration_desired[3 + i] = reference.joint_accelerations[i]
 
 
 @kernel
@@ -363,14 +357,6 @@ def copy_reference(reference: Reference, desired: Reference) -> None:
         desired.joint_positions[i] = reference.joint_positions[i]
         desired.joint_velocities[i] = reference.joint_velocities[i]
         desired.joint_accelerations[i] = reference.joint_accelerations[i]
-
-
-@kernel
-def _leave_base_out(signals: Signals) -> None:
-    """Zero the base's axes in all signals of m axes."""
-    for k in range(3):
-        signals.error[k] = signals.error_rate[k] = signals.acceleration_desired[k] = 0.0
-        signals.rho[k] = signals.rho_rate[k] = signals.applied_force[k] = 0.0
 
 
 @kernel

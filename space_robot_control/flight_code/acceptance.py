@@ -12,13 +12,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from space_robot_model.dynamics.attitude import compose
 from space_robot_msgs_py.compiled.records import Block
 from space_robot_msgs_py.samples import Command, Reference, RobotState
 
 from ..controller.controller import Controller
 from ..controller.supervisor import MODES, Supervisor
 from ..controller.tick import ANSWERED, NEW
-from ..navigation.attitude_filter import multiply
 from .folder import Exported
 from .library import fill_measurement, fill_reference
 
@@ -166,7 +166,7 @@ def spoil(
         eta = random.choice([0.0, 1e-7, 0.01, 0.0199, 0.03, -0.04, 0.06])
         axis = random.normal(size=3)
         axis *= np.sqrt(1.0 - eta * eta) / np.sqrt(axis @ axis)
-        multiply(desired, np.array([eta, *axis]), state.quaternion)
+        compose(desired, np.array([eta, *axis]), state.quaternion)
     elif way == 2:  # a quaternion of another norm
         state.quaternion[:] *= random.choice([0.0, 0.9, 0.9996, 1.0004, 1.1, -1.0])
     elif way == 3:  # everything the same number

@@ -7,7 +7,7 @@ checked here, before it becomes a reference.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from typing import Annotated, NamedTuple
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
@@ -56,15 +56,6 @@ class MissionLimits(StrictModel):
         description="refuse segments that ask the base's actuators for more than they give; else "
         "flights warn of them",
     )
-
-
-class Beyond(NamedTuple):
-    """A value of a mission beyond the limit of a joint."""
-
-    joint: str
-    asked: float
-    limit: float
-    unit: str
 
 
 def shown_unit(robot: Robot, joint: int) -> tuple[float, str]:
@@ -197,16 +188,17 @@ def turn_remarks(robot: Robot, pieces: Iterable[Piece]) -> list[str]:
     ]
 
 
-def too_strong(robot: Robot, force: Array) -> list[Beyond]:
-    """Return the joints whose ``force`` (K, n), N m or N, is above their limit, and the largest."""
+def effort_remarks(robot: Robot, force: Array) -> list[str]:
+    """Return a remark on each joint whose ``force`` (K, n), N m or N, is above its limit."""
+    largest = np.abs(force).max(axis=0, initial=0.0)
     return [
-        Beyond(name, float(largest), limits.effort, "N" if is_prismatic else "N m")
-        for name, largest, limits, is_prismatic in zip(
+        f"{name} needs {most:.3g} {unit} and more, its limit is {limits.effort:.3g} {unit}"
+        for name, most, limits, unit in zip(
             robot.joint_names,
-            np.abs(force).max(axis=0, initial=0.0),
+            largest.tolist(),
             robot.limits,
-            robot.is_prismatic[: robot.n],
+            np.where(robot.is_prismatic[: robot.n], "N", "N m").tolist(),
             strict=True,
         )
-        if largest > limits.effort * (1.0 + ROUNDING)
+        if most > limits.effort * (1.0 + ROUNDING)
     ]

@@ -20,13 +20,12 @@ from space_robot_model.dynamics.algebra import (
     add,
     cross,
     dot,
-    multiply,
-    rotated,
     scale,
     store,
     subtract,
     vector,
 )
+from space_robot_model.dynamics.attitude import multiply, rotated
 from space_robot_model.elementary.functions import angle_of, sin_cos
 from space_robot_model.elementary.matrices import dot_rows, norm, norms
 from space_robot_model.elementary.splines import QuinticSpline

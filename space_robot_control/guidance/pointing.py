@@ -15,17 +15,8 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from space_robot_model.dynamics.algebra import (
-    Vector,
-    columns_quaternion,
-    cross,
-    dot,
-    multiply,
-    rotated,
-    scale,
-    store,
-    vector,
-)
+from space_robot_model.dynamics.algebra import Vector, cross, dot, scale, store, vector
+from space_robot_model.dynamics.attitude import columns_quaternion, multiply, rotated
 from space_robot_model.elementary.matrices import dot_rows, norm
 from space_robot_model.orbit.ephemeris import Ephemeris
 from space_robot_model.orbit.propagation import Motion, point_motion, target_motion

@@ -6,10 +6,9 @@ Its type is in control_msgs; without that package there is no action.
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
 from contextlib import closing, nullcontext
 from functools import partial
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -87,13 +86,6 @@ class Pursuit:
             times, states = self.measured.take()
             self._verdict = self.tolerances.judge(self.piece, self._names.joints, times, states)
         return self._verdict
-
-
-class GoalEnding(NamedTuple):
-    """End of a goal."""
-
-    end: Callable[[], None]
-    verdict: GoalVerdict
 
 
 class TrajectoryAction:
@@ -174,34 +166,33 @@ class TrajectoryAction:
         if pursuit.tolerances.are_given:
             pursuit.measured = MeasuredJoints(self._node, self._motions.names)
         with closing(pursuit.measured) if pursuit.measured else nullcontext():
-            while (outcome := self._outcome(goal, pursuit)) is None:
+            while (verdict := self._verdict(goal, pursuit)) is None:
                 goal.publish_feedback(self._feedback())
                 await self._pause(goal, pursuit)
-        code, text = outcome.verdict
+        code, text = verdict
         if code.endswith("VIOLATED"):
             self._motions.warn(f"a goal is aborted, the reference is brought to rest: {text}")
             self._stop("to bring the reference to rest")
-        outcome.end()
+        if code != "SUCCESSFUL":
+            goal.abort()
+        elif goal.is_cancel_requested:
+            goal.canceled()
+        else:
+            goal.succeed()
         return self._action.Result(error_code=getattr(self._action.Result, code), error_string=text)
 
     async def _pause(self, goal: ServerGoalHandle, pursuit: Pursuit) -> None:
         wake_at = time.monotonic() + FEEDBACK_S
-        await until(lambda: time.monotonic() >= wake_at or self._outcome(goal, pursuit) is not None)
+        await until(lambda: time.monotonic() >= wake_at or self._verdict(goal, pursuit) is not None)
 
-    def _outcome(self, goal: ServerGoalHandle, pursuit: Pursuit) -> GoalEnding | None:
+    def _verdict(self, goal: ServerGoalHandle, pursuit: Pursuit) -> GoalVerdict | None:
         if self._is_closed:
-            return GoalEnding(goal.abort, GoalVerdict("INVALID_GOAL", "the mission has ended"))
+            return GoalVerdict("INVALID_GOAL", "the mission has ended")
         if goal.is_cancel_requested:
-            text = "the reference is brought to rest"
-            return GoalEnding(goal.canceled, GoalVerdict("SUCCESSFUL", text))
+            return GoalVerdict("SUCCESSFUL", "the reference is brought to rest")
         if self._motions.latest is not pursuit.piece:
-            return GoalEnding(
-                goal.abort, GoalVerdict("INVALID_GOAL", "another motion took its place")
-            )
-        verdict = pursuit.verdict(self._motions.time)
-        if verdict is None:
-            return None
-        return GoalEnding(goal.succeed if verdict.code == "SUCCESSFUL" else goal.abort, verdict)
+            return GoalVerdict("INVALID_GOAL", "another motion took its place")
+        return pursuit.verdict(self._motions.time)
 
     def _feedback(self) -> Any:
         motions, feedback = self._motions, self._action.Feedback()

@@ -91,16 +91,9 @@ def aba(
     bias_moment, bias_force = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
     for j in range(whole(model.joint_count) - 1, -1, -1):
         i = j + 1
-        if uniform(model.branches[i]) != 0.0:
-            inertia, coupling, mass, bias_moment, bias_force = _collect_branches(
-                data.inwards[i], inertia, coupling, mass, bias_moment, bias_force
-            )
-        inertia = add_symmetric(inertia, symmetric(data.inertia[i]))
-        coupling = skew_added(coupling, vector(data.first_moment[i], 0))
-        m = model.mass[i]
-        mass = (mass[0] + m, mass[1] + m, mass[2] + m, mass[3], mass[4], mass[5])
-        bias_moment = add(bias_moment, vector(data.bias[i], 0))
-        bias_force = add(bias_force, vector(data.bias[i], 3))
+        inertia, coupling, mass, bias_moment, bias_force = _add_body(
+            model, i, data, inertia, coupling, mass, bias_moment, bias_force
+        )
         angular, linear = vector(data.motion[i], 0), vector(data.motion[i], 3)
         # U = I^A S, D = S^T U, u = tau - S^T p^A
         U_angular = add(transform_symmetric(inertia, angular), transform(coupling, linear))
@@ -138,20 +131,18 @@ def aba(
             inertia, bias_moment = _take_rotor(model, j, force, data, inertia, bias_moment)
         if uniform(model.continues[j]) == 0.0:
             row = data.inwards[whole(model.parent[j])]
-            _accumulate_branch(row, inertia, coupling, mass, bias_moment, bias_force)
+            for k in range(6):
+                row[k] += inertia[k]
+                row[15 + k] += mass[k]
+            for k in range(9):
+                row[6 + k] += coupling[k]
+            accumulate_wrench(row[21:], bias_moment, bias_force)
             inertia = mass = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
             coupling = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
             bias_moment = bias_force = (0.0, 0.0, 0.0)
-    if uniform(model.branches[0]) != 0.0:
-        inertia, coupling, mass, bias_moment, bias_force = _collect_branches(
-            data.inwards[0], inertia, coupling, mass, bias_moment, bias_force
-        )
-    inertia = add_symmetric(inertia, symmetric(data.inertia[0]))
-    coupling = skew_added(coupling, vector(data.first_moment[0], 0))
-    m = model.mass[0]
-    mass = (mass[0] + m, mass[1] + m, mass[2] + m, mass[3], mass[4], mass[5])
-    bias_moment = add(bias_moment, vector(data.bias[0], 0))
-    bias_force = add(bias_force, vector(data.bias[0], 3))
+    inertia, coupling, mass, bias_moment, bias_force = _add_body(
+        model, 0, data, inertia, coupling, mass, bias_moment, bias_force
+    )
     if uniform(model.wheel_count) > 0.0:
         inertia, bias_moment = _take_wheels(
             model, omega_inertial, joint_velocities, force, data, inertia, bias_moment
@@ -220,38 +211,40 @@ def solve_spatial(
 
 
 @subroutine
-def _accumulate_branch(
-    row: Array, inertia: Symmetric, coupling: Matrix, mass: Symmetric, moment: Vector, force: Vector
-) -> None:
-    for k in range(6):
-        row[k] += inertia[k]
-        row[15 + k] += mass[k]
-    for k in range(9):
-        row[6 + k] += coupling[k]
-    accumulate_wrench(row[21:], moment, force)
-
-
-@subroutine
-def _collect_branches(
-    row: Array, inertia: Symmetric, coupling: Matrix, mass: Symmetric, moment: Vector, force: Vector
+def _add_body(
+    model: Model,
+    i: int,
+    data: Data,
+    inertia: Symmetric,
+    coupling: Matrix,
+    mass: Symmetric,
+    moment: Vector,
+    force: Vector,
 ) -> Articulated:
-    inertia = add_symmetric(inertia, symmetric(row))
-    mass = add_symmetric(mass, symmetric(row[15:]))
-    c = coupling
-    coupling = (
-        c[0] + row[6],
-        c[1] + row[7],
-        c[2] + row[8],
-        c[3] + row[9],
-        c[4] + row[10],
-        c[5] + row[11],
-        c[6] + row[12],
-        c[7] + row[13],
-        c[8] + row[14],
-    )
-    for k in range(21):
-        row[k] = 0.0
-    moment, force = collect_wrench(row[21:], moment, force)
+    if uniform(model.branches[i]) != 0.0:
+        row, c = data.inwards[i], coupling
+        inertia = add_symmetric(inertia, symmetric(row))
+        mass = add_symmetric(mass, symmetric(row[15:]))
+        coupling = (
+            c[0] + row[6],
+            c[1] + row[7],
+            c[2] + row[8],
+            c[3] + row[9],
+            c[4] + row[10],
+            c[5] + row[11],
+            c[6] + row[12],
+            c[7] + row[13],
+            c[8] + row[14],
+        )
+        moment, force = collect_wrench(row[21:], moment, force)
+        for k in range(21):
+            row[k] = 0.0
+    inertia = add_symmetric(inertia, symmetric(data.inertia[i]))
+    coupling = skew_added(coupling, vector(data.first_moment[i], 0))
+    m = model.mass[i]
+    mass = (mass[0] + m, mass[1] + m, mass[2] + m, mass[3], mass[4], mass[5])
+    moment = add(moment, vector(data.bias[i], 0))
+    force = add(force, vector(data.bias[i], 3))
     return inertia, coupling, mass, moment, force
 
 

@@ -1,8 +1,7 @@
-"""Algebra of three-vectors, 3 x 3 matrices and quaternions as tuples, and their memory.
+"""Algebra of three-vectors and 3 x 3 matrices as tuples, and their memory.
 
 Tuples are kept in registers, since the compiler need not consider overlaps as for array views.
-A symmetric matrix is ``(xx, yy, zz, xy, xz, yz)``, a general one nine numbers row by row, a
-quaternion ``(w, x, y, z)``.
+A symmetric matrix is ``(xx, yy, zz, xy, xz, yz)``, a general one nine numbers row by row.
 
 Recursions visit bodies branch by branch (see `Model`). Along a branch the parent is the previous
 body, and its values are in registers; at the start of a branch they are loaded from its row. In
@@ -21,7 +20,6 @@ Array = NDArray[np.float64]
 Vector = tuple[float, float, float]
 Symmetric = tuple[float, float, float, float, float, float]
 Matrix = tuple[float, float, float, float, float, float, float, float, float]
-Quaternion = tuple[float, float, float, float]
 Spatial = tuple[Vector, Vector]
 """Angular and linear part of a velocity, acceleration or force."""
 
@@ -184,42 +182,6 @@ def inverse_symmetric(s: Symmetric) -> Symmetric:
         xz * factor,
         (s[3] * s[4] - s[0] * s[5]) * factor,
     )
-
-
-@subroutine
-def columns_quaternion(a: Vector, b: Vector, c: Vector) -> Quaternion:
-    """Return the unit quaternion of the rotation with these columns (Shepperd 1978)."""
-    trace = a[0] + b[1] + c[2]
-    if trace >= max(a[0], b[1], c[2]):
-        q = (1.0 + trace, b[2] - c[1], c[0] - a[2], a[1] - b[0])
-    elif a[0] >= max(b[1], c[2]):
-        q = (b[2] - c[1], 1.0 + 2.0 * a[0] - trace, b[0] + a[1], c[0] + a[2])
-    elif b[1] >= c[2]:
-        q = (c[0] - a[2], b[0] + a[1], 1.0 + 2.0 * b[1] - trace, c[1] + b[2])
-    else:
-        q = (a[1] - b[0], c[0] + a[2], c[1] + b[2], 1.0 + 2.0 * c[2] - trace)
-    size = 1.0 / np.sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3])
-    return q[0] * size, q[1] * size, q[2] * size, q[3] * size
-
-
-@subroutine
-def multiply(a: Quaternion, b: Quaternion) -> Quaternion:
-    """Return the product of two quaternions."""
-    return (
-        a[0] * b[0] - a[1] * b[1] - a[2] * b[2] - a[3] * b[3],
-        a[0] * b[1] + a[1] * b[0] + a[2] * b[3] - a[3] * b[2],
-        a[0] * b[2] + a[2] * b[0] + a[3] * b[1] - a[1] * b[3],
-        a[0] * b[3] + a[3] * b[0] + a[1] * b[2] - a[2] * b[1],
-    )
-
-
-@subroutine
-def rotated(q: Quaternion, a: Vector) -> Vector:
-    """Return ``a`` rotated by a unit quaternion."""
-    x, y, z, w = q[1], q[2], q[3], q[0]
-    t = scale(cross((x, y, z), a), 2.0)
-    s = cross((x, y, z), t)
-    return a[0] + w * t[0] + s[0], a[1] + w * t[1] + s[1], a[2] + w * t[2] + s[2]
 
 
 @subroutine

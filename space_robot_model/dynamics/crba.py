@@ -65,7 +65,12 @@ def crba(model: Model, data: Data, out: Array) -> None:
             column[5 + i] = out[5 + i, 6 + j] = element
             i = whole(model.parent[i - 1])
         if uniform(model.continues[j]) == 0.0:
-            _accumulate(data.inwards[whole(model.parent[j])], mass, moment, inertia)
+            row = data.inwards[whole(model.parent[j])]
+            row[0] += mass
+            for k in range(3):
+                row[1 + k] += moment[k]
+            for k in range(6):
+                row[4 + k] += inertia[k]
             mass, moment = 0.0, (0.0, 0.0, 0.0)
             inertia = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     if uniform(model.branches[0]) != 0.0:
@@ -86,15 +91,6 @@ def crba(model: Model, data: Data, out: Array) -> None:
     out[2, 3] = out[3, 2] = moment[1]
     out[1, 5] = out[5, 1] = moment[0]
     out[2, 4] = out[4, 2] = -moment[0]
-
-
-@subroutine
-def _accumulate(row: Array, mass: float, moment: Vector, inertia: Symmetric) -> None:
-    row[0] += mass
-    for k in range(3):
-        row[1 + k] += moment[k]
-    for k in range(6):
-        row[4 + k] += inertia[k]
 
 
 @subroutine

@@ -133,10 +133,8 @@ class FreeBase(Record):
 
     joints: Array = shaped(lambda n: (n,))
     quaternion: Array = shaped(lambda n: (4,))
-    rates: Array = shaped(lambda n: (4, n))
-    """Joint velocities of the four stages."""
-    turns: Array = shaped(lambda n: (4, 4))
-    """Rates of the quaternion of the four stages."""
+    rates: Array = shaped(lambda n: (4, n), "Joint velocities of the four stages")
+    turns: Array = shaped(lambda n: (4, 4), "Rates of the quaternion of the four stages")
     omega: Array = shaped(lambda n: (3,))
     tool: ToolKinematics = nested(ToolKinematics)
 

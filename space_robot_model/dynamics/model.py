@@ -33,8 +33,7 @@ class Model(Record):
 
     joint_count: float = shaped(lambda n: (), uniform=True)
     """Number N of moving joints, actuated and passive."""
-    mass: Array = shaped(lambda n: (MOST_JOINTS + 1,))
-    """Body masses, kg, base first."""
+    mass: Array = shaped(lambda n: (MOST_JOINTS + 1,), "Body masses, kg, base first")
     inertia: Array = shaped(lambda n: (MOST_JOINTS + 1, 6))
     """Inertia about each body's CoM, in body axes: xx, yy, zz, xy, xz, yz, kg m2."""
     com: Array = shaped(lambda n: (MOST_JOINTS + 1, 3))
@@ -60,8 +59,7 @@ class Model(Record):
     stiffness: Array = shaped(lambda n: (MOST_JOINTS,))
     """Stiffness of the springs of passive joints, and of the gears of geared ones, N m/rad, or N/m
     for prismatic joints."""
-    damping: Array = shaped(lambda n: (MOST_JOINTS,))
-    """Damping of the same, N m s/rad or N s/m."""
+    damping: Array = shaped(lambda n: (MOST_JOINTS,), "Damping of the same, N m s/rad or N s/m")
     rest: Array = shaped(lambda n: (MOST_JOINTS,))
     """Rest position of each passive joint's spring, rad or m."""
     wheel_count: float = shaped(lambda n: (), uniform=True)
@@ -83,8 +81,7 @@ class Model(Record):
 class Data(Record):
     """Scratch of the algorithms for one robot: allocate once, reuse for every call."""
 
-    rotation: Array = shaped(lambda n: (3, 3))
-    """Rotation from the base frame to the inertial frame."""
+    rotation: Array = shaped(lambda n: (3, 3), "Rotation from the base frame to the inertial frame")
     motion: Array = shaped(lambda n: (MOST_JOINTS + 1, 6))
     """Motion subspace ``S_i`` of the joint that moves body i: ``z_i`` and ``(P_i - r_0) x z_i`` for
     a revolute joint, 0 and ``z_i`` for a prismatic one (row 0 is unused)."""

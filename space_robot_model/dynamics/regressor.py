@@ -76,10 +76,8 @@ class MassCoordinates(Record):
 
     frame: Array = shaped(lambda n: (n + 1, 4, 2 * n + 3))
     """Axes x, y, z of each body and its origin, m, as sums of the vectors."""
-    centre: Array = shaped(lambda n: (2 * n + 3,))
-    """Centre of mass of the robot."""
-    arm: Array = shaped(lambda n: (2 * n + 3,))
-    """From there to the centre of mass of one body."""
+    centre: Array = shaped(lambda n: (2 * n + 3,), "Centre of mass of the robot")
+    arm: Array = shaped(lambda n: (2 * n + 3,), "From there to the centre of mass of one body")
 
 
 @kernel
@@ -191,30 +189,21 @@ class Regressor(Record):
     ``4 + 2 j``; the second of a prismatic joint is zero.
     """
 
-    velocity: Array = shaped(lambda n: (n + 3,))
-    """qdot, rad/s and m/s."""
-    s: Array = shaped(lambda n: (n + 3,))
-    """Any other velocity."""
-    v: Array = shaped(lambda n: (n + 3,))
-    """And one more."""
-    v_rate: Array = shaped(lambda n: (n + 3,))
-    """vdot, rad/s2 and m/s2."""
-    axes: Array = shaped(lambda n: (n + 1, 9))
-    """Axes x, y and z of each body."""
+    velocity: Array = shaped(lambda n: (n + 3,), "qdot, rad/s and m/s")
+    s: Array = shaped(lambda n: (n + 3,), "Any other velocity")
+    v: Array = shaped(lambda n: (n + 3,), "And one more")
+    v_rate: Array = shaped(lambda n: (n + 3,), "vdot, rad/s2 and m/s2")
+    axes: Array = shaped(lambda n: (n + 1, 9), "Axes x, y and z of each body")
     motion: Array = shaped(lambda n: (n + 1, 12))
     """Angular velocity of each body with qdot, s and v, and the rate of the last."""
     torque: Array = shaped(lambda n: (n + 1, 3))
     """Torque on each body and all bodies that it carries, N m."""
     jacobian_inverse: Array = shaped(lambda n: (3, 3))
     """``J0^-1`` in the base frame; in inertial axes it is the transpose."""
-    rotation: Array = shaped(lambda n: (3, 3))
-    """Rotation from the base frame to the outer one."""
-    vectors: Array = shaped(lambda n: (3, 2 * n + 3))
-    """``u_k``."""
-    sliding: Array = shaped(lambda n: (3, 2 * n + 3))
-    """``J_k s``."""
-    acceleration: Array = shaped(lambda n: (3, 2 * n + 3))
-    """``J_k vdot + Jdot_k v``."""
+    rotation: Array = shaped(lambda n: (3, 3), "Rotation from the base frame to the outer one")
+    vectors: Array = shaped(lambda n: (3, 2 * n + 3), "``u_k``")
+    sliding: Array = shaped(lambda n: (3, 2 * n + 3), "``J_k s``")
+    acceleration: Array = shaped(lambda n: (3, 2 * n + 3), "``J_k vdot + Jdot_k v``")
 
 
 @kernel

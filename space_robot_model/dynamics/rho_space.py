@@ -51,20 +51,15 @@ Block = NDArray[Any]
 class RhoSpaceModel(Record):
     """Results and scratch of `rho_space_into` for n joints."""
 
-    inertia: Array = shaped(lambda n: (n + 3, n + 3))
-    """``H_S``."""
-    bias: Array = shaped(lambda n: (n + 3,))
-    """``c_S``."""
-    full_inertia: Array = shaped(lambda n: (n + 6, n + 6))
-    """H."""
-    full_bias: Array = shaped(lambda n: (n + 6,))
-    """c."""
+    inertia: Array = shaped(lambda n: (n + 3, n + 3), "``H_S``")
+    bias: Array = shaped(lambda n: (n + 3,), "``c_S``")
+    full_inertia: Array = shaped(lambda n: (n + 6, n + 6), "H")
+    full_bias: Array = shaped(lambda n: (n + 6,), "c")
     to_force: Array = shaped(lambda n: (3, 3))
     """``J0^-T`` on the outer axes, the transpose of ``J0^-1``."""
     rotation: Array = shaped(lambda n: (3, 3))
     """Rotation from the base frame to the outer one: that of the quaternion it was computed for."""
-    vectors: Array = shaped(lambda n: (3, 3))
-    """Scratch."""
+    vectors: Array = shaped(lambda n: (3, 3), "Scratch")
     data: Data = nested(Data)
 
 

@@ -60,10 +60,8 @@ class ToolKinematics(Record):
     """The robot's centre of mass from the base's, inertial axes, m."""
     rotation: Array = shaped(lambda n: (3, 3))
     """Rotation from the tool's frame to the inertial frame."""
-    base: Array = shaped(lambda n: (6, 6))
-    """``J_b``."""
-    joints: Array = shaped(lambda n: (6, n))
-    """``J_m``."""
+    base: Array = shaped(lambda n: (6, 6), "``J_b``")
+    joints: Array = shaped(lambda n: (6, n), "``J_m``")
     attitude: Array = shaped(lambda n: (6, 3))
     """``J_w``: twist by angular velocity of the base, P = 0."""
     held: Array = shaped(lambda n: (6, n))
@@ -76,8 +74,7 @@ class ToolKinematics(Record):
     """``H~_wm``: angular momentum about the centre of mass by joint velocities, N m s per rad/s."""
     inertia: Array = shaped(lambda n: (6,))
     """``H~_ww``: inertia of the whole about its centre of mass, xx, yy, zz, xy, xz, yz, kg m2."""
-    full_inertia: Array = shaped(lambda n: (n + 6, n + 6))
-    """H of (7)."""
+    full_inertia: Array = shaped(lambda n: (n + 6, n + 6), "H of (7)")
     data: Data = nested(Data)
 
 

@@ -87,7 +87,7 @@ def propagate(nodes: Array, first: int, has_j2: float) -> None:
         store(pull, node, 6)
         store(tide, node, TARGET + 6)
         zero = (0.0, 0.0, 0.0)
-        way, gain, away, drift = zero, zero, zero, zero
+        dr, dv, dd, dw = zero, zero, zero, zero
         for count in range(1, 5):
             # increments since the node: less is rounded away
             step, weight = STEP / count, WEIGHTS[count - 1]
@@ -96,16 +96,16 @@ def propagate(nodes: Array, first: int, has_j2: float) -> None:
             for _ in range(count):
                 u, s = add(u, scale(a, 0.5 * step)), add(s, scale(b, 0.5 * step))
                 x, y = add(x, scale(add(v, u), step)), add(y, scale(add(w, s), step))
-                place = add(r, x)
-                a = gravity_at(place, has_j2)
-                b = subtract(gravity_at(add(place, add(d, y)), has_j2), a)
+                position = add(r, x)
+                a = gravity_at(position, has_j2)
+                b = subtract(gravity_at(add(position, add(d, y)), has_j2), a)
                 u, s = add(u, scale(a, 0.5 * step)), add(s, scale(b, 0.5 * step))
-            way, gain = add(way, scale(x, weight)), add(gain, scale(u, weight))
-            away, drift = add(away, scale(y, weight)), add(drift, scale(s, weight))
-        store(add(r, way), after, 0)
-        store(add(v, gain), after, 3)
-        store(add(d, away), after, TARGET)
-        store(add(w, drift), after, TARGET + 3)
+            dr, dv = add(dr, scale(x, weight)), add(dv, scale(u, weight))
+            dd, dw = add(dd, scale(y, weight)), add(dw, scale(s, weight))
+        store(add(r, dr), after, 0)
+        store(add(v, dv), after, 3)
+        store(add(d, dd), after, TARGET)
+        store(add(w, dw), after, TARGET + 3)
         r, d = vector(after, 0), vector(after, TARGET)
         pull = gravity_at(r, has_j2)
         store(pull, after, 6)

@@ -90,7 +90,7 @@ def nearest_inertia(inertia: Array) -> Array | None:
     inequalities for physically consistent inertial parameter identification). The nearest such
     matrix has the negative eigenvalues raised to 0 (Higham 1988), here to a little above.
     """
-    from space_robot_model.elementary.linear_algebra import principal_axes
+    from ..elementary.linear_algebra import principal_axes  # slow to import
 
     moments, axes = principal_axes(inertia)
     second = 0.5 * np.sum(moments) - moments

@@ -149,7 +149,7 @@ class Spring(NamedTuple):
 
 
 class Gear(NamedTuple):
-    """Drive of a joint with a motor on the parent, a gear and a spring (dynamics.rotors)."""
+    """Drive of a joint with a motor on the parent, a gear and a spring (dynamics.aba)."""
 
     rotor_inertia: Annotated[Real, Field(gt=0.0, le=1e6)]
     """Inertia of the rotor about its axis, kg m2; its mass and static inertia are the parent's."""

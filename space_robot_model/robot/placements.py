@@ -8,11 +8,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from space_robot_model.elementary.functions import sines_cosines
 from space_robot_msgs_py.samples import RobotState
 from space_robot_msgs_py.topics import BASE_FRAME, INERTIAL_FRAME
 from space_robot_msgs_py.wire.viewers import POSE, Frame
 
+from ..elementary.functions import sines_cosines
 from ..elementary.matrices import norm
 from .names import BASE
 from .robot import Robot

@@ -233,7 +233,7 @@ def solid_inertia(mass: float, visuals: tuple[Visual, ...]) -> tuple[Array, str]
             turn = visual.rotation
             inertia: Array = rotate_tensor(turn, np.diag(_solid(mass, visual.shape, visual.size)))
             return inertia, f"the solid {visual.shape} of its visual"
-    from space_robot_model.elementary.functions import exp, log
+    from ..elementary.functions import exp, log  # slow to import
 
     radius = exp(log(3.0 * mass / (4.0 * math.pi * SOLID)) / 3.0)
     ball = _solid(mass, "sphere", (radius,))

@@ -23,10 +23,9 @@ from ..samples import (
 )
 from ..wire.definitions import decode
 from .batch import Batch
-from .contents import Bag
 from .description import read_description
 from .flight_log import REFERENCE, FlightLog, MeasuredStates, finite_rows
-from .folder import open_bag
+from .folder import Bag, open_bag
 from .message_accounting import (
     LONGEST_JUMP,
     Account,

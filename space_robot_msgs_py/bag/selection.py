@@ -12,7 +12,7 @@ from ..config.text import parse_json
 from ..config.validation import one_of
 from ..errors import InputError
 from .batch import Batch
-from .contents import Bag, some_of
+from .folder import Bag, some_of
 from .recorder import FLIGHT_KEY, TOPICS_KEY
 
 REQUIRED = (graph.JOINT_STATES, graph.BASE_STATE, graph.REFERENCE_JOINTS, graph.REFERENCE_BASE)

@@ -78,6 +78,25 @@ def array_of_lanes(ndim: int) -> Any:
     return types.Array(LANE, ndim, "C", aligned=False)
 
 
+def array_over(
+    context: Any, builder: Any, kind: Any, data: Any, shape: Any, strides: Any, itemsize: int
+) -> Any:
+    """Emit an array of a Numba type over memory that something else owns."""
+    from numba.np import arrayobj  # only the compiler needs it
+
+    array = arrayobj.make_array(kind)(context, builder)
+    arrayobj.populate_array(
+        array,
+        data=data,
+        shape=cgutils.pack_array(builder, shape),
+        strides=cgutils.pack_array(builder, strides),
+        itemsize=cgutils.intp_t(itemsize),
+        meminfo=None,
+        parent=None,
+    )
+    return array._getvalue()
+
+
 @register_model(LaneType)
 class _LaneModel(models.PrimitiveModel):
     def __init__(self, manager: Any, kind: Any) -> None:
@@ -456,7 +475,7 @@ def _as_lanes(context: Any, builder: Any, sig: Any, args: Any) -> Any:
     if sig.return_type == LANE:
         return builder.load(data, align=1)
     shape, strides = (cgutils.unpack_tuple(builder, p) for p in (numbers.shape, numbers.strides))
-    return _view(context, builder, sig.return_type, data, shape[:-1], strides[:-1], 8 * WIDTH)
+    return array_over(context, builder, sig.return_type, data, shape[:-1], strides[:-1], 8 * WIDTH)
 
 
 @infer_global(as_numbers)
@@ -478,23 +497,4 @@ def _as_numbers(context: Any, builder: Any, sig: Any, args: Any) -> Any:
     shape, strides = (cgutils.unpack_tuple(builder, part) for part in (wide.shape, wide.strides))
     data = builder.bitcast(wide.data, DOUBLE.as_pointer())
     shape, strides = [*shape, cgutils.intp_t(width)], [*strides, cgutils.intp_t(8)]
-    return _view(context, builder, sig.return_type, data, shape, strides, 8)
-
-
-def _view(
-    context: Any, builder: Any, kind: Any, data: Any, shape: Any, strides: Any, itemsize: int
-) -> Any:
-    """Emit an array of a kind over memory that another one keeps."""
-    from numba.np import arrayobj  # only the compiler needs it
-
-    array = arrayobj.make_array(kind)(context, builder)
-    arrayobj.populate_array(
-        array,
-        data=data,
-        shape=cgutils.pack_array(builder, shape),
-        strides=cgutils.pack_array(builder, strides),
-        itemsize=cgutils.intp_t(itemsize),
-        meminfo=None,
-        parent=None,
-    )
-    return array._getvalue()
+    return array_over(context, builder, sig.return_type, data, shape, strides, 8)

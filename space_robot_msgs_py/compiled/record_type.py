@@ -32,7 +32,7 @@ from numba.core.typing.templates import (
 from numba.core.typing.typeof import typeof_impl
 from numba.extending import models, register_model, unbox
 
-from .lane_type import LANE, array_of_lanes
+from .lane_type import LANE, array_of_lanes, array_over
 from .records import Dimension, Layout, Polynomial, layout_of
 
 BYTES = 8
@@ -147,25 +147,14 @@ def _get_field(context: Any, builder: Any, kind: RecordType, value: Any, name: s
     numbers = builder.bitcast(place, context.get_value_type(kind.array(0)).as_pointer())
     if not field:
         return builder.load(numbers, align=BYTES)
-    from numba.np import arrayobj  # only the compiler needs it
-
-    array = arrayobj.make_array(kind.array(len(field)))(context, builder)
     shape = [value_of(builder, Polynomial(*dimension), record.n) for dimension in field]
     strides: list[Any] = []
     step: Any = _INT(kind.bytes)
     for k, length in enumerate(reversed(shape)):
         strides.insert(0, step)
         step = builder.mul(step, length, flags=["nsw"]) if k + 1 < len(shape) else step
-    arrayobj.populate_array(
-        array,
-        data=numbers,
-        shape=cgutils.pack_array(builder, shape),
-        strides=cgutils.pack_array(builder, strides),
-        itemsize=_INT(kind.bytes),
-        meminfo=None,
-        parent=None,
-    )
-    return array._getvalue()
+    array = kind.array(len(field))
+    return array_over(context, builder, array, numbers, shape, strides, kind.bytes)
 
 
 @imputils.lower_setattr_generic(RecordType)

@@ -109,7 +109,6 @@ def nest(flat: Mapping[Any, Any]) -> Tree:
 
 
 def _refuse_both(one: Tree, other: Tree, prefix: str = "") -> None:
-    """Check that no key is a value in one tree and a group of values in the other."""
     for key in one.keys() & other.keys():
         first, second = one[key], other[key]
         if isinstance(first, dict) is not isinstance(second, dict):

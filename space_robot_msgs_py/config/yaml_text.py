@@ -86,7 +86,6 @@ def _opened(path: Path) -> Iterator[BinaryIO]:
 
 
 def _similar_file(path: Path) -> str:
-    """Return the file of the same folder with the most similar name; empty if none is similar."""
     try:
         with os.scandir(path.parent) as entries:
             names = sorted(entry.name for entry in islice(entries, MOST_COMPARED))

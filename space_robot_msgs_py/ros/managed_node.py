@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from typing import Any, Generic, TypeVar
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
@@ -35,18 +36,26 @@ NO_TIME = Timebase(1)
 """Timebase of a node that has never been configured: it is at tick 0."""
 
 
+@dataclass(frozen=True)
+class NodeKind(Generic[Schema]):
+    """Definition of a kind of node."""
+
+    schema: type[Schema]
+    """Schema of its parameters, with the node's name."""
+    make_loop: Callable[[ManagedNode[Schema], Schema], Loop]
+    changeable: tuple[str, ...] = ()
+    """Names of the parameters that can be changed in flight."""
+    offer_services: Callable[[ManagedNode[Schema]], None] = lambda node: None
+    """Creates services and parameters that exist in all lifecycle states."""
+
+
 class ManagedNode(LifecycleNode, Generic[Schema]):
     """Lifecycle node that creates, starts, stops and closes a `Loop`."""
 
-    def __init__(
-        self,
-        schema: type[Schema],
-        make_loop: Callable[[ManagedNode[Schema], Schema], Loop],
-        changeable: tuple[str, ...] = (),
-        offer_services: Callable[[ManagedNode[Schema]], None] = lambda node: None,
-    ) -> None:
-        super().__init__(schema.ros_name())
-        self._schema, self._make_loop, self._changeable = schema, make_loop, changeable
+    def __init__(self, kind: NodeKind[Schema]) -> None:
+        """Create the node in the state unconfigured."""
+        super().__init__(kind.schema.ros_name())
+        self._kind = kind
         self.settings: Schema | None = None
         self.loop: Loop | None = None
         self.is_active = False
@@ -70,7 +79,7 @@ class ManagedNode(LifecycleNode, Generic[Schema]):
         )
         self.set_descriptor("use_sim_time", no_effect)
         self._diagnostics = Diagnostics(self)
-        offer_services(self)
+        kind.offer_services(self)
         self._own = self._entities()
         self.calls = ServiceCalls(self)
         guard_change_state(self, self._refuse_transition)
@@ -88,10 +97,10 @@ class ManagedNode(LifecycleNode, Generic[Schema]):
         return self.settings.timebase if self.settings else NO_TIME
 
     def _health(self) -> Health:
-        """Return the loop's health with the numbers of sent messages, for the recorder's check."""
         if self.loop is None:
             return Health("unconfigured")
         health = self.loop.health()
+        # the recorder compares these numbers with those of the messages that it received
         sent = {f"{SENT}{output.full_name}": output.sent for output in self.loop.outputs}
         values = {**health.values, **sent, "service_calls": self.calls.count}
         if not self.is_active:
@@ -176,10 +185,11 @@ class ManagedNode(LifecycleNode, Generic[Schema]):
         """Check parameters and files, create the loop and its topics."""
 
         def configure() -> None:
-            self.settings = declare_settings(self, self._schema, self._changeable)
-            if not self._changeable:  # otherwise the loop declares more parameters
+            kind = self._kind
+            self.settings = declare_settings(self, kind.schema, kind.changeable)
+            if not kind.changeable:  # otherwise the loop declares more parameters
                 refuse_unknown(self)
-            self.loop = self._make_loop(self, self.settings)
+            self.loop = kind.make_loop(self, self.settings)
             refuse_unknown(self)
             self.times_configured += 1
 
@@ -238,7 +248,6 @@ class ManagedNode(LifecycleNode, Generic[Schema]):
             self.loop.deactivate()
 
     def _release(self) -> None:
-        """Close the loop, and destroy everything created by configure."""
         loop, self.loop = self.loop, None
         try:
             if loop is not None:
@@ -310,7 +319,6 @@ class Diagnostics:
             self._publisher.wait_for_all_acked(Duration(seconds=FLUSH_S))
 
     def _rate(self, health: Health, now: float) -> dict[str, float]:
-        """Return the ticks per second of wall-clock time since the last report."""
         tick = health.values.get("tick")
         if not isinstance(tick, int):
             return {}

@@ -7,6 +7,7 @@ import os
 import time
 from collections.abc import Sequence
 from functools import partial
+from operator import attrgetter
 from pathlib import Path
 from typing import Any
 
@@ -23,11 +24,9 @@ UPKEEP_GAP_S = 2e-3
 """Minimum time between the upkeep of two nodes, so that they do not delay a tick together."""
 UPKEEP_PATIENCE_S = 0.02
 """Maximum time that due upkeep waits for an idle moment of all nodes."""
-GLANCE_S = 1e-3
+POLL_S = 1e-3
 """Period of polling for messages that are not expected soon, in a process with several nodes."""
 NO_WAIT = Wait(0.0)
-
-
 PERIOD_S = 0.1
 """Period of checks for service calls, which take time of the loop."""
 SERVICE_SHARE = 0.1
@@ -45,28 +44,29 @@ class Upkeep:
         self.node = node
         self._next_call = self._next_report = 0.0
 
-    def run(self, timeout_s: float = 0.0) -> float:
+    @property
+    def due(self) -> float:
+        """Time of the next call of `run`, monotonic clock."""
+        return min(self._next_call, self._next_report)
+
+    def run(self, timeout_s: float = 0.0) -> None:
         """Execute a waiting service call or report the health, if due.
 
         Args:
             timeout_s: time to wait for a call; only without flight.
-
-        Returns:
-            Time of the next call of this method, monotonic clock.
         """
         now = time.monotonic()
-        looks = timeout_s > 0.0 or self._next_call <= min(now, self._next_report)
-        if looks:
+        serves_calls = timeout_s > 0.0 or self._next_call <= min(now, self._next_report)
+        if serves_calls:
             has_run = self.node.calls.run_one(timeout_s)
             begin, now = now, time.monotonic()
             # after a call check again soon, within the allowed share of time; the answer to a
             # client that has ended takes the middleware 0.1 s
             pause = min((now - begin) / SERVICE_SHARE, LONGEST_PAUSE_S)
             self._next_call = now + (pause if has_run else PERIOD_S)
-        if now >= self._next_report and (timeout_s or not looks):
+        if now >= self._next_report and (timeout_s or not serves_calls):
             self._next_report = now + PERIOD_S
             self.node.report()
-        return min(self._next_call, self._next_report)
 
 
 class NodeScheduler:
@@ -75,15 +75,13 @@ class NodeScheduler:
     def __init__(self, nodes: Sequence[ManagedNode[Any]]) -> None:
         """Store the nodes in the order of their turns."""
         self._nodes = nodes
-        self._seats = [ScheduledNode(node, is_alone=len(nodes) == 1) for node in nodes]
+        self._scheduled = [ScheduledNode(node, is_alone=len(nodes) == 1) for node in nodes]
         self._upkeeps = [Upkeep(node) for node in nodes]
-        self._due = [0.0] * len(nodes)
-        """Time at which each node's upkeep is due, monotonic clock."""
         self._upkeep_at = 0.0
         self._waiter = Waiter(nodes[0])
         self._is_alone = len(nodes) == 1
-        for seat in self._seats if not self._is_alone else []:
-            seat.node.let_others_work = partial(self._step_others, seat)
+        for scheduled in self._scheduled if not self._is_alone else []:
+            scheduled.node.let_others_work = partial(self._step_others, scheduled)
 
     def take(self) -> bool:
         """Step all nodes once; return False when the process is to end."""
@@ -94,10 +92,10 @@ class NodeScheduler:
             if now >= self._upkeep_at + UPKEEP_PATIENCE_S:
                 self._serve_one()
         is_idle = True
-        for seat in self._seats:
-            if seat.step(now):
+        for scheduled in self._scheduled:
+            if scheduled.step(now):
                 is_idle = False
-                if seat.is_complete:
+                if scheduled.is_complete:
                     return False
         return self._rest(now) if is_idle else True
 
@@ -109,40 +107,35 @@ class NodeScheduler:
         return not all(node.is_shut_down for node in self._nodes)
 
     def _serve_one(self) -> None:
-        """Run the upkeep that is due first."""
-        first = self._due.index(min(self._due))
-        self._due[first] = self._upkeeps[first].run()
-        self._upkeep_at = max(min(self._due), time.monotonic() + UPKEEP_GAP_S)
+        min(self._upkeeps, key=attrgetter("due")).run()
+        due = min(upkeep.due for upkeep in self._upkeeps)
+        self._upkeep_at = max(due, time.monotonic() + UPKEEP_GAP_S)
 
     def _rest(self, now: float) -> bool:
-        """Run due upkeep, or wait until a node has work.
-
-        Returns:
-            False when the process is to end.
-        """
+        """Run due upkeep, or wait until a node has work; return False at the end."""
         if now >= self._upkeep_at:
             self._serve_one()
             return True
-        if self._is_alone and self._seats[0].spins and self._seats[0].spin(now + SPIN_S):
-            return not self._seats[0].is_complete
-        seats = [seat for seat in self._seats if seat.node.is_active]
-        until = min([seat.wake_at for seat in seats], default=self._upkeep_at)
+        if self._is_alone and self._scheduled[0].spins and self._scheduled[0].spin(now + SPIN_S):
+            return not self._scheduled[0].is_complete
+        active = [scheduled for scheduled in self._scheduled if scheduled.node.is_active]
+        until = min([scheduled.wake_at for scheduled in active], default=self._upkeep_at)
         if (left := until - time.monotonic()) <= 0.0:
-            for seat in seats:
-                seat.glance_at = min(seat.glance_at, seat.wake_at)
+            for scheduled in active:
+                scheduled.step_at = min(scheduled.step_at, scheduled.wake_at)
             return True
-        if inputs := [entry for seat in seats for entry in seat.wait.inputs]:
+        if inputs := [entry for scheduled in active for entry in scheduled.wait.inputs]:
             self._waiter.wait(inputs, left)
-            for seat in seats:
-                seat.glance_at = 0.0
+            for scheduled in active:
+                scheduled.step_at = 0.0
         else:
             time.sleep(left)
         return True
 
-    def _step_others(self, seat: ScheduledNode) -> None:
+    def _step_others(self, scheduled: ScheduledNode) -> None:
         now = time.monotonic()
-        for other in self._seats:
-            if other is not seat:
+        for other in self._scheduled:
+            if other is not scheduled:
                 other.step(now)
 
 
@@ -156,7 +149,7 @@ class ScheduledNode:
         """Last wait requested by the loop."""
         self.wake_at = 0.0
         """Time at which the loop is stepped without message, monotonic clock."""
-        self.glance_at = 0.0
+        self.step_at = 0.0
         """Earliest time of the next step."""
         self.spins = False
         """True to poll for the next message instead of sleeping."""
@@ -173,9 +166,9 @@ class ScheduledNode:
     def step(self, now: float) -> bool:
         """Step the loop if it is active and need not wait; return True if it did work."""
         if not self.node.is_active:
-            self._loop, self.wait, self.glance_at, self.spins = None, NO_WAIT, 0.0, False
+            self._loop, self.wait, self.step_at, self.spins = None, NO_WAIT, 0.0, False
             return False
-        if now < self.glance_at:
+        if now < self.step_at:
             return False
         if self._loop is None and not self._begin(now):
             return False
@@ -203,10 +196,10 @@ class ScheduledNode:
         self.wait = wait
         is_short = wait.is_for_others and not self._is_alone
         self.wake_at = now if is_short else now + wait.seconds
-        self.glance_at = self.wake_at if self._is_alone else self.wake_at + wait.patience_s
+        self.step_at = self.wake_at if self._is_alone else self.wake_at + wait.patience_s
         self.spins = wait.is_brief and self._may_spin
         if wait.inputs:
-            self.glance_at = 0.0 if wait.is_brief else min(now + GLANCE_S, self.wake_at)
+            self.step_at = 0.0 if wait.is_brief else min(now + POLL_S, self.wake_at)
 
     def _begin(self, now: float) -> bool:
         """Start the loop of a newly active node once its subscribers exist; return True then."""

@@ -72,7 +72,6 @@ class ServiceWaitSet:
         return any(action.is_ready(self._set) for action in self._actions)
 
     def _renew(self, entities: list[Any]) -> None:
-        """Make a set of the size that services and action servers need."""
         self._entities = entities
         handle: Any = self._node.context.handle
         self._actions = [w for w in self._node.waitables if w.get_num_entities().num_services]

@@ -59,7 +59,7 @@ class CommandGuard:
             self.refused["stamp"] += 1
             return False
         torque = self.offered.torque
-        # the sum is had in a third of the time, and finite unless something is wrong
+        # a sum takes a third of the time of `isfinite`; finite unless a number is not, or huge
         if not (math.isfinite(sum(torque.tolist())) or np.isfinite(torque).all()):
             self.refused["not finite"] += 1
             return False

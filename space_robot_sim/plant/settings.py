@@ -36,15 +36,10 @@ class PlantNodeSettings(PlantSettings, NodeSettings):
         "orbit",
     )
     sends: ClassVar[tuple[topics.Topic, ...]] = (
-        topics.JOINT_STATES,
-        topics.BASE_STATE,
+        *topics.STATES,
         topics.CLOCK,
         *topics.TRUTH,
         topics.TRUTH_ORBIT,
-        topics.WHEELS_STATE,
-        topics.THRUSTERS_STATE,
-        topics.MOTORS_STATE,
-        topics.MAGNETOMETER,
         *topics.SCENE,
         topics.PLANT_DESCRIPTION,
     )

@@ -14,7 +14,7 @@ import pytest
 from bags import read_accounts
 
 from space_robot_msgs_py import topics
-from space_robot_msgs_py.bag.recorder_settings import RecorderNodeSettings
+from space_robot_msgs_py.bag.recorder import RecorderNodeSettings
 from space_robot_msgs_py.errors import FlightError, InputError
 from space_robot_msgs_py.wire.definitions import jazzy
 from space_robot_msgs_py.wire.telemetry import ClockCodec
@@ -168,7 +168,7 @@ def test_what_was_sent_until_it_is_told_to_stop_is_taken_and_no_more(
     node.hear_clock([2], now + 10**12)
     loop._recorder._flush_at = time.monotonic() + 60.0
     loop.deactivate()
-    assert loop._recorder._open_bytes == 0, "the file grows no more"
+    assert loop._recorder._writer.open_bytes == 0, "the file grows no more"
     assert loop._recorder.accounting["/clock"].received == 2
     assert not node.queues[topics.CLOCK]
     until = loop._until_ns

@@ -34,7 +34,8 @@ from space_robot_control.controller.loop import ControllerLoop  # noqa: E402
 from space_robot_control.controller.settings import ControllerNodeSettings  # noqa: E402
 from space_robot_msgs_py import topics  # noqa: E402
 from space_robot_msgs_py.ros.endpoints import message_type, qos  # noqa: E402
-from space_robot_msgs_py.ros.node_host import NodeKind, run_nodes  # noqa: E402
+from space_robot_msgs_py.ros.managed_node import NodeKind  # noqa: E402
+from space_robot_msgs_py.ros.node_host import run_nodes  # noqa: E402
 from space_robot_msgs_py.ros.process import hold_to_standard_input  # noqa: E402
 from space_robot_sim.plant.loop import PlantLoop  # noqa: E402
 from space_robot_sim.plant.settings import PlantNodeSettings  # noqa: E402

@@ -7,8 +7,7 @@ from contextlib import closing
 from dataclasses import dataclass
 from functools import lru_cache
 
-from space_robot_msgs_py.bag.blocks import blocks_of
-from space_robot_msgs_py.bag.flight_log import FlightLog
+from space_robot_msgs_py.bag.flight_log import FlightLog, blocks_of
 from space_robot_msgs_py.compiled.lanes import WIDTH
 from space_robot_msgs_py.config.text import one_line_of
 from space_robot_msgs_py.errors import FlightError, InputError, SpaceRobotError

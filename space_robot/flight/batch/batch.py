@@ -9,8 +9,7 @@ from typing import NamedTuple
 from space_robot_control.controller.controller import unusable
 from space_robot_control.controller.law_choice import LawChoice
 from space_robot_control.controller.signals import USABLE
-from space_robot_msgs_py.bag.blocks import block_bounds
-from space_robot_msgs_py.bag.flight_log import FlightLog
+from space_robot_msgs_py.bag.flight_log import FlightLog, block_bounds
 from space_robot_msgs_py.compiled.records import assign
 from space_robot_msgs_py.errors import FlightError
 from space_robot_msgs_py.samples import LawInForce

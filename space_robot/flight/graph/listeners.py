@@ -12,8 +12,10 @@ from .node_names import NODE_NAMES, PLANT
 _TO_CONTROLLER = ("controller_node", "recorder_node")
 
 LISTENERS = {
-    topics.JOINT_STATES: _TO_CONTROLLER,
-    topics.BASE_STATE: _TO_CONTROLLER,
+    **{
+        topic: _TO_CONTROLLER if topic.is_controlling else ("recorder_node",)
+        for topic in topics.STATES
+    },
     topics.COMMAND: (PLANT, "recorder_node"),
     topics.REFERENCE_JOINTS: _TO_CONTROLLER,
     topics.REFERENCE_BASE: _TO_CONTROLLER,
@@ -24,10 +26,6 @@ LISTENERS = {
     topics.TRUTH_JOINTS: ("recorder_node",),
     topics.TRUTH_BASE: ("recorder_node",),
     topics.TRUTH_ORBIT: ("recorder_node",),
-    topics.WHEELS_STATE: _TO_CONTROLLER,
-    topics.THRUSTERS_STATE: ("recorder_node",),
-    topics.MOTORS_STATE: ("recorder_node",),
-    topics.MAGNETOMETER: _TO_CONTROLLER,
     **dict.fromkeys((*topics.SCENE, topics.PLANT_DESCRIPTION), ("recorder_node",)),
 }
 """Nodes of the graph that subscribe to each topic."""

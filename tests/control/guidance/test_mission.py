@@ -15,7 +15,7 @@ from scipy.interpolate import BPoly
 from strategies import random_robot
 
 from space_robot.tuning.warning import limit_remarks
-from space_robot_control.guidance.limits import too_strong
+from space_robot_control.guidance.limits import effort_remarks
 from space_robot_control.guidance.mission import Mission, MissionSettings
 from space_robot_model.robot import Robot
 
@@ -112,8 +112,9 @@ def test_limits_themselves_and_joints_without_any_are_allowed(end: list[float]) 
 
 
 def test_forces_are_held_against_efforts() -> None:
-    found = too_strong(ROBOT, np.array([[39.0, -21.0, *[1e9] * 4], [-39.5, 3.0, *[0.0] * 4]]))
-    assert [(b.joint, b.asked, b.limit, b.unit) for b in found] == [("boom", 21.0, 20.0, "N")]
+    force = np.array([[39.0, -21.0, *[1e9] * 4], [-39.5, 3.0, *[0.0] * 4]])
+    said = "boom needs 21 N and more, its limit is 20 N"
+    assert effort_remarks(ROBOT, force) == [said]
 
 
 def test_remarks_name_joint_number_and_unit() -> None:

@@ -18,7 +18,6 @@ from oracles import quaternion_of, rotation_of
 from scipy.spatial.transform import Rotation
 from strategies import random_quaternion
 
-from space_robot_control.navigation.attitude_filter import multiply, small_angle, turn
 from space_robot_control.navigation.navigation import LONGEST_BRIDGE, Navigation, navigate
 from space_robot_control.navigation.settings import (
     LEAST,
@@ -27,6 +26,7 @@ from space_robot_control.navigation.settings import (
     assumed_numbers,
     completed,
 )
+from space_robot_model.dynamics.attitude import compose, from_small_rotation, to_small_rotation
 from space_robot_model.hardware.sensors import SensorSettings
 from space_robot_model.robot import Robot
 from space_robot_msgs_py.errors import InputError, UnusableStateError
@@ -303,10 +303,10 @@ def vector(rng: np.random.Generator, size: float) -> Array:
 @given(seeds, st.sampled_from([1e-9, 1e-3, 0.03, 0.1]))
 def test_a_turn_is_exact_to_1e_12_of_its_angle(rng: np.random.Generator, angle: float) -> None:
     rotation, out = vector(rng, angle), np.empty(4)
-    turn(rotation, out)
+    from_small_rotation(rotation, out)
     found = rotation_of(out / np.linalg.norm(out)).as_rotvec()
     np.testing.assert_allclose(found, rotation, rtol=0.0, atol=1.2e-12 * angle)
-    turn(rotation * 1e6, out)
+    from_small_rotation(rotation * 1e6, out)
     assert np.isfinite(out).all()
 
 
@@ -316,7 +316,7 @@ def test_products_are_scipys_whichever_is_overwritten(rng: np.random.Generator) 
     expected = quaternion_of(rotation_of(p) * rotation_of(q))
     for left, right in ((p.copy(), 3.0 * q), (2.0 * p, q.copy())):
         for out in (np.empty(4), left, right):
-            multiply(left, right, out)
+            compose(left, right, out)
             assert min(np.abs(out - expected).max(), np.abs(out + expected).max()) < 1e-15
             left[:], right[:] = p, q
 
@@ -328,7 +328,7 @@ def test_a_small_angle_is_the_rotation_between(
     """To third order, whichever sign; the cosine is that of half of it."""
     origin, rotation, out = random_quaternion(rng), vector(rng, angle), np.empty(3)
     other = sign * quaternion_of(rotation_of(origin) * Rotation.from_rotvec(rotation))
-    cosine = small_angle(origin, other, out)
+    cosine = to_small_rotation(origin, other, out)
     np.testing.assert_allclose(out, rotation, rtol=0.0, atol=angle**3 / 10.0 + 1e-15)
     assert abs(cosine - np.cos(0.5 * angle)) < 1e-14
-    assert small_angle(origin, origin[[1, 0, 3, 2]] * [-1.0, 1.0, 1.0, -1.0], out) < 1e-15
+    assert to_small_rotation(origin, origin[[1, 0, 3, 2]] * [-1.0, 1.0, 1.0, -1.0], out) < 1e-15

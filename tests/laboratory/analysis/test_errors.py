@@ -25,8 +25,7 @@ from space_robot.analysis.settling import Settling
 from space_robot.analysis.waypoints import Waypoints, junction_ticks, waypoint_ticks
 from space_robot.flight.flown_log import empty_log
 from space_robot.flight.plan import Flight, FlightPlan, resolve
-from space_robot_msgs_py.bag.blocks import blocks_of
-from space_robot_msgs_py.bag.flight_log import FlightLog
+from space_robot_msgs_py.bag.flight_log import FlightLog, blocks_of
 from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.samples import Timebase
 

@@ -15,9 +15,8 @@ from space_robot.analysis.excerpt import excerpt
 from space_robot.flight.plan import Flight, FlightPlan, resolve
 from space_robot.flight.replay.run import RecordedLaws
 from space_robot.flight.simulate import fly_blocks, simulate
-from space_robot_msgs_py.bag import blocks
-from space_robot_msgs_py.bag.blocks import blocks_of, joined
-from space_robot_msgs_py.bag.flight_log import REFERENCE, FlightLog
+from space_robot_msgs_py.bag import flight_log
+from space_robot_msgs_py.bag.flight_log import REFERENCE, FlightLog, blocks_of, joined
 from space_robot_msgs_py.bag.law_history import as_data, in_words, same, within
 from space_robot_msgs_py.bag.reader import read_flight
 from space_robot_msgs_py.samples import STATE_FIELDS, LawInForce, Timebase, in_order
@@ -41,7 +40,7 @@ def test_a_flight_whole_from_blocks_and_from_its_bag_is_the_same(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """To the last bit, log and report."""
-    monkeypatch.setattr(blocks, "BLOCK_TICKS", 150)
+    monkeypatch.setattr(flight_log, "BLOCK_TICKS", 150)
     analysis, parts, log = Analysis(), [], None
     for block in fly_blocks(Flight(resolve(PLAN)), tmp_path / "bag"):
         analysis.add(block)

@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from space_robot_msgs_py import topics
-from space_robot_msgs_py.bag.contents import read_information
+from space_robot_msgs_py.bag.folder import read_information
 from space_robot_msgs_py.bag.message_accounting import (
     LONGEST_JUMP,
     MessageAccounting,

@@ -13,7 +13,7 @@ from space_robot_control.controller.gains import build_law, gain_files, read_gai
 from space_robot_control.controller.settings import ControllerNodeSettings
 from space_robot_control.guidance.mission import MissionNodeSettings
 from space_robot_control.laws import laws
-from space_robot_msgs_py.bag.recorder_settings import RecorderNodeSettings
+from space_robot_msgs_py.bag.recorder import RecorderNodeSettings
 from space_robot_msgs_py.config.files import (
     GIVEN,
     flatten,

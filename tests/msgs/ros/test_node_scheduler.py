@@ -17,10 +17,10 @@ pytest.importorskip("rclpy")
 from space_robot_msgs_py.ros import node_scheduler
 from space_robot_msgs_py.ros.loop import Wait
 from space_robot_msgs_py.ros.node_scheduler import (
-    GLANCE_S,
     LISTENER_PERIOD_S,
     LONGEST_PAUSE_S,
     PERIOD_S,
+    POLL_S,
     REMIND_S,
     SERVICE_SHARE,
     UPKEEP_GAP_S,
@@ -109,7 +109,7 @@ def clock(monkeypatch: pytest.MonkeyPatch) -> Clock:
     return clock
 
 
-def seat_of(node: Any, is_alone: bool = True) -> ScheduledNode:
+def scheduled_of(node: Any, is_alone: bool = True) -> ScheduledNode:
     return ScheduledNode(node, is_alone)
 
 
@@ -122,28 +122,28 @@ def scheduler_of(*nodes: Any, upkeep_at: float = 1e9) -> NodeScheduler:
 def test_a_node_begins_once_all_its_listeners_are_there() -> None:
     """It is said from time to time who is waited for; one that stood still begins anew."""
     node = Node(Wait(10.0, is_brief=True))
-    seat, loop = seat_of(node), node.loop
+    scheduled, loop = scheduled_of(node), node.loop
     loop.missing = {"/clock": ["a", "b"], "/joint_states": ["b"]}
     said = []
     for seconds in (0.0, REMIND_S, REMIND_S + 1.0, 2 * REMIND_S + 1.0, 2 * REMIND_S + 2.0):
-        assert not seat.step(100.0 + seconds)
+        assert not scheduled.step(100.0 + seconds)
         said.append(len(node.said))
     assert said == [0, 0, 1, 1, 2]
     assert set(node.said) == {"waiting for a, b on /clock, b on /joint_states"}
-    assert seat.wake_at == 100.0 + seconds + LISTENER_PERIOD_S
+    assert scheduled.wake_at == 100.0 + seconds + LISTENER_PERIOD_S
     loop.missing = {}
-    seat.step(seat.wake_at - 0.5 * LISTENER_PERIOD_S)
+    scheduled.step(scheduled.wake_at - 0.5 * LISTENER_PERIOD_S)
     assert (loop.begun, loop.steps) == (0, 0), "it is not looked at so soon"
-    assert not seat.step(seat.wake_at)
-    assert (loop.begun, loop.steps, seat.spins) == (1, 1, True)
+    assert not scheduled.step(scheduled.wake_at)
+    assert (loop.begun, loop.steps, scheduled.spins) == (1, 1, True)
     node.is_active = False
-    assert not seat.step(200.0)
-    assert (seat.wait, seat.spins, seat.is_complete) == (Wait(0.0), False, False)
+    assert not scheduled.step(200.0)
+    assert (scheduled.wait, scheduled.spins, scheduled.is_complete) == (Wait(0.0), False, False)
     node.is_active, loop.missing = True, {"/clock": ["a"]}
-    seat.step(300.0)
+    scheduled.step(300.0)
     assert len(node.said) == 2, "time is counted anew"
     loop.missing = {}
-    seat.step(400.0)
+    scheduled.step(400.0)
     assert (loop.begun, loop.steps) == (2, 2)
 
 
@@ -151,47 +151,47 @@ INPUT: Any = object()
 
 
 @pytest.mark.parametrize(
-    ("wait", "is_alone", "wake_after", "glance_after"),
+    ("wait", "is_alone", "wake_after", "step_after"),
     [
         (Wait(2.0), True, 2.0, 2.0),
         (Wait(2.0, patience_s=0.5), True, 2.0, 2.0),
         (Wait(2.0, patience_s=0.5), False, 2.0, 2.5),
         (Wait(2.0, is_for_others=True), True, 2.0, 2.0),
         (Wait(2.0, is_for_others=True), False, 0.0, 0.0),
-        (Wait(2.0, (INPUT,)), True, 2.0, GLANCE_S),
-        (Wait(2.0, (INPUT,)), False, 2.0, GLANCE_S),
-        (Wait(0.1 * GLANCE_S, (INPUT,)), True, 0.1 * GLANCE_S, 0.1 * GLANCE_S),
+        (Wait(2.0, (INPUT,)), True, 2.0, POLL_S),
+        (Wait(2.0, (INPUT,)), False, 2.0, POLL_S),
+        (Wait(0.1 * POLL_S, (INPUT,)), True, 0.1 * POLL_S, 0.1 * POLL_S),
         (Wait(2.0, (INPUT,), is_brief=True), True, 2.0, 0.0),
     ],
 )
 def test_when_a_node_is_looked_at_again(
-    wait: Wait, is_alone: bool, wake_after: float, glance_after: float
+    wait: Wait, is_alone: bool, wake_after: float, step_after: float
 ) -> None:
     node = Node(wait)
-    seat = seat_of(node, is_alone)
-    assert not seat.step(100.0)
-    assert seat.wait == wait
-    assert seat.wake_at == pytest.approx(100.0 + wake_after, abs=1e-9)
-    glance_at = 0.0 if wait.is_brief and wait.inputs else 100.0 + glance_after
-    assert seat.glance_at == pytest.approx(glance_at, abs=1e-9)
-    seat.step(glance_at - 1e-6)
+    scheduled = scheduled_of(node, is_alone)
+    assert not scheduled.step(100.0)
+    assert scheduled.wait == wait
+    assert scheduled.wake_at == pytest.approx(100.0 + wake_after, abs=1e-9)
+    step_at = 0.0 if wait.is_brief and wait.inputs else 100.0 + step_after
+    assert scheduled.step_at == pytest.approx(step_at, abs=1e-9)
+    scheduled.step(step_at - 1e-6)
     assert node.loop.steps == 1
-    seat.step(seat.glance_at)
+    scheduled.step(scheduled.step_at)
     assert node.loop.steps == 2
 
 
 def test_one_that_expects_a_message_at_once_looks_for_it_without_sleep(clock: Clock) -> None:
     node = Node(Wait(5.0, (INPUT,), is_brief=True))
-    seat = seat_of(node)
-    seat.step(clock.monotonic())
+    scheduled = scheduled_of(node)
+    scheduled.step(clock.monotonic())
     begin = clock.monotonic()
-    assert not seat.spin(begin + 1e-4)
+    assert not scheduled.spin(begin + 1e-4)
     assert begin + 1e-4 <= clock.now < begin + 1.1e-4
-    assert seat.wake_at == pytest.approx(clock.now + 5.0)
+    assert scheduled.wake_at == pytest.approx(clock.now + 5.0)
     node.loop.waits = [*node.loop.waits * 3, None]
-    assert seat.spin(begin + 1.0)
+    assert scheduled.spin(begin + 1.0)
     assert clock.now < begin + 0.01
-    under_fifo = seat_of(Node(Wait(5.0, is_brief=True), fifo=10))
+    under_fifo = scheduled_of(Node(Wait(5.0, is_brief=True), fifo=10))
     under_fifo.step(1.0)
     assert not under_fifo.spins, "yielding gives way to nobody there"
     assert under_fifo.node.said == ["fifo 10"]  # type: ignore[attr-defined]
@@ -202,7 +202,7 @@ def test_each_has_a_turn_a_round_until_one_has_come_to_its_end() -> None:
     first, second, third = nodes = [Node(None) for _ in range(3)]
     scheduler = scheduler_of(*nodes)
     assert all(scheduler.take() for _ in range(5))
-    scheduler._seats[0].node.let_others_work()
+    scheduler._scheduled[0].node.let_others_work()
     assert [node.loop.steps for node in nodes] == [5, 6, 6]
     second.loop.is_complete = True
     assert not scheduler.take()

@@ -157,7 +157,7 @@ def test_transforms_are_the_bytes_of_rosbags(frames: list[Frame], tick: int, see
 
 @given(st.binary(max_size=99))
 def test_a_carrier_is_a_message_of_ros(data: bytes) -> None:
-    message = STORE.deserialize_cdr(wrap(data), topics.CARRIER)
+    message = STORE.deserialize_cdr(wrap(data), topics.TRANSFORMS.type)
     assert bytes(message.data) == unwrap(wrap(data)) == data
 
 

@@ -189,7 +189,7 @@ def test_brief_logs_have_what_metrics_need(options: dict[str, Any]) -> None:
 def test_a_flight_longer_than_a_block_is_flown_block_by_block(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr("space_robot_msgs_py.bag.blocks.BLOCK_TICKS", 60)
+    monkeypatch.setattr("space_robot_msgs_py.bag.flight_log.BLOCK_TICKS", 60)
     blocks = [[], []]  # type: list[list[FlightLog]]
     for block in FlightBatch(some(2, sensors="fine")).fly():
         blocks[block.flight].append(block.log)
