@@ -6,6 +6,7 @@ import math
 import shlex
 from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 from click.shell_completion import CompletionItem
@@ -13,6 +14,9 @@ from click.shell_completion import CompletionItem
 from . import new_files
 from .completed_names import names_in
 from .options import BASE, REPAIR, flight_options
+
+if TYPE_CHECKING:
+    from space_robot_model.robot.urdf_mount import Mount
 
 SECTION = "Robots, missions and own pieces"
 
@@ -60,6 +64,54 @@ def _springs(
     return springs
 
 
+def _numbers(
+    context: click.Context, option: click.Parameter, text: str | None
+) -> list[float] | None:
+    """Parse numbers with commas between them: three, or six of an inertia."""
+    if text is None:
+        return None
+    try:
+        values = [float(word) for word in text.split(",")]
+    except ValueError:
+        values = []
+    counts = (3, 6) if option.name == "base_inertia" else (3,)
+    if len(values) not in counts or not all(map(math.isfinite, values)):
+        wanted = " or ".join(map(str, counts))
+        raise click.BadParameter(f"{wanted} numbers were expected, as 1,2,3, got {text!r}")
+    return values if counts == (3,) else [*values, 0.0, 0.0, 0.0][:6]
+
+
+def _mount(
+    on: Path | None,
+    mass: float | None,
+    inertia: list[float] | None,
+    at: list[float] | None,
+    rpy_deg: list[float] | None,
+) -> Mount | None:
+    """Return the satellite of an arm; None: the robot has one."""
+    from space_robot_model.robot.inertia import check_inertia
+    from space_robot_model.robot.urdf_mount import Mount
+
+    if on and (mass is not None or inertia):
+        raise click.UsageError("a satellite is --on a URDF, or has --base-mass and --base-inertia")
+    if (mass is None) != (inertia is None):
+        raise click.UsageError("--base-mass and --base-inertia need one another")
+    if not on and mass is None:
+        if at or rpy_deg:
+            raise click.UsageError("--at and --rpy-deg need --on, or --base-mass")
+        return None
+    if mass is not None and not 0.0 < mass <= 1e12:
+        raise click.BadParameter(
+            f"a number above 0 was expected, got {mass:g}", param_hint="--base-mass"
+        )
+    try:
+        inertia = check_inertia(inertia) if inertia else []
+    except ValueError as error:
+        raise click.BadParameter(str(error), param_hint="--base-inertia") from None
+    rpy = [math.radians(angle) for angle in rpy_deg or (0.0, 0.0, 0.0)]
+    return Mount(on, mass or 0.0, inertia, at or (0.0, 0.0, 0.0), rpy)
+
+
 @click.group(cls=NewGroup)
 def new() -> None:
     """Make a folder for a robot, or a template: a law, sensors, a metric, a mission.
@@ -94,6 +146,36 @@ def new() -> None:
     help="A spring instead of a motor in a joint, such as the hinge of a panel: N m/rad and "
     "N m s/rad, or N/m and N s/m if it slides; may be repeated.",
 )
+@click.option(
+    "--on",
+    type=click.Path(path_type=Path, dir_okay=False),
+    metavar="URDF",
+    help="Mount the robot, an arm on a fixed base, on the root of this satellite.",
+)
+@click.option(
+    "--base-mass",
+    type=float,
+    metavar="KG",
+    help="Mount the robot, an arm on a fixed base, on a satellite of this mass.",
+)
+@click.option(
+    "--base-inertia",
+    callback=_numbers,
+    metavar="IXX,IYY,IZZ[,IXY,IXZ,IYZ]",
+    help="Inertia of that satellite about its centre of mass, kg m2.",
+)
+@click.option(
+    "--at",
+    callback=_numbers,
+    metavar="X,Y,Z",
+    help="Where the arm's root is on the satellite's, m [default: 0,0,0].",
+)
+@click.option(
+    "--rpy-deg",
+    callback=_numbers,
+    metavar="R,P,Y",
+    help="Roll, pitch, yaw of the arm's root on the satellite, degrees [default: 0,0,0].",
+)
 @click.option("--force", is_flag=True, help="Replace an older folder of this command.")
 @flight_options("json")
 def new_robot(
@@ -102,6 +184,11 @@ def new_robot(
     base: str | None,
     repair: bool,
     passive: dict[str, dict[str, float]],
+    on: Path | None,
+    base_mass: float | None,
+    base_inertia: list[float] | None,
+    at: list[float] | None,
+    rpy_deg: list[float] | None,
     force: bool,
     as_json: bool,
 ) -> None:
@@ -118,6 +205,8 @@ def new_robot(
       space-robot new my.urdf
       space-robot new my.urdf --base satellite --repair --out my_robot
       space-robot new my.urdf --passive left_hinge:15,0.05 --passive right_hinge:15,0.05
+      space-robot new arm.urdf --on satellite.urdf --at 0.5,0,0.6 --rpy-deg 0,90,0
+      space-robot new arm.urdf --base-mass 300 --base-inertia 60,50,40 --at 0,0,0.6
       space-robot fly --robot my_robot --controller ctc
     """
     from space_robot_model.robot.find import robot_as_path, robot_files
@@ -135,8 +224,13 @@ def new_robot(
     words += ["--repair"] if repair else []
     for joint, spring in passive.items():
         words += ["--passive", f"{joint}:{spring['stiffness']:.12g},{spring['damping']:.12g}"]
+    words += ["--on", str(on)] if on else []
+    words += ["--base-mass", f"{base_mass:.12g}"] if base_mass is not None else []
+    for option, values in (("base-inertia", base_inertia), ("at", at), ("rpy-deg", rpy_deg)):
+        words += [f"--{option}", ",".join(f"{v:.12g}" for v in values)] if values else []
     command = shlex.join(words)
-    texts, read = robot_texts(files.file, base, repair, command, passive)
+    mount = _mount(on, base_mass, base_inertia, at, rpy_deg)
+    texts, read = robot_texts(files.file, base, repair, command, passive, mount)
     for line in read.repairs:
         click.echo(f"repaired: {line}", err=True)
     folder = out or Path(files.name)

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple, Protocol
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from space_robot_msgs_py.config.arguments import as_numbers
-from space_robot_msgs_py.config.validation import one_of, short
+from space_robot_msgs_py.config.validation import short
 from space_robot_msgs_py.errors import InputError
 
 from ..dynamics.tool_kinematics import ToolKinematics, tool_kinematics_into
@@ -19,10 +19,6 @@ if TYPE_CHECKING:
     from .parts import Tool
 
 Array = NDArray[np.float64]
-Attitude = Literal["held", "free"]
-
-RANK_TOLERANCE = 1e-7
-"""Singular values below this share of the largest count as zero."""
 
 
 class ModelledRobot(Protocol):
@@ -114,49 +110,6 @@ def tool_state(
         out.turn[:, columns],
         out.coupling[:, columns],
     )
-
-
-def tool_jacobian(
-    robot: ModelledRobot,
-    quaternion_wxyz: ArrayLike,
-    joint_positions: ArrayLike,
-    attitude: Attitude = "held",
-    tool: str | None = None,
-) -> Array:
-    """Return the Jacobian (6, N) of a tool by joint velocities, with zero linear momentum.
-
-    Args:
-        robot: the robot's numbers.
-        quaternion_wxyz: (4,) base attitude, unit.
-        joint_positions: (N,) of all joints, rad, or m of prismatic ones.
-        attitude: "held": the base does not turn; "free": angular momentum is zero, too, which gives
-            the generalised Jacobian (Umetani & Yoshida 1989).
-        tool: name of one of ``robot.tools``; None: the first.
-
-    Raises:
-        InputError: see `tool_state`.
-    """
-    one_of(attitude, ("held", "free"), "attitude")
-    state = tool_state(robot, quaternion_wxyz, joint_positions, tool)
-    return state.held if attitude == "held" else state.free
-
-
-def reaction_null_space(
-    robot: ModelledRobot, quaternion_wxyz: ArrayLike, joint_positions: ArrayLike
-) -> Array:
-    """Return an orthonormal basis of the joint velocities that leave the base's attitude alone.
-
-    They have no angular momentum about the robot's centre of mass (Nenchev, Yoshida & Uchiyama
-    1992): a column (N,) each, N - 3 of them in general.
-
-    Raises:
-        InputError: see `tool_state`.
-    """
-    coupling = tool_state(robot, quaternion_wxyz, joint_positions).coupling
-    _, values, axes = np.linalg.svd(coupling)
-    rank = np.count_nonzero(values > RANK_TOLERANCE * values.max(initial=0.0))
-    basis: Array = axes[rank:].T
-    return basis
 
 
 def manipulability(jacobian: Array) -> float:

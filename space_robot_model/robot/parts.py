@@ -77,7 +77,11 @@ Moments = Annotated[
 
 
 class RobotPart:
-    """Base class of what a file holds: no unknown keys, only an integer may stand for a float."""
+    """Base class of what a file holds: no unknown keys, only an integer may stand for a float.
+
+    The parts are dataclasses of the standard library, so that only files are validated: a robot is
+    built thousands of times in a campaign, from arrays that have been checked.
+    """
 
     __pydantic_config__ = ConfigDict(
         extra="forbid", allow_inf_nan=False, coerce_numbers_to_str=True
@@ -181,10 +185,10 @@ def _limits(
         except (TypeError, ValueError):
             raise ValueError("lower, upper, velocity and effort were expected") from None
     read: LimitsInDegrees = in_degrees(value)
-    scale = 1.0 if info.data.get("joint") == "prismatic" else None
+    is_prismatic = info.data.get("joint") == "prismatic"
 
     def number(degrees: float) -> float:
-        return degrees if scale else float(np.radians(degrees))
+        return degrees if is_prismatic else float(np.radians(degrees))
 
     lower, upper = map(number, read.position_deg or (-np.inf, np.inf))
     return JointLimits(lower, upper, number(read.velocity_deg or np.inf), read.effort or np.inf)

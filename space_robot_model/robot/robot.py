@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from space_robot_msgs_py.compiled.records import assign
 from space_robot_msgs_py.config.arguments import as_numbers, as_path
 from space_robot_msgs_py.config.text import html_table
-from space_robot_msgs_py.config.validation import read_yaml, short
+from space_robot_msgs_py.config.validation import one_of, read_yaml, short
 from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.topics import BASE_AXES
 
@@ -41,6 +41,8 @@ from .parts import (
 from .urdf import UrdfRobot, read_urdf
 
 Array = NDArray[np.float64]
+RANK_TOLERANCE = 1e-7
+"""Singular values below this share of the largest count as zero."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -311,35 +313,44 @@ class Robot:
     ) -> Array:
         """Return the Jacobian (6, N) of a tool by joint velocities, with zero linear momentum.
 
-        Rows are the tool's velocity (m/s) and angular velocity (rad/s) on inertial axes. See
-        `space_robot_model.robot.kinematics.tool_jacobian`.
+        Rows are the tool's velocity (m/s) and angular velocity (rad/s) on inertial axes.
 
         Args:
             joint_positions: (N,) of all joints, rad, or m of prismatic ones.
             quaternion_wxyz: (4,) base attitude, unit.
-            attitude: "held": the base does not turn; "free": angular momentum is zero, too.
+            attitude: "held": the base does not turn; "free": angular momentum is zero, too, which
+                gives the generalised Jacobian (Umetani & Yoshida 1989).
             tool: name of one of `tools`; None: the first.
 
         Raises:
             InputError: an argument has another type or shape, or there is no such tool.
         """
-        from .kinematics import tool_jacobian
+        from .kinematics import tool_state  # numba: slow to import
 
-        return tool_jacobian(self, quaternion_wxyz, joint_positions, attitude, tool)
+        one_of(attitude, ("held", "free"), "attitude")
+        state = tool_state(self, quaternion_wxyz, joint_positions, tool)
+        return state.held if attitude == "held" else state.free
 
     def reaction_null_space(
         self, joint_positions: ArrayLike, quaternion_wxyz: ArrayLike = (1.0, 0.0, 0.0, 0.0)
     ) -> Array:
-        """Return a basis (N, K) of the joint velocities without angular momentum of the robot.
+        """Return an orthonormal basis of the joint velocities that leave the base's attitude alone.
+
+        They have no angular momentum about the robot's centre of mass (Nenchev, Yoshida & Uchiyama
+        1992): a column (N,) each, N - 3 of them in general.
 
         Args: see `tool_jacobian`.
 
         Raises:
             InputError: an argument has another type or shape.
         """
-        from .kinematics import reaction_null_space
+        from .kinematics import tool_state
 
-        return reaction_null_space(self, quaternion_wxyz, joint_positions)
+        coupling = tool_state(self, quaternion_wxyz, joint_positions).coupling
+        _, values, axes = np.linalg.svd(coupling)
+        rank = np.count_nonzero(values > RANK_TOLERANCE * values.max(initial=0.0))
+        basis: Array = axes[rank:].T
+        return basis
 
     def with_last_link(self, mass: float, inertia: list[float]) -> Robot:
         """Return the robot with mass and inertia of the body with the tool replaced, CoM kept.

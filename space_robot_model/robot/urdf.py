@@ -70,8 +70,7 @@ def read_urdf(
             the possible repair.
     """
     path = Path(path)
-    text = expand_xacro(path) if path.suffix == XACRO else read_file(path)
-    return parse_urdf(text, path, base, repair, tools)
+    return parse_urdf(expand_urdf(path), path, base, repair, tools)
 
 
 def parse_urdf(
@@ -153,12 +152,14 @@ def _check_moving(tree: Tree, report: Report) -> None:
             raise joint.fields.error(joint.line, f"it needs another name: this is {meaning}")
 
 
-def expand_xacro(path: Path) -> str:
-    """Return the URDF text of a xacro file, with default arguments.
+def expand_urdf(path: Path) -> str:
+    """Return the text of a URDF, or of a xacro file with default arguments.
 
     Raises:
-        InputError: the package is not installed, or cannot expand the file.
+        InputError: it cannot be read; or xacro is not installed, or cannot expand the file.
     """
+    if path.suffix != XACRO:
+        return read_file(path)
     check_readable(path)
     try:
         import xacro

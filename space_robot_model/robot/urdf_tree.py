@@ -22,6 +22,8 @@ from .urdf_xml import HERE, UrdfFrame
 Array = NDArray[np.float64]
 Kind = Literal["revolute", "prismatic", "fixed"]
 
+MOUNT = "`space-robot new --on` mounts an arm on a satellite"
+
 SOLID = 1000.0
 """Assumed density of a body of unknown shape, kg/m3."""
 
@@ -156,7 +158,7 @@ def mend_massless(links: Mapping[str, UrdfLink], tree: Tree) -> None:
             _lock(links[tips[0]], "a moving link", edge, carriers[edge.parent])
         elif tree.base in massless and len(carried[tree.base]) == 1:
             child = carried[tree.base][0]
-            _lock(links[tree.base], "the base", tree.edges[child], child)
+            _lock(links[tree.base], "the base", tree.edges[child], child, f" ({MOUNT})")
         else:
             link = links[massless[0]]
             what = "a base that" if link.name == tree.base else "a moving link that"
@@ -165,11 +167,11 @@ def mend_massless(links: Mapping[str, UrdfLink], tree: Tree) -> None:
             )
 
 
-def _lock(defective: UrdfLink, what: str, edge: Edge, other: str) -> None:
+def _lock(defective: UrdfLink, what: str, edge: Edge, other: str, advice: str = "") -> None:
     """Lock a joint at 0 which moves nothing, or whose child floats freely anyway."""
     repair = f"{edge.joint.fields.part} locked at 0, merged into link {short(other)}"
     mass = f"{defective.mass:g}"
-    defective.fields.repaired(defective.mass_line, f"{what} must have a mass", mass, repair)
+    defective.fields.repaired(defective.mass_line, f"{what} must have a mass{advice}", mass, repair)
     edge.joint = replace(edge.joint, kind="fixed")
 
 

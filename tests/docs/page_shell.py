@@ -127,6 +127,7 @@ def _bag_of_two(folder: Path) -> None:
 def _urdf(folder: Path) -> None:
     for file in ("my.urdf", "my.xacro"):
         shutil.copy(DATA / "docs.urdf", folder / file)
+    shutil.copy(DATA / "ground_arm.urdf", folder / "arm.urdf")
 
 
 def _urdf_with_a_defect(folder: Path) -> None:

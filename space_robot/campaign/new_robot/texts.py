@@ -13,6 +13,7 @@ from space_robot_model.robot.files import is_urdf, read_content
 from space_robot_model.robot.find import OWN, URDF
 from space_robot_model.robot.urdf import UrdfRobot
 from space_robot_model.robot.urdf_links import with_absolute_meshes
+from space_robot_model.robot.urdf_mount import Mount, mounted_urdf
 from space_robot_msgs_py.config.validation import one_of, read_yaml
 from space_robot_msgs_py.config.yaml_text import read_file
 from space_robot_msgs_py.errors import InputError
@@ -60,6 +61,7 @@ def robot_texts(
     repair: bool,
     command: str,
     passive: Mapping[str, Mapping[str, float]] | None = None,
+    mount: Mount | None = None,
 ) -> tuple[dict[str, str], Robot]:
     """Return the texts of a robot's files by name, and the robot.
 
@@ -72,6 +74,7 @@ def robot_texts(
         repair: whether a URDF's defects are repaired.
         command: the user's command, for the header.
         passive: stiffness and damping of joints that get a spring instead of a motor, by name.
+        mount: a satellite on which the robot of a URDF is mounted as an arm.
 
     Raises:
         InputError: the file is invalid, it has no such joint, or ``base`` or ``repair`` is set for
@@ -79,8 +82,14 @@ def robot_texts(
     """
     content: dict[str, Any]
     if file.suffix in URDF:
-        choice = {"base": base} if base else {}
-        content = {"robot": {"urdf": file.name, **choice, **({"repair": True} if repair else {})}}
+        choice: dict[str, Any] = {"urdf": file.name}
+        if mount:
+            mounted = mounted_urdf(file, mount, repair)
+            choice = {"name": mounted.name, "urdf_text": mounted.text}
+        choice |= {"base": base} if base else {}
+        content = {"robot": {**choice, **({"repair": True} if repair else {})}}
+    elif mount:
+        raise InputError(f"{file}: not a URDF, so it cannot be mounted on a satellite")
     elif base or repair:
         raise InputError(f"{file}: not a URDF, so base and repair cannot be chosen")
     else:
@@ -98,7 +107,8 @@ def robot_texts(
     read = Robot.from_dict(content, str(file), file.parent)
     urdf = read_content(content, file.parent, str(file))
     assert isinstance(urdf, UrdfRobot)
-    source = file.parent / str(robot.pop("urdf", file.name))
+    own_name = f"{mounted.name}.urdf" if mount else file.name
+    source = file.parent / str(robot.pop("urdf", own_name))
     robot.pop("urdf_text", None)
     name = f"{source.stem}.urdf"
     return {

@@ -241,8 +241,8 @@ def test_joints_beyond_their_limits_are_said() -> None:
     """Where the file has limits, and not by rounding."""
     log = flown(controller="ctc", duration=0.01)
     joints = find_robot("paper").content
-    for number, body in enumerate(body for body in joints["robot"]["bodies"] if body["joint"]):
-        body["joint"]["limits"] = [-3.0, 3.0, 2.0, 60.0] if number < 3 else [None] * 4
+    for number, link in enumerate(joints["robot"]["links"]):
+        link["limits"] = [-3.0, 3.0, 2.0, 60.0] if number < 3 else [None] * 4
     log.flight["robot_file"] = joints
     log.joint_positions[:], log.joint_velocities[:], log.applied_torque[:] = 3.0, -2.0, 60.0
     report = analyze(log)

@@ -25,12 +25,7 @@ from strategies import (
 from space_robot_model.robot import Robot
 from space_robot_model.robot.find import find_robot, robot_names
 from space_robot_model.robot.inertia import inertia_tensor
-from space_robot_model.robot.kinematics import (
-    manipulability,
-    reaction_null_space,
-    tool_jacobian,
-    tool_state,
-)
+from space_robot_model.robot.kinematics import manipulability, tool_state
 from space_robot_model.robot.markers import RobotMarkers
 from space_robot_model.robot.parts import RobotTree, Visual
 from space_robot_model.robot.placements import (
@@ -192,7 +187,7 @@ def test_jacobians_of_all_tools_are_pinocchios_at_zero_momentum(
         com = pin.centerOfMass(oracle.model, oracle.data, oracle.q)
         assert_same_place(pin.SE3(state.rotation, state.position + com), place)
         for attitude in ("held", "free"):
-            ours = tool_jacobian(robot, *posture, attitude, tool.name)
+            ours = robot.tool_jacobian(*posture[::-1], attitude, tool.name)
             assert_close(ours, oracle.jacobian_of(attitude), 1e-11)
         of_base, of_joints = oracle.map[:, :3], oracle.map[:, oracle.columns]
         coupling = of_joints[3:] - of_base[3:] @ np.linalg.solve(of_base[:3], of_joints[:3])
@@ -206,7 +201,7 @@ def test_the_base_moves_the_whole_as_a_rigid_body_and_a_null_space_does_not_move
     twist = state.attitude @ omega  # the whole turns about its centre of mass
     np.testing.assert_allclose(twist[:3], np.cross(omega, state.position), atol=1e-14)
     np.testing.assert_allclose(twist[3:], omega)
-    basis = reaction_null_space(robot, *posture)
+    basis = robot.reaction_null_space(*posture[::-1])
     assert basis.shape == (7, 4)
     np.testing.assert_allclose(basis.T @ basis, np.eye(4), atol=1e-12)
     scale = float(np.max(np.abs(state.coupling)))
@@ -215,7 +210,7 @@ def test_the_base_moves_the_whole_as_a_rigid_body_and_a_null_space_does_not_move
 
 
 def test_manipulability_is_the_product_of_the_singular_values() -> None:
-    jacobian = tool_jacobian(find_robot("paper"), UPRIGHT, np.full(6, 0.4), "free")
+    jacobian = find_robot("paper").tool_jacobian(np.full(6, 0.4), UPRIGHT, "free")
     expected = np.prod(np.linalg.svd(jacobian, compute_uv=False))
     assert manipulability(jacobian) == pytest.approx(expected, rel=1e-9)
 
@@ -223,7 +218,7 @@ def test_manipulability_is_the_product_of_the_singular_values() -> None:
 def test_unknown_names_are_refused_in_one_line() -> None:
     robot = find_robot("paper")
     with pytest.raises(InputError, match="unknown attitude 'led'"):
-        tool_jacobian(robot, UPRIGHT, np.zeros(6), "led")  # type: ignore[arg-type]
+        robot.tool_jacobian(np.zeros(6), UPRIGHT, "led")  # type: ignore[arg-type]
     with pytest.raises(InputError, match=r"'hand': choose one of .*; `tools: \[\.\.\.\]` in"):
         tool_state(robot, UPRIGHT, np.zeros(6), "hand")
 

@@ -83,6 +83,18 @@ def test_from_yaml_reads_every_number(tmp_path: Path, content: dict[str, Any]) -
     np.testing.assert_array_equal(robot.tool.position, [0.0, 0.0, -0.3])
 
 
+def test_the_base_is_seen_from_its_centre_of_mass(content: dict[str, Any]) -> None:
+    """Also where a file gives it in another frame; a joint may have a name of its own."""
+    before = Robot.from_dict(content)
+    content["robot"]["base"]["com"] = [0.1, -0.2, 0.3]
+    content["robot"]["links"][0]["joint_name"] = "shoulder"
+    robot = Robot.from_dict(content)
+    assert robot.joint_names == ("shoulder", "joint2", "joint3")
+    assert not robot.com[0].any()
+    moved = robot.rotation[0] @ (robot.offset[0] - before.offset[0])
+    np.testing.assert_allclose(moved, [-0.1, 0.2, -0.3], atol=1e-15)
+
+
 def test_model_is_exact_at_right_angles(paper_robot: Robot) -> None:
     """No 6e-17 where the cosine of 90 degrees is meant; any other twist as cos and sin say."""
     assert set(paper_robot.model.rotation[:6].ravel()) <= {-1.0, 0.0, 1.0}

@@ -34,6 +34,7 @@ from space_robot_model.robot.flatten import SETTINGS_FRICTION
 from space_robot_model.robot.inertia import SLENDER, inertia_tensor
 from space_robot_model.robot.parts import Base, Body, Visual
 from space_robot_model.robot.urdf import UrdfRobot, parse_urdf, read_urdf
+from space_robot_model.robot.urdf_mount import Mount, mounted_urdf
 from space_robot_model.robot.urdf_tree import solid_inertia
 from space_robot_msgs_py.errors import InputError
 
@@ -121,6 +122,37 @@ def test_shapes_and_frames_are_where_pinocchio_has_them(seed: int, count: int) -
             gaps = [np.abs((here.inverse() * shape).homogeneous - w.homogeneous) for w in wanted]
             wanted.pop(int(np.argmin([gap.max() for gap in gaps])))
             assert min(gap.max() for gap in gaps) < 1e-12
+
+
+INERTIAL = (
+    '<inertial>{at}<mass value="300.0"/><inertia ixx="60.0" iyy="50.0" izz="40.0" ixy="1.5" '
+    'ixz="-2.0" iyz="0.5"/></inertial>'
+)
+SATELLITE = f'<link name="{{name}}">{INERTIAL}<visual><geometry><box size="1 1 1"/></geometry>'
+SATELLITE += '<material name="grey"/></visual></link><material name="grey"/>'
+
+
+@pytest.mark.parametrize("has_file", [True, False])
+def test_a_mounted_arm_is_pinocchios_of_a_urdf_written_by_hand(
+    has_file: bool, tmp_path: Path
+) -> None:
+    """On a satellite with a link of the name of the arm's, or on one of mass and inertia."""
+    name, at = ("base_link", '<origin xyz="0.1 0.2 0.3"/>') if has_file else ("satellite", "")
+    satellite, file = SATELLITE.format(name=name, at=at), tmp_path / "sat.urdf"
+    file.write_text(f'<robot name="sat">{satellite}</robot>')
+    xyz, rpy = (0.5, -0.2, 0.6), (0.3, -1.2, 0.4)
+    inertia = [60.0, 50.0, 40.0, 1.5, -2.0, 0.5]
+    mount = Mount(file, xyz=xyz, rpy=rpy) if has_file else Mount(None, 300.0, inertia, xyz, rpy)
+    mounted = mounted_urdf(DATA / "ground_arm.urdf", mount, repair=False)
+    assert mounted.name == ("ground_arm_on_sat" if has_file else "ground_arm_on_satellite")
+    robot = Robot.of_tree(parse_urdf(mounted.text, FILE).tree)
+    assert robot.joint_names == ("shoulder", "elbow")
+    arm = (DATA / "ground_arm.urdf").read_text("utf-8").replace('"base_link"', '"foot"')
+    seat = f'<origin xyz="{words(list(xyz))}" rpy="{words(list(rpy))}"/><parent link="{name}"/>'
+    joint = f'<joint name="m" type="fixed">{seat}<child link="world"/></joint></robot>'
+    arm = arm.replace('"grey"', '"g"').replace("</robot>", f"{satellite}{joint}")
+    model = pin.buildModelFromXML(arm, pin.JointModelFreeFlyer())
+    assert_same_dynamics(robot, TreeOracle(model, name, robot.joint_names, 3), 3)
 
 
 def one_joint(limit: str, dynamics: str = "", inertia: str = "") -> UrdfRobot:
