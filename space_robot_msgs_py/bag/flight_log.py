@@ -25,6 +25,7 @@ from ..samples import (
     StateSignals,
     Timebase,
 )
+from ..signals import signals_of
 
 Array = NDArray[np.float64]
 
