@@ -43,7 +43,8 @@ _NAMES: dict[str, str] = {}
 def laws() -> dict[str, type[ControlLaw]]:
     """Return every law of this folder by name."""
     laws: dict[str, type[ControlLaw]] = {}
-    for module in pkgutil.iter_modules([str(Path(__file__).parent)]):
+    room = importlib.import_module(__package__)
+    for module in pkgutil.iter_modules(room.__path__):
         for value in vars(importlib.import_module(f"{__package__}.{module.name}")).values():
             if _is_law(value):
                 laws[value.name] = value
