@@ -95,12 +95,15 @@ def rpy_of_rotation(rotation: Array) -> Array:
     Yaw is computed first, then roll from the rotation without yaw: near gimbal lock both are
     inaccurate, but their combination is accurate to rounding.
     """
+    # The C library's arctangent has other bits on other processors, and robots of URDF files are
+    # flown from these angles.
+    from .functions import arctan2  # slow to import
+
     level = norm(rotation[:2, 0])
-    yaw = math.atan2(rotation[1, 0], rotation[0, 0]) if level > GIMBAL_LOCK else 0.0
+    yaw = arctan2(rotation[1, 0], rotation[0, 0]) if level > GIMBAL_LOCK else 0.0
     s, c = exact_sines_cosines(yaw)
     across = c * rotation[1] - s * rotation[0]
-    roll, pitch = math.atan2(-across[2], across[1]), math.atan2(-rotation[2, 0], level)
-    return np.array([roll, pitch, yaw])
+    return np.array([arctan2(-across[2], across[1]), arctan2(-rotation[2, 0], level), yaw])
 
 
 def _exact(values: Array) -> Array:
