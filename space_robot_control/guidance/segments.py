@@ -245,8 +245,10 @@ SEGMENT_KINDS: dict[str, type[Segment]] = {
     )
 }
 """Kinds of segments by the key that each of them has."""
-SEGMENT_KEYS = tuple(
-    dict.fromkeys(key for kind in SEGMENT_KINDS.values() for key in kind.allowed_keys())
+OF_ALL = Segment.allowed_keys()
+SEGMENT_KEYS = (
+    *(k for kind in SEGMENT_KINDS.values() for k in kind.allowed_keys() if k not in OF_ALL),
+    *OF_ALL,
 )
 
 

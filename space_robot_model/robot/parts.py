@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import (
     AfterValidator,
+    AfterValidator,
     BeforeValidator,
     ConfigDict,
     Field,
@@ -25,7 +26,6 @@ from pydantic import (
     field_validator,
     model_validator,
 )
-from pydantic_core import core_schema
 from typing_extensions import Self
 
 from space_robot_msgs_py.config.text import choices
@@ -57,9 +57,7 @@ Encoder = Literal["motor", "link", "both"]
 def _array(items: Any) -> GetPydanticSchema:
     """Read nested lists of checked numbers as an array."""
     return GetPydanticSchema(
-        lambda _, handler: core_schema.no_info_after_validator_function(
-            np.array, handler.generate_schema(items)
-        )
+        lambda _, handler: handler.generate_schema(Annotated[items, AfterValidator(np.array)])
     )
 
 

@@ -64,7 +64,9 @@ def named() -> FlownFlight:
 
 @pytest.fixture(scope="module")
 def paper_mission() -> dict[str, Any]:
-    return file_of("missions/paper", "mission")
+    content = yaml.safe_load((CONFIG / "missions/paper.yaml").read_text())
+    mission: dict[str, Any] = content["mission"]
+    return mission
 
 
 def tuned(signals: Signals) -> Any:
@@ -94,7 +96,11 @@ def test_objects_in_the_place_of_names_fly_the_same_bits(
     """And a bag tells all of them."""
     scenario = Scenario(
         robot=Robot.from_yaml(CONFIG / "robots/paper.yaml"),
-        mission=MissionSettings(**paper_mission),
+        mission=MissionSettings(
+            joints_deg=paper_mission["start"]["joints_deg"],
+            segments=[json.dumps(segment) for segment in paper_mission["segments"]],
+            limits=paper_mission["limits"],
+        ),
         controller=find_law("tde_stc"),
         gains=file_of("gains/paper/printed/tde_stc", "controller")["tde_stc"],
         case=EnvironmentSettings(**file_of("cases/3", "plant")),

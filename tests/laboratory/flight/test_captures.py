@@ -72,7 +72,7 @@ def mission_of(folder: Path, events: list[str]) -> str:
     """The paper's mission with events, in a folder of its own."""
     folder.mkdir()
     content = yaml.safe_load((CONFIG / "missions/paper.yaml").read_text("utf-8"))
-    content["plant_node"]["ros__parameters"]["events"] = events
+    content["mission"]["events"] = events
     (folder / "mission.yaml").write_text(yaml.safe_dump(content), "utf-8")
     shutil.copy(CONFIG / "targets/tumbling_satellite.yaml", folder / "mine.yaml")
     return str(folder / "mission.yaml")

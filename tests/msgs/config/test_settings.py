@@ -76,7 +76,7 @@ def test_a_file_that_has_more_or_less_than_parameters_is_refused(
 def test_a_node_waits_for_listeners_to_what_it_sends_alone() -> None:
     assert PlantNodeSettings.resolve({"wait_for": ["a:/clock", "b", ""]}).wait_for[0] == "a:/clock"
     for schema, entry, sent in (
-        (PlantNodeSettings, "recorder_node:/command", "joint_states, base/state, clock, "),
+        (PlantNodeSettings, "recorder_node:/command", "joint_states, wheels/state, "),
         (ControllerNodeSettings, "plant_node:", "command, controller/telemetry, "),
     ):
         with pytest.raises(InputError) as error:
