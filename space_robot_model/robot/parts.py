@@ -15,7 +15,6 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import (
     AfterValidator,
-    AfterValidator,
     BeforeValidator,
     ConfigDict,
     Field,

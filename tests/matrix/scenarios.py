@@ -31,13 +31,6 @@ OWN_KEYS = ("why", "besides", "also", "lacking")
 ADVICE = "If new bits are wanted: python tests/matrix --write, and say so in the commit"
 BLOCKS = 10
 """Parts of a flight that have digests of their own."""
-ORDER = (
-    *("base_position", "quaternion", "base_velocity", "omega_base", "joint_positions"),
-    *("joint_velocities", "applied_torque", "reference_joints", "reference_base"),
-    *("wheel_velocities", "wheel_torques", "thrusts", "actuator_commands"),
-    *("passive_positions", "passive_velocities", "motor_positions", "motor_velocities"),
-)
-"""The first columns of a digest; the others follow in the order of the log."""
 OF_THE_CLOCK = {"latency_s"}
 """Columns that are no flight's own."""
 OF_THE_PROCESS = {"telemetry"}
@@ -110,16 +103,14 @@ PLANS = read_scenarios()
 
 
 def columns_of(log: FlightLog) -> dict[str, NDArray[np.float64]]:
-    """Return all columns of a log by name, without those of the wall clock."""
-    columns = {name: c for name, c in log.columns.items() if name not in OF_THE_CLOCK}
-    columns = {name: columns[name] for name in dict.fromkeys([*ORDER, *columns])}
+    """Return all columns of a log by name, in alphabetical order, without those of the wall clock.
+
+    What the sensors tell is ``measured.NAME``.
+    """
+    columns = dict(log.columns)
     if log.measured is not None:
-        measured = log.measured.columns
-        field = measured.pop("magnetic_field")
-        if field.size and not np.array_equal(field, columns["magnetic_field"]):
-            measured["magnetic_field"] = field  # of a magnetometer with errors
-        columns |= {f"measured.{name}": c for name, c in measured.items()}
-    return columns
+        columns |= {f"measured.{name}": column for name, column in log.measured.columns.items()}
+    return {name: columns[name] for name in sorted(columns.keys() - OF_THE_CLOCK)}
 
 
 def fly(plan: Planned, bag: Path) -> FlownFlight:
