@@ -20,7 +20,7 @@ from space_robot_sim.environment.friction import coefficients
 from .inertia import J0, SAMPLING, sampled_reference
 
 Array = NDArray[np.float64]
-NOTHING = 1e-9
+NEGLIGIBLE = 1e-9
 """Accelerations below this fraction of the largest one are rounding errors."""
 
 
@@ -51,7 +51,7 @@ class ForceDemand:
 
 def _filled(force: Array, inertia: Array) -> Array:
     acceleration = force / inertia
-    is_asked = acceleration > NOTHING * acceleration.max()
+    is_asked = acceleration > NEGLIGIBLE * acceleration.max()
     least = np.min(acceleration, where=is_asked, initial=np.inf)
     return np.where(is_asked, force, inertia * least) if is_asked.any() else force
 

@@ -18,7 +18,7 @@ from space_robot_msgs_py.config.validation import StrictModel, short
 
 Array = NDArray[np.float64]
 
-Frame = Literal["inertial", "base", "start", "orbit"]
+GoalFrame = Literal["inertial", "base", "start", "orbit"]
 Point = Literal["nadir", "velocity", "sun", "target", "inertial"]
 ABOUT = ("velocity", "nadir", "normal", "sun", "target")
 """Second directions that have a name; any other is a vector on inertial axes."""
@@ -32,7 +32,7 @@ class ToolGoal(Orientation):
     """Where a tool goes in a straight line; without an orientation the shortest joint motion."""
 
     xyz: Vector | None = Field(None, description="position, m (none: it stays)")
-    frame: Frame = Field(
+    frame: GoalFrame = Field(
         "start",
         description="axes of the goal: inertial (origin: the base at t = 0), base (at the end of "
         "the segment), start (a displacement and a turn on inertial axes), or orbit (the same on "

@@ -217,7 +217,7 @@ class GoalTolerances(NamedTuple):
         """Whether any error is limited."""
         return bool(np.isfinite(self.path).any() or np.isfinite(self.goal).any())
 
-    def judge(
+    def evaluate(
         self, piece: Piece, names: Sequence[str], time: Array, measured: Array
     ) -> GoalVerdict | None:
         """Compare measured joints with a trajectory; None: the goal goes on.

@@ -84,7 +84,7 @@ class Pursuit:
             return GoalVerdict("SUCCESSFUL") if time >= self.piece.end else None
         if self._verdict is None:
             times, states = self.measured.take()
-            self._verdict = self.tolerances.judge(self.piece, self._names.joints, times, states)
+            self._verdict = self.tolerances.evaluate(self.piece, self._names.joints, times, states)
         return self._verdict
 
 

@@ -22,7 +22,7 @@ from .inertia import inertia_elements
 from .names import BASE
 from .parts import Body, Drive, Gear, Name, Plate, Plates, RobotPart, RobotTree, Spring, Visual
 from .urdf import UrdfRobot, parse_urdf, read_urdf
-from .urdf_xml import HERE
+from .urdf_xml import IDENTITY
 
 Array = NDArray[np.float64]
 
@@ -106,7 +106,7 @@ class UrdfReference(RobotPart):
             if name not in names:
                 key, advice = f"robot.plates.{number}.link", choices(name, names)
                 raise InputError(f"{where}: {key}: no link {short(name)}: {advice}")
-            frame, own = urdf.frames.get(name, HERE), plate.normalised
+            frame, own = urdf.frames.get(name, IDENTITY), plate.normalised
             normal = product(frame.rotation.T, own.normal)
             centre = product(frame.rotation.T, own.centre - frame.position)
             placed.append(replace(own, link=name, normal=normal, centre=centre))

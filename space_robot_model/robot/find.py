@@ -40,7 +40,7 @@ from .robot import Robot
 YAML, URDF = (".yaml", ".yml"), (".urdf", ".xacro")
 ROBOTS = "robots"
 """Folder of the shipped robots in the config folder."""
-OWN = "robot"
+ROBOT_STEM = "robot"
 """Name, without suffix, of the robot's file in its own folder."""
 OWN_MISSION, OWN_GAINS = "mission.yaml", "gains"
 TRAJECTORIES = (".csv", ".parquet")
@@ -105,7 +105,7 @@ def robot_files(robot: str) -> RobotFiles:
     path = Path(robot)
     if robot.endswith((*YAML, *URDF)):
         check_readable(path)
-        return _own_folder(path) if path.stem == OWN else _in_config(path)
+        return _own_folder(path) if path.stem == ROBOT_STEM else _in_config(path)
     if "/" in robot:
         return _own_folder(_file_of(path))
     if not is_named(ROBOTS, robot):
@@ -193,7 +193,7 @@ def remake_advice(file: Path) -> str:
         file: a mission or gains.
     """
     for folder in file.parents[:3]:
-        names = (f"{OWN}{ending}" for ending in (*YAML, *URDF))
+        names = (f"{ROBOT_STEM}{ending}" for ending in (*YAML, *URDF))
         if folder.name and any((folder / name).is_file() for name in names):
             words = ["space-robot", "new", f"{folder}/", "--out", str(folder), "--force"]
             return (
@@ -246,7 +246,7 @@ def _file_of(folder: Path) -> Path:
         )
     if not is_folder(folder):
         raise InputError(f"robot {short(str(folder))}: no such file or folder")
-    names = [OWN + ending for ending in endings]
+    names = [ROBOT_STEM + ending for ending in endings]
     for name in names:
         if (folder / name).is_file():
             return folder / name

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from space_robot_msgs_py.samples import RobotState
 from space_robot_msgs_py.topics import BASE_FRAME, INERTIAL_FRAME
-from space_robot_msgs_py.wire.viewers import POSE, Frame
+from space_robot_msgs_py.wire.viewers import POSE, FramePair
 
 from ..elementary.functions import sines_cosines
 from ..elementary.matrices import norm
@@ -171,7 +171,7 @@ def frame_names(robot: Robot) -> FrameNames:
     taken = {INERTIAL_FRAME, *joints}
     base, *links = robot.body_names
     names = {0: distinct(BASE_FRAME if base == BASE else base, "_body", taken)}
-    clashes = [printable(link) in joints for link in links]
+    clashes = [plain_name(link) in joints for link in links]
     for is_changed in (False, True):  # unchanged names have priority
         for number, link in enumerate(links, 1):
             if clashes[number - 1] is is_changed:
@@ -195,16 +195,16 @@ def _link_name(name: str) -> str:
 
 def distinct(name: str, ending: str, taken: set[str]) -> str:
     """Return an unused name, with a suffix if necessary, and add it to ``taken``."""
-    candidate = printable(name)
+    candidate = plain_name(name)
     number = 1
     while candidate in taken:
-        candidate = f"{printable(name)}{ending}{number if number > 1 else ''}"
+        candidate = f"{plain_name(name)}{ending}{number if number > 1 else ''}"
         number += 1
     taken.add(candidate)
     return candidate
 
 
-def printable(name: str) -> str:
+def plain_name(name: str) -> str:
     """Return a name as one line, without slashes or spaces at its ends."""
     shown = "".join(letter if letter.isprintable() else "_" for letter in name)
     return shown.strip().lstrip("/") or "_"
@@ -217,8 +217,8 @@ class RobotPoses:
         """Compute the poses at joint positions zero."""
         names, order = frame_names(robot).bodies, np.array(robot.order, np.intp)
         self.frames = (
-            Frame(INERTIAL_FRAME, names[0]),
-            *(Frame(names[robot.parent[joint]], names[joint + 1]) for joint in order),
+            FramePair(INERTIAL_FRAME, names[0]),
+            *(FramePair(names[robot.parent[joint]], names[joint + 1]) for joint in order),
         )
         """Frames in the order of the poses."""
         self._at_zero = np.zeros((1 + len(order), POSE))
@@ -291,10 +291,10 @@ def tool_transforms(robot: Robot) -> list[Transform]:
     ]
 
 
-def tool_poses(robot: Robot) -> tuple[tuple[Frame, ...], Array]:
+def tool_poses(robot: Robot) -> tuple[tuple[FramePair, ...], Array]:
     """Return the tools' frames and their constant poses (M, 7)."""
     poses = [_pose(tool.rotation, tool.position) for tool in robot.tools]
-    frames = (Frame(tool.parent, tool.child) for tool in tool_transforms(robot))
+    frames = (FramePair(tool.parent, tool.child) for tool in tool_transforms(robot))
     return tuple(frames), np.array(poses).reshape(-1, POSE)
 
 

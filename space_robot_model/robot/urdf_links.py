@@ -24,7 +24,7 @@ Array = NDArray[np.float64]
 
 ELEMENTS = ("inertial", "visual", "collision")
 EXTENSIONS = ("contact", "gravity", "self_collision_checking", "sensor", "verbose")
-NOTHING = 1e-9
+MASSLESS = 1e-9
 """Mass below which a body counts as massless, kg."""
 MOMENTS = ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
 
@@ -115,7 +115,7 @@ def _read_inertial(inertial: Element, link: UrdfLink) -> None:
     xx, yy, zz, xy, xz, yz = values
     tensor = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
     link.inertia = rotate_tensor(frame.rotation, tensor)
-    if link.mass < NOTHING and link.inertia.any():
+    if link.mass < MASSLESS and link.inertia.any():
         trace = f"{np.trace(link.inertia):g} kg m2 (trace)"
         fields.repaired(inertia, "inertia without mass", trace, "the inertia is ignored")
         link.inertia = np.zeros((3, 3))

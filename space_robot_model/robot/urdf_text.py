@@ -24,7 +24,7 @@ from ..elementary.matrices import product
 from ..elementary.rotations import rpy_of_rotation
 from .inertia import inertia_elements
 from .parts import Colour, JointLimits, Visual
-from .placements import distinct, frame_names, printable, urdf_joint_names
+from .placements import distinct, frame_names, plain_name, urdf_joint_names
 from .robot import Robot
 from .shapes import shapes_of
 from .urdf_links import MOMENTS
@@ -47,7 +47,7 @@ def urdf_text(robot: Robot, name: str = "") -> str:
     shapes = shapes_of(robot)
     colours = dict.fromkeys(shape.colour for shape in shapes if shape.colour)
     materials = {colour: f"colour_{number + 1}" for number, colour in enumerate(colours)}
-    root = Element("robot", name=printable(name or robot.name))
+    root = Element("robot", name=plain_name(name or robot.name))
     for colour, material in materials.items():
         SubElement(SubElement(root, "material", name=material), "color", rgba=_words(colour))
     joints = urdf_joint_names(robot)

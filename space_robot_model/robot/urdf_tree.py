@@ -16,8 +16,8 @@ from ..elementary.matrices import product, rotate_tensor
 from .inertia import inertia_defect, nearest_inertia
 from .parts import Base, Body, RobotTree, Tool, Visual
 from .urdf_joints import UrdfJoint
-from .urdf_links import NOTHING, UrdfLink
-from .urdf_xml import HERE, UrdfFrame
+from .urdf_links import MASSLESS, UrdfLink
+from .urdf_xml import IDENTITY, UrdfFrame
 
 Array = NDArray[np.float64]
 Kind = Literal["revolute", "prismatic", "fixed"]
@@ -145,7 +145,7 @@ def mend_massless(links: Mapping[str, UrdfLink], tree: Tree) -> None:
         mass = dict.fromkeys(carriers.values(), 0.0)
         for name, carrier in carriers.items():
             mass[carrier] += links[name].mass
-        massless = [name for name in tree.order if mass.get(name, 1.0) < NOTHING]
+        massless = [name for name in tree.order if mass.get(name, 1.0) < MASSLESS]
         if not massless:
             return
         carried: dict[str, list[str]] = {name: [] for name in mass}
@@ -199,10 +199,10 @@ def mend_inertias(links: Mapping[str, UrdfLink], tree: Tree) -> None:
     carriers = tree.carriers()
     solid = set()
     for name, link in links.items():
-        if link.mass >= NOTHING and inertia_defect(link.mass, link.inertia)[0] == "":
+        if link.mass >= MASSLESS and inertia_defect(link.mass, link.inertia)[0] == "":
             solid.add(carriers[name])
     for name, link in links.items():
-        if link.mass < NOTHING or (carriers[name] in solid and not link.inertia.any()):
+        if link.mass < MASSLESS or (carriers[name] in solid and not link.inertia.any()):
             continue
         defect, moments = inertia_defect(link.mass, link.inertia)
         if not defect:
@@ -264,12 +264,12 @@ def make_tree(
         tools: links whose frames are tools, in order of rank.
     """
     frames, root = moved_frames(tree), links[tree.base]
-    base = Base(root.mass, *_matter(root, HERE), root.name)
+    base = Base(root.mass, *_matter(root, IDENTITY), root.name)
     own = [_link(links[child], edge, frames) for child, edge in tree.edges.items()]
     visuals = [
         visual
         for child in (tree.base, *tree.edges)
-        for visual in _visuals(links[child], frames.get(child, HERE))
+        for visual in _visuals(links[child], frames.get(child, IDENTITY))
     ]
     return RobotTree(
         name, base, own, tools=[_tool(tool, frames) for tool in tools], visuals=visuals
@@ -296,7 +296,7 @@ def end_frames(links: Mapping[str, UrdfLink], tree: Tree) -> list[str]:
     for name in tree.order[1:]:
         edge = tree.edges[name]
         depth[name] = depth[edge.parent] + edge.moves
-    ends = [name for name in tree.edges if name in leaves and links[name].mass < NOTHING]
+    ends = [name for name in tree.edges if name in leaves and links[name].mass < MASSLESS]
     carried = {carriers[edge.parent] for edge in tree.edges.values() if edge.moves}
     for name, edge in tree.edges.items():
         if edge.moves and name not in carried and name not in {carriers[end] for end in ends}:
@@ -307,7 +307,7 @@ def end_frames(links: Mapping[str, UrdfLink], tree: Tree) -> list[str]:
 
 def _link(link: UrdfLink, edge: Edge, frames: Mapping[str, UrdfFrame]) -> Body:
     """Return a link with its joint, in the frame of its body."""
-    joint, parent = edge.joint, frames.get(edge.parent, HERE)
+    joint, parent = edge.joint, frames.get(edge.parent, IDENTITY)
     rotation = parent.rotation.T
     if edge.is_reversed:
         offset, axis = -parent.position, -joint.axis
@@ -315,7 +315,7 @@ def _link(link: UrdfLink, edge: Edge, frames: Mapping[str, UrdfFrame]) -> Body:
         rotation = product(rotation, joint.frame.rotation)
         offset = product(joint.frame.rotation.T, joint.frame.position - parent.position)
         axis = joint.axis
-    inertia, com = _matter(link, frames.get(link.name, HERE))
+    inertia, com = _matter(link, frames.get(link.name, IDENTITY))
     return Body(
         name=link.name,
         parent=edge.parent,
@@ -353,6 +353,6 @@ def _visuals(link: UrdfLink, frame: UrdfFrame) -> list[Visual]:
 
 def _tool(name: str, frames: Mapping[str, UrdfFrame]) -> Tool:
     """Return the frame of a link as a tool."""
-    frame = frames.get(name, HERE)
+    frame = frames.get(name, IDENTITY)
     turn = frame.rotation.T
     return Tool(name, turn, -product(turn, frame.position), link=name)

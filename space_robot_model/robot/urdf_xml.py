@@ -164,7 +164,7 @@ class UrdfFrame(NamedTuple):
     """(3,) position, m, in the axes of the other."""
 
 
-HERE = UrdfFrame(np.eye(3), np.zeros(3))
+IDENTITY = UrdfFrame(np.eye(3), np.zeros(3))
 
 
 class Fields:
@@ -250,7 +250,7 @@ class Fields:
     def frame(self, origin: Element | None) -> UrdfFrame:
         """Return the frame of an ``<origin>``, relative to that of its element."""
         if origin is None:
-            return HERE
+            return IDENTITY
         self.check_content(origin, (), ("xyz", "rpy"))
         zero = (0.0, 0.0, 0.0)
         rotation = rotation_of_rpy(self.vector(origin, "rpy", zero))

@@ -66,7 +66,7 @@ class NumbersCodec:
         return self._wire.tobytes()
 
 
-class Frame(NamedTuple):
+class FramePair(NamedTuple):
     """Names of a frame and of its parent."""
 
     parent: str
@@ -76,7 +76,7 @@ class Frame(NamedTuple):
 class TransformsCodec(NumbersCodec):
     """Encodes poses of a constant set of frames relative to their parents as tf2_msgs/TFMessage."""
 
-    def __init__(self, frames: Sequence[Frame], timebase: Timebase) -> None:
+    def __init__(self, frames: Sequence[FramePair], timebase: Timebase) -> None:
         """Create the codec for ``frames``, in the order of the poses (M, 7)."""
         content = [{"header": {"frame_id": f.parent}, "child_frame_id": f.child} for f in frames]
         runs = [(f"transforms[{i}].transform.translation", POSE) for i in range(len(frames))]

@@ -15,7 +15,7 @@ from space_robot_model.robot.urdf_text import urdf_text
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.samples import RobotState, Timebase
 from space_robot_msgs_py.wire.telemetry import Messages
-from space_robot_msgs_py.wire.viewers import Frame, TransformsCodec, robot_description, wrap
+from space_robot_msgs_py.wire.viewers import FramePair, TransformsCodec, robot_description, wrap
 
 PERIOD_NS = 10_000_000
 """Least time between two messages on /tf: 100 Hz."""
@@ -47,8 +47,8 @@ class SceneWriter:
         """Yield the poses of a true state."""
         yield topics.TRANSFORMS, wrap(self._codec.encode(truth.tick, self._poses.at(truth)))
 
-    def _named(self, frames: Sequence[Frame]) -> list[Frame]:
-        return [Frame(self._full(frame.parent), self._full(frame.child)) for frame in frames]
+    def _named(self, frames: Sequence[FramePair]) -> list[FramePair]:
+        return [FramePair(self._full(frame.parent), self._full(frame.child)) for frame in frames]
 
     def _full(self, name: str) -> str:
         return name if name == topics.INERTIAL_FRAME else self._prefix + name

@@ -14,7 +14,7 @@ from matrix.scenarios import CELLS, PLANS, in_root
 from space_robot.flight.plan import Flight
 from space_robot.scenario.faults import KINDS, PROCESS_KINDS
 from space_robot.scenario.option_table import names
-from space_robot_control.guidance.goals import Frame, Point
+from space_robot_control.guidance.goals import GoalFrame, Point
 from space_robot_control.guidance.segments import (
     KINDS_OF_BASE,
     SEGMENT_KINDS,
@@ -129,7 +129,7 @@ def test_every_kind_of_segment_is_flown() -> None:
     assert any(segment.span is None for segment in segments), "fast"
     assert any(segment.is_base_free for segment in segments)
     tools = [segment.tool for segment in segments if isinstance(segment, ToolSegment)]
-    assert lacking(get_args(Frame), (tool.frame for tool in tools)) == []
+    assert lacking(get_args(GoalFrame), (tool.frame for tool in tools)) == []
     assert {tool.least for tool in tools} == {"motion", "momentum"}
     bases = [s.base for s in segments if s.base and not s.is_base_free]
     bases += [read_pointing(s.base_point, "start") for s in settings if s.base_point.strip()]

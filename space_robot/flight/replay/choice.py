@@ -22,7 +22,7 @@ from space_robot_control.controller.settings import DEFAULT, ControllerNodeSetti
 from space_robot_control.laws import ControlLaw, find_law
 from space_robot_control.laws.names import is_plain, require_shipped_file, require_shipped_law
 from space_robot_model.robot import Robot
-from space_robot_model.robot.find import OWN, find_robot
+from space_robot_model.robot.find import ROBOT_STEM, find_robot
 from space_robot_msgs_py.config.files import Tree, flatten
 from space_robot_msgs_py.config.validation import one_of
 from space_robot_msgs_py.errors import InputError
@@ -149,7 +149,9 @@ class ControllerChoice:
         if content is None:
             return {}
         name = Path(str(flown.get("robot", "paper"))).stem
-        path = self._folder / f"{name if is_plain(name) and name != OWN else 'recorded'}.yaml"
+        path = (
+            self._folder / f"{name if is_plain(name) and name != ROBOT_STEM else 'recorded'}.yaml"
+        )
         _write(path, content)
         return {"robot": str(path)}
 

@@ -42,7 +42,7 @@ class Scalar:
     """In C."""
 
 
-FLOAT, INT, BOOL, NOTHING = (Scalar(name) for name in ("double", "int64_t", "bool", "void"))
+FLOAT, INT, BOOL, VOID = (Scalar(name) for name in ("double", "int64_t", "bool", "void"))
 
 
 @dataclass(frozen=True)

@@ -102,7 +102,7 @@ def translated(
         label,
         tuple(Parameter(p, kind, p in written) for p, kind in kept),
         tuple(tuple(p for p in names if p in dict(kept)) for names in translation.arguments),
-        translation.result or lang.NOTHING,
+        translation.result or lang.VOID,
         tuple(ignored + lines),
         frozenset(translation.stores),
     )

@@ -356,7 +356,7 @@ class Statements(Expressions):
 
     def _return_statement(self, node: ast.Return) -> bool:
         if node.value is None:
-            self.result = lang.NOTHING
+            self.result = lang.VOID
             self.emit("return;")
             return True
         value = self.translate(node.value)
@@ -373,7 +373,7 @@ class Statements(Expressions):
             return
         value = self.translate(node.value)
         if value.text:
-            self.emit(f"{'' if value.type == lang.NOTHING else '(void)'}{value.text};")
+            self.emit(f"{'' if value.type == lang.VOID else '(void)'}{value.text};")
 
     def _pass_statement(self, node: ast.Pass) -> None:
         """Do nothing."""

@@ -272,8 +272,8 @@ def flown(error: np.ndarray) -> np.ndarray:
 def verdict(limits: GoalTolerances, error: np.ndarray) -> tuple[str, str] | None:
     """As told by all states at once, or by one after the other."""
     states = flown(error)
-    together = limits.judge(PIECE, ARM, TIME, states)
-    single = (limits.judge(PIECE, ARM, TIME[k : k + 1], states[k : k + 1]) for k in range(451))
+    together = limits.evaluate(PIECE, ARM, TIME, states)
+    single = (limits.evaluate(PIECE, ARM, TIME[k : k + 1], states[k : k + 1]) for k in range(451))
     assert together == next(filter(None, single), None)
     return together
 
@@ -325,9 +325,9 @@ def test_a_goal_without_a_time_is_waited_for_and_without_numbers_there_is_no_lim
 
 def test_rates_are_measured_too() -> None:
     limits, states = tolerances(path=[("shoulder", 0.0, 0.1)]), flown(np.zeros(451))
-    assert limits.judge(PIECE, ARM, TIME, states) == ("SUCCESSFUL", "")
+    assert limits.evaluate(PIECE, ARM, TIME, states) == ("SUCCESSFUL", "")
     states[200, 1, 0] += 0.2
-    told = limits.judge(PIECE, ARM, TIME, states)
+    told = limits.evaluate(PIECE, ARM, TIME, states)
     assert told is not None
     assert "the velocity of joint 'shoulder' is off by 0.2" in told.text
 

@@ -24,7 +24,7 @@ from space_robot_msgs_py.wire.messages import Codec, MessageDescription, describ
 from space_robot_msgs_py.wire.stamp_guard import AGREEING, StampGuard
 from space_robot_msgs_py.wire.viewers import (
     POSE,
-    Frame,
+    FramePair,
     TransformsCodec,
     robot_description,
     unwrap,
@@ -139,8 +139,8 @@ def test_garbage_has_a_tick_or_is_refused(topic: topics.Topic, garbage: bytes) -
             assert message_tick(topic, data, TIMEBASE) >= 0
 
 
-@given(st.lists(st.builds(Frame, texts, texts), max_size=6), st.integers(0, 10**9), seeds)
-def test_transforms_are_the_bytes_of_rosbags(frames: list[Frame], tick: int, seed: int) -> None:
+@given(st.lists(st.builds(FramePair, texts, texts), max_size=6), st.integers(0, 10**9), seeds)
+def test_transforms_are_the_bytes_of_rosbags(frames: list[FramePair], tick: int, seed: int) -> None:
     """Of a codec that has written another message before."""
     rng, codec = np.random.default_rng(seed), TransformsCodec(frames, TIMEBASE)
     codec.encode(7, rng.normal(size=(len(frames), POSE)))
