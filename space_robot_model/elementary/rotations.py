@@ -1,7 +1,7 @@
-"""Sine and cosine in plain Python, and rotations by angles about fixed axes.
+"""Sine, cosine and arctangent in plain Python, and rotations by angles about fixed axes.
 
 Importing Numba takes longer than all that a command without a flight does, so nothing here is
-compiled; `functions` compiles `plain_sin_cos` as a kernel, with the same bits.
+compiled; `functions` compiles them as kernels, with the same bits.
 """
 
 from __future__ import annotations
@@ -27,6 +27,18 @@ EXACT_LIMIT = 1.6e6
     (-1.0) ** k / math.factorial(2 * k + 1) for k in range(1, 9)
 )
 (C4, C6, C8, C10, C12, C14, C16) = ((-1.0) ** k / math.factorial(2 * k) for k in range(2, 9))
+OF_QUARTERS = (0.0, 0.24497866312686414, 0.4636476090008061, 0.6435011087932844, 0.7853981633974483)
+"""Arctangents of 0, 1/4, 1/2, 3/4 and 1, rad."""
+REST_OF_QUARTERS = (
+    0.0,
+    1.0698755618734451e-17,
+    2.2698777452961687e-17,
+    1.5834785051444286e-17,
+    3.061616997868383e-17,
+)
+"""Rounding errors of these constants, rad."""
+REST_OF_HALF_PI = 6.123233995736766e-17
+(A3, A5, A7, A9, A11, A13, A15, A17, A19) = ((-1.0) ** k / (2 * k + 1) for k in range(1, 10))
 GIMBAL_LOCK = 1e-12
 """Cosine of the pitch below which the axes of roll and yaw coincide (gimbal lock)."""
 
@@ -69,6 +81,33 @@ def plain_sin_cos(angle: float) -> tuple[float, float]:
     return where(quarter >= 2.0, -first, first), where(is_behind, -second, second)
 
 
+def plain_angle_of(y: float, x: float) -> float:
+    """Return the angle of the point (x, y), rad, from -pi to pi; NaN if it is not finite.
+
+    With c the multiple of 1/4 nearest to the tangent t,
+    ``arctan t = arctan c + arctan (t - c)/(1 + c t)``, and the second term is a Taylor series. The
+    error is below 2 units in the last place.
+    """
+    if not (math.isfinite(x) and math.isfinite(y)):
+        return math.nan
+    small, large = min(abs(x), abs(y)), max(abs(x), abs(y))
+    if large == 0.0:
+        angle = 0.0
+    else:
+        number = int(4.0 * (small / large) + 0.5) if small < large else 4
+        quarter = 0.25 * number
+        r = (small - quarter * large) / (large + quarter * small)
+        z = r * r
+        series = A11 + z * (A13 + z * (A15 + z * (A17 + z * A19)))
+        series = A3 + z * (A5 + z * (A7 + z * (A9 + z * series)))
+        angle = OF_QUARTERS[number] + (REST_OF_QUARTERS[number] + (r + r * z * series))
+    if abs(y) > abs(x):
+        angle = 0.5 * math.pi - (angle - REST_OF_HALF_PI)
+    if math.copysign(1.0, x) < 0.0:
+        angle = math.pi - (angle - 2.0 * REST_OF_HALF_PI)
+    return math.copysign(angle, y)
+
+
 def exact_sines_cosines(angles: ArrayLike) -> tuple[Array, Array]:
     """Return sines and cosines of angles, rad; exact for multiples of a right angle."""
     values = np.asarray(angles, dtype=np.float64)
@@ -95,15 +134,13 @@ def rpy_of_rotation(rotation: Array) -> Array:
     Yaw is computed first, then roll from the rotation without yaw: near gimbal lock both are
     inaccurate, but their combination is accurate to rounding.
     """
-    # The C library's arctangent has other bits on other processors, and robots of URDF files are
-    # flown from these angles.
-    from .functions import arctan2  # slow to import
-
     level = norm(rotation[:2, 0])
-    yaw = arctan2(rotation[1, 0], rotation[0, 0]) if level > GIMBAL_LOCK else 0.0
+    yaw = plain_angle_of(rotation[1, 0], rotation[0, 0]) if level > GIMBAL_LOCK else 0.0
     s, c = exact_sines_cosines(yaw)
     across = c * rotation[1] - s * rotation[0]
-    return np.array([arctan2(-across[2], across[1]), arctan2(-rotation[2, 0], level), yaw])
+    return np.array(
+        [plain_angle_of(-across[2], across[1]), plain_angle_of(-rotation[2, 0], level), yaw]
+    )
 
 
 def _exact(values: Array) -> Array:

@@ -14,16 +14,15 @@ import pytest
 from space_robot_control.guidance.mission import MissionNodeSettings
 from space_robot_model.robot import Robot
 from space_robot_msgs_py import topics
-from space_robot_msgs_py.ros.loop import Level
 from space_robot_msgs_py.wire.telemetry import ClockCodec, ReferenceCodec
 
 pytest.importorskip("rclpy")
-
 
 from space_robot_control.guidance import loop, mission_changes
 from space_robot_control.guidance.loop import CLOCK_WAIT_S, GREET_S, MOST_AT_ONCE, MissionLoop
 from space_robot_control.guidance.mission import Mission
 from space_robot_control.guidance.mission_changes import TOLD_S
+from space_robot_msgs_py.ros.loop import Level
 
 CHUNK, LEAD = 10, 35
 NO_TRAJECTORIES = {"trajectories accepted": 0, "trajectories refused": 0}
