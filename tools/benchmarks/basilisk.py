@@ -15,7 +15,7 @@ from Basilisk.simulation import (
 from Basilisk.utilities import RigidBodyKinematics, SimulationBaseClass
 from kernels import Array
 from scipy.spatial.transform import Rotation
-from simulators import PERIOD, Start
+from start import PERIOD, Start
 
 from space_robot import mass_matrix
 

@@ -8,7 +8,6 @@ frictions and the disturbances of case 3.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from importlib.util import find_spec
 from statistics import median
 from typing import Any
@@ -19,9 +18,10 @@ import pinocchio as pin
 from kernels import Array, plant_steps
 from measuring import Competitor, Row, Run, timed
 from mujoco import rollout
-from oracles import mujoco_model, pinocchio_model
+from oracles import pinocchio_model, quaternion_of
 from plant import forward_dynamics_of, moving_plant
 from scipy.spatial.transform import Rotation
+from start import PERIOD, Start, rotation_of
 
 from space_robot import forward_dynamics
 from space_robot_model.robot import Robot
@@ -32,7 +32,6 @@ from space_robot_sim.environment.friction import FrictionSettings
 from space_robot_sim.plant.plant import Plant
 from space_robot_sim.plant.settings import PlantSettings
 
-PERIOD = 5e-4
 BATCH = 64
 """Calls of ``pin.aba`` that C++ makes in a row."""
 FRICTION = FrictionSettings()
@@ -44,43 +43,33 @@ MOTION = 1e-3
 """The least that the plant moves: at rest every robot is the same."""
 
 
-@dataclass(frozen=True)
-class Start:
-    """Where a robot starts, and the torque held from then on: base (base frame), joints; N m."""
+def mujoco_model(robot: Robot) -> mujoco.MjModel:
+    """Return the same robot in MuJoCo, without gravity: a free joint, hinges and slides of z."""
 
-    robot: Robot
-    quaternion: Array
-    theta: Array
-    v0: Array
-    w0: Array
-    rate: Array
-    torque: Array
+    def numbers(values: Any) -> str:
+        return " ".join(repr(float(value)) for value in values)
 
-    @classmethod
-    def moving(cls, robot: Robot, rate: float = 0.1, torque: float = 0.0) -> Start:
-        """Return one in which everything turns."""
-        n = robot.n
-        rng = np.random.default_rng(n)
-        theta = rng.uniform(-1.0, 1.0, n)
-        v0, w0, rates = (rng.uniform(-rate, rate, size) for size in (3, 3, n))
-        force = torque * rng.uniform(-1.0, 1.0, n + 3)
-        return cls(robot, np.array([0.8, 0.36, -0.48, 0.0]), theta, v0, w0, rates, force)
+    def branch(body: int) -> str:
+        tensor = robot.inertia[body]
+        full = [tensor[ij] for ij in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))]
+        text = (
+            f'<inertial pos="{numbers(robot.com[body])}" mass="{float(robot.mass[body])!r}" '
+            f'fullinertia="{numbers(full)}"/>'
+        )
+        for i in (joint for joint in robot.order if robot.parent[joint] == body):
+            place = numbers(robot.rotation[i] @ robot.offset[i])
+            turn = numbers(quaternion_of(Rotation.from_matrix(robot.rotation[i])))
+            kind = "slide" if robot.is_prismatic[i] else "hinge"
+            text += (
+                f'<body pos="{place}" quat="{turn}"><joint type="{kind}" axis="0 0 1"/>'
+                f"{branch(i + 1)}</body>"
+            )
+        return text
 
-    @property
-    def rotation(self) -> Rotation:
-        """Attitude of the base."""
-        return rotation_of(self.quaternion)
-
-    @property
-    def x(self) -> Array:
-        """The plant's state."""
-        parts = (np.zeros(3), self.quaternion, self.theta, self.v0, self.w0, self.rate)
-        return np.concatenate(parts)
-
-
-def rotation_of(quaternion: Array) -> Rotation:
-    """Return SciPy's rotation of ``[w, x, y, z]``."""
-    return Rotation.from_quat(np.roll(quaternion, -1))
+    base = f'<body name="base"><freejoint/>{branch(0)}</body>'
+    return mujoco.MjModel.from_xml_string(
+        f'<mujoco><option gravity="0 0 0"/><worldbody>{base}</worldbody></mujoco>'
+    )
 
 
 def chain(joints: int) -> Robot:
