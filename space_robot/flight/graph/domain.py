@@ -152,12 +152,17 @@ def _ports_in_use(domain: int) -> bool:
 
 
 def refuse_publishers(
-    node: Any, names: Sequence[str], of_others: Collection[topics.Topic], check: Callable[[], None]
+    node: Any,
+    joined_at: float,
+    names: Sequence[str],
+    of_others: Collection[topics.Topic],
+    check: Callable[[], None],
 ) -> None:
     """Wait until all earlier nodes are discovered; refuse those that publish a flight's topics.
 
     Args:
         node: an rclpy node in the domain.
+        joined_at: when it was made, by the monotonic clock: discovery began then.
         names: of the flight's own nodes in its namespace.
         of_others: topics that the user's nodes publish.
         check: called while waiting; raises to give up.
@@ -170,10 +175,11 @@ def refuse_publishers(
     namespace = node.get_namespace().rstrip("/")
     # discovery shows a node, also one of ours, without its name for a moment
     own = {f"{namespace}/{name}" for name in names} | {"/_NODE_NAME_UNKNOWN_"}
-    until = time.monotonic() + DISCOVERY_S
-    while time.monotonic() < until:
+    is_discovered = False
+    while not is_discovered:
         check()
         time.sleep(LOOK_S)
+        is_discovered = time.monotonic() >= joined_at + DISCOVERY_S
         for topic in (topic for topic in topics.RECORDED if topic not in of_others):
             infos = node.get_publishers_info_by_topic(topic.name)
             if others := sorted({full_name_of(info) for info in infos} - own):

@@ -131,6 +131,7 @@ class _Follower:
         self._graph, self._monitor, self._stopped = graph, monitor, stopped
         options = flight.scenario.options
         self._names = started_nodes(options.without)
+        self._joined_at = time.monotonic()
         self._topics_of_others = topics_of(options.without)
         self._own = OwnNodes(monitor.node, options.without, options.join_timeout)
         self._fault_kinds = frozenset(fault.kind.name for fault in flight.scenario.process_faults)
@@ -160,7 +161,7 @@ class _Follower:
         self._change(self._names, "configure")
         if not nobody_was_there:
             node, of_others = self._monitor.node, self._topics_of_others
-            refuse_publishers(node, self._names, of_others, self._check_start)
+            refuse_publishers(node, self._joined_at, self._names, of_others, self._check_start)
         for name in self._names:
             self._change([name], "activate")
         show.say(
