@@ -132,6 +132,7 @@ def test_another_distribution_or_middleware_is_a_warning() -> None:
     item = check_distribution(file, {"ROS_DISTRO": "humble"})
     assert item.status == "warning"
     assert item.text.startswith(f"humble, rclpy from {file}")
+    assert ("(no wheel)" in item.text) == (item.values["wheel"] is None)
     assert check_distribution(file, {"ROS_DISTRO": "jazzy"}).status == "ok"
 
     item = check_middleware("rmw_fastrtps_cpp", {})
