@@ -1,21 +1,33 @@
 """Metrics, tables and figures of flights: those of Table V and further ones.
 
-| module | metrics |
+| module | |
 |---|---|
-| `metrics` | RMS in both definitions, maxima, chatter |
-| `spectrum` | power above 100 Hz |
-| `ripple` | torque beyond the needs of the task, and its spectrum |
-| `settling` | time until the error stays small after a motion |
-| `actuation` | saturation, latency, commands that were not applied |
+| `measure` | all metrics by name: units, meanings, numbers |
+| `series` | series over a flight and their statistics; how a metric is declared |
+| `pointing` | tracking errors, pointing of base and end effector |
+| `torques` | torques, chatter, ripple beyond the needs of the task |
+| `waypoints` | settling time after a motion |
+| `actuation` | saturation, latency, commands that were not applied, limits of joints |
 | `estimate_error` | error of the time-delay estimate |
-| `pointing` | end effector's pointing in the inertial frame |
-| `report` | all of them, as a dictionary |
+| `tool_path` | the tool on the path of its mission |
+| `momentum`, `external_torques` | momentum, and what changes it |
+| `sizing` | what a flight asks of its base, and whether actuators have it |
+| `report` | what was flown, and all metrics, as a dictionary |
 
-All are accumulated over blocks of a flight (`blocks`), which may be longer than memory.
+Metrics are functions of a whole log, which may lie in a file; they take its rows block by block.
 """
 
+from .errors import attitude_angles, tracking_error
 from .excerpt import excerpt
-from .metrics import attitude_angles, tracking_error
-from .report import Analysis, analyze
+from .measure import Window, describe, measure
+from .report import analyze
 
-__all__ = ["Analysis", "analyze", "attitude_angles", "excerpt", "tracking_error"]
+__all__ = [
+    "Window",
+    "analyze",
+    "attitude_angles",
+    "describe",
+    "excerpt",
+    "measure",
+    "tracking_error",
+]

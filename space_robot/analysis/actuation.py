@@ -1,230 +1,268 @@
-"""Metrics of the commands: limits reached, latency, deadlines missed."""
+"""Metrics of commands, joints and wheels: limits reached, latency, deadlines missed."""
 
 from __future__ import annotations
-
-from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from space_robot_model.robot import Robot
-from space_robot_msgs_py.bag.flight_log import FlightLog, Metric, last_rows
+from space_robot_model.hardware.wheels import WheelSettings
+from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.errors import InputError
 
+from .analysed_log import AnalysedLog
+from .described import NO_LIMITS, torque_limits
 from .generalised_motion import measured_rows
+from .series import Quantity, Series, metrics, series
 
 Array = NDArray[np.float64]
 
 STANDING = 0.01
 """Share of the desired velocity below which a joint stands."""
 ROUNDING = 1e-9
-"""rad or m of a position, share of the limit of velocity and effort, that is not beyond it."""
+"""rad or m of a position, share of other limits, by which a number at its limit may miss it."""
 LEAST_WAY = 1e-3
 """Way, rad or m, from which on it is of interest whether a joint stands."""
-
 PERCENTILES = {"p50": 50.0, "p99": 99.0, "max": 100.0}
 
 
-class TorqueLimits(NamedTuple):
-    """Largest torque of each actuator of base and joints, N m; infinite where there is no limit."""
-
-    base: float
-    joint: float
-
-    def of_axes(self, axes: int) -> Array:
-        """Return the limit of each axis, (m,) N m."""
-        return np.array([self.base] * 3 + [self.joint] * (axes - 3))
-
-
-class Saturation(Metric):
-    """Number of ticks at which the torque applied on some axis was at its limit.
+@metrics(
+    "saturation",
+    {
+        "torque_limits.ticks": Quantity("ticks", "ticks with a reported torque at its limit"),
+        "torque_limits.share": Quantity("share", "share of these ticks"),
+        "torque_limits.base": Quantity("N m", "limit of the base's torque; missing: none"),
+        "torque_limits.joints": Quantity("N m", "limit of the joints' torques; missing: none"),
+    },
+    applies=lambda flight: bool(np.isfinite(torque_limits(flight.log)).any()),
+)
+def saturation(flight: AnalysedLog) -> dict[str, float]:
+    """Count the ticks at which the torque applied on some axis was at its limit.
 
     The plant clips to the limit, so "at" is exact but for the rounding of whoever recorded. It is
     the torque as reported, behind the limits and before what the drives make of it.
     """
-
-    def __init__(self, limits: TorqueLimits) -> None:
-        self._limits = limits
-        self._ticks = self._rows = 0
-
-    def add(self, log: FlightLog, error: Array) -> None:
-        """Take further rows."""
-        limit = self._limits.of_axes(log.axes) * (1.0 - 1e-9)
-        at_limit = np.abs(log.as_measured().applied_torque) >= limit
-        self._ticks += int(np.count_nonzero(at_limit.any(axis=1)))
-        self._rows += log.ticks
-
-    def result(self) -> dict[str, Any]:
-        """Return the limits (None: none), the ticks at one, and their share of all ticks."""
-        base, joint = self._limits
-        return {
-            "base_torque_limit_n_m": base if np.isfinite(base) else None,
-            "joint_torque_limit_n_m": joint if np.isfinite(joint) else None,
-            "ticks": self._ticks,
-            "share": self._ticks / self._rows,
-        }
+    limits, log = torque_limits(flight.log), flight.log.as_measured()
+    ticks, limit = 0, limits.of_axes(log.axes) * (1.0 - ROUNDING)
+    for start, stop in flight.blocks():
+        at_limit = np.abs(log.applied_torque[start:stop]) >= limit
+        ticks += int(np.count_nonzero(at_limit.any(axis=1)))
+    numbers = {"torque_limits.ticks": float(ticks), "torque_limits.share": ticks / log.ticks}
+    of_parts = {"torque_limits.base": limits.base, "torque_limits.joints": limits.joint}
+    return numbers | {name: limit for name, limit in of_parts.items() if np.isfinite(limit)}
 
 
-class Latency(Metric):
-    """Percentiles of the wall-clock time from sending a state to sending its command."""
-
-    def __init__(self, period: float) -> None:
-        """Begin without rows; ``period`` is that of a tick, s."""
-        self._period = period
-        self._known: list[Array] = []
-
-    def add(self, log: FlightLog, error: Array) -> None:
-        """Take further rows; where a graph was flown, 8 bytes a tick are kept."""
-        if log.latency_s is not None:
-            self._known.append(log.latency_s[np.isfinite(log.latency_s)])
-
-    def result(self) -> dict[str, float]:
-        """Return ``p50``, ``p99``, ``max`` as ``..._ms`` and ``..._ticks``, and ``answers``."""
-        known = np.concatenate([np.empty(0), *self._known])
-        if not len(known):
-            raise InputError("no wall-clock times of states and commands: not flown as a graph")
-        percentiles = np.percentile(known, list(PERCENTILES.values()))
-        values = dict(zip(PERCENTILES, percentiles, strict=True))
-        return {
-            **{f"{name}_ms": float(1e3 * value) for name, value in values.items()},
-            **{f"{name}_ticks": float(value / self._period) for name, value in values.items()},
-            "answers": len(known),
-        }
-
-
-class MissedDeadlines(Metric):
-    """Number of ticks without their own command, or with a late one.
-
-    The plant's diagnostics count them all as they happen (``missed_deadlines``); a recording tells
-    two kinds apart: ticks that no command was ever recorded for (``unanswered_ticks``), and ticks
-    with a command other than the torque that was applied (``differing_ticks``), since it was late.
-
-    The torque applied over the interval that begins at tick k is reported with the state of tick
-    k+1; commanded for it was the answer to tick ``k - latency_ticks``, clipped to the limits. In
-    lockstep they are the same to the last bit. By the wall clock the plant holds the command
-    before where an answer is late.
-
-    Hardware on the base gives what it can of a torque, and a free base has none: the joints
-    alone then tell whether a command was in time, for it is applied as a whole.
-    """
-
-    def __init__(
-        self, latency_ticks: int, limits: TorqueLimits, base_is_ideal: bool = True
-    ) -> None:
-        self._delay, self._limits = latency_ticks + 1, limits
-        self._axes = slice(0 if base_is_ideal else 3, None)
-        self._before: FlightLog | None = None
-        """The last row."""
-        self._due: Array | None = None
-        """(K, m) commands of the last rows, K up to the delay."""
-        self._known = self._unanswered = 0
-        self.differing = self.compared = 0
-        """Ticks that differ, and those that were compared: they have a command."""
-
-    def add(self, log: FlightLog, error: Array) -> None:
-        """Take further rows.
-
-        Drives give another torque than commanded, an echo tells another one, and in time: what
-        counts is that neither is as commanded.
-        """
-        reported = log.as_measured()
-        measured = measured_rows(reported, self._before)
-        self._before, self._unanswered = last_rows(reported, 1), log.unanswered
-        if log.commanded_torque is None:
-            return
-        self._known += int(np.count_nonzero(np.isfinite(log.commanded_torque[:, 0])))
-        commands = log.commanded_torque
-        if self._due is not None:
-            commands = np.concatenate([self._due, commands])
-        # the first row that applies one of them is ``delay`` rows behind the first of them
-        first = min(log.ticks, max(0, log.ticks + self._delay - len(commands)))
-        limit = self._limits.of_axes(log.axes)
-        commanded = np.clip(commands[: log.ticks - first], -limit, limit)
-        known = np.isfinite(commanded).all(axis=1) & measured[first:]
-        differ = self._differ(reported, first, commanded) & known
-        if reported is not log:
-            differ &= self._differ(log, first, commanded)
-        self.differing += int(np.count_nonzero(differ))
-        self.compared += int(np.count_nonzero(known))
-        self._due = commands[-self._delay :].copy()
-
-    def _differ(self, log: FlightLog, first: int, commanded: Array) -> NDArray[np.bool_]:
-        """(N - first,) true where another torque was applied than ``commanded``."""
-        axes = self._axes
-        differ: NDArray[np.bool_] = np.any(
-            log.applied_torque[first:, axes] != commanded[:, axes], axis=1
+@metrics(
+    "saturation",
+    {
+        "wheels.saturation": Quantity("share", "share of the ticks with any wheel at a limit"),
+        "wheels.saturation_ticks": Quantity("ticks", "these ticks"),
+        "{wheel}.torque_limit_ticks": Quantity("ticks", "ticks at the motor's largest torque"),
+        "{wheel}.momentum_limit_ticks": Quantity("ticks", "ticks at the largest momentum"),
+        "{wheel}.first_limit": Quantity("s", "when the wheel was first at a limit"),
+    },
+    applies=lambda flight: flight.log.wheel_velocities.shape[1] > 0,
+)
+def wheel_saturation(flight: AnalysedLog) -> dict[str, float]:
+    """Count the ticks at which each wheel's motor gave all it can, or its wheel was full."""
+    log, wheels = flight.log, flight.actuators.wheels
+    limits = [wheels.limits(f"max_{key}") for key in ("torque", "momentum")]
+    ticks, any_ticks = np.zeros((2, wheels.count), dtype=np.intp), 0
+    first = np.full(wheels.count, -1)
+    for start, stop in flight.blocks():
+        at_torque, at_momentum = (
+            np.abs(values) >= limit * (1.0 - ROUNDING)
+            for values, limit in zip(wheel_motion(log, start, stop, wheels), limits, strict=True)
         )
-        return differ
+        ticks += [np.sum(at_torque, axis=0), np.sum(at_momentum, axis=0)]
+        at_either = at_torque | at_momentum
+        here = np.where(at_either.any(axis=0), np.argmax(at_either, axis=0) + start, -1)
+        first = np.where(first < 0, here, first)
+        any_ticks += int(np.count_nonzero(at_either.any(axis=1)))
+    numbers = {
+        "wheels.saturation": any_ticks / log.ticks,
+        "wheels.saturation_ticks": float(any_ticks),
+    }
+    for i, name in enumerate(flight.parts("wheel")):
+        numbers[f"{name}.torque_limit_ticks"] = float(ticks[0, i])
+        numbers[f"{name}.momentum_limit_ticks"] = float(ticks[1, i])
+        if first[i] >= 0:
+            numbers[f"{name}.first_limit"] = (log.first_tick + first[i]) * log.timebase.period
+    return numbers
 
-    def result(self) -> dict[str, int]:
-        """Return the unanswered, compared and differing ticks."""
-        if not self._known:
-            raise InputError("the commands were not recorded")
-        return {
-            "unanswered_ticks": self._unanswered,
-            "compared_ticks": self.compared,
-            "differing_ticks": self.differing,
-        }
 
+def wheel_motion(
+    log: FlightLog, start: int, stop: int, wheels: WheelSettings
+) -> tuple[Array, Array]:
+    """Return what the motors gave up to some rows, and where they brought the wheels, (N, W) each.
 
-class BeyondLimits(Metric):
-    """Number of ticks at which each joint was beyond the limits of the robot's file.
-
-    The plant has no end stops, and does not limit velocity and effort by that file.
+    The torque, N m, over the interval that ended at the tick, and the momentum, N m s, that the
+    wheel would have by then without friction. A motor stops at its wheel's limit whatever friction
+    takes, and whatever the base does meanwhile: ``h + u T`` is what it looks at.
     """
+    before = max(start - 1, 0)
+    momentum, torque = wheels.spin_momenta(log.wheel_velocities[before:stop]), log.wheel_torques
+    if start == 0:
+        momentum = np.concatenate([momentum[:1], momentum])
+    reached = momentum[:-1] + torque[start:stop] * log.timebase.period
+    if start == 0:  # the interval before the first row is not of this flight
+        reached[0] = momentum[0]
+    return torque[start:stop], reached
 
-    def __init__(self, log: FlightLog, robot: Robot) -> None:
-        """``log``: the first rows; ``robot`` that was flown."""
-        joints = log.reference_joints.shape[2]
-        self._names = log.joint_names[:joints]
-        self._limits: Array = np.array(robot.limits[:joints]).reshape(joints, 4).T
-        self._ticks = np.zeros((3, joints), dtype=np.intp)
 
-    def add(self, log: FlightLog, error: Array) -> None:
-        """Take further rows."""
-        lower, upper, velocity, effort = self._limits
-        joints = len(self._names)
-        position = log.joint_positions[:, :joints]
-        beyond = (
-            np.maximum(position - upper, lower - position) > ROUNDING,
-            np.abs(log.joint_velocities[:, :joints]) > velocity * (1.0 + ROUNDING),
-            np.abs(log.applied_torque[:, 3:]) > effort * (1.0 + ROUNDING),
+@metrics(
+    "joints",
+    {
+        "{joint}.standing": Quantity(
+            "share", "share of the way that the joint is to move on which friction holds it"
         )
-        self._ticks += np.count_nonzero(beyond, axis=1)
-
-    def result(self) -> dict[str, dict[str, int]]:
-        """Return the ticks beyond position, velocity and effort, by joint that has a limit."""
-        return {
-            name: dict(zip(("position", "velocity", "effort"), map(int, ticks), strict=True))
-            for name, ticks, limits in zip(self._names, self._ticks.T, self._limits.T, strict=True)
-            if np.isfinite(limits).any()
-        }
-
-
-class StandingJoints(Metric):
-    """Share of the way that each joint is to move on which it stands, as friction holds it.
+    },
+)
+def standing(flight: AnalysedLog) -> dict[str, float]:
+    """Compute the share of its way on which each joint stands; of joints that are to move.
 
     A joint stands at a tick at which it is slower than `STANDING` of the desired velocity. Ticks
     count by the desired velocity, so that a joint that starts a little late counts for little.
     """
+    log, (way, held) = flight.log, np.zeros((2, flight.log.reference_joints.shape[2]))
+    for start, stop in flight.blocks():
+        desired = np.abs(log.reference_joints[start:stop, 1])
+        stands = np.abs(log.joint_velocities[start:stop]) < STANDING * desired
+        way += np.sum(desired, axis=0)
+        held += np.sum(desired, axis=0, where=stands)
+    return {
+        f"{name}.standing": float(held[k] / way[k])
+        for k, name in enumerate(log.joint_names)
+        if way[k] * log.timebase.period >= LEAST_WAY
+    }
 
-    def __init__(self, log: FlightLog) -> None:
-        """``log``: the first rows."""
-        self._joints, self._period = log.reference_joints.shape[2], log.timebase.period
-        self._names = log.joint_names[: self._joints]
-        self._way, self._standing = np.zeros((2, self._joints))
 
-    def add(self, log: FlightLog, error: Array) -> None:
-        """Take further rows."""
-        desired = np.abs(log.reference_joints[:, 1])
-        stands = np.abs(log.joint_velocities[:, : self._joints]) < STANDING * desired
-        self._way += np.sum(desired, axis=0)
-        self._standing += np.sum(desired, axis=0, where=stands)
+@metrics(
+    "joints",
+    {
+        f"{{joint}}.beyond_{kind}": Quantity(
+            "ticks", f"ticks beyond the {kind} of the robot's file"
+        )
+        for kind in ("position", "velocity", "effort")
+    },
+)
+def beyond_limits(flight: AnalysedLog) -> dict[str, float]:
+    """Count the ticks at which each joint was beyond the limits of the robot's file.
 
-    def result(self) -> dict[str, float]:
-        """Return the share by joint, of those that are to move by `LEAST_WAY` or more."""
-        return {
-            name: float(standing / way)
-            for name, standing, way in zip(self._names, self._standing, self._way, strict=True)
-            if way * self._period >= LEAST_WAY
-        }
+    The plant has no end stops, and does not limit velocity and effort by that file.
+    """
+    log, joints = flight.log, flight.log.joint_names
+    limits: Array = np.array(flight.robot.limits[: len(joints)]).reshape(len(joints), 4).T
+    lower, upper, velocity, effort = limits
+    ticks = np.zeros((3, len(joints)), dtype=np.intp)
+    if not np.isfinite(limits).any():
+        return {}
+    for start, stop in flight.blocks():
+        position = log.joint_positions[start:stop]
+        beyond = (
+            np.maximum(position - upper, lower - position) > ROUNDING,
+            np.abs(log.joint_velocities[start:stop]) > velocity * (1.0 + ROUNDING),
+            np.abs(log.applied_torque[start:stop, 3:]) > effort * (1.0 + ROUNDING),
+        )
+        ticks += np.count_nonzero(beyond, axis=1)
+    return {
+        f"{name}.beyond_{kind}": float(ticks[row, k])
+        for k, name in enumerate(joints)
+        if np.isfinite(limits[:, k]).any()
+        for row, kind in enumerate(("position", "velocity", "effort"))
+    }
+
+
+@metrics(
+    "latency",
+    {
+        f"latency.{name}_{unit}": Quantity(unit, "from a state's sending to its command's")
+        for unit in ("ms", "ticks")
+        for name in PERCENTILES
+    }
+    | {"latency.answers": Quantity("", "commands whose wall-clock time is known")},
+)
+def latency(flight: AnalysedLog) -> dict[str, float]:
+    """Compute percentiles of the wall-clock time from sending a state to sending its command."""
+    times = flight.log.latency_s
+    known = np.empty(0) if times is None else times[np.isfinite(times)]
+    if not len(known):
+        raise InputError("no wall-clock times of states and commands: not flown as a graph")
+    numbers = {"latency.answers": float(len(known))}
+    for name, value in zip(
+        PERCENTILES, np.percentile(known, list(PERCENTILES.values())), strict=True
+    ):
+        numbers[f"latency.{name}_ms"] = float(1e3 * value)
+        numbers[f"latency.{name}_ticks"] = float(value / flight.log.timebase.period)
+    return numbers
+
+
+@metrics(
+    "commands",
+    {
+        "commands.unanswered": Quantity("ticks", "ticks that no command was ever recorded for"),
+        "commands.compared": Quantity("ticks", "ticks with a command and the torque applied"),
+        "commands.differing": Quantity(
+            "ticks", "of these, ticks with another torque than commanded, as the command was late"
+        ),
+    },
+)
+def commands(flight: AnalysedLog) -> dict[str, float]:
+    """Count the ticks without their own command, or with a late one.
+
+    The torque applied over the interval that begins at tick k is reported with the state of tick
+    k+1; commanded for it was the answer to tick ``k - latency_ticks``, clipped to the limits. In
+    lockstep they are the same to the last bit. By the wall clock the plant holds the command
+    before where an answer is late. Drives give another torque than commanded, an echo tells another
+    one, and in time: what counts is that neither is as commanded.
+
+    Hardware on the base gives what it can of a torque, and a free base has none: the joints
+    alone then tell whether a command was in time, for it is applied as a whole.
+    """
+    log = flight.log
+    if log.commanded_torque is None or not np.isfinite(log.commanded_torque[:, 0]).any():
+        raise InputError("the commands were not recorded")
+    try:
+        limits = torque_limits(log)
+    except InputError:
+        limits = NO_LIMITS
+    axes = slice(3 if log.flight.get("base_actuators") else 0, None)
+    delay = int(log.flight.get("command_latency_ticks", 0)) + 1
+    limit, reported = limits.of_axes(log.axes), log.as_measured()
+    logs = [log] if reported is log else [reported, log]
+    differing = compared = 0
+    for start, stop in flight.blocks():
+        first = max(start, delay)
+        if first >= stop:
+            continue
+        commanded = np.clip(log.commanded_torque[first - delay : stop - delay], -limit, limit)
+        known = np.isfinite(commanded).all(axis=1) & measured_rows(reported, first, stop)
+        differ = known.copy()
+        for each in logs:
+            differ &= np.any(each.applied_torque[first:stop, axes] != commanded[:, axes], axis=1)
+        differing += int(np.count_nonzero(differ))
+        compared += int(np.count_nonzero(known))
+    return {
+        "commands.unanswered": float(log.unanswered),
+        "commands.compared": float(compared),
+        "commands.differing": float(differing),
+    }
+
+
+@series(
+    "deflection",
+    {"deflection_*": Quantity("rad or m", "motor angle less link angle of a joint with a gear")},
+)
+def deflections(flight: AnalysedLog) -> Series | None:
+    """Return the deflection of each joint with a gear."""
+    log = flight.log
+    if not log.geared_names:
+        return None
+    axes = {f"deflection_{name}": [k] for k, name in enumerate(log.geared_names)}
+    return Series(axes, lambda start, stop: deflection(log.rows(start, stop)))
+
+
+def deflection(log: FlightLog) -> Array:
+    """Return ``theta_m - theta`` (N, G) of the joints with gears, rad or m."""
+    joints = [log.joint_names.index(name) for name in log.geared_names]
+    difference: Array = log.motor_positions - log.joint_positions[:, joints]
+    return difference

@@ -1,14 +1,15 @@
-"""The robot, its hardware and its environment, from a flight's description.
+"""The robot, its hardware and its environment, as they were flown.
 
-A bag carries the numbers. One that does not (an older one, or of another recorder) is taken at its
-names' word: the robot, case and gains of that name here and now. Files and modules that it names
-are opened only if it is trusted (`FlightLog.trusted`).
+A flight in this process has its resolved scenario. A bag carries the numbers. One that does not (an
+older one, or of another recorder) is taken at its names' word: the robot, case and gains of that
+name here and now. Files and modules that it names are opened only if it is trusted
+(`FlightLog.trusted`).
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,11 +35,8 @@ from space_robot_sim.environment.orbit import OrbitSettings
 from space_robot_sim.plant.settings import PlantNodeSettings
 
 from ..flight.start_step import StartStep
-from .actuation import TorqueLimits
-from .momentum import MomentumSeries
 
 Array = NDArray[np.float64]
-
 
 IDEAL = "ideal"
 """Name of the sensors without error."""
@@ -55,6 +53,20 @@ DIRECT = "direct"
 
 class NotDescribedError(InputError):
     """The description in a bag lacks data that a metric needs."""
+
+
+class TorqueLimits(NamedTuple):
+    """Largest torque of each actuator of base and joints, N m; infinite where there is no limit."""
+
+    base: float
+    joint: float
+
+    def of_axes(self, axes: int) -> Array:
+        """Return the limit of each axis, (m,) N m."""
+        return np.array([self.base] * 3 + [self.joint] * (axes - 3))
+
+
+NO_LIMITS = TorqueLimits(np.inf, np.inf)
 
 
 def start_step_of(log: FlightLog) -> dict[str, Any] | None:
@@ -75,6 +87,9 @@ def robot_of(log: FlightLog) -> Robot:
     Raises:
         InputError: it is not described, not here, or not that of the bag's joints.
     """
+    if log.scenario is not None:
+        robot: Robot = log.scenario.robots.plant
+        return robot
     flight = log.flight
     if isinstance(content := flight.get("robot_file"), dict):
         robot = Robot.from_dict(content, where="robot_file of the bag")
@@ -93,6 +108,9 @@ def assumed_robot_of(log: FlightLog) -> Robot:
     Raises:
         InputError: see `robot_of`.
     """
+    if log.scenario is not None:
+        robot: Robot = log.scenario.robots.controller
+        return robot
     if isinstance(content := log.flight.get("controller_robot_file"), dict):
         return Robot.from_dict(content, where="controller_robot_file of the bag")
     return robot_of(log)
@@ -141,18 +159,6 @@ def orbit_of(log: FlightLog) -> OrbitSettings:
     return _plant_settings(log, [name for name, _ in leaves(OrbitSettings)])
 
 
-def momentum_of(log: FlightLog) -> MomentumSeries:
-    """Return the momentum tracker of a flight from its first rows ``log`` on.
-
-    Raises:
-        InputError: the robot, its actuators or its environment are not known.
-    """
-    settings = _plant_settings(log)
-    if settings.has_orbit and not log.external_torques.shape[1]:
-        raise NotDescribedError("the torques that acted in the orbit were not recorded")
-    return MomentumSeries(captures_of(log), flown_actuators(log), settings.disturbance)
-
-
 def captures_of(log: FlightLog) -> Captures:
     """Return the captures and releases of the robot that flew, from the first rows ``log`` on.
 
@@ -185,6 +191,9 @@ def events_of(log: FlightLog) -> list[Event]:
     Raises:
         InputError: what the bag tells cannot be, or names a file and the bag is not trusted.
     """
+    if log.scenario is not None:
+        events: list[Event] = log.scenario.plant.parsed_events
+        return events
     texts = [str(text) for text in log.flight.get("events", ())]
     if not log.trusted:
         for name in named_targets(texts):
@@ -216,6 +225,9 @@ def _plant_settings(log: FlightLog, keys: Sequence[str] = ()) -> PlantNodeSettin
 
     The bag has every number. An older one has those that were set, and names of files.
     """
+    if log.scenario is not None:
+        settings: PlantNodeSettings = log.scenario.plant
+        return settings
     parameters = parameters_of(log, PlantNodeSettings.node)
     if parameters.keys() >= _NUMBERS:
         return validate(PlantNodeSettings, nest(parameters), "plant parameters of the bag")
@@ -252,6 +264,8 @@ def _without_told_robot(log: FlightLog, parameters: Mapping[str, Any]) -> dict[s
 
 def sensors_of(log: FlightLog) -> str:
     """Return the name of the sensors, as far as the bag records it."""
+    if log.scenario is not None:
+        return str(log.scenario.plant.sensors) or IDEAL
     return str(parameters_of(log, PlantNodeSettings.node).get("sensors", "")) or IDEAL
 
 
@@ -266,6 +280,9 @@ def base_actuators_of(log: FlightLog) -> BaseActuatorSettings:
     Raises:
         InputError: what the bag tells cannot be.
     """
+    if log.scenario is not None:
+        actuators: BaseActuatorSettings = log.scenario.plant
+        return actuators
     recorded = log.flight.get("base_actuators", {})
     return validate(BaseActuatorSettings, recorded, "base_actuators of the bag")
 
@@ -290,6 +307,8 @@ def flown_actuators(log: FlightLog) -> BaseActuatorSettings:
 
 def navigation_of(log: FlightLog) -> str:
     """Return the name of the navigation, as far as the bag records it."""
+    if log.scenario is not None:
+        return str(log.scenario.controller.navigation) or DIRECT
     return str(parameters_of(log, ControllerNodeSettings.node).get("navigation", "")) or DIRECT
 
 

@@ -15,13 +15,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from space_robot_msgs_py.bag.flight_log import FlightLog, Metric, joined, last_rows
+from space_robot_control.controller.gains import build_law, split_gains
+from space_robot_control.controller.settings import ControllerNodeSettings
+from space_robot_control.laws.names import require_shipped_law
+from space_robot_control.navigation.rate_filters import low_pass_weight
+from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.bag.law_history import laws_of
 from space_robot_msgs_py.errors import InputError
 
-from .attitude_drift import controls_base
+from .analysed_log import AnalysedLog
+from .described import DIRECT, NotDescribedError, check_files, navigation_of, parameters_of
 from .generalised_motion import applied_force, continuous_error, mean_acceleration, measured_rows
-from .metrics import AxisMaximum, AxisRms, Table, axis_groups
+from .series import Quantity, Series, series
 
 Array = NDArray[np.float64]
 HBar = Callable[[FlightLog], Array]
@@ -29,137 +34,181 @@ HBar = Callable[[FlightLog], Array]
 with one of the nominal inertia."""
 
 
-class DelayedEstimate:
-    """``N_hat`` as the controller forms it, from `generalised_motion.neglected_force` in parts.
+@series(
+    "estimate error",
+    {
+        "estimate_error_base": Quantity(
+            "N m",
+            "N - N_hat on the base, of the generalised force of eps_e (about twice the torque)",
+            is_vector=True,
+        ),
+        "estimate_error_prismatic": Quantity("N", "N - N_hat of the time-delay estimate"),
+        "estimate_error_*": Quantity("N m", "N - N_hat of the time-delay estimate"),
+    },
+)
+def estimate_error(flight: AnalysedLog) -> Series:
+    """Return the error of the time-delay estimate of the laws in force."""
+    log = flight.log
+    axes = {f"estimate_error_{name}": index for name, index in flight.groups.items()}
+    h_bar, smoothing = estimator(log)
+    values = errors_of(log, h_bar, smoothing, rest=log.first_tick == 0)
+    return Series(axes, values, _unknown(log))
 
-    It is linear, so that it may be formed of force and acceleration before h_bar is known.
+
+def errors_of(
+    log: FlightLog, h_bar: HBar, smoothing: float = 0.0, rest: bool = True
+) -> Callable[[int, int], Array]:
+    """Return a function from rows, in order, to ``N - N_hat`` (stop - start, m).
+
+    N is of the true motion and the torque given, N_hat of the motion measured and the torque
+    reported, as the controller had them. A row is NaN where a state that it needs is missing or was
+    filled in (`FlightLog.filled`), and under a law without an estimate. The first and the last are.
+
+    Args:
+        log: a flight without gaps.
+        h_bar: of the laws in force.
+        smoothing: weight of a new pair in the low-pass, see `low_pass_weight`; 0: no low-pass.
+        rest: whether the flight begins at rest; else the low-pass begins at the first row.
+    """
+    told, low_pass = log.as_measured(), LowPass(smoothing, rest)
+
+    def values(start: int, stop: int) -> Array:
+        first, last = max(start - 1, 0), min(stop + 1, log.ticks)
+        rows, errors = log.rows(first, last), np.full((stop - start, log.axes), np.nan)
+        if rows.ticks < 3:
+            return errors
+        true = _pairs(rows)
+        as_told = true if told is log else _pairs(told.rows(first, last))
+        estimates = low_pass.of(first, as_told)
+        of_laws = h_bar(rows)
+        own = of_laws[1:-1] if of_laws.ndim == 2 else of_laws
+        # force and acceleration outlast a change of law or gains, their h_bar does not
+        estimate = estimates[:-1, 0] - own * estimates[:-1, 1]
+        error = true[1:, 0] - own * true[1:, 1] - estimate
+        known = np.broadcast_to(np.isfinite(own).all(axis=-1), len(error))
+        is_measured = measured_rows(told, first, last)
+        known = known & is_measured[:-2] & is_measured[1:-1] & is_measured[2:]
+        if not np.isfinite(error[known]).all():
+            raise InputError("the attitude's error was 180 degrees, where J0 of (1) is singular")
+        row = first + 1 - start
+        errors[row : row + len(error)][known] = error[known]
+        return errors
+
+    return values
+
+
+class LowPass:
+    """``N_hat`` as the controller forms it of force and acceleration, interval after interval.
+
+    It is linear, so that it may be formed of both before h_bar is known.
     """
 
     def __init__(self, smoothing: float = 0.0, rest: bool = True) -> None:
-        """Begin without rows.
-
-        Args:
-            smoothing: weight of a new pair in the low-pass, see
-                `low_pass_weight`; 0: no low-pass.
-            rest: whether the rows begin at the flight's start, at rest; else the low-pass begins
-                at the first row.
-        """
+        """Arguments as in `errors_of`."""
         self._smoothing, self._rest = smoothing, rest
         self._state: Array | None = None
+        self._stop, self._last = 0, np.empty(0)
 
-    def of(self, neglected: Array) -> Array:
-        """(K, ...) ``N_hat`` at the ends of the intervals of ``neglected`` (K, ...)."""
-        smoothing = self._smoothing
-        if not (0.0 < smoothing < 1.0 and len(neglected)):
-            return neglected
+    def of(self, first: int, pairs: Array) -> Array:
+        """Return (K, ...) filtered; those before the last call's end are taken from there.
+
+        Args:
+            first: interval of the flight that ``pairs`` begin with.
+            pairs: (K, ...).
+        """
+        smoothing, known = self._smoothing, self._stop - first
+        new = pairs[max(known, 0) :]
+        if not (0.0 < smoothing < 1.0 and len(new)):
+            return pairs
         from scipy.signal import lfilter  # slow to import, and hardly ever needed
 
         if self._state is None:
-            before = np.zeros_like(neglected[:1]) if self._rest else neglected[:1]
+            before = np.zeros_like(new[:1]) if self._rest else new[:1]
             self._state = (1.0 - smoothing) * before
-        filtered: Any = lfilter(
-            [smoothing], [1.0, smoothing - 1.0], neglected, axis=0, zi=self._state
-        )
-        estimate: Array
-        estimate, self._state = filtered
-        return estimate
+        filtered: Any = lfilter([smoothing], [1.0, smoothing - 1.0], new, axis=0, zi=self._state)
+        estimates: Array
+        estimates, self._state = filtered
+        if known > 0:
+            estimates = np.concatenate([self._last[len(self._last) - known :], estimates])
+        self._stop, self._last = first + len(pairs), estimates[-2:].copy()
+        return estimates
 
 
-class Intervals:
-    """Force and mean acceleration over each interval between two rows of a log in parts."""
-
-    def __init__(self) -> None:
-        self._last: FlightLog | None = None
-        self._side = 1.0
-        """1 if q_e continues from that of the last row with eta >= 0, -1 if from its negative."""
-
-    def of(self, log: FlightLog) -> tuple[FlightLog, Array]:
-        """Return the rows at which the new intervals begin, and one more; and (K, 2, m) of each."""
-        rows = joined(self._last, log)
-        error = self._side * continuous_error(rows)
-        with np.errstate(divide="ignore", invalid="ignore"):  # J0 may be singular
-            pairs = np.stack([applied_force(rows, error), mean_acceleration(rows, error)], axis=1)
-        self._last = last_rows(log, 1)
-        self._side = -1.0 if error[-1, 0] < 0.0 else 1.0
-        return rows, pairs
+def _pairs(rows: FlightLog) -> Array:
+    """(K, 2, m) force and mean acceleration over each interval between two rows."""
+    error = continuous_error(rows)
+    with np.errstate(divide="ignore", invalid="ignore"):  # J0 may be singular
+        return np.stack([applied_force(rows, error), mean_acceleration(rows, error)], axis=1)
 
 
-class EstimateErrors:
-    """``N - N_hat`` of a flight in parts, in the units of `generalised_motion.neglected_force`.
+def _unknown(log: FlightLog) -> str:
+    laws = laws_of(log)
+    if laws and not any(any(law.gains.get("h_bar", ())) for law in laws):
+        names = ", ".join(sorted({law.name for law in laws}))
+        return f"{names} has no time-delay estimate with a constant h_bar"
+    return "three measured states in a row are needed"
 
-    N is of the true motion and the torque given, N_hat of the motion measured and the torque
-    reported, as the controller had them. The error is known from the third row on, at the tick
-    before. Ticks whose state was filled in (`FlightLog.filled`), and their neighbours, are left
-    out: what stands there was not measured. So are ticks under a law without an estimate.
+
+def estimator(log: FlightLog) -> tuple[HBar, float]:
+    """Find h_bar of the laws' time-delay estimate, and the weight of its low-pass (0: none).
+
+    Raises:
+        InputError: the law is not recorded, and has no estimate or is not described; or its
+            estimate is not of the states measured.
     """
+    if navigation_of(log) != DIRECT:
+        raise InputError("the filtered states that N_hat is formed of are not recorded")
+    if log.laws:
+        h_bar = recorded_h_bar
+    else:
+        described = _described_h_bar(log)
 
-    def __init__(self, h_bar: HBar, smoothing: float = 0.0, rest: bool = True) -> None:
-        """``h_bar``: as `described.estimator` has it; the others as in `DelayedEstimate`."""
-        self._h_bar = h_bar
-        self._estimate = DelayedEstimate(smoothing, rest)
-        self._true, self._told = Intervals(), Intervals()
-        self._before: FlightLog | None = None
-        """The last row, as measured."""
-        self._measured = np.empty(0, np.bool_)
-        """True for those of the last two rows that were measured."""
-        self._last: Array | None = None
-        """(1, 2, m) force and acceleration of the estimate at the last row."""
+        def h_bar(log: FlightLog) -> Array:
+            return described
 
-    def of(self, log: FlightLog) -> Array:
-        """(K, m) those that become known with the rows of ``log``."""
-        as_measured = log.as_measured()
-        measured = np.concatenate([self._measured, measured_rows(as_measured, self._before)])
-        rows, true = self._true.of(log)
-        as_told = true if as_measured is log else self._told.of(as_measured)[1]
-        estimates = self._estimate.of(as_told)
-        if self._last is not None:
-            estimates = np.concatenate([self._last, estimates])
-        known = slice(len(true) - len(estimates) + 1, len(true))
-        h_bar = self._h_bar(rows)
-        if h_bar.ndim == 2:
-            h_bar = h_bar[known]
-        # force and acceleration outlast a change of law or gains, their h_bar does not
-        estimate = estimates[:-1, 0] - h_bar * estimates[:-1, 1]
-        error: Array = true[known, 0] - h_bar * true[known, 1] - estimate
-        there = np.broadcast_to(np.isfinite(h_bar).all(axis=-1), len(error))
-        if log.filled:
-            there = there & measured[:-2] & measured[1:-1] & measured[2:]
-        self._before, self._measured = last_rows(as_measured, 1), measured[-2:]
-        self._last = estimates[-1:].copy()
-        return error if there.all() else error[there]
+    if log.scenario is not None:
+        filter_hz = log.scenario.controller.acceleration_filter_hz
+    else:
+        key, recorded = "acceleration_filter_hz", parameters_of(log, ControllerNodeSettings.node)
+        known = {key: recorded[key]} if key in recorded else {}
+        filter_hz = ControllerNodeSettings.resolve(known).acceleration_filter_hz
+    return h_bar, low_pass_weight(filter_hz, log.timebase.period)
 
 
-class EstimateError(Metric):
-    """RMS and largest absolute value of `EstimateErrors`, by group of axes."""
+def recorded_h_bar(log: FlightLog) -> Array:
+    """Return h_bar of the laws in force in the rows of ``log``, see `HBar`."""
+    laws, none = laws_of(log), np.full(log.axes, np.nan)
+    rows: list[Array] = [none]
+    for law in laws:
+        values = law.gains.get("h_bar", ())
+        fits = len(values) in (1, log.axes) and any(values)  # zeros: the nominal inertia
+        rows.append(np.broadcast_to(values, log.axes) if fits else none)
+    if len(laws) == 1 and laws[0].tick <= log.first_tick:
+        return np.asarray(rows[1])
+    ticks = np.arange(log.first_tick, log.first_tick + log.ticks)
+    which = np.searchsorted([law.tick for law in laws], ticks, side="right")
+    return np.array(rows)[which]
 
-    def __init__(self, log: FlightLog, h_bar: HBar, smoothing: float) -> None:
-        """``log``: the first rows; the others as in `EstimateErrors`."""
-        self._errors = EstimateErrors(h_bar, smoothing, rest=log.first_tick == 0)
-        self._laws: set[str] = set()
-        self._has_estimate = False
-        self._groups = axis_groups(log.axes - 3, controls_base(log), log.prismatic, log.branches)
-        self._rms, self._maximum = AxisRms(log.axes), AxisMaximum(log.axes)
 
-    def add(self, log: FlightLog, error: Array) -> None:
-        """Take further rows."""
-        errors = self._errors.of(log)
-        for law in laws_of(log):
-            self._laws.add(law.name)
-            self._has_estimate |= any(law.gains.get("h_bar", ()))
-        self._rms.add(errors)
-        self._maximum.add(errors)
-
-    def result(self) -> Table:
-        """``rms`` and ``max`` by group."""
-        if not self._rms.rows:
-            if self._laws and not self._has_estimate:
-                names = ", ".join(sorted(self._laws))
-                raise InputError(f"{names} has no time-delay estimate with a constant h_bar")
-            raise InputError("three measured states in a row are needed")
-        each, largest, groups = self._rms.value, self._maximum.value, self._groups
-        if not np.isfinite([each[axes].sum() for axes in groups.values()]).all():
-            raise InputError("the attitude's error was 180 degrees, where J0 of (1) is singular")
-        return {
-            "rms": {name: float(np.mean(each[axes])) for name, axes in groups.items()},
-            "max": {name: float(np.max(largest[axes])) for name, axes in groups.items()},
-        }
+def _described_h_bar(log: FlightLog) -> Array:
+    """Return h_bar of a bag without the laws in force, at its description's word."""
+    flight = log.flight
+    if flight.get("swaps"):
+        raise NotDescribedError("laws were swapped in flight, so no one h_bar holds")
+    if not (name := flight.get("controller")):
+        raise NotDescribedError("the bag does not say which law was flown")
+    if isinstance(gains := flight.get("gains_used"), dict):
+        h_bar = np.array(gains.get("h_bar", ()), dtype=np.float64)
+    else:
+        chosen: dict[str, Any] = {key: flight[key] for key in ("robot", "gains") if key in flight}
+        recorded, _ = split_gains(parameters_of(log, ControllerNodeSettings.node))
+        chosen |= {**recorded, "controller": name}
+        check_files(log, chosen)
+        if not log.trusted:
+            require_shipped_law(str(name))
+        h_bar = build_law(str(name), ControllerNodeSettings.resolve(chosen), log.axes).h_bar
+    if not h_bar.any():
+        raise NotDescribedError(f"{name} has no time-delay estimate with a constant h_bar")
+    if h_bar.shape not in ((log.axes,), (1,)):
+        raise NotDescribedError(f"gains_used of the bag: h_bar: {log.axes} values were expected")
+    return np.broadcast_to(h_bar, log.axes)

@@ -2,22 +2,24 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from space_robot_model.elementary.matrices import unit_rows
+from space_robot_model.elementary.matrices import norms, unit_rows
 from space_robot_model.robot import Robot
 from space_robot_model.robot.momentum import Motion, robot_momentum
-from space_robot_model.robot.placements import cross, to_inertial
-from space_robot_msgs_py.bag.flight_log import FlightLog, Metric
+from space_robot_model.robot.placements import base_axes, cross, to_inertial
+from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.samples import SOURCES
 from space_robot_sim.environment.captures import Captures
 from space_robot_sim.environment.disturbance import DisturbanceSettings, LoadSchedule
 
-from .base_demand import axes_of
+from .analysed_log import AnalysedLog
+from .described import captures_of, environment_of
+from .series import Quantity, Series, series
 
 Array = NDArray[np.float64]
 
@@ -27,72 +29,63 @@ OWN = "own"
 """Name of the user's own disturbance among them."""
 
 
-class DisturbanceBySource(Metric):
-    """RMS, maximum and impulse of the torque of each source, about the common centre of mass.
+@series(
+    "disturbance torque",
+    {
+        "disturbance_*": Quantity("N m", "torque of the source about the common centre of mass"),
+        "impulse_*": Quantity(
+            "N m s", "angular momentum that the source has given since the first tick", ("max",)
+        ),
+    },
+)
+def disturbance(flight: AnalysedLog) -> Series | None:
+    """Return size and impulse of each source in an orbit.
 
-    The impulse is the angular momentum that the source has given since the first tick, which
-    wheels have to store if nothing unloads them.
+    The impulse is what wheels have to store if nothing unloads them.
     """
+    log = flight.log
+    if not log.orbit_position.shape[1]:
+        return None
+    sources = torques_by_source(log)
+    given = dict.fromkeys(sources, np.zeros(3))
 
-    def __init__(self, disturbance: DisturbanceSettings, captures: Captures | None = None) -> None:
-        """Prepare the sources of a flight.
+    def values(start: int, stop: int) -> Array:
+        torques = {name: torque(start, stop) for name, torque in sources.items()}
+        sizes = [norms(torque) for torque in torques.values()]
+        for name, torque in torques.items():
+            impulse = given[name] + log.timebase.period * np.cumsum(torque, axis=0)
+            given[name] = impulse[-1].copy()
+            sizes.append(norms(impulse))
+        return np.column_stack(sizes)
 
-        Args:
-            disturbance: of the flight.
-            captures: of its robot; needed if the disturbance has a table.
-        """
-        self._disturbance, self._captures = disturbance, captures
-        names = (
-            *SOURCES,
-            *((SINES,) if disturbance.scale else ()),
-            *((OWN,) if disturbance.table else ()),
-        )
-        self._rows = 0
-        self._squares, self._largest = (dict.fromkeys(names, 0.0) for _ in range(2))
-        self._impulse = {name: np.zeros(3) for name in names}
-        self._stored = dict.fromkeys(names, 0.0)
-
-    def add(self, log: FlightLog, error: Array) -> None:
-        """Take further rows."""
-        self._rows += log.ticks
-        for name, torque in torques_by_source(log, self._disturbance, self._captures).items():
-            square = np.sum(torque**2, axis=1)
-            self._squares[name] += float(square.sum())
-            self._largest[name] = max(self._largest[name], float(np.sqrt(square.max())))
-            impulse = self._impulse[name] + log.timebase.period * np.cumsum(torque, axis=0)
-            self._impulse[name] = impulse[-1].copy()
-            longest = float(np.linalg.norm(impulse, axis=1).max())
-            self._stored[name] = max(self._stored[name], longest)
-
-    def result(self) -> dict[str, dict[str, float]]:
-        """Return by source RMS and maximum, N m, and the largest impulse, N m s."""
-        return {
-            name: {
-                "rms_n_m": float(np.sqrt(self._squares[name] / self._rows)),
-                "max_n_m": self._largest[name],
-                "impulse_n_m_s": self._stored[name],
-            }
-            for name in self._largest
-        }
+    names = [f"{kind}_{name}" for kind in ("disturbance", "impulse") for name in sources]
+    return Series({name: [k] for k, name in enumerate(names)}, values)
 
 
-def torques_by_source(
-    log: FlightLog, disturbance: DisturbanceSettings, captures: Captures | None = None
-) -> dict[str, Array]:
-    """Return the torque (N, 3) of each source over the interval after each tick, N m.
+def torques_by_source(log: FlightLog) -> dict[str, Callable[[int, int], Array]]:
+    """Return a function from rows to the torque (N, 3) of each source after each tick, N m.
 
-    Inertial axes, about the common centre of mass; ``captures`` as in `DisturbanceBySource`.
+    Inertial axes, about the common centre of mass, over the interval after the tick.
+
+    Raises:
+        InputError: the environment is not known.
     """
-    torques: dict[str, Any] = {
-        name: log.external_torques[:, 3 * k : 3 * k + 3] for k, name in enumerate(SOURCES)
-    }
-    if disturbance.scale:
-        waves = np.array(disturbance.base_frequencies)[:, np.newaxis] * (2.0 * np.pi * log.time)
-        sine = -disturbance.scale * disturbance.base_amplitude * np.sin(waves).sum(axis=0)
-        torques[SINES] = np.repeat(sine[:, np.newaxis], 3, axis=1)
-    if disturbance.table and captures is not None:
-        torques[OWN] = _own_torque(log, disturbance, captures)
+    settings = environment_of(log).disturbance
+    captures = captures_of(log) if settings.table else None
+    torques: dict[str, Callable[[int, int], Array]] = {}
+    for k, name in enumerate(SOURCES):
+        torques[name] = lambda a, b, k=k: log.external_torques[a:b, 3 * k : 3 * k + 3]  # type: ignore[misc]
+    if settings.scale:
+        torques[SINES] = lambda a, b: _sines(log.rows(a, b), settings)
+    if captures is not None:
+        torques[OWN] = lambda a, b: _own_torque(log.rows(a, b), settings, captures)
     return torques
+
+
+def _sines(log: FlightLog, settings: DisturbanceSettings) -> Array:
+    waves = np.array(settings.base_frequencies)[:, np.newaxis] * (2.0 * np.pi * log.time)
+    sine = -settings.scale * settings.base_amplitude * np.sin(waves).sum(axis=0)
+    return np.repeat(sine[:, np.newaxis], 3, axis=1)
 
 
 def base_loads(log: FlightLog, disturbance: DisturbanceSettings) -> tuple[Array, Array]:
@@ -103,6 +96,11 @@ def base_loads(log: FlightLog, disturbance: DisturbanceSettings) -> tuple[Array,
     schedule = LoadSchedule.of(disturbance, log.joint_names, log.timebase.period)
     begin, end = schedule.over(np.arange(log.first_tick, log.first_tick + log.ticks))
     return begin[:, :6], end[:, :6]
+
+
+def axes_of(log: FlightLog) -> Array:
+    """Return the base's axes on inertial ones, (3, 3, N), see `base_axes`."""
+    return base_axes(unit_rows(log.quaternion).T)
 
 
 def torque_about_centre(axes: Array, centre_of_mass: Array, force: Array, torque: Array) -> Array:
@@ -124,11 +122,11 @@ def _own_torque(log: FlightLog, disturbance: DisturbanceSettings, captures: Capt
     centres = []
     for begin, end in pairwise(ticks):  # between captures and releases the robot is the same
         rows = log.rows(begin - log.first_tick, end - log.first_tick)
-        centres.append(_centre_of_mass(captures.robot_at(begin), rows))
+        centres.append(centre_of_mass(captures.robot_at(begin), rows))
     return torque_about_centre(axes_of(log), np.concatenate(centres), loads[:, :3], loads[:, 3:])
 
 
-def _centre_of_mass(robot: Robot, log: FlightLog) -> Array:
+def centre_of_mass(robot: Robot, log: FlightLog) -> Array:
     """Return the common centre of mass (N, 3) from the base's, inertial axes, m."""
     quaternion = unit_rows(log.quaternion)
     motion = Motion(quaternion, log.omega_base, log.all_positions, log.all_velocities)

@@ -12,26 +12,19 @@ from space_robot_model.elementary.matrices import unit_rows
 from space_robot_model.robot.placements import base_axes, to_base
 from space_robot_msgs_py.bag.flight_log import FlightLog
 
-from .metrics import attitude_error
+from .errors import attitude_error
 
 Array = NDArray[np.float64]
 
 
-def measured_rows(log: FlightLog, before: FlightLog | None = None) -> NDArray[np.bool_]:
-    """(N,) true where a tick's state was measured: one that was filled in repeats the one before.
-
-    ``before``: rows before those of ``log`` (None: the flight begins with it).
-    """
-    there = np.ones(log.ticks, dtype=bool)
-    if log.filled:
-        state = _state(log)
-        last = state[:1] + np.nan if before is None else _state(before)[-1:]
-        there = np.any(np.diff(state, axis=0, prepend=last) != 0.0, axis=1)
-    return there
-
-
-def _state(log: FlightLog) -> Array:
-    return np.hstack([log.quaternion, log.omega_base, log.joint_positions])
+def measured_rows(log: FlightLog, start: int, stop: int) -> NDArray[np.bool_]:
+    """(stop - start,) true where a tick's state was measured: a filled one repeats that before."""
+    if not log.filled:
+        return np.ones(stop - start, dtype=bool)
+    rows = slice(max(start - 1, 0), stop)
+    state = np.hstack([log.quaternion[rows], log.omega_base[rows], log.joint_positions[rows]])
+    differs = np.any(np.diff(state, axis=0) != 0.0, axis=1)
+    return differs if start else np.concatenate([[True], differs])
 
 
 def continuous_error(log: FlightLog) -> Array:

@@ -16,23 +16,230 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from space_robot_model.elementary.matrices import norm, product, unit_rows
-from space_robot_model.hardware.base_actuators import BaseActuatorSettings
+from space_robot_model.elementary.matrices import norm, norms, product, unit_rows
 from space_robot_model.hardware.wheels import WheelSettings
 from space_robot_model.robot import Robot
 from space_robot_model.robot.gears import motor_momentum
 from space_robot_model.robot.momentum import Motion, robot_momentum
 from space_robot_model.robot.placements import base_axes, to_inertial
-from space_robot_msgs_py.bag.flight_log import FlightLog, Metric, joined, last_rows
+from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.samples import SOURCES
 from space_robot_sim.environment.captures import CaptureEvent, Captures
 from space_robot_sim.environment.disturbance import DisturbanceSettings
+from space_robot_sim.environment.events import Capture
 from space_robot_sim.environment.impact import Impact
 
-from .base_demand import axes_of
-from .external_torques import base_loads, torque_about_centre
+from .analysed_log import AnalysedLog
+from .described import NotDescribedError, captures_of, environment_of, events_of
+from .external_torques import axes_of, base_loads, torque_about_centre
+from .series import Quantity, Series, metrics, series
 
 Array = NDArray[np.float64]
+
+
+class Momentum(NamedTuple):
+    """Angular momentum of a flight's parts, tick by tick; N m s on inertial axes."""
+
+    robot: Array
+    """(N, 3) of all bodies, wheels locked."""
+    base: Array
+    """(N, 3) the share of it that the base has."""
+    wheels: Array
+    """(N, 3) of the wheels' spin."""
+    motors: Array
+    """(N, 3) of the spin of rotors behind gears."""
+    outside: Array
+    """(N, 3) N m s that came from outside since the first row."""
+    centre_of_mass: Array
+    """(N, 3) m, of the robot, inertial frame."""
+
+    @property
+    def total(self) -> Array:
+        """(N, 3) robot, wheels and motors; less `outside` it is conserved."""
+        return self.robot + self.wheels + self.motors
+
+
+class MomentumSeries:
+    """Computes the momentum of a flight, whose rows are asked for in their order.
+
+    At the tick of a capture or release it is that after it; the change is from outside.
+    """
+
+    def __init__(self, flight: AnalysedLog) -> None:
+        """Begin at the first row.
+
+        Raises:
+            InputError: the robot, its actuators or its environment are not known.
+        """
+        settings = environment_of(flight.log)
+        if settings.has_orbit and not flight.log.external_torques.shape[1]:
+            raise NotDescribedError("the torques that acted in the orbit were not recorded")
+        self._log, self.flown = flight.log, flight.actuators
+        self._captures, self._disturbance = captures_of(flight.log), settings.disturbance
+        self._robot = self._captures.robot_at(flight.log.first_tick)
+        self._outside = np.zeros(3)
+
+    def of(self, start: int, stop: int) -> Momentum:
+        """Return the momentum of the rows from ``start`` to before ``stop``."""
+        first = self._log.first_tick
+        events = [
+            tick - first for tick in self._captures.ticks(first + max(start, 1), first + stop)
+        ]
+        parts, begin = [], start
+        for row in events:
+            if begin < row:
+                parts.append(self._piece(max(begin - 1, 0), begin, row))
+            self._exchange(row)
+            parts.append(self._piece(row, row, row + 1))
+            begin = row + 1
+        if begin < stop:
+            parts.append(self._piece(max(begin - 1, 0), begin, stop))
+        return Momentum(*(np.concatenate(columns) for columns in zip(*parts, strict=True)))
+
+    def _piece(self, before: int, begin: int, stop: int) -> Momentum:
+        """Return the momentum of rows under one robot; ``before``: the row that is known."""
+        whole = self._momentum(self._robot, self._log.rows(before, stop), self._outside)
+        self._outside = whole.outside[-1].copy()
+        return Momentum(*(column[begin - before :] for column in whole))
+
+    def _exchange(self, row: int) -> None:
+        """Take the events of one tick, one after the other, into what comes from outside."""
+        rows = self._log.rows(row - 1, row + 1)
+        after = rows.rows(1, 2)
+        happening = [
+            event
+            for event in self._captures.at(after.first_tick)
+            if happens_in(self._captures, event, after)
+        ]
+        self._outside = self._momentum(self._robot, rows, self._outside).outside[-1]
+        states = [after]
+        for event in reversed(happening):
+            states.insert(0, state_before(event, states[0], self.flown.wheels))
+        for event, state, then in zip(happening, states[:-1], states[1:], strict=True):
+            here = self._momentum(self._robot, state, self._outside).total[0]
+            self._robot = event.after
+            self._outside = (
+                self._outside + self._momentum(self._robot, then, self._outside).total[0] - here
+            )
+
+    def _momentum(self, robot: Robot, rows: FlightLog, outside: Array) -> Momentum:
+        """Return the momentum of rows; ``outside``: (3,) what had come by the first."""
+        axes = axes_of(rows)
+        motion = Motion(
+            unit_rows(rows.quaternion), rows.omega_base, rows.all_positions, rows.all_velocities
+        )
+        momentum = robot_momentum(robot, motion)
+        wheels = self.flown.wheels
+        spin = product(wheels.spin_momenta(rows.wheel_velocities), wheels.unit_axes)
+        return Momentum(
+            momentum.angular,
+            momentum.base,
+            to_inertial(axes, spin.T).T,
+            motor_momentum(robot, motion.quaternion, motion.joint_positions, rows.motor_velocities),
+            outside + self._impulse(rows, axes, momentum.centre_of_mass),
+            rows.base_position + momentum.centre_of_mass,
+        )
+
+    def _impulse(self, rows: FlightLog, axes: Array, centre: Array) -> Array:
+        """Return the angular impulse from outside from the first row to each, (N, 3) N m s."""
+        period, flown = rows.timebase.period, self.flown
+
+        def turned(begin: Array, end: Array) -> Array:
+            """Return the torque of loads (N-1, 6) on the base at both ends of each interval."""
+            sides = (slice(None, -1), begin), (slice(1, None), end)
+            at_begin, at_end = (
+                torque_about_centre(axes[:, :, side], centre[side], loads[:, :3], loads[:, 3:])
+                for side, loads in sides
+            )
+            return 0.5 * (at_begin + at_end)
+
+        torque = np.zeros((rows.ticks - 1, 3))
+        if flown.thruster_count or flown.torquer_count:
+            thrusters = flown.thrusters
+            force = product(rows.thrusts, thrusters.unit_directions)
+            arms = np.cross(thrusters.places, thrusters.unit_directions)
+            about = product(rows.thrusts, arms)
+            if flown.torquer_count:  # all on the base that is not of the wheels' motors
+                of_wheels = product(rows.wheel_torques, flown.wheels.unit_axes)
+                about = rows.applied_torque[:, :3] + of_wheels
+            loads = np.hstack([force, about])[1:]
+            torque += turned(loads, loads)
+        if self._disturbance.table:
+            begin, end = base_loads(rows, self._disturbance)
+            torque += turned(begin[:-1], end[:-1])
+        if rows.external_torques.shape[1]:
+            torque += rows.external_torques[:-1].reshape(-1, len(SOURCES), 3).sum(axis=1)
+        wave = disturbance_impulse(self._disturbance, rows.time)
+        impulse = np.zeros((rows.ticks, 3))
+        np.cumsum(period * torque, axis=0, out=impulse[1:])
+        whole: Array = impulse + (wave - wave[0])[:, np.newaxis]
+        return whole
+
+
+def momentum_of(log: FlightLog) -> Momentum:
+    """Return the momentum of a whole log.
+
+    Raises:
+        InputError: see `MomentumSeries`.
+    """
+    return MomentumSeries(AnalysedLog(log)).of(0, log.ticks)
+
+
+@series(
+    "momentum",
+    {
+        "momentum_robot": Quantity("N m s", "of the robot, its wheels locked", ("max",)),
+        "momentum_base": Quantity("N m s", "the base's share of that", ("max",)),
+        "momentum_wheels": Quantity("N m s", "of the wheels' spin", ("max",)),
+        "momentum_outside": Quantity("N m s", "what came from outside", ("max",)),
+        "momentum_drift": Quantity("N m s", "of robot and wheels from what is conserved", ("max",)),
+        "pushed": Quantity(
+            "m", "of the whole robot's centre of mass, by thrusters, from its start", ("max", "end")
+        ),
+    },
+    {"momentum_drift.relative": Quantity("-", "the drift by the largest momentum of the robot")},
+)
+def momentum(flight: AnalysedLog) -> Series | None:
+    """Return the sizes of the momentum's parts, of a base that ideal torques do not turn."""
+    if not flight.log.flight.get("base_actuators"):
+        return None
+    # without wheels the robot's momentum is to stay what it was, and says nothing of the drift
+    of_what = "robot" if flight.actuators.wheel_count else "base"
+    names = ["robot", "base", "wheels", "outside", "drift"]
+    axes: dict[str, list[int]] = {f"momentum_{name}": [k] for k, name in enumerate(names)}
+    if flight.actuators.thruster_count:
+        axes["pushed"] = [len(names)]
+    tracker, start = MomentumSeries(flight), list[Momentum]()
+
+    def values(begin: int, stop: int) -> Array:
+        rows = tracker.of(begin, stop)
+        if not start:
+            start.append(Momentum(*(column[:1].copy() for column in rows)))
+        drift = rows.total - start[0].total - rows.outside
+        pushed = rows.centre_of_mass - start[0].centre_of_mass
+        parts = (rows.robot, rows.base, rows.wheels, rows.outside, drift, pushed)
+        return np.column_stack([norms(part) for part in parts])
+
+    def derive(numbers: dict[str, float]) -> dict[str, float]:
+        size = numbers[f"momentum_{of_what}.max"]
+        drift = numbers["momentum_drift.max"]
+        return {"momentum_drift.relative": drift / size} if size else {}
+
+    return Series(axes, values, derive=derive)
+
+
+def disturbance_impulse(disturbance: DisturbanceSettings, time: Array) -> Array:
+    """(N,) N m s that (61) has given to each inertial axis of the base from 0 to ``time`` (N,) s.
+
+    It acts as friction does, against the torque: ``-integral sin(w t) = (cos(w t) - 1) / w``.
+    """
+    integral = np.zeros_like(time)
+    for frequency in disturbance.base_frequencies:
+        if frequency:
+            omega = 2.0 * np.pi * frequency
+            integral += (np.cos(omega * time) - 1.0) / omega
+    impulse: Array = disturbance.scale * disturbance.base_amplitude * integral
+    return impulse
 
 
 def impact_at(exchange: CaptureEvent, row: FlightLog, wheels: WheelSettings) -> Impact:
@@ -86,213 +293,28 @@ def state_before(exchange: CaptureEvent, row: FlightLog, wheels: WheelSettings) 
     return replace(row, **{name: values[np.newaxis] for name, values in columns.items()})
 
 
-class Momentum(NamedTuple):
-    """Angular momentum of a flight's parts, tick by tick; N m s on inertial axes."""
-
-    robot: Array
-    """(N, 3) of all bodies, wheels locked."""
-    base: Array
-    """(N, 3) the share of it that the base has."""
-    wheels: Array
-    """(N, 3) of the wheels' spin."""
-    motors: Array
-    """(N, 3) of the spin of rotors behind gears."""
-    outside: Array
-    """(N, 3) N m s that came from outside since the first row."""
-    centre_of_mass: Array
-    """(N, 3) m, of the robot, inertial frame."""
-
-    @property
-    def total(self) -> Array:
-        """(N, 3) robot, wheels and motors; less `outside` it is conserved."""
-        return self.robot + self.wheels + self.motors
+def _has_free_targets(flight: AnalysedLog) -> bool:
+    try:
+        events = events_of(flight.log)
+    except ValueError:
+        return False
+    return any(isinstance(event, Capture) and event.target.is_in_orbit for event in events)
 
 
-class MomentumSeries:
-    """Follows the momentum through a flight, block by block.
-
-    At the tick of a capture or release it is that after it; the change is from outside.
-    """
-
-    def __init__(
-        self, captures: Captures, flown: BaseActuatorSettings, disturbance: DisturbanceSettings
-    ) -> None:
-        """``captures``: of the robot that flew, payload included; ``flown``: what turned it."""
-        self._captures, self.flown, self._disturbance = captures, flown, disturbance
-        self._part: _OfOneRobot | None = None
-
-    def add(self, log: FlightLog) -> Momentum:
-        """Take further rows of the flight and return their momentum."""
-        start, stop = log.first_tick, log.first_tick + log.ticks
-        if self._part is None:  # the first state that is known is that after the first tick's
-            self._part = self._begin(self._captures.robot_at(start), np.zeros(3))
-            start += 1
-        momentum, begin = [], log.first_tick
-        for tick in self._captures.ticks(start, stop):
-            if tick > begin:
-                momentum.append(self._part.add(_rows(log, begin, tick)))
-            momentum.append(self._exchange(_rows(log, tick, tick + 1)))
-            begin = tick + 1
-        if begin < stop:
-            momentum.append(self._part.add(_rows(log, begin, stop)))
-        return Momentum(*(np.concatenate(columns) for columns in zip(*momentum, strict=True)))
-
-    def _begin(self, robot: Robot, outside: Array) -> _OfOneRobot:
-        return _OfOneRobot(robot, self.flown, self._disturbance, outside)
-
-    def _exchange(self, row: FlightLog) -> Momentum:
-        """Take the tick of one event or several, as they happen one after the other."""
-        exchanges = [
-            exchange
-            for exchange in self._captures.at(row.first_tick)
-            if happens_in(self._captures, exchange, row)
-        ]
-        assert self._part is not None
-        if not exchanges:
-            return self._part.add(row)
-        states = [row]
-        for exchange in reversed(exchanges):
-            states.insert(0, state_before(exchange, states[0], self.flown.wheels))
-        for exchange, state, after in zip(exchanges, states[:-1], states[1:], strict=True):
-            before = self._part.add(state)
-            bare = self._begin(exchange.after, np.zeros(3)).add(after)
-            outside = before.outside[0] + bare.total[0] - before.total[0]
-            self._part = self._begin(exchange.after, outside)
-            momentum = self._part.add(after)
-        return momentum
-
-
-class _OfOneRobot:
-    """Follows the momentum of a robot that holds the same all the time."""
-
-    def __init__(
-        self,
-        robot: Robot,
-        flown: BaseActuatorSettings,
-        disturbance: DisturbanceSettings,
-        outside: Array,
-    ) -> None:
-        """``outside``: (3,) N m s that have come from outside at the first row."""
-        self._robot, self._flown, self._disturbance = robot, flown, disturbance
-        self._before: FlightLog | None = None
-        self._outside = outside
-
-    def add(self, log: FlightLog) -> Momentum:
-        """Take further rows, see `MomentumSeries.add`."""
-        rows = joined(self._before, log)
-        axes, skipped = axes_of(rows), rows.ticks - log.ticks
-        motion = Motion(
-            unit_rows(rows.quaternion), rows.omega_base, rows.all_positions, rows.all_velocities
-        )
-        momentum = robot_momentum(self._robot, motion)
-        wheels = self._flown.wheels
-        spin = product(wheels.spin_momenta(rows.wheel_velocities), wheels.unit_axes)
-        outside = self._from_outside(rows, axes, momentum.centre_of_mass)
-        self._before, self._outside = last_rows(log, 1), outside[-1].copy()
-        whole = Momentum(
-            momentum.angular,
-            momentum.base,
-            to_inertial(axes, spin.T).T,
-            motor_momentum(
-                self._robot, motion.quaternion, motion.joint_positions, rows.motor_velocities
-            ),
-            outside,
-            rows.base_position + momentum.centre_of_mass,
-        )
-        return Momentum(*(values[skipped:] for values in whole))
-
-    def _from_outside(self, rows: FlightLog, axes: Array, centre_of_mass: Array) -> Array:
-        """Return the angular impulse up to each row, the first row's known, (N, 3) N m s."""
-        period, time = rows.timebase.period, rows.time
-        impulse = np.zeros((rows.ticks, 3))
-        if self._flown.thruster_count or self._flown.torquer_count:
-            thrusters = self._flown.thrusters
-            force = product(rows.thrusts, thrusters.unit_directions)
-            arms = np.cross(thrusters.places, thrusters.unit_directions)
-            torque = product(rows.thrusts, arms)
-            if self._flown.torquer_count:  # all on the base that is not of the wheels' motors
-                wheels = product(rows.wheel_torques, self._flown.wheels.unit_axes)
-                torque = rows.applied_torque[:, :3] + wheels
-            each = [  # turned as the base is before and after the interval
-                torque_about_centre(side, centre, force[1:], torque[1:])
-                for side, centre in (
-                    (axes[:, :, :-1], centre_of_mass[:-1]),
-                    (axes[:, :, 1:], centre_of_mass[1:]),
-                )
-            ]
-            impulse[1:] = 0.5 * period * np.cumsum(each[0] + each[1], axis=0)
-        if self._disturbance.table:
-            before, after = base_loads(rows, self._disturbance)
-            each = [
-                torque_about_centre(side, centre, loads[:-1, :3], loads[:-1, 3:])
-                for side, centre, loads in (
-                    (axes[:, :, :-1], centre_of_mass[:-1], before),
-                    (axes[:, :, 1:], centre_of_mass[1:], after),
-                )
-            ]
-            impulse[1:] += 0.5 * period * np.cumsum(each[0] + each[1], axis=0)
-        if rows.external_torques.shape[1]:
-            by_axis = rows.external_torques[:-1].reshape(-1, len(SOURCES), 3).sum(axis=1)
-            impulse[1:] += period * np.cumsum(by_axis, axis=0)
-        wave = disturbance_impulse(self._disturbance, time)
-        outside: Array = self._outside + impulse + (wave - wave[0])[:, np.newaxis]
-        return outside
-
-
-class MomentumBudget(Metric):
-    """Largest momentum of each part, and how far the sum is from being conserved."""
-
-    def __init__(self, series: MomentumSeries) -> None:
-        self._series, self._flown = series, series.flown
-        self._start: Momentum | None = None
-        self._largest = dict.fromkeys(("robot", "base", "wheels", "outside"), 0.0)
-        self._drift = self._pushed = self._end = 0.0
-
-    def add(self, log: FlightLog, error: Array) -> None:
-        """Take further rows."""
-        momentum = self._series.add(log)
-        if self._start is None:
-            self._start = Momentum(*(values[:1].copy() for values in momentum))
-        start = self._start
-        for name in self._largest:
-            self._largest[name] = max(self._largest[name], _longest(getattr(momentum, name)))
-        self._drift = max(self._drift, _longest(momentum.total - start.total - momentum.outside))
-        pushed = np.linalg.norm(momentum.centre_of_mass - start.centre_of_mass, axis=1)
-        self._pushed, self._end = max(self._pushed, float(pushed.max())), float(pushed[-1])
-
-    def result(self) -> dict[str, Any]:
-        """Return the largest sizes, N m s, the drift of the sum, and how far thrusters pushed, m.
-
-        The drift is relative to the largest momentum of the robot; where there are no wheels, to
-        that of its base, for the robot's is then to stay what it was.
-        """
-        size = self._largest["robot" if self._flown.wheel_count else "base"]
-        pushed = {"max": self._pushed, "end": self._end} if self._flown.thruster_count else None
-        return {
-            "peak_n_m_s": dict(self._largest),
-            "drift": {"n_m_s": self._drift, "relative": self._drift / size if size else None},
-            "pushed_m": pushed,
-        }
-
-
-def disturbance_impulse(disturbance: DisturbanceSettings, time: Array) -> Array:
-    """(N,) N m s that (61) has given to each inertial axis of the base from 0 to ``time`` (N,) s.
-
-    It acts as friction does, against the torque: ``-integral sin(w t) = (cos(w t) - 1) / w``.
-    """
-    integral = np.zeros_like(time)
-    for frequency in disturbance.base_frequencies:
-        if frequency:
-            omega = 2.0 * np.pi * frequency
-            integral += (np.cos(omega * time) - 1.0) / omega
-    impulse: Array = disturbance.scale * disturbance.base_amplitude * integral
-    return impulse
-
-
-def _rows(log: FlightLog, start: int, stop: int) -> FlightLog:
-    """Return the rows of the ticks from ``start`` to before ``stop``."""
-    return log.rows(start - log.first_tick, stop - log.first_tick)
-
-
-def _longest(vectors: Array) -> float:
-    return float(np.linalg.norm(vectors, axis=1).max())
+@metrics(
+    "captures",
+    {"missed.{event}": Quantity("m", "of the target from where the tool would have held it")},
+    applies=_has_free_targets,
+)
+def missed_captures(flight: AnalysedLog) -> dict[str, float]:
+    """Return the distances of the captures that missed their target, and did not happen."""
+    log, captures = flight.log, captures_of(flight.log)
+    for tick in captures.ticks(log.first_tick, log.first_tick + log.ticks):
+        row = log.rows(tick - log.first_tick, tick - log.first_tick + 1)
+        for exchange in captures.at(tick):
+            happens_in(captures, exchange, row)
+    return {
+        f"missed.{exchange.event.label}": captures.misses[exchange.tick]
+        for exchange in captures.exchanges
+        if exchange.tick in captures.misses and exchange.meeting
+    }

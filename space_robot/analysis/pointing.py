@@ -1,292 +1,250 @@
-"""Pointing of the end effector and of the base, which a mission is flown for.
-
-The tool's pose follows from base attitude and joint angles (`placements.tool_pose`), once with the
-measured ones and once with the desired ones. The base's position is free in this mission
-("semi-floating"), so both poses share it and its drift is given separately.
+"""Tracking errors and pointing, of the base and of the end effector.
 
 The base's error is the rotation from its desired attitude, as in a pointing budget
 (ECSS-E-ST-60-10C): the absolute performance error (APE) is the error at a tick, the relative one
 (RPE, here "jitter") its difference from its mean over a window.
+
+The tool's pose follows from base attitude and joint angles (`placements.tool_pose`), once with the
+measured ones and once with the desired ones. The base's position is free in this mission
+("semi-floating"), so both poses share it and its drift is given separately.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from contextlib import suppress
-from typing import Annotated, Any, NamedTuple
-
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field, field_validator
 
-from space_robot_model.elementary.matrices import direction_norm, dot_rows, norms, unit_rows
-from space_robot_model.robot import Robot
-from space_robot_model.robot.mission_document import Vector
+from space_robot_model.elementary.matrices import dot_rows, norms, unit_rows
 from space_robot_model.robot.placements import tool_pose
-from space_robot_msgs_py.bag.flight_log import FlightLog, Metric
-from space_robot_msgs_py.config.validation import StrictModel
-from space_robot_msgs_py.config.yaml_text import parse_yaml
 
-from .metrics import AxisMaximum, AxisRms, Table, attitude_error, rotation_vectors
+from .analysed_log import ANGLES, AnalysedLog
+from .errors import (
+    attitude_drift,
+    joined_error,
+    quaternions_of,
+    relative_attitude,
+    rotation_vectors,
+)
+from .pointing_budget import window_ticks
+from .series import Quantity, Series, metrics, series
 
 Array = NDArray[np.float64]
 
 ARCSEC = np.pi / 180.0 / 3600.0
 """rad."""
-BASE_ANGLES = ("half_cone_arcsec", "about_arcsec", "rotation_arcsec")
-"""Keys of the angles of a `BasePointingError`."""
+TABLE_V = ("rms", "rms_eq64", "max")
+ALL = ("rms", "max", "end")
 
 
-Z = (0.0, 0.0, 1.0)
+@series(
+    "errors",
+    {
+        "attitude_angle": Quantity(
+            "deg", "error of the base's attitude, as rotation vector", TABLE_V, True
+        ),
+        "attitude": Quantity(
+            "-",
+            "error of the base's attitude, vector part of the quaternion (half the angle, rad)",
+            TABLE_V,
+            is_vector=True,
+            is_shown=False,
+        ),
+        "joints_prismatic": Quantity("m", "desired less true position of these joints", TABLE_V),
+        "joints_*": Quantity("rad", "desired less true angle of these joints", TABLE_V),
+        "half_cone": Quantity(
+            "arcsec",
+            "angle between the true and the desired direction of the axis that points",
+            ALL,
+        ),
+        "about_axis": Quantity("arcsec", "rotation of the base about the axis that points", ALL),
+        "base_rotation": Quantity("arcsec", "rotation between desired and true attitude", ALL),
+    },
+)
+def errors(flight: AnalysedLog) -> Series:
+    """Return the errors of base and joints, and the angles of the base's pointing."""
+    log, m, is_held = flight.log, flight.log.axes, flight.controls_base
+    axes = dict(flight.error_columns)
+    if is_held:
+        angle = {"attitude_angle": slice(m, m + 3)}
+        axes = {**angle, **axes, **{name: [m + 3 + k] for k, name in enumerate(ANGLES)}}
+
+    def values(start: int, stop: int) -> Array:
+        attitude = flight.attitude_errors(start, stop)
+        error = joined_error(log.rows(start, stop), attitude)
+        if not is_held:
+            return error
+        vectors = rotation_vectors(attitude)
+        return np.hstack([error, np.degrees(vectors), base_angles(attitude, vectors, flight)])
+
+    return Series(axes, values)
 
 
-class PointingBudget(StrictModel):
-    """What the base's pointing is measured against."""
-
-    band_deg: Annotated[float, Field(gt=0.0, le=180.0)] = Field(
-        0.1, description="angle within which the base points well, degrees"
-    )
-    window_s: Annotated[float, Field(gt=0.0, le=1e6)] = Field(
-        1.0, description="window over which jitter counts, s"
-    )
-    axis: Vector | None = Field(
-        None,
-        description="axis of the base that points, base frame, any length (none: of the mission's "
-        "first pointing segment, or of its start, else z)",
-    )
-
-    @field_validator("axis", mode="after")
-    @classmethod
-    def _has_direction(cls, axis: list[float] | None) -> list[float] | None:
-        if axis is not None:
-            direction_norm(axis, "axis")
-        return axis
-
-    def of(self, segments: Sequence[str], start: str = "") -> PointingBudget:
-        """Return the budget with the axis that points, of unit length.
-
-        Args:
-            segments: of the mission, as YAML texts.
-            start: what the base points at from the start on, as YAML text; empty: nothing.
-        """
-        pointed = pointed_axis([*segments, f"base: {start}"])
-        axis = np.array(self.axis or (Z if pointed is None else pointed))
-        unit = (axis / direction_norm(axis, "axis")).tolist()
-        return self.model_copy(update={"axis": unit})
-
-
-class PointingError(NamedTuple):
-    """The end effector's error, tick by tick."""
-
-    boresight: Array
-    """(N,) rad, between the measured and the desired direction of the tool's z axis."""
-    rotation: Array
-    """(N,) rad, of the one rotation that turns the desired frame into the measured one."""
-    position: Array
-    """(N,) m, between measured and desired position, the base at its measured position in both."""
-    base_drift: Array
-    """(N,) m, of the base's CoM from where it was at the first tick."""
-
-
-class Pointing(Metric):
-    """Takes RMS, maximum and last value of each number of a `PointingError`."""
-
-    def __init__(self, log: FlightLog, robot: Robot) -> None:
-        """``log``: the first rows; the base's drift counts from there."""
-        self._robot, self._start = robot, log.base_position[:1].copy()
-        figures = len(PointingError._fields)
-        self._rms, self._maximum = AxisRms(figures), AxisMaximum(figures)
-        self._end: Array = np.empty(0)
-
-    def add(self, log: FlightLog, error: Array) -> None:
-        """Take further rows."""
-        values = np.stack(pointing_error(log, self._robot, self._start)).T
-        self._rms.add(values)
-        self._maximum.add(values)
-        self._end = values[-1]
-
-    def result(self) -> Table:
-        """``rms``, ``max`` and ``end`` by figure."""
-        names = ("boresight_rad", "rotation_rad", "tool_position_m", "base_drift_m")
-        kinds = {"rms": self._rms.value, "max": self._maximum.value, "end": self._end}
-        return {
-            name: {kind: float(values[i]) for kind, values in kinds.items()}
-            for i, name in enumerate(names)
-        }
-
-
-class BasePointingError(NamedTuple):
-    """The rotation from the base's desired attitude to the true one, tick by tick."""
-
-    half_cone: Array
-    """(N,) rad, between the true and the desired direction of the axis that points."""
-    about: Array
-    """(N,) rad, size of the rotation about that axis."""
-    rotation: Array
-    """(N,) rad, of the one rotation between both attitudes."""
-    vector: Array
-    """(N, 3) rad, that rotation as a vector, base axes."""
-
-    @property
-    def angles(self) -> Array:
-        """(N, 3) arcsec, by `BASE_ANGLES`."""
-        angles: Array = np.stack(self[:3], axis=1) / ARCSEC
-        return angles
-
-
-def base_pointing_error(log: FlightLog, axis: Array) -> BasePointingError:
-    """Compute the base's error of pointing at every tick.
+def base_angles(attitude: Array, vectors: Array, flight: AnalysedLog) -> Array:
+    """Return the angles (N, 3) of the base's pointing, arcsec, by `ANGLES`.
 
     Args:
-        log: rows of a flight.
-        axis: (3,) that points, base frame, unit length.
+        attitude: (N, 4) `attitude_error`.
+        vectors: (N, 3) rad, the same as rotation vectors.
+        flight: with the axis that points.
     """
-    error = attitude_error(log)
-    eps = error[:, 1:]
+    axis, eps = np.array(flight.budget.axis), attitude[:, 1:]
     about = dot_rows(eps, axis[np.newaxis])
-    vector = rotation_vectors(error)
-    across, rest = eps - about * axis, np.hstack([error[:, :1], about])
-    return BasePointingError(
-        half_cone=2.0 * np.arctan2(norms(across), norms(rest)),
-        about=2.0 * np.arctan2(np.abs(about[:, 0]), error[:, 0]),
-        rotation=norms(vector),
-        vector=vector,
-    )
+    across, rest = eps - about * axis, np.hstack([attitude[:, :1], about])
+    half_cone = 2.0 * np.arctan2(norms(across), norms(rest))
+    turned = 2.0 * np.arctan2(np.abs(about[:, 0]), attitude[:, 0])
+    angles: Array = np.stack([half_cone, turned, norms(vectors)], axis=1) / ARCSEC
+    return angles
 
 
-class Jitter:
-    """Difference of the error from its mean in windows that follow one another, in parts.
-
-    Of the vector about the axis, across it (the half cone), and of its length, by `BASE_ANGLES`.
-    A window that the flight does not fill does not count.
-    """
-
-    def __init__(self, ticks: int, axis: Array) -> None:
-        """``ticks``: of a window; ``axis``: (3,) that points, base frame, unit length."""
-        self._ticks, self._axis = ticks, axis
-        self._rest: Array = np.empty((0, 3))
-        self._rms, self._maximum = AxisRms(3), AxisMaximum(3)
-
-    def add(self, vectors: Array) -> None:
-        """Take further rows (N, 3), rad."""
-        rows = np.concatenate([self._rest, vectors])
-        whole = len(rows) - len(rows) % self._ticks
-        self._rest = rows[whole:].copy()
-        windows = rows[:whole].reshape(-1, self._ticks, 3)
+@metrics(
+    "errors",
+    {
+        "{angle}.within_band": Quantity("share", "share of time within the band (--band)"),
+        "{angle}.outside_band": Quantity("share", "share of time outside of it", is_shown=False),
+        "{angle}.jitter_rms": Quantity(
+            "arcsec", "RMS of the difference from the mean in a window (--window)"
+        ),
+        "{angle}.jitter_max": Quantity("arcsec", "largest such difference"),
+    },
+    applies=lambda flight: flight.controls_base,
+)
+def steadiness(flight: AnalysedLog) -> dict[str, float]:
+    """Compute time within the band, and jitter; a window that the flight does not fill is none."""
+    axis, band = np.array(flight.budget.axis), 3600.0 * flight.budget.band_deg
+    ticks = window_ticks(flight.budget.window_s, flight.log.timebase.period)
+    whole = flight.log.ticks // ticks * ticks
+    step = max(1, 60_000 // ticks) * ticks
+    within, squares, largest = np.zeros(3), np.zeros(3), np.zeros(3)
+    for start in range(0, flight.log.ticks, step):
+        attitude = flight.attitude_errors(start, min(start + step, flight.log.ticks))
+        vectors = rotation_vectors(attitude)
+        within += np.sum(base_angles(attitude, vectors, flight) <= band, axis=0)
+        windows = vectors[: max(whole - start, 0)].reshape(-1, ticks, 3)
         away = (windows - windows.mean(axis=1, keepdims=True)).reshape(-1, 3)
-        about = dot_rows(away, self._axis[np.newaxis])
-        sizes = [norms(away - about * self._axis), np.abs(about[:, 0]), norms(away)]
+        about = dot_rows(away, axis[np.newaxis])
+        sizes = [norms(away - about * axis), np.abs(about[:, 0]), norms(away)]
         angles = np.stack(sizes, axis=1) / ARCSEC
-        self._rms.add(angles)
-        self._maximum.add(angles)
-
-    @property
-    def value(self) -> tuple[Array, Array] | None:
-        """RMS and largest, (3,) arcsec each; None: no window was full."""
-        return (self._rms.value, self._maximum.value) if self._rms.rows else None
-
-
-class BasePointing(Metric):
-    """RMS, maximum and last value, share of time within a band, and jitter of the base's angles."""
-
-    def __init__(self, log: FlightLog, budget: PointingBudget | None = None) -> None:
-        """``log``: the first rows; ``budget``: None for the default."""
-        segments, start = pointing_of(log)
-        self._points = pointed_axis([*segments, f"base: {start}"]) is not None
-        self._budget = (budget or PointingBudget()).of(segments, start)
-        self._axis = np.array(self._budget.axis)
-        self._rms, self._maximum = AxisRms(3), AxisMaximum(3)
-        self._within, self._end = np.zeros(3), np.zeros(3)
-        ticks = window_ticks(self._budget.window_s, log.timebase.period)
-        self._jitter = Jitter(ticks, self._axis)
-
-    def add(self, log: FlightLog, error: Array) -> None:
-        """Take further rows."""
-        self.add_error(base_pointing_error(log, self._axis))
-
-    def add_error(self, error: BasePointingError) -> None:
-        """Take the error of further rows, at least one, about the budget's axis."""
-        angles = error.angles
-        self._rms.add(angles)
-        self._maximum.add(angles)
-        self._within += np.sum(angles <= 3600.0 * self._budget.band_deg, axis=0)
-        self._end = angles[-1]
-        self._jitter.add(error.vector)
-
-    def result(self) -> dict[str, Any]:
-        """Return whether the mission points the base, budget, and the numbers by `BASE_ANGLES`."""
-        jitter = self._jitter.value
-        figures = {
-            "rms": self._rms.value,
-            "max": self._maximum.value,
-            "end": self._end,
-            "within_band": self._within / self._rms.rows,
-            "jitter_rms": jitter and jitter[0],
-            "jitter_max": jitter and jitter[1],
-        }
-        return {
-            "points": self._points,
-            **self._budget.model_dump(),
-            **{
-                name: {
-                    kind: None if values is None else float(values[i])
-                    for kind, values in figures.items()
-                }
-                for i, name in enumerate(BASE_ANGLES)
-            },
-        }
+        squares += np.einsum("ij,ij->j", angles, angles)
+        largest = np.maximum(largest, angles.max(axis=0, initial=0.0))
+    numbers = {}
+    for k, name in enumerate(ANGLES):
+        share = float(within[k]) / flight.log.ticks
+        numbers |= {f"{name}.within_band": share, f"{name}.outside_band": 1.0 - share}
+        if whole:
+            numbers[f"{name}.jitter_rms"] = float(np.sqrt(squares[k] / whole))
+            numbers[f"{name}.jitter_max"] = float(largest[k])
+    return numbers
 
 
-def window_ticks(window_s: float, period: float) -> int:
-    """Return the number of ticks in a window, at least 2; ``period`` in s."""
-    return max(2, round(window_s / period))
+def lacking_for_jitter(name: str, seconds: float, window_s: float, period: float) -> str:
+    """Return why there is no jitter of some seconds of a flight; empty: there is."""
+    if ".jitter_" not in name or round(seconds / period) >= window_ticks(window_s, period):
+        return ""
+    return f"needs {window_s:g} s of flight (pointing.window_s), got {seconds:g} s"
 
 
-def pointed_axis(segments: Sequence[str]) -> Array | None:
-    """Return the axis (3,) of the first segment of a mission that points the base; None: none does.
+@series(
+    "attitude drift",
+    {
+        "attitude_drift": Quantity(
+            "rad", "rotation of a base without actuators since the first tick", ALL
+        )
+    },
+)
+def drift(flight: AnalysedLog) -> Series | None:
+    """Return the angle by which a free base has turned since the first tick."""
+    if flight.controls_base:
+        return None
+    log = flight.log
 
-    Args:
-        segments: as YAML texts.
+    def values(start: int, stop: int) -> Array:
+        return norms(attitude_drift(log.rows(start, stop), log.quaternion[0]))[:, np.newaxis]
+
+    return Series({"attitude_drift": [0]}, values)
+
+
+NAVIGATION = "true less assumed"
+
+
+@series(
+    "navigation error",
+    {
+        "navigation_attitude_angle": Quantity("deg", f"{NAVIGATION} attitude", is_vector=True),
+        "navigation_attitude": Quantity(
+            "-",
+            f"{NAVIGATION} attitude, vector part of the quaternion",
+            is_vector=True,
+            is_shown=False,
+        ),
+        "navigation_joints_prismatic": Quantity("m", f"{NAVIGATION} position of these joints"),
+        "navigation_joints_*": Quantity("rad", f"{NAVIGATION} angle of these joints"),
+    },
+)
+def navigation(flight: AnalysedLog) -> Series | None:
+    """Return how far the state that the law assumed was from the true one.
+
+    The law tells the error e that it sees in its telemetry. Less the true one this is the true
+    state less the assumed one, in the coordinates rho = [eps_e, theta], whatever stands between
+    sensors and law: ``e - e_true = rho - rho_assumed``. It is known at the ticks of the telemetry.
     """
-    for text in segments:
-        with suppress(ValueError, TypeError, AttributeError):  # a bag may hold anything
-            base = parse_yaml(text).get("base")
-            base = {"point": base} if base == "nadir" else base
-            if isinstance(base, dict) and "point" in base:
-                axis = np.array(base.get("axis", Z), dtype=np.float64)
-                direction_norm(axis, "axis")
-                return axis
-    return None
+    log, m = flight.log, flight.log.axes
+    if log.measured is None:
+        return None
+    axes = {f"navigation_{name}": index for name, index in flight.error_columns.items()}
+    if flight.controls_base:
+        axes = {"navigation_attitude_angle": slice(m, m + 3), **axes}
+
+    def values(start: int, stop: int) -> Array:
+        error = joined_error(log.rows(start, stop), flight.attitude_errors(start, stop))
+        known = log.assumed_error
+        seen = np.full_like(error, np.nan) if known is None else known[start:stop]
+        turned = np.full((stop - start, 3), np.nan)
+        if (rows := np.isfinite(seen).all(axis=1)).any():
+            assumed, true = (quaternions_of(-e[rows, :3]) for e in (seen, error))
+            turned[rows] = np.degrees(rotation_vectors(relative_attitude(assumed, true)))
+        return np.hstack([seen - error, turned])
+
+    return Series(axes, values, "no telemetry was recorded")
 
 
-def pointing_of(log: FlightLog) -> tuple[list[str], str]:
-    """Return segments and start of a log's mission, see `PointingBudget.of`, as far as it tells."""
-    scenario = log.flight.get("scenario")
-    mission = scenario.get("mission") if isinstance(scenario, dict) else None
-    if not isinstance(mission, dict):
-        return [], ""
-    segments = mission.get("segments")
-    texts = [str(text) for text in segments] if isinstance(segments, list) else []
-    return texts, str(mission.get("base_point") or "")
+POSE = "of the end effector, true less desired"
 
 
-def pointing_error(log: FlightLog, robot: Robot, start: Array | None = None) -> PointingError:
-    """Compute the error of the tool's pose at every tick of a flight of ``robot``.
+@series(
+    "end effector",
+    {
+        "boresight": Quantity("arcsec", f"direction of the z axis {POSE}", ALL),
+        "tool_attitude": Quantity("arcsec", f"rotation {POSE}", ALL),
+        "tool_position": Quantity(
+            "m", f"position {POSE}, the base at its true position in both", ALL
+        ),
+        "base_drift": Quantity(
+            "m", "of the base's centre of mass from where it began; nothing holds it", ALL
+        ),
+    },
+)
+def end_effector(flight: AnalysedLog) -> Series:
+    """Return the error of the tool's pose; joints without motors are to rest on their springs."""
+    log, robot = flight.log, flight.robot
+    rest = np.array([[spring.rest for spring in robot.springs]])
 
-    Joints without motors are desired to be at rest where their springs hold them.
-    ``start``: (1, 3) m, where the base was when the flight began (None: at the first tick here).
-    """
-    start = log.base_position[:1] if start is None else start
-    actual, place = tool_pose(robot, unit_rows(log.quaternion), log.all_positions)
-    rest = np.broadcast_to([spring.rest for spring in robot.springs], log.passive_positions.shape)
-    joints = np.hstack([log.reference_joints[:, 0], rest])
-    desired, wanted = tool_pose(robot, unit_rows(log.reference_base[:, :4]), joints)
-    return PointingError(
-        boresight=angle_between(actual[:, :, 2], desired[:, :, 2]),
-        rotation=rotation_angle(actual, desired),
-        position=np.linalg.norm(place - wanted, axis=1),
-        base_drift=np.linalg.norm(log.base_position - start, axis=1),
-    )
+    def values(start: int, stop: int) -> Array:
+        rows = log.rows(start, stop)
+        actual, place = tool_pose(robot, unit_rows(rows.quaternion), rows.all_positions)
+        passive = np.broadcast_to(rest, rows.passive_positions.shape)
+        joints = np.hstack([rows.reference_joints[:, 0], passive])
+        desired, wanted = tool_pose(robot, unit_rows(rows.reference_base[:, :4]), joints)
+        return np.column_stack(
+            [
+                angle_between(actual[:, :, 2], desired[:, :, 2]) / ARCSEC,
+                rotation_angle(actual, desired) / ARCSEC,
+                norms(place - wanted),
+                norms(rows.base_position - log.base_position[0]),
+            ]
+        )
+
+    names = ("boresight", "tool_attitude", "tool_position", "base_drift")
+    return Series({name: [k] for k, name in enumerate(names)}, values)
 
 
 def angle_between(first: Array, second: Array) -> Array:

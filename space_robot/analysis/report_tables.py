@@ -6,67 +6,18 @@ from collections.abc import Mapping, Sequence
 from itertools import groupby
 from typing import Any
 
-from ..console.tables import Column, Group, Table
+import numpy as np
+
+from ..console.tables import NONE, Column, Group, Table
 from .described import IDEAL
-from .metrics import unit_of
-from .report_lines import OF_BASE, Line, lines, named, with_angles
-from .settling import BAND
+from .measure import GROUPS, column_unit, describe, group_of
 from .words import Report, analyzed, flown, law_of, notes, remarks, seen_through
 
-DEFINITIONS = {
-    "RMS, mean of axes": "mean over a column's axes of each axis' root mean square: what Table V "
-    "of the paper holds",
-    "RMS, eq. (64)": "a third of the root mean square of the vector: what the paper defines",
-    "maximum": "largest absolute value on any axis of the column",
-    "attitude drift": "angle by which the base has turned from where it was at the first tick, of "
-    "a flight in which nothing turns it",
-    "navigation error": "true attitude and joints less those that the law assumed, at the "
-    "ticks of its telemetry: RMS, mean of axes",
-    "variation per s": "how far the torque moves up and down in a second, mean over the axes",
-    "power > 100 Hz": "share of the torque's power above 100 Hz, mean over the axes: chatter",
-    "ripple": "root mean square, above 2 Hz, of the torque beside the one that inverse dynamics "
-    "asks for along the reference, mean over the axes: limit cycles, noise and switching",
-    "ripple's peak": "frequency at which the ripple's spectrum is highest, and the root mean "
-    "square of what is within 0.5 Hz of it",
-    "settled after": "time from the last waypoint after which the error stays to the end within "
-    f"{BAND:g} rad or m on joints, and 4.1 arcsec of the attitude's error on each axis",
-    "saturation": "ticks at which a torque was at the actuator's limit; of each wheel those at its "
-    "largest torque and at its largest momentum",
-    "latency": "from a state's sending to its command's, by the wall clock; in brackets in ticks",
-    "commands": "ticks without an answer, and ticks after which the plant applied another torque "
-    "than was commanded for them",
-    "estimate error": "error N - N_hat of the time-delay estimate, from recorded motion and "
-    "torque; on the base in units of the generalised force of eps_e, about twice the torque",
-    OF_BASE[0]: "angle between the true and the desired direction of the base's axis that points "
-    "(of the mission's first pointing segment, else z); band and window: base_pointing in JSON; "
-    "jitter is the difference from the mean in a window",
-    OF_BASE[1]: "the base's rotation about that axis from the desired attitude",
-    OF_BASE[2]: "angle of the one rotation between the base's desired and true attitude",
-    "pointing": "angle between the measured and the desired direction of the end effector's z "
-    "axis in the inertial frame",
-    "rotation": "angle of the one rotation between the end effector's desired and measured frame",
-    "tool position": "distance from the desired position, the base at its measured position",
-    "base's drift": "of the base's centre of mass from where it began; nothing holds it",
-    "tool on its path": "distance and rotation of the end effector from the path that the mission "
-    "leads along, on inertial axes; the path moves with the common centre of mass, where drag, "
-    "thrusters or a captured target move that, which is its drift",
-    "momentum": "largest angular momentum about the common centre of mass: of the robot with "
-    "its wheels locked, of its base in that, of the wheels' spin, and what came from outside; and "
-    "how far robot and wheels together drifted from what is conserved",
-    "disturbance torque": "in orbit, of each source about the common centre of mass: RMS, largest, "
-    "and the impulse, the largest angular momentum that it has given since the first tick",
-    "deflection": "of joints with gears, motor angle less link angle",
-    "pushed by thrusters": "of the centre of mass of the whole robot, from where it was at the "
-    "first tick",
-    "asked of the base": "largest torque commanded on each axis of the base, and the largest "
-    "momentum that wheels have to hold for it",
-    "own metric": "what a function of your own returned for the flight",
-    "recording": "what is missing of the flight or was found wrong with the bag",
-}
-"""The meaning of each group of metrics, for someone who sees it for the first time."""
-
+TABLE_V = ("rms", "rms_eq64", "variation", "chatter", "ripple")
+"""Statistics of the table of RMS."""
 WIDE = 1e4
 """Torque from which on all torques of a table are written with exponents: of diverged flights."""
+OWN = "own metrics"
 
 
 def rms_table(report: Report) -> Table:
@@ -74,43 +25,64 @@ def rms_table(report: Report) -> Table:
 
     Where the truth was recorded, the navigation error stands in the place of (64).
     """
-    report = with_angles(report)
+    metrics = report["metrics"]
     title = f"{flown(report)}: {analyzed(report)}"
     if report["truth_recorded"]:
         title += f"\n{seen_through(report)}"
-    navigation = report["navigation_error"]
+    names = table_v_columns(metrics)
+    beside = {name: metrics[f"{name}.rms_eq64"] for name in names}
+    seen = {name: metrics.get(f"navigation_{name}.rms", "") for name in names}
+    is_seen = any(value != "" for value in seen.values())
     columns = (
         Column(is_label=True),
         Column("unit"),
         Column("RMS, mean\nof axes"),
-        Column("naviga-\ntion RMS" if navigation else "RMS, eq.\n(64)"),
+        Column("naviga-\ntion RMS" if is_seen else "RMS, eq.\n(64)"),
         Column("variation\nper s", spec=".3g"),
         Column("power >\n100 Hz", spec=".2e"),
         Column("ripple", spec=".2e"),
     )
-    beside = report["rms"]["eq64"]
-    if navigation:
-        beside = dict.fromkeys(beside, "") | navigation["rms"]
-    rough = *report["chatter"].values(), (report["ripple"] or {}).get("rms", {})
+    torques = {name for name in names if column_unit(name).startswith("N")}
+    is_wide = any(metrics[f"{name}.rms"] >= WIDE for name in torques)
     rows: list[list[Any]] = []
-    of_axes: dict[str, float] = report["rms"]["mean_axis"]
-    torques = {key for key in of_axes if unit_of(key).startswith("N")}
-    is_wide = any(of_axes[key] >= WIDE for key in torques)
-    for key, value in of_axes.items():
-        has_exponent = is_wide or key not in torques
-        rms = _rms(value, has_exponent), beside[key] and _rms(beside[key], has_exponent)
-        rows.append([named(key), unit_of(key), *rms, *(measure.get(key, "") for measure in rough)])
+    for name in names:
+        spec = ".3e" if is_wide or name not in torques else ".4f"
+        second = seen[name] if is_seen else beside[name]
+        rms = [
+            value if value == "" else format(value, spec)
+            for value in (metrics[f"{name}.rms"], second)
+        ]
+        rough = (metrics.get(f"{name}.{key}", "") for key in ("variation", "chatter", "ripple"))
+        rows.append([short_name(name), column_unit(name), *rms, *rough])
     return Table(title, columns, [Group(rows)], remarks(report))
 
 
-def _rms(value: float, has_exponent: bool) -> str:
-    return f"{value:.3e}" if has_exponent else f"{value:.4f}"
+def table_v_columns(metrics: Mapping[str, float]) -> list[str]:
+    """Return the columns of errors and torques of Table V; of the attitude that of its angles."""
+    columns = [name.removesuffix(".rms_eq64") for name in metrics if name.endswith(".rms_eq64")]
+    return [name for name in columns if describe(f"{name}.rms").is_shown]
+
+
+def short_name(column: str) -> str:
+    """Return the name of a column that has its unit elsewhere."""
+    return column.removesuffix("_angle")
 
 
 def metrics_table(report: Report) -> Table:
     """Tabulate what `rms_table` leaves out; below stands why a metric is missing."""
     columns = Column(is_label=True), Column()
-    return Table("further metrics", columns, _groups(lines([report], brief=True)), notes(report))
+    shown = [
+        name
+        for name in shown_names([report])
+        if not name.endswith(tuple(f".{key}" for key in TABLE_V))
+        or not _is_of_table_v(name, report)
+    ]
+    return Table(
+        "further metrics",
+        columns,
+        [*_groups([report], shown), *_recording([report])],
+        notes(report),
+    )
 
 
 def comparison_table(reports: Mapping[str, Report]) -> Table:
@@ -127,18 +99,76 @@ def comparison_table(reports: Mapping[str, Report]) -> Table:
     if any(report["ticks"] < report["flight_ticks"] for report in each):
         flights.append(["share analyzed", *(f"{r['ticks'] / r['flight_ticks']:.1%}" for r in each)])
     columns = Column(is_label=True), *(Column(name) for name in reports)
-    return Table("", columns, [Group(flights, "flight"), *_groups(lines(each))])
+    groups = _groups(each, shown_names(each))
+    return Table("", columns, [Group(flights, "flight"), *groups, *_asked(each), *_recording(each)])
 
 
-def _groups(shown: Sequence[Line]) -> list[Group]:
-    return [
-        Group(
-            [[f"{x.name} ({x.unit})" if x.unit else x.name, *x.texts] for x in lines],
-            name,
-            DEFINITIONS[name],
-        )
-        for name, lines in groupby(shown, key=lambda line: line.group)
+def shown_names(reports: Sequence[Report]) -> list[str]:
+    """Return the metrics of any report that tables show, in the registry's order."""
+    order = list(dict.fromkeys(group.title for group in GROUPS.values()))
+    names = dict.fromkeys(name for report in reports for name in report["metrics"])
+    shown = [name for name in names if describe(name).is_shown]
+    return sorted(shown, key=lambda name: [*order, OWN].index(title_of(name)))
+
+
+def title_of(name: str) -> str:
+    """Return the title of a metric's group."""
+    group = group_of(name)
+    return group.title if group else OWN
+
+
+def text_of(name: str, value: float) -> str:
+    """Write the number of a metric as a table shows it."""
+    unit = describe(name).unit
+    if not np.isfinite(value):
+        return "never" if unit == "s" else str(value)
+    if unit == "arcsec" and value >= 3600.0:
+        return f"{value / 3600.0:.3g} deg"
+    return f"{value:.4g}"
+
+
+def _groups(reports: Sequence[Report], names: Sequence[str]) -> list[Group]:
+    """Return a row for each name, in groups by title; a group's note has the meanings."""
+    groups = []
+    for title, own in groupby(names, key=title_of):
+        rows, meanings = [], dict[str, None]()
+        for name in own:
+            unit, text, *_ = describe(name)
+            values = [report["metrics"].get(name) for report in reports]
+            texts = [NONE if value is None else text_of(name, value) for value in values]
+            rows.append([f"{name} ({unit})" if unit.strip("-") else name, *texts])
+            meanings |= {f"{name.rpartition('.')[2] or name}: {text}": None} if text else {}
+        groups.append(Group(rows, title, "; ".join(meanings)))
+    return groups
+
+
+def _is_of_table_v(name: str, report: Report) -> bool:
+    return name.rpartition(".")[0] in table_v_columns(report["metrics"])
+
+
+def _asked(reports: Sequence[Report]) -> list[Group]:
+    """Return what was asked of each axis of the base."""
+    rows = []
+    axes = dict.fromkeys(axis for r in reports if r["sizing"] for axis in r["sizing"]["axes"])
+    for key, name in (
+        ("peak_torque_n_m", "torque (N m)"),
+        ("peak_momentum_n_m_s", "momentum (N m s)"),
+    ):
+        for axis in axes:
+            each = [r["sizing"]["axes"][axis][key] if r["sizing"] else None for r in reports]
+            rows.append([f"{axis} {name}", *(NONE if v is None else f"{v:.4g}" for v in each)])
+    note = "largest torque commanded, and momentum that wheels have to hold for it"
+    return [Group(rows, "asked of the base", note)] if rows else []
+
+
+def _recording(reports: Sequence[Report]) -> list[Group]:
+    rows = [
+        ["messages lost", *(str(sum(r["lost"].values())) for r in reports)],
+        ["states filled in", *(str(r["filled_ticks"]) for r in reports)],
+        ["finished", *("no" if r["unfinished"] else "yes" for r in reports)],
+        ["damage found", *(str(len(r["damage"])) for r in reports)],
     ]
+    return [Group(rows, "recording", "what is missing of the flight or is wrong with the bag")]
 
 
 def _errors_of(report: Report) -> str:

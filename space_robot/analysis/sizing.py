@@ -1,4 +1,9 @@
-"""Sizing: what a flight asks of its base, and whether a set of actuators has it."""
+"""Sizing: what a flight asks of its base, and whether a set of actuators has it.
+
+Wheels that turn the base by a torque ``tau`` take up what they give: their momentum on inertial
+axes falls by ``integral R tau dt`` whatever does the turning in this flight. So an ideal torque
+tells what wheels would hold.
+"""
 
 from __future__ import annotations
 
@@ -8,15 +13,18 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from space_robot_model.elementary.matrices import product
 from space_robot_model.hardware.base_actuators import BaseActuatorSettings
 from space_robot_model.hardware.capability import largest_momentum, largest_torque
-from space_robot_msgs_py.bag.flight_log import FlightLog, Metric
+from space_robot_model.robot.placements import to_base, to_inertial
+from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.topics import BASE_AXES
 
-from .base_demand import BaseDemand
-from .loads import Load, LoadRequirement, OtherThrusterLoad, OtherWheelLoad, ThrusterLoad, WheelLoad
-from .metrics import AxisMaximum, AxisRms
+from .analysed_log import AnalysedLog
+from .described import actuators_of
+from .external_torques import axes_of
+from .loads import Demand, Load, LoadRequirement, ThrusterLoad, loads_on
 
 Array = NDArray[np.float64]
 
@@ -29,97 +37,126 @@ class ActuatorSet(NamedTuple):
     settings: BaseActuatorSettings
 
 
-class Sizing(Metric):
-    """Sums up what is asked of each axis of the base, and of each part of a set of actuators."""
+def sizing(flight: AnalysedLog, other: ActuatorSet | None = None) -> dict[str, Any]:
+    """Return the demand on each axis, and whether the parts of a set have what is asked of them.
 
-    def __init__(
-        self, log: FlightLog, flown: ActuatorSet, other: ActuatorSet | None = None
-    ) -> None:
-        """Begin without rows.
+    ``requirements`` is empty where there is no set; ``has`` is None where it has no limit.
 
-        Args:
-            log: the first rows.
-            flown: what turned the base.
-            other: what is asked after in its place.
+    Args:
+        flight: that was flown.
+        other: actuators to ask about in the place of those that flew.
 
-        Raises:
-            InputError: the base floated freely.
-        """
-        if not flown.settings.controls_base:
-            raise InputError("the base floated freely: nothing was asked of it")
-        self._period, self._is_flown = log.timebase.period, other is None
-        self._name, self._set = other or flown
-        self._demand = BaseDemand(flown.settings)
-        self._rms, self._torque, self._momentum = AxisRms(3), AxisMaximum(3), AxisMaximum(3)
-        self._impulse, self._largest = np.zeros(3), 0.0
-        wheels, thrusters = self._set.wheels, self._set.thrusters
-        self._thrusters: ThrusterLoad | None = None
-        self._loads: list[Load] = []
-        if wheels.count:
-            self._loads.append((WheelLoad if self._is_flown else OtherWheelLoad)(wheels))
-        if thrusters.count:
-            kind = ThrusterLoad if self._is_flown else OtherThrusterLoad
-            self._thrusters = kind(thrusters, not wheels.count)
-            self._loads.append(self._thrusters)
-
-    def add(self, log: FlightLog, error: Array) -> None:
-        """Take further rows."""
-        demand = self._demand.add(log)
-        self._rms.add(demand.torque)
-        self._torque.add(demand.torque)
-        self._momentum.add(demand.momentum)
-        self._impulse += self._period * np.sum(np.abs(demand.torque), axis=0)
-        self._largest = max(self._largest, float(np.linalg.norm(demand.momentum, axis=1).max()))
-        for load in self._loads:
-            load.add(log, demand)
-
-    def result(self) -> dict[str, Any]:
-        """Return the demand by axis, and whether the parts of the set have what is asked of them.
-
-        ``requirements`` is empty where there is no set; ``has`` is None where it has no limit.
-        """
-        pulses = self._thrusters.pulses() if self._thrusters else None
-        propellant = self._thrusters.propellant(self._period) if self._thrusters else None
-        return {
-            "actuators": self._name,
-            "flown": self._is_flown,
-            "axes": {
-                axis: {
-                    "peak_torque_n_m": float(self._torque.value[i]),
-                    "rms_torque_n_m": float(self._rms.value[i]),
-                    "angular_impulse_n_m_s": float(self._impulse[i]),
-                    "peak_momentum_n_m_s": float(self._momentum.value[i]),
-                    "pulses": None if pulses is None else int(pulses[i]),
-                    "propellant_kg": None if propellant is None else float(propellant[i]),
-                }
-                for i, axis in enumerate(BASE_AXES)
-            },
-            "peak_momentum_n_m_s": self._largest,
-            "requirements": [_as_data(requirement) for requirement in self._requirements()],
-        }
-
-    def _requirements(self) -> Iterator[LoadRequirement]:
-        if not self._loads:
-            return
-        torque = largest_torque(self._set)
-        for i, axis in enumerate(BASE_AXES):
-            asked = float(self._torque.value[i])
-            yield LoadRequirement(axis, "peak torque", "N m", asked, float(torque[i]))
-        if self._set.wheel_count:
-            momentum = largest_momentum(self._set.wheels)
-            for i, axis in enumerate(BASE_AXES):
-                asked = float(self._momentum.value[i])
-                yield LoadRequirement(axis, "stored momentum", "N m s", asked, float(momentum[i]))
-        for load in self._loads:
-            yield from load.requirements(self._period)
-
-
-def _as_data(requirement: LoadRequirement) -> dict[str, Any]:
-    has = requirement.has if np.isfinite(requirement.has) else None
+    Raises:
+        InputError: the base floated freely, or what turned it is not known.
+    """
+    log, flown = flight.log, flight.actuators
+    if not flown.controls_base:
+        raise InputError("the base floated freely: nothing was asked of it")
+    name, asked = other or ActuatorSet(actuators_of(log), flown)
+    loads = loads_on(asked, log, is_flown=other is None)
+    demands, squares = BaseDemand(log, flown), np.zeros(3)
+    torque, momentum, impulse, largest = np.zeros(3), np.zeros(3), np.zeros(3), 0.0
+    period = log.timebase.period
+    for start, stop in flight.blocks():
+        demand = demands.of(start, stop)
+        squares += np.einsum("ij,ij->j", demand.torque, demand.torque)
+        torque = np.maximum(torque, np.abs(demand.torque).max(axis=0))
+        momentum = np.maximum(momentum, np.abs(demand.momentum).max(axis=0))
+        impulse += period * np.sum(np.abs(demand.torque), axis=0)
+        largest = max(largest, float(np.linalg.norm(demand.momentum, axis=1).max()))
+        for load in loads:
+            load.add(start, stop, demand)
+    thrusters = next((load for load in loads if isinstance(load, ThrusterLoad)), None)
+    pulses = thrusters and thrusters.pulses()
+    propellant = thrusters and thrusters.propellant(period)
+    requirements = _requirements(asked, torque, momentum, loads, period)
     return {
-        **requirement._asdict(),
-        "has": has,
-        "margin": requirement.margin,
-        "is_met": requirement.is_met,
-        "is_at_limit": requirement.is_at_limit,
+        "actuators": name,
+        "flown": other is None,
+        "axes": {
+            axis: {
+                "peak_torque_n_m": float(torque[i]),
+                "rms_torque_n_m": float(np.sqrt(squares[i] / log.ticks)),
+                "angular_impulse_n_m_s": float(impulse[i]),
+                "peak_momentum_n_m_s": float(momentum[i]),
+                "pulses": None if pulses is None else int(pulses[i]),
+                "propellant_kg": None if propellant is None else float(propellant[i]),
+            }
+            for i, axis in enumerate(BASE_AXES)
+        },
+        "peak_momentum_n_m_s": largest,
+        "requirements": [requirement.as_data() for requirement in requirements],
     }
+
+
+def _requirements(
+    asked: BaseActuatorSettings, torque: Array, momentum: Array, loads: list[Load], period: float
+) -> Iterator[LoadRequirement]:
+    if not loads:
+        return
+    by_axis = [("peak torque", "N m", torque, largest_torque(asked))]
+    if asked.wheel_count:
+        held = largest_momentum(asked.wheels)
+        by_axis.append(("stored momentum", "N m s", momentum, held))
+    for quantity, unit, values, limits in by_axis:
+        for axis, value, limit in zip(BASE_AXES, values.tolist(), limits, strict=True):
+            yield LoadRequirement(axis, quantity, unit, value, float(limit))
+    for load in loads:
+        yield from load.requirements(period)
+
+
+class BaseDemand:
+    """Computes the demand on the base, of rows that are asked for in their order."""
+
+    def __init__(self, log: FlightLog, flown: BaseActuatorSettings) -> None:
+        """``flown``: what turned the base; the momentum of its wheels is known."""
+        self._log, self._flown = log, flown
+        self._taken: Array = np.zeros((3, 1))
+        """N m s, inertial axes: what the base was given so far."""
+
+    def of(self, start: int, stop: int) -> Demand:
+        """Return the demand of the rows from ``start`` to before ``stop``."""
+        torque = self._asked(start, stop)
+        if self._flown.wheel_count:
+            momentum = self._held(start, stop)
+        else:
+            momentum = self._given(start, stop, torque)
+        return Demand(torque, momentum, self._log.omega_base[start:stop])
+
+    def _asked(self, start: int, stop: int) -> Array:
+        """Return the torque commanded for the interval before each row, or else the one given."""
+        torque = self._log.applied_torque[start:stop, :3]
+        if self._log.commanded_torque is None:
+            return torque
+        commands = self._log.commanded_torque[max(start - 1, 0) : stop - 1, :3]
+        if start == 0:
+            commands = np.concatenate([np.full((1, 3), np.nan), commands])
+        return np.where(np.isfinite(commands), commands, torque)
+
+    def _given(self, start: int, stop: int, torque: Array) -> Array:
+        """Return what the wheels must have taken up, by the mean of an interval's two attitudes."""
+        axes = axes_of(self._log.rows(max(start - 1, 0), stop))
+        before = axes[:, :, :-1]
+        if start == 0:
+            before = np.concatenate([axes[:, :, :1], before], axis=2)
+        else:
+            axes = axes[:, :, 1:]
+        impulse = self._log.timebase.period * to_inertial(0.5 * (axes + before), torque.T)
+        if start == 0:  # the interval before the first row is not of this flight
+            impulse[:, 0] = 0.0
+        taken = self._taken + np.cumsum(impulse, axis=1)
+        self._taken = taken[:, -1:].copy()
+        return -to_base(axes, taken).T
+
+    def _held(self, start: int, stop: int) -> Array:
+        """Return what the flight's own wheels hold beyond what they held at its first row."""
+        wheels = self._flown.wheels
+        rows = self._log.rows(start, stop)
+        held, axes = (
+            product(wheels.spin_momenta(rows.wheel_velocities), wheels.unit_axes),
+            axes_of(rows),
+        )
+        if start == 0:
+            self._taken = to_inertial(axes[:, :, :1], held[:1].T)
+        at_first = to_base(axes, np.broadcast_to(self._taken, (3, len(held)))).T
+        return held - at_first

@@ -78,7 +78,7 @@ def _title(sizing: dict[str, Any]) -> str:
 
 def _notes(report: Report) -> list[str]:
     sizing, notes = report["sizing"], []
-    if (report["wheel_saturation"] or {}).get("ticks"):
+    if report["metrics"].get("wheels.saturation"):
         notes.append(
             "wheels were at their limits: what the law then asked for is not what the mission "
             "asks; fly ideal actuators for that"

@@ -1,4 +1,4 @@
-"""Waypoints between the segments of a mission, detected in the reference."""
+"""Waypoints between the segments of a mission, detected in the reference, and settling there."""
 
 from __future__ import annotations
 
@@ -8,6 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from space_robot_msgs_py.bag.flight_log import FlightLog
+from space_robot_msgs_py.errors import InputError
+
+from .analysed_log import AnalysedLog
+from .errors import joined_error
+from .series import Quantity, metrics
 
 Array = NDArray[np.float64]
 
@@ -15,91 +20,77 @@ SLOW = 1e-4
 """Share of the highest desired speed so far below which a waypoint is near."""
 AT_REST = 1e-9
 """Share of the highest desired speed so far that is no motion."""
+BAND = 1e-5
+"""Largest |error| that counts as settled: rad or m on a joint; on eps, which is 4.1 arcsec."""
+SHORTEST_WATCH = 0.1
+"""s of flight after a waypoint without which nothing can be said of settling there."""
 
 
-class Waypoints:
-    """Finds the rows at which all desired joint velocities vanish, in a reference in parts.
+def reference_speed(log: FlightLog) -> Array:
+    """(N,) rad/s, the highest desired velocity of any joint."""
+    return reduce(np.maximum, (np.abs(column) for column in log.reference_joints[:, 1].T))
 
-    Slow is what is slow beside all that came before, so that no row has to be looked at twice.
+
+def waypoint_ticks(log: FlightLog, speed: Array | None = None) -> NDArray[np.intp]:
+    """Return the rows at which all desired joint velocities vanish; both ends of a longer rest.
+
+    Where none is exactly 0 at a tick, the slowest one counts. Of an arm that never moves it is the
+    first row. ``speed``: see `reference_speed` (None: computed here).
     """
-
-    def __init__(self) -> None:
-        self.rows = 0
-        """Rows so far."""
-        self.highest = 0.0
-        """The highest desired speed so far, rad/s."""
-        self._found: list[int] = []
-        self._near: _Near | None = None
-        """The slow stretch that the last row belongs to."""
-
-    def add(self, reference_joints: Array) -> None:
-        """Take further rows (N, 3, n)."""
-        if not len(reference_joints):
-            return
-        speed = reduce(np.maximum, np.abs(reference_joints[:, 1].T))
-        highest = np.fmax.accumulate(np.concatenate([[self.highest], speed]))[1:]
-        slow, rests = speed <= SLOW * highest, speed <= AT_REST * highest
-        edges = np.flatnonzero(np.diff(slow.astype(np.int8), prepend=0, append=0))
-        if not slow[0]:
-            self._leave()
-        for begin, end in zip(edges[::2], edges[1::2], strict=True):
-            self._near = self._near or _Near()
-            self._near.add(speed[begin:end], rests[begin:end], self.rows + int(begin))
-            if end < len(speed):
-                self._leave()
-        self.rows += len(speed)
-        self.highest = float(highest[-1])
-
-    def found(self) -> NDArray[np.intp]:
-        """Their rows, rising; both ends of a longer rest.
-
-        The waypoint of a segment whose end has not come is not among them.
-        """
-        now = self._near.waypoints if self._near else []
-        return np.unique(np.array([*self._found, *now], dtype=np.intp))  # there may be none
-
-    def forget_before(self, row: int) -> None:
-        """Keep of the waypoints up to ``row`` only the last."""
-        passed = [k for k in self._found if k <= row]
-        self._found = [*passed[-1:], *self._found[len(passed) :]]
-
-    def _leave(self) -> None:
-        if self._near:
-            self._found += self._near.waypoints
-            self._near = None
-
-
-class _Near:
-    """A stretch of slow rows."""
-
-    def __init__(self) -> None:
-        self._resting: tuple[int, int] | None = None
-        self._slowest, self._slowest_row = np.inf, -1
-
-    def add(self, speed: Array, rests: NDArray[np.bool_], row: int) -> None:
-        """Take further rows, of which ``row`` is the first."""
-        resting = np.flatnonzero(rests)
-        if len(resting):
-            first = self._resting[0] if self._resting else row + int(resting[0])
-            self._resting = first, row + int(resting[-1])
-        slowest = int(np.argmin(speed))
-        if speed[slowest] < self._slowest:
-            self._slowest, self._slowest_row = float(speed[slowest]), row + slowest
-
-    @property
-    def waypoints(self) -> list[int]:
-        """Both ends of the rest, or the slowest row where the waypoint lies between two ticks."""
-        return list(self._resting or (self._slowest_row,))
-
-
-def waypoint_ticks(log: FlightLog) -> NDArray[np.intp]:
-    """`Waypoints` of a whole log; of an arm that never moves the first row alone."""
-    waypoints = Waypoints()
-    waypoints.add(log.reference_joints)
-    return waypoints.found() if waypoints.highest > 0.0 else np.array([0])
+    speed = reference_speed(log) if speed is None else speed
+    highest = np.fmax.accumulate(speed)
+    if not len(speed) or not highest[-1] > 0.0:
+        return np.array([0])
+    slow, rests = speed <= SLOW * highest, speed <= AT_REST * highest
+    edges = np.flatnonzero(np.diff(slow.astype(np.int8), prepend=0, append=0))
+    waypoints: list[int] = []
+    for begin, end in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
+        resting = begin + np.flatnonzero(rests[begin:end])
+        slowest = begin + int(np.argmin(speed[begin:end]))
+        waypoints += [int(resting[0]), int(resting[-1])] if len(resting) else [slowest]
+    return np.unique(np.array(waypoints, dtype=np.intp))
 
 
 def junction_ticks(log: FlightLog) -> NDArray[np.intp]:
     """Waypoints inside the flight, where a motion has ended and another begins."""
     ticks = waypoint_ticks(log)
     return ticks[(ticks > 0) & (ticks < log.ticks - 1)]
+
+
+@metrics(
+    "settling",
+    {
+        "{error}.settling": Quantity(
+            "s",
+            "time from the last waypoint after which the error stays to the end within "
+            f"{BAND:g} rad or m on joints, and 4.1 arcsec of the attitude's error on each axis",
+        ),
+        "settling.after": Quantity("s", "time of the waypoint from which settling counts"),
+    },
+)
+def settling(flight: AnalysedLog) -> dict[str, float]:
+    """Compute the time from which each error column stays in `BAND`; inf: outside at the end.
+
+    As in control engineering (e.g. Ogata, Modern Control Engineering, 5-3), with a band in
+    absolute terms: a tracking error has no final value to take a share of. The last waypoint of the
+    paper's mission is its last tick, so that the one at 15 s is taken.
+    """
+    log, period = flight.log, flight.log.timebase.period
+    rows = waypoint_ticks(log)
+    watched = rows[rows <= log.ticks - round(SHORTEST_WATCH / period)]
+    if not len(watched):
+        raise InputError("the arm does not come to rest with flight left after it")
+    waypoint = int(watched[-1])
+    last = dict.fromkeys(flight.error_columns, waypoint - 1)
+    for start, stop in flight.blocks():
+        error = joined_error(log.rows(start, stop), flight.attitude_errors(start, stop))
+        for name, axes in flight.error_columns.items():
+            outside = np.abs(error[:, axes]).max(axis=1) > BAND
+            if outside.any():
+                row = start + len(outside) - 1 - int(np.argmax(outside[::-1]))
+                last[name] = max(last[name], row)
+    numbers = {"settling.after": (log.first_tick + waypoint) * period}
+    for name, row in last.items():
+        is_settled = row < log.ticks - 1
+        numbers[f"{name}.settling"] = (row + 1 - waypoint) * period if is_settled else np.inf
+    return numbers

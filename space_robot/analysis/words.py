@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import Any
 
@@ -9,10 +10,11 @@ from space_robot_control.controller.law_choice import NoLaw
 from space_robot_msgs_py.bag.law_history import in_words
 
 from ..flight.start_step import sentence
-from .attitude_drift import FREE
-from .metrics import unit_of
+from .errors import FREE
+from .measure import column_unit
 
 Report = dict[str, Any]
+Metrics = Mapping[str, float]
 
 FASTEST_CYCLE = 100.0
 """Hz; faster is chatter, which has a column of its own."""
@@ -74,19 +76,22 @@ def remarks(report: Report) -> list[str]:
         remarks.append(f"events: {', '.join(report['events'])}")
     if disturbance := report.get("disturbance"):
         remarks.append(f"disturbance of the user's own, unknown to the law: {disturbance}")
+    metrics = report["metrics"]
     remarks += [
-        f"{event} did not happen: the target was {distance:.3g} m from where the tool holds it"
-        for event, distance in (report["missed_captures"] or {}).items()
+        f"{name.removeprefix('missed.')} did not happen: the target was {distance:.3g} m from "
+        "where the tool holds it"
+        for name, distance in metrics.items()
+        if name.startswith("missed.")
     ]
-    if drift := report["attitude_drift"]:
+    if "attitude_drift.max" in metrics:
+        most, end = (math.degrees(metrics[f"attitude_drift.{key}"]) for key in ("max", "end"))
         remarks.append(
-            f"{FREE}: its attitude is no error but drift, {drift['max_deg']:.4g} deg at most and "
-            f"{drift['end_deg']:.4g} deg at the end, which pointing includes"
+            f"{FREE}: its attitude is no error but drift, {most:.4g} deg at most and "
+            f"{end:.4g} deg at the end, which pointing includes"
         )
-    remarks += _pointing(report["base_pointing"])
-    if full := report["wheel_saturation"]:
-        remarks += _saturated_wheels(full)
-    remarks += [*_limit_cycles(report), *_standing_joints(report), *_beyond_limits(report)]
+    remarks += _pointing(report["pointing"], metrics)
+    remarks += _saturated_wheels(metrics)
+    remarks += [*_limit_cycles(metrics), *_standing_joints(metrics), *_beyond_limits(metrics)]
     remarks += [text for text in (report["unfinished"], *report["damage"]) if text]
     if report["unanswered_ticks"]:
         remarks.append(f"ticks that no command was recorded for: {report['unanswered_ticks']}")
@@ -97,72 +102,79 @@ def remarks(report: Report) -> list[str]:
     return remarks
 
 
-def _pointing(base: dict[str, Any] | None) -> list[str]:
+def _pointing(base: dict[str, Any] | None, metrics: Metrics) -> list[str]:
     """Say how well a base points whose mission points it."""
     if not base or not base["points"]:
         return []
-    cone, about = base["half_cone_arcsec"], base["about_arcsec"]
-    jitter = cone["jitter_rms"]
+    jitter = metrics.get("half_cone.jitter_rms")
     within = "" if jitter is None else f", jitter {jitter:.3g} within {base['window_s']:g} s"
     return [
-        f"the base points: half cone from the reference {cone['rms']:.3g} arcsec RMS, "
-        f"{cone['max']:.3g} at most"
-        f"{within}; about the axis {about['rms']:.3g} RMS, {about['max']:.3g} at most"
+        f"the base points: half cone from the reference {metrics['half_cone.rms']:.3g} arcsec RMS, "
+        f"{metrics['half_cone.max']:.3g} at most{within}; about the axis "
+        f"{metrics['about_axis.rms']:.3g} RMS, {metrics['about_axis.max']:.3g} at most"
     ]
 
 
-def _saturated_wheels(saturation: dict[str, Any]) -> list[str]:
+def _saturated_wheels(metrics: Metrics) -> list[str]:
     """Say which wheel reached a limit first, and for how long any was at one."""
-    first = {n: w["first_s"] for n, w in saturation["wheels"].items() if w["first_s"] is not None}
+    first = of_statistic(metrics, "first_limit")
     if not first:
         return []
     name = min(first, key=lambda wheel: first[wheel])
     return [
-        f"wheels were at a limit of torque or momentum at {saturation['ticks']} ticks "
-        f"({saturation['share']:.2%}), {name} first at {first[name]:g} s"
+        "wheels were at a limit of torque or momentum at "
+        f"{metrics['wheels.saturation_ticks']:.0f} ticks "
+        f"({metrics['wheels.saturation']:.2%}), {name} first at {first[name]:g} s"
     ]
 
 
-def _limit_cycles(report: Report) -> list[str]:
+def _limit_cycles(metrics: Metrics) -> list[str]:
     """Say which torques oscillate at one frequency, by more than a share of what they do."""
     cycles = [
-        f"{name} at {peak['frequency_hz']:.3g} Hz with {peak['rms']:.2g} {unit_of(name)} RMS"
-        for name, peak in (report["ripple"] or {}).get("peak", {}).items()
-        if peak
-        and peak["frequency_hz"] <= FASTEST_CYCLE
-        and (report["ripple"]["lasting"][name] or 0.0) >= LASTING_CYCLE
-        and peak["rms"] >= PURE_CYCLE * report["ripple"]["rms"][name]
-        and peak["rms"] >= LARGE_CYCLE * report["rms"]["mean_axis"][name]
+        f"{name} at {metrics[f'{name}.ripple_peak_hz']:.3g} Hz with {peak:.2g} "
+        f"{column_unit(name)} RMS"
+        for name, peak in of_statistic(metrics, "ripple_peak").items()
+        if metrics[f"{name}.ripple_peak_hz"] <= FASTEST_CYCLE
+        and metrics.get(f"{name}.ripple_lasting", 0.0) >= LASTING_CYCLE
+        and peak >= PURE_CYCLE * metrics[f"{name}.ripple"]
+        and peak >= LARGE_CYCLE * metrics[f"{name}.rms"]
     ]
     return [f"limit cycle: {', '.join(cycles)}"] if cycles else []
 
 
-def _standing_joints(report: Report) -> list[str]:
+def _standing_joints(metrics: Metrics) -> list[str]:
     """Say which joints stood on a part of the way that they were to move."""
-    standing = report["standing"] or {}
+    standing = of_statistic(metrics, "standing")
     much = [f"{name} {share:.0%}" for name, share in standing.items() if share >= LONG_STANDING]
     if not much:
         return []
     return [f"joints that stood still on a part of the way they were to move: {', '.join(much)}"]
 
 
-def _beyond_limits(report: Report) -> list[str]:
+def _beyond_limits(metrics: Metrics) -> list[str]:
     """Say which joints were beyond which limits of their file, and at how many ticks."""
-    joints = [
-        f"{name} ({', '.join(f'{what} at {n} ticks' for what, n in ticks.items() if n)})"
-        for name, ticks in (report["beyond_limits"] or {}).items()
-        if any(ticks.values())
-    ]
+    beyond: dict[str, list[str]] = {}
+    for kind in ("position", "velocity", "effort"):
+        for name, ticks in of_statistic(metrics, f"beyond_{kind}").items():
+            if ticks:
+                beyond.setdefault(name, []).append(f"{kind} at {ticks:.0f} ticks")
+    joints = [f"{name} ({', '.join(texts)})" for name, texts in beyond.items()]
     return [f"joints beyond the limits of the robot's file: {', '.join(joints)}"] if joints else []
+
+
+def of_statistic(metrics: Metrics, statistic: str) -> dict[str, float]:
+    """Return the metrics of one statistic, by what they are of."""
+    end = f".{statistic}"
+    return {k.removesuffix(end): value for k, value in metrics.items() if k.endswith(end)}
 
 
 def notes(report: Report) -> list[str]:
     """Say of single metrics from where they count, or why there is none."""
     missing = [f"no {key.replace('_', ' ')}: {why}" for key, why in report["unavailable"].items()]
     counted = []
-    if settling := report["settling"]:
-        counted = [f"settling is counted from the waypoint at {settling['after_s']:g} s"]
-    if base := report["base_pointing"]:
+    if (after := report["metrics"].get("settling.after")) is not None:
+        counted = [f"settling is counted from the waypoint at {after:g} s"]
+    if base := report["pointing"]:
         axis = ", ".join(f"{value:.3g}" for value in base["axis"])
         counted.append(
             f"the base points its axis ({axis}): band {base['band_deg']:g} deg, jitter within "

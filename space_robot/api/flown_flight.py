@@ -42,8 +42,8 @@ class FlownFlight:
         flight: Flight,
         ending: Ending,
         bag: Path | None,
-        log: FlightLog | None,
-        metrics: dict[str, Any] | None = None,
+        log: FlightLog,
+        keep_log: bool = True,
     ) -> None:
         """Store flight, ending, bag and log.
 
@@ -51,11 +51,14 @@ class FlownFlight:
             flight: that was flown.
             ending: of the flight.
             bag: folder of the bag; None if it was not recorded.
-            log: of the flight; None if it was not kept.
-            metrics: of the report, without the short names; None: computed from the log.
+            log: of the flight.
+            keep_log: False: the log is let go once its report is computed.
         """
         self.flight, self.ending, self.bag = flight, ending, bag
-        self._log, self._metrics = log, metrics
+        self._log: FlightLog | None = log
+        if not keep_log:
+            _ = self._report
+            self._log = None
 
     @property
     def log(self) -> FlightLog:
@@ -102,20 +105,13 @@ class FlownFlight:
         return self
 
     @cached_property
-    def metrics(self) -> dict[str, Any]:
-        """Metrics of the flight, as in ``space-robot analyze --json``.
+    def metrics(self) -> dict[str, float]:
+        """Metrics of the flight by name, such as ``joints_1_3.rms`` or ``base_torque.ripple``.
 
-        The columns of Table V have short names, too, for the mean-axis RMS:
-        ``metrics["attitude"]`` is ``metrics["rms"]["mean_axis"]["attitude"]``, of the vector part
-        of the error quaternion; ``metrics["attitude_deg"]`` is that of the angles. Empty if the
-        flight has no complete tick.
+        They are those of ``space-robot analyze --json``; `space_robot.analysis.describe` has the
+        unit and meaning of each. Empty if the flight has no complete tick.
         """
-        report = self._report
-        if not report:
-            return {}
-        angles = report["attitude_error_deg"]
-        named = {"attitude_deg": angles["mean_axis"]} if angles else {}
-        return {**report["rms"]["mean_axis"], **named, **report}
+        return dict(self._report.get("metrics", {}))
 
     def metric(self, function: MetricFunction | str) -> float:
         """Return a metric of your own.
@@ -146,8 +142,6 @@ class FlownFlight:
 
     @cached_property
     def _report(self) -> dict[str, Any]:
-        if self._metrics is not None:
-            return self._metrics
         try:
             return analyze(self.log)
         except InputError:

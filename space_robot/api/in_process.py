@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from contextlib import closing
 from pathlib import Path
 
 from space_robot_msgs_py.errors import FlightError
 
-from ..analysis import Analysis
 from ..console.progress import flight_progress
 from ..flight.bag_path import check_bag_path
 from ..flight.compilation import compile_kernels
 from ..flight.ending import Ending
 from ..flight.plan import Flight
-from ..flight.simulate import fly_blocks, simulate
+from ..flight.simulate import simulate
 from .flown_flight import FlownFlight
 
 
@@ -44,8 +42,13 @@ def fly_in_process(
         if progress:
             progress(tick * flight.period)
 
-    fly = _into_a_log if keep_log else _into_metrics
-    return fly(flight, bag, show)
+    try:
+        log, ending = simulate(flight, bag, show), Ending.complete(flight.ticks, flight.period)
+    except FlightError as error:
+        if error.log is None:
+            raise
+        log, ending = error.log, Ending.early(error, flight.period)
+    return FlownFlight(flight, ending, bag, log, keep_log)
 
 
 def fly_with_progress(
@@ -65,29 +68,3 @@ def fly_with_progress(
     compile_kernels(bool(flight.plant.names.actuators))  # has a progress line of its own
     with flight_progress(flight.ticks * flight.period, flight.law.name) as show:
         return fly_in_process(flight, bag, show, keep_log)
-
-
-def _into_a_log(flight: Flight, bag: Path | None, show: Callable[[int], None]) -> FlownFlight:
-    try:
-        log, ending = simulate(flight, bag, show), _complete(flight)
-    except FlightError as error:
-        if error.log is None:
-            raise
-        log, ending = error.log, Ending.early(error, flight.period)
-    return FlownFlight(flight, ending, bag, log)
-
-
-def _into_metrics(flight: Flight, bag: Path | None, show: Callable[[int], None]) -> FlownFlight:
-    """Fly and keep only the metrics; memory holds one block."""
-    analysis, ending = Analysis(), _complete(flight)
-    with closing(fly_blocks(flight, bag, show)) as blocks:
-        try:
-            for block in blocks:
-                analysis.add(block)
-        except FlightError as error:
-            ending = Ending.early(error, flight.period)
-    return FlownFlight(flight, ending, bag, None, analysis.report() if analysis.ticks else {})
-
-
-def _complete(flight: Flight) -> Ending:
-    return Ending.complete(flight.ticks, flight.period)

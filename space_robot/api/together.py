@@ -4,20 +4,16 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable, Iterable, Iterator
-from typing import Any
 
-from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.config.validation import short
 from space_robot_msgs_py.errors import InputError
 
-from ..analysis import Analysis
 from ..console.progress import check_progress, flights_progress
 from ..flight.batch.batch import FlightBatch
 from ..flight.batch.benches import Benches
 from ..flight.batch.compilation import compile_lanes
 from ..flight.batch.sharing import batches
 from ..flight.compilation import compile_kernels
-from ..flight.ending import Ending
 from ..flight.plan import Flight
 from .flown_flight import FlownFlight
 from .in_process import fly_in_process
@@ -134,24 +130,7 @@ def _compile(flights: list[Flight]) -> None:
 
 def _fly_batch(flights: list[Flight], keep_log: bool) -> list[FlownFlight]:
     """Fly the flights of one batch, whose kernels are compiled."""
-    analyses = [Analysis() for _ in flights]
-    logs: list[FlightLog | None] = [None for _ in flights]
-    endings = [Ending.complete(flight.ticks, flight.period) for flight in flights]
-    for block in FlightBatch(flights).fly(is_whole=keep_log):
-        if keep_log:
-            logs[block.flight] = block.log
-        else:
-            analyses[block.flight].add(block.log)
-        if block.error is not None:
-            endings[block.flight] = Ending.early(block.error, flights[block.flight].period)
     return [
-        FlownFlight(flight, endings[k], None, logs[k], _metrics(analyses[k], keep_log))
-        for k, flight in enumerate(flights)
+        FlownFlight(flights[flown.flight], flown.ending, None, flown.log, keep_log)
+        for flown in FlightBatch(flights).fly()
     ]
-
-
-def _metrics(analysis: Analysis, keep_log: bool) -> dict[str, Any] | None:
-    """Return the metrics of a flight without a log; None: they are computed from its log."""
-    if keep_log:
-        return None
-    return analysis.report() if analysis.ticks else {}

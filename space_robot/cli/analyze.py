@@ -113,7 +113,7 @@ def analyze(
 
     from ..analysis import analyze, excerpt
     from ..analysis.export import check_parquet, write_csv, write_parquet
-    from ..analysis.pointing import PointingBudget
+    from ..analysis.pointing_budget import PointingBudget
     from ..console.files import check_free, write_text
 
     if parquet:
@@ -144,7 +144,7 @@ def analyze(
         reports[name] = analyze(log, _set(log, actuators), budget)
         descriptions[name] = log.flight
         if own:
-            reports[name]["own_metrics"] = {m.name: m.finite_value(log) for m in own}
+            reports[name]["metrics"] |= {m.name: m.finite_value(log) for m in own}
         for write, paths in exports:
             write(log, paths[name])
             click.echo(f"wrote {paths[name]}", err=True)

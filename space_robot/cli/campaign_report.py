@@ -18,7 +18,7 @@ from .options import file_option
     "metrics",
     multiple=True,
     metavar="NAME",
-    help="Compare the laws by this metric, as attitude_max; repeatable [default: RMS errors, "
+    help="Compare the laws by this metric, as attitude.max; repeatable [default: RMS errors, "
     "the base's ripple, and what is required].",
 )
 @click.option(
@@ -45,7 +45,7 @@ def report(
     Examples:
       space-robot campaign report campaigns/a
       space-robot campaign report campaigns/a --html a.html
-      space-robot campaign report campaigns/a --metric attitude_max --json
+      space-robot campaign report campaigns/a --metric attitude.max --json
       space-robot campaign report campaigns/a --study stricter.yaml
     """
     from ..analysis.figures.style import save_figure

@@ -39,10 +39,9 @@ def _is_law(name: str) -> bool:
 
 
 def _is_metric(name: str) -> bool:
-    from ..campaign.row.columns import Columns
-    from ..flight.plan import Flight, FlightPlan, resolve
+    from ..analysis.measure import group_of
 
-    return name in Columns.of_flight(Flight(resolve(FlightPlan()))).metrics
+    return group_of(name) is not None
 
 
 def _is_file_of(kind: str) -> Callable[[str], bool]:

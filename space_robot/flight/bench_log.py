@@ -18,7 +18,7 @@ from space_robot_msgs_py.samples import Command
 
 from .bench_history import BenchHistory
 from .closed_loop import measured_ticks
-from .flown_log import check_memory, empty_log, ended_early, note_assumed_errors
+from .flown_log import ended_early, flight_log, note_assumed_errors
 from .plan import Flight
 
 STRETCH_TICKS = 10_000
@@ -37,19 +37,18 @@ class BenchLog:
             error: that ended the flight; None: it is complete, or goes on.
 
         Raises:
-            InputError: the log does not fit into memory.
+            InputError: there is no room for the log.
         """
         self.flight = flight_of(flight, history)
         """The flight that was flown, with its plant at the end: of the seed that was flown, and
         without a law if the law was never asked."""
-        check_memory(self.flight, len(history))
         self.log = self._fly(history, error)
         """All ticks flown."""
 
     def _fly(self, history: BenchHistory, error: FlightError | None) -> FlightLog:
         flight, plant, ticks = self.flight, self.flight.plant, len(history)
         is_unanswered = error is not None and not isinstance(error, DivergedError)
-        log = empty_log(flight, 0, ticks + is_unanswered)
+        log = flight_log(flight, ticks + is_unanswered)
         assert log.commanded_torque is not None
         assert log.telemetry is not None
         width, axes = len(plant.names.commanded), log.axes

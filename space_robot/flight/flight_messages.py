@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from space_robot_msgs_py import topics
-from space_robot_msgs_py.bag.flight_log import FlightLog, blocks_of
+from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.bag.recorder import BagRecorder
 from space_robot_msgs_py.samples import Command, RobotState
 from space_robot_msgs_py.wire.codecs import CommandCodec, StateCodec
@@ -127,7 +127,7 @@ def recording(flight: Flight, bag: Path | None) -> Iterator[Messages | None]:
 
 
 def record(flight: Flight, log: FlightLog, bag: Path) -> None:
-    """Write a flown flight into a bag, with the messages that `fly_blocks` would have written.
+    """Write a flown flight into a bag, with the messages that `simulate` would have written.
 
     Args:
         flight: that was flown.
@@ -140,6 +140,4 @@ def record(flight: Flight, log: FlightLog, bag: Path) -> None:
     answered = log.ticks - log.unanswered
     with recording(flight, bag) as messages:
         assert messages
-        for block in blocks_of(log):
-            start, stop = block.first_tick, block.first_tick + block.ticks
-            messages.stretch(block, start, stop, min(stop, answered))
+        messages.stretch(log, 0, log.ticks, answered)

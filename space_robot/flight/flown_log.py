@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import math
+import shutil
+import tempfile
 from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
 
 from space_robot_msgs_py import topics
-from space_robot_msgs_py.bag.flight_log import FlightLog, of_nan
+from space_robot_msgs_py.bag.flight_log import FlightLog, block_bounds, of_nan
 from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.samples import ReferenceChunk
 from space_robot_msgs_py.wire.messages import TELEMETRY_ROWS
@@ -16,6 +19,54 @@ from space_robot_msgs_py.wire.messages import TELEMETRY_ROWS
 from .plan import Flight
 
 Array = NDArray[np.float64]
+
+LARGE = 2**30
+"""Bytes from which on a log lies in files, which have no names and go with it."""
+
+
+def flight_log(flight: Flight, ticks: int | None = None) -> FlightLog:
+    """Return the log of the first ``ticks`` (None: all) before they are flown, see `empty_log`.
+
+    Raises:
+        InputError: there is no room for its files.
+    """
+    ticks = flight.ticks if ticks is None else ticks
+    if (size := ticks * row_bytes(flight)) < LARGE:
+        return empty_log(flight, 0, ticks)
+    check_room(size, f"duration {ticks * flight.period:g} s")
+    log = empty_log(flight, 0, ticks, mapped, flight.mission.chunk(0, 1))
+    joints, base = log.reference_joints, log.reference_base
+    log.reference_joints = mapped((ticks, *joints.shape[1:]))
+    log.reference_base = mapped((ticks, *base.shape[1:]))
+    for start, stop in block_bounds(ticks):
+        chunk = flight.mission.chunk(start, stop - start)
+        log.reference_joints[start:stop], log.reference_base[start:stop] = chunk.joints, chunk.base
+    return log
+
+
+def mapped(shape: tuple[int, ...]) -> Array:
+    """Return an array of NaN in a file without a name, which the system writes out as it needs."""
+    if not math.prod(shape):
+        return np.empty(shape)
+    with tempfile.TemporaryFile() as file:
+        array: Array = np.memmap(file, np.float64, "w+", shape=shape)
+    array[:] = np.nan
+    return array
+
+
+def check_room(size: int, what: str) -> None:
+    """Check that files of ``size`` bytes fit into the folder for temporary files.
+
+    Raises:
+        InputError: they do not; says so of ``what``.
+    """
+    folder = tempfile.gettempdir()
+    free = shutil.disk_usage(folder).free
+    if size > free:
+        raise InputError(
+            f"{what}: the log of the whole flight needs {size / 1e9:.1f} GB in {folder}, "
+            f"{free / 1e9:.1f} GB are free: fly a shorter one, or set TMPDIR"
+        )
 
 
 def empty_log(
@@ -32,7 +83,7 @@ def empty_log(
     flight fills. ``is_brief``: with what metrics need only, see `Flight.brief`.
     """
     log = columns_of(flight, (flight.ticks if stop is None else stop) - start, new, is_brief)
-    log.first_tick = start
+    log.first_tick, log.scenario = start, flight.scenario
     log.flight = flight.brief if is_brief else flight.description
     log.lost = {topic.full_name: 0 for topic in topics.ALL}
     reference = reference or flight.mission.chunk(start, log.ticks)
@@ -75,22 +126,6 @@ def ended_early(block: FlightLog, measured: int, answered: int) -> FlightLog:
     block.unanswered = measured - answered
     block.laws = tuple(law for law in block.laws if law.tick < block.first_tick + answered)
     return block.rows(0, measured)
-
-
-def check_memory(flight: Flight, ticks: int) -> None:
-    """Check that a log of the first ``ticks`` of a flight fits into memory.
-
-    Raises:
-        InputError: the log does not fit.
-    """
-    from ..processes.memory import available_bytes
-
-    needed, free = ticks * row_bytes(flight), available_bytes()
-    if needed > free:
-        raise InputError(
-            f"duration {ticks * flight.period:g} s: the whole flight in memory needs "
-            f"{needed / 1e9:.1f} GB, {free / 1e9:.1f} GB are free: fly a shorter one"
-        )
 
 
 def row_bytes(flight: Flight) -> int:

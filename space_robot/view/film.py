@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from space_robot_model.robot import Robot
 from space_robot_msgs_py.bag.flight_log import FlightLog
 
-from ..analysis.tool_error import wanted_poses
+from ..analysis.tool_path import wanted_poses
 from .actuators import actuators
 from .base_surface import clearest_side
 from .frames import Frames

@@ -14,8 +14,7 @@ from space_robot_model.robot.placements import Transform, joint_transforms, tool
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.errors import InputError
 
-from ..analysis.attitude_drift import controls_base
-from ..analysis.plot_series import tick_times
+from ..analysis.errors import controls_base
 
 Array = NDArray[np.float64]
 
@@ -98,8 +97,8 @@ def shown_times(logs: Sequence[FlightLog], rate: float) -> Array:
         logs: of the flights, none of them empty.
         rate: frames per second; reduced for long flights.
     """
-    start = min(float(tick_times(log)[0]) for log in logs)
-    end = max(float(tick_times(log)[-1]) for log in logs)
+    start = min(float(log.time[0]) for log in logs)
+    end = max(float(log.time[-1]) for log in logs)
     period = logs[0].timebase.period
     ticks = max(1, round((end - start) / period))
     frames = min((end - start) * rate, MOST_FRAMES / len(logs), ticks)
@@ -124,14 +123,14 @@ def held_rows(log: FlightLog, columns: Sequence[str], times: Array) -> NDArray[n
         return known
     # times are rounded: the nearest tick is meant
     due = times + 0.5 * log.timebase.period
-    at = np.searchsorted(tick_times(log)[known], due, side="right") - 1
+    at = np.searchsorted(log.time[known], due, side="right") - 1
     return np.asarray(known[np.maximum(at, 0)])
 
 
 def frame_rows(log: FlightLog, times: Array) -> NDArray[np.intp]:
     """Return the last row (K,) of a flight at or before each frame."""
     due = times + 0.5 * log.timebase.period
-    at = np.searchsorted(tick_times(log), due, side="right") - 1
+    at = np.searchsorted(log.time, due, side="right") - 1
     return np.asarray(np.maximum(at, 0))
 
 

@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 
 from space_robot_msgs_py.bag.flight_log import FlightLog
 
-from ..analysis.tool_error import Poses
+from ..analysis.tool_path import Poses
 from ..analysis.waypoints import waypoint_ticks
 
 if TYPE_CHECKING:

@@ -13,7 +13,6 @@ from space_robot_model.robot import Robot
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.config.text import shortened
 
-from ..analysis.plot_series import tick_times
 from .plotted_quantity import PlottedQuantity
 from .quantities import quantities_of
 
@@ -69,8 +68,8 @@ def plots_of(
     """
     logs = list(flights.values())
     edges = np.linspace(
-        min(float(tick_times(log)[0]) for log in logs),
-        max(float(tick_times(log)[-1]) for log in logs),
+        min(float(log.time[0]) for log in logs),
+        max(float(log.time[-1]) for log in logs),
         STRETCHES + 1,
         dtype=np.float64,
     )
@@ -128,7 +127,7 @@ def extremes(log: FlightLog, values: Array, edges: Array) -> Array:
     Returns:
         (2 K,), NaN for intervals without a known value.
     """
-    starts = np.searchsorted(tick_times(log), edges[:-1])
+    starts = np.searchsorted(log.time, edges[:-1])
     lowest_and_highest = np.full((len(starts), 2), np.nan)
     inside = np.flatnonzero(np.diff(np.append(starts, len(values))) > 0)
     if len(inside):

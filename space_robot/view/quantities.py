@@ -13,17 +13,18 @@ from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.samples import SOURCES
 
-from ..analysis.attitude_drift import attitude_drift, controls_base
-from ..analysis.described import assumed_robot_of, captures_of, flown_actuators
-from ..analysis.figures.overlay import words
-from ..analysis.metrics import (
+from ..analysis.described import flown_actuators
+from ..analysis.errors import (
     attitude_angles,
+    attitude_drift,
+    controls_base,
     error_columns,
+    groups_of,
     torque_columns,
     tracking_error,
-    unit_of,
 )
-from ..analysis.tool_error import ToolError, leads_tool
+from ..analysis.measure import column_label, column_unit
+from ..analysis.tool_path import ToolPath, leads_tool
 from .plotted_quantity import AXES, PlottedQuantity
 from .state_quantities import by_unit, estimates, momentum, motion
 
@@ -53,7 +54,7 @@ def quantities_of(log: FlightLog, robot: Robot) -> list[PlottedQuantity]:
 
 
 def _errors(log: FlightLog) -> Iterator[PlottedQuantity]:
-    columns = error_columns(log.axes, controls_base(log), log.prismatic, log.branches)
+    columns = error_columns(groups_of(log))
     names, values = np.array([*AXES, *log.joint_names]), tracking_error(log)
     for name, axes in columns.items():
         if name == "attitude":
@@ -62,8 +63,8 @@ def _errors(log: FlightLog) -> Iterator[PlottedQuantity]:
             continue
         yield PlottedQuantity(
             "joints",
-            f"{words(name)} error",
-            unit_of(name),
+            f"{column_label(name)} error",
+            column_unit(name),
             names[axes].tolist(),
             values[:, axes],
             True,
@@ -75,16 +76,20 @@ def _tool(log: FlightLog) -> Iterator[PlottedQuantity]:
     if not leads_tool(log):
         return
     with suppress(InputError):  # the bag does not tell what the flight software assumed
-        errors = ToolError(log, captures_of(log), assumed_robot_of(log)).errors(log)
+        errors = ToolPath(log).errors(0, log.ticks)
         yield PlottedQuantity("tool", "tool error", "m", ["distance"], errors[:, :1], True)
 
 
 def _torques(log: FlightLog) -> Iterator[PlottedQuantity]:
-    columns = torque_columns(log.axes, controls_base(log), log.prismatic, log.branches)
+    columns = torque_columns(groups_of(log))
     names = np.array([*AXES, *log.joint_names])
     for name, axes in columns.items():
         yield PlottedQuantity(
-            "torques", words(name), unit_of(name), names[axes].tolist(), log.applied_torque[:, axes]
+            "torques",
+            column_label(name),
+            column_unit(name),
+            names[axes].tolist(),
+            log.applied_torque[:, axes],
         )
 
 
@@ -95,7 +100,7 @@ def _drift(log: FlightLog) -> Iterator[PlottedQuantity]:
         return
     first = known[0]
     if not controls_base(log):
-        turned = attitude_drift(log, log.quaternion[first])
+        turned = np.degrees(attitude_drift(log, log.quaternion[first]))
         yield PlottedQuantity("attitude", "attitude drift", "deg", AXES, turned)
     away = log.base_position - log.base_position[first]
     yield PlottedQuantity("base", "base drift", "m", AXES, away)
@@ -137,7 +142,7 @@ def _surroundings(log: FlightLog) -> Iterator[PlottedQuantity]:
     for number, source in enumerate(SOURCES):
         torque = log.external_torques[:, 3 * number : 3 * number + 3]
         if np.nan_to_num(torque).any():
-            yield PlottedQuantity("orbit", f"{words(source)} torque", "N m", AXES, torque)
+            yield PlottedQuantity("orbit", f"{column_label(source)} torque", "N m", AXES, torque)
     if np.nan_to_num(log.magnetic_field).any():
         yield PlottedQuantity("orbit", "magnetic field", "T", AXES, log.magnetic_field)
 

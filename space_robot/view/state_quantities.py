@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.errors import InputError
 
-from ..analysis.described import momentum_of
+from ..analysis.momentum import momentum_of
 from .plotted_quantity import AXES, PlottedQuantity
 
 Array = NDArray[np.float64]
@@ -61,7 +61,7 @@ def motion(log: FlightLog) -> Iterator[PlottedQuantity]:
 def momentum(log: FlightLog) -> Iterator[PlottedQuantity]:
     """Yield the angular momentum about the common centre of mass, inertial axes."""
     with suppress(InputError):  # the bag does not describe what it depends on
-        total = momentum_of(log).add(log).total
+        total = momentum_of(log).total
         yield PlottedQuantity("momentum", "angular momentum", "N m s", AXES, total, is_shown=False)
 
 

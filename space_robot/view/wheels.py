@@ -16,7 +16,6 @@ from space_robot_model.hardware.wheels import WheelSettings
 from space_robot_model.robot import Robot
 from space_robot_msgs_py.bag.flight_log import FlightLog
 
-from ..analysis.plot_series import tick_times
 from .arrows import turns_from_z
 from .base_surface import base_size, distance_to_surface
 from .frames import frame_rows
@@ -63,7 +62,7 @@ class WheelFrames(NamedTuple):
             wheels: of its base.
             times: (K,) of the frames, s.
         """
-        ticks = tick_times(log)
+        ticks = log.time
         speeds = np.column_stack([_known(ticks, column) for column in log.wheel_velocities.T])
         turned = np.zeros_like(speeds)
         np.cumsum(0.5 * log.timebase.period * (speeds[1:] + speeds[:-1]), axis=0, out=turned[1:])

@@ -134,6 +134,11 @@ class FlightLog(StateSignals):
 
     For a bag it is true only if the user says so.
     """
+    scenario: Any = None
+    """The resolved scenario of a flight in this process; None: see ``flight``. It is not pickled."""
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {**self.__dict__, "scenario": None}
 
     @classmethod
     def allocate(
@@ -271,7 +276,8 @@ class FlightLog(StateSignals):
         self.measured = MeasuredStates.unknown(self, new)
         if not has_magnetometer:
             self.measured.magnetic_field = np.empty((self.ticks, 0))
-        self.assumed_error = np.full_like(self.applied_torque, np.nan)
+        self.assumed_error = new(self.applied_torque.shape)
+        self.assumed_error[:] = np.nan
 
     def as_measured(self) -> FlightLog:
         """The flight as the flight software knows it, with `measured` as its states."""

@@ -13,10 +13,9 @@ from space_robot_model.hardware.thrusters import ThrusterSettings
 from space_robot_model.hardware.wheels import WheelSettings
 from space_robot_msgs_py.bag.flight_log import FlightLog
 
+from ..errors import attitude_angles
 from ..generalised_motion import relative_rate
-from ..metrics import attitude_angles
 from ..momentum import Momentum
-from ..plot_series import tick_times
 from .single_flight import BASE_AXES
 from .style import GREY, LineStyle, house_style, legend_above, page, plot_lines
 
@@ -46,7 +45,7 @@ def momentum(log: FlightLog, budget: Momentum, flown: BaseActuatorSettings) -> F
     panels = figure.subplots(3, 1, sharex=True)
     for i, (axes, name) in enumerate(zip(panels, INERTIAL, strict=True)):
         lines = np.column_stack([values[:, i] for values in parts.values()])
-        plot_lines(axes, tick_times(log), lines, dashed=True)
+        plot_lines(axes, log.time, lines, dashed=True)
         axes.set_ylabel(f"momentum {name} (N m s)")
     panels[-1].set_xlabel("time (s)")
     figure.align_ylabels()
@@ -59,7 +58,7 @@ def wheels(log: FlightLog, settings: WheelSettings) -> Figure:
     """Draw momentum and motor torque of every wheel, with their limits if they have any."""
     figure = page(18.0 + 55.0 * 2)
     above, below = figure.subplots(2, 1, sharex=True)
-    time, held = tick_times(log), settings.spin_momenta(log.wheel_velocities)
+    time, held = log.time, settings.spin_momenta(log.wheel_velocities)
     plot_lines(above, time, held)
     plot_lines(below, time, log.wheel_torques)
     _mark_limits(above, settings.values("max_momentum"))
@@ -80,7 +79,7 @@ def thrusters(log: FlightLog, pushed: Array, settings: ThrusterSettings) -> Figu
         pushed: (N, 3) displacement of the robot's centre of mass from its start, m.
         settings: of the thrusters.
     """
-    figure, time = page(210.0, ""), tick_times(log)
+    figure, time = page(210.0, ""), log.time
     rows = figure.add_gridspec(4, 1, height_ratios=(5, 3, 3, 6))
     pulses = figure.add_subplot(rows[0])
     used, place = (figure.add_subplot(rows[i], sharex=pulses) for i in (1, 2))

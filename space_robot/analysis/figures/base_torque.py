@@ -12,8 +12,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure, FigureBase
 from numpy.typing import NDArray
 
-from ..plot_series import BaseTorque
-from ..spectrum import CHATTER_FREQUENCY
+from ..torques import CHATTER_FREQUENCY
+from .flight_curves import BaseTorque
 from .single_flight import BASE_AXES, JUNCTION_HALF_WIDTH
 from .style import (
     GREY,

@@ -15,13 +15,14 @@ from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.bag.law_history import as_data, laws_of
 from space_robot_msgs_py.errors import InputError
 
-from ..described import captures_of, environment_of, flown_actuators, momentum_of
+from ..described import flown_actuators
 from ..external_torques import torques_by_source
-from ..plot_series import PlotSeries
-from ..pointing import PointingBudget
+from ..momentum import momentum_of
+from ..pointing_budget import PointingBudget
 from ..words import flown
 from .base_actuators import momentum, thrusters, wheels
 from .base_torque import chatter, junctions
+from .flight_curves import FlightCurves
 from .overlay import base_pointing, errors_and_torques, latency_histogram, pointing
 from .ripple import ripple
 from .single_flight import control_results, desired_joints
@@ -78,7 +79,7 @@ class FigureSet:
     def __init__(self, budget: PointingBudget | None = None) -> None:
         """``budget``: of the base's pointing; None: the default."""
         self._budget = budget or PointingBudget()
-        self._flights: dict[str, PlotSeries] = {}
+        self._flights: dict[str, FlightCurves] = {}
         self._missions: dict[bytes, tuple[str, Figure]] = {}
         self._first: Figure | None = None
         self._parts: dict[str, dict[str, tuple[str, Figure]]] = {}
@@ -90,7 +91,7 @@ class FigureSet:
         self._missions.setdefault(reference.tobytes(), (name, desired_joints(log)))
         if not self._flights:
             self._first = control_results(log, title(name, log))
-        self._flights[name] = PlotSeries.of(log, self._budget)
+        self._flights[name] = FlightCurves.of(log, self._budget)
         kinds = {
             _of_gears: bool(log.geared_names),
             _of_orbit: log.orbit_position.shape[1] > 0,
@@ -166,9 +167,7 @@ def _of_orbit(log: FlightLog) -> Iterator[tuple[str, tuple[str, Figure]]]:
     Raises:
         InputError: the environment is unknown.
     """
-    disturbance = environment_of(log).disturbance
-    captures = captures_of(log) if disturbance.table else None
-    torques = torques_by_source(log, disturbance, captures)
+    torques = {name: torque(0, log.ticks) for name, torque in torques_by_source(log).items()}
     caption = "Torques from outside about the common centre of mass"
     yield "torques_from_outside", (caption, torques_from_outside(log, torques))
 
@@ -181,7 +180,7 @@ def _of_hardware(log: FlightLog) -> Iterator[tuple[str, tuple[str, Figure]]]:
     """
     if not log.ticks:
         raise InputError("no tick has both a state and a reference")
-    flown, budget = flown_actuators(log), momentum_of(log).add(log)
+    flown, budget = flown_actuators(log), momentum_of(log)
     caption = "Angular momentum about the common centre of mass"
     yield "momentum", (caption, momentum(log, budget, flown))
     if flown.wheel_count:

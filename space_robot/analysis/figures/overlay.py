@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -10,9 +10,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from ..metrics import UNITS, unit_of
-from ..plot_series import PlotSeries
-from ..pointing import ARCSEC
+from ..analysed_log import ANGLES
+from ..measure import column_label, column_unit
+from .flight_curves import FlightCurves
 from .style import GREY, LineStyle, house_style, legend_above, mark_events, page, plot_lines
 
 Array = NDArray[np.float64]
@@ -33,76 +33,45 @@ class _Panel(NamedTuple):
 
 
 @house_style()
-def errors_and_torques(flights: Mapping[str, PlotSeries]) -> Figure:
-    """Draw Figs. 6 to 9 of several flights: norms of errors (left, logarithmic) and torques.
+def errors_and_torques(flights: Mapping[str, FlightCurves]) -> Figure:
+    """Draw Figs. 6 to 9 of several flights: sizes of errors (left, logarithmic) and torques.
 
     Args:
         flights: by name.
     """
-    errors = _panels(
-        flights,
-        lambda series: series.errors,
-        lambda key: f"|{words(key)} error| ({unit_of(key)})",
-        True,
-    )
-    torques = _panels(
-        flights,
-        lambda series: series.torques,
-        lambda key: f"|{words(key)}| ({unit_of(key)})",
-        False,
-    )
-    return _draw([errors, torques], list(flights), _events(flights))
+    torques = dict.fromkeys(name for curves in flights.values() for name in curves.torque_axes)
+    names = dict.fromkeys(name for curves in flights.values() for name in curves.sizes)
+    errors = [name for name in names if name.startswith(("attitude_angle", "joints_"))]
+    panels = [_panels(flights, errors, True, " error"), _panels(flights, list(torques), False)]
+    return _draw(panels, list(flights), _events(flights))
 
 
 @house_style()
-def pointing(flights: Mapping[str, PlotSeries]) -> Figure:
+def pointing(flights: Mapping[str, FlightCurves]) -> Figure:
     """Draw the end effector's errors of boresight, rotation and position, and the base's drift."""
-    known = {name: series for name, series in flights.items() if series.pointing is not None}
-    if not known:
+    panels = _panels(flights, ["boresight", "tool_attitude", "tool_position"], True, " error")
+    if not panels:
         return page(12.0, "No robot is known for these flights, so no pointing error.")
-    panels = [
-        _Panel(
-            {key: (s.time, getattr(s.pointing, field) / unit) for key, s in known.items()},
-            label,
-            field != "base_drift",
-        )
-        for field, label, unit in (
-            ("boresight", "boresight error (arcsec)", ARCSEC),
-            ("rotation", "rotation error (arcsec)", ARCSEC),
-            ("position", "tool position error (m)", 1.0),
-            ("base_drift", "base's drift (m)", 1.0),
-        )
-    ]
+    panels += _panels(flights, ["base_drift"], False)
     return _draw([panels], list(flights), _events(flights))
 
 
 @house_style()
-def base_pointing(flights: Mapping[str, PlotSeries], band_deg: float) -> Figure:
+def base_pointing(flights: Mapping[str, FlightCurves], band_deg: float) -> Figure:
     """Draw the base's errors of pointing: half cone, about the axis that points, and in all.
 
     Args:
         flights: by name.
         band_deg: drawn as a line, degrees.
     """
-    known = {n: s.base_pointing for n, s in flights.items() if s.base_pointing is not None}
-    if not known:
+    panels = _panels(flights, ANGLES, True, limit=3600.0 * band_deg)
+    if not panels:
         return page(12.0, "Nothing turned the base of these flights, so no pointing error.")
-    panels = [
-        _Panel(
-            {name: (flights[name].time, error.angles[:, i]) for name, error in known.items()},
-            label,
-            True,
-            3600.0 * band_deg,
-        )
-        for i, label in enumerate(
-            ("half cone (arcsec)", "about the axis (arcsec)", "rotation (arcsec)")
-        )
-    ]
     return _draw([panels], list(flights), _events(flights))
 
 
 @house_style()
-def latency_histogram(flights: Mapping[str, PlotSeries]) -> Figure:
+def latency_histogram(flights: Mapping[str, FlightCurves]) -> Figure:
     """Draw the histogram of latencies, for flights that were flown as a graph."""
     known = {name: s.latency_ms for name, s in flights.items() if s.latency_ms is not None}
     if not known:
@@ -130,7 +99,7 @@ def latency_histogram(flights: Mapping[str, PlotSeries]) -> Figure:
     return figure
 
 
-def _events(flights: Mapping[str, PlotSeries]) -> Array:
+def _events(flights: Mapping[str, FlightCurves]) -> Array:
     """Return the times of captures and releases in any flight, s."""
     times: Array = np.unique(np.concatenate([series.events for series in flights.values()]))
     return times
@@ -174,25 +143,20 @@ def _roughness(values: Array) -> float:
 
 
 def _panels(
-    flights: Mapping[str, PlotSeries],
-    values_of: Callable[[PlotSeries], dict[str, Array]],
-    label: Callable[[str], str],
+    flights: Mapping[str, FlightCurves],
+    names: Sequence[str],
     is_logarithmic: bool,
+    word: str = "",
+    limit: float | None = None,
 ) -> list[_Panel]:
-    """Return a panel for every column of any flight."""
-    curves: dict[str, dict[str, tuple[Array, Array]]] = {}
-    for name, series in flights.items():
-        for key, values in values_of(series).items():
-            curves.setdefault(key, {})[name] = series.time, values
-    return [_Panel(lines, label(key), is_logarithmic) for key, lines in curves.items()]
-
-
-def words(key: str) -> str:
-    """Return the label of a column: "joints 1-3" for ``joints_1_3``."""
-    for column, unit in UNITS.items():  # a column may have its unit in its name
-        if column.endswith(f"_{unit}") and key.startswith(column):
-            key = key.replace(f"_{unit}", "", 1)
-    word, _, axes = key.partition("_")
-    if not axes or not axes[0].isdigit():
-        return key.replace("_", " ")
-    return f"{word} {axes.replace('_', '-')}"
+    """Return a panel for every column that any flight has; ``word`` follows its label."""
+    panels = []
+    for name in names:
+        lines = {
+            key: (curves.time, curves.sizes[name])
+            for key, curves in flights.items()
+            if name in curves.sizes
+        }
+        label = f"{column_label(name)}{word} ({column_unit(name)})"
+        panels += [_Panel(lines, label, is_logarithmic, limit)] if lines else []
+    return panels

@@ -8,16 +8,15 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from ..metrics import unit_of
-from ..plot_series import PlotSeries
-from .overlay import words
+from ..measure import column_label, column_unit
+from .flight_curves import FlightCurves
 from .style import LineStyle, house_style, legend_above, page, scattered
 
 Array = NDArray[np.float64]
 
 
 @house_style()
-def ripple(flights: Mapping[str, PlotSeries]) -> Figure:
+def ripple(flights: Mapping[str, FlightCurves]) -> Figure:
     """Draw the spectral density of the ripple, one panel per group of axes (mean of the axes).
 
     Args:
@@ -49,8 +48,8 @@ def ripple(flights: Mapping[str, PlotSeries]) -> Figure:
                 linewidth=0.7,
                 markevery=_marks(frequency, names.index(name), len(names)),
             )
-        squared = "N²" if unit_of(key) == "N" else "(N m)²"
-        panel.set(xscale="log", yscale="log", ylabel=f"PSD of {words(key)} ({squared}/Hz)")
+        squared = "N²" if column_unit(key) == "N" else "(N m)²"
+        panel.set(xscale="log", yscale="log", ylabel=f"PSD of {column_label(key)} ({squared}/Hz)")
     panels[-1].set_xlabel("frequency (Hz)")
     panels[-1].xaxis.set_major_formatter("{x:g}")
     figure.align_ylabels()

@@ -10,10 +10,8 @@ from numpy.typing import NDArray
 
 from space_robot_msgs_py.bag.flight_log import FlightLog
 
-from ..attitude_drift import attitude_drift, controls_base
 from ..described import event_times
-from ..metrics import attitude_angles, tracking_error
-from ..plot_series import tick_times
+from ..errors import attitude_angles, attitude_drift, controls_base, tracking_error
 from ..waypoints import junction_ticks, waypoint_ticks
 from .style import (
     PAGE_WIDTH,
@@ -43,7 +41,7 @@ def desired_joints(log: FlightLog) -> Figure:
     Prismatic joints have a separate panel.
     """
     slides = np.array(log.prismatic[: len(log.joint_names)])
-    desired, time, waypoints = log.reference_joints[:, 0], tick_times(log), waypoint_ticks(log)
+    desired, time, waypoints = log.reference_joints[:, 0], log.time, waypoint_ticks(log)
     panels = [
         (np.flatnonzero(kind), values, label)
         for kind, values, label in (
@@ -77,11 +75,10 @@ def control_results(log: FlightLog, title: str) -> Figure:
         log: a flight, complete or not.
         title: of the figure.
     """
-    error, torque, time = tracking_error(log), log.applied_torque, tick_times(log)
-    of_base, turned = "attitude error (deg)", attitude_angles
+    error, torque, time = tracking_error(log), log.applied_torque, log.time
+    of_base, error[:, :3] = "attitude error (deg)", attitude_angles(log)
     if not controls_base(log):
-        of_base, turned = "attitude drift (deg)", attitude_drift
-    error[:, :3] = turned(log)
+        of_base, error[:, :3] = "attitude drift (deg)", np.degrees(attitude_drift(log))
     moments = time[junction_ticks(log)[:MOST_JUNCTIONS]]
     rows = 3 if len(moments) else 2
     figure = page(22.0 + 46.0 * rows, title)

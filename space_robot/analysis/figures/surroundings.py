@@ -10,8 +10,7 @@ from numpy.typing import NDArray
 
 from space_robot_msgs_py.bag.flight_log import FlightLog
 
-from ..deflection import deflection
-from ..plot_series import tick_times
+from ..actuation import deflection
 from .base_actuators import INERTIAL
 from .style import house_style, legend_above, page, plot_lines
 
@@ -31,7 +30,7 @@ def torques_from_outside(log: FlightLog, torques: Mapping[str, Array]) -> Figure
     figure = page(18.0 + 45.0 * max(1, len(shown)))
     panels = np.atleast_1d(figure.subplots(max(1, len(shown)), 1, sharex=True))
     for axes, (name, torque) in zip(panels, shown.items(), strict=False):
-        plot_lines(axes, tick_times(log), torque)
+        plot_lines(axes, log.time, torque)
         axes.set_ylabel(f"{name.replace('_', ' ')} (N m)")
     panels[-1].set_xlabel("time (s)")
     figure.align_ylabels()
@@ -44,7 +43,7 @@ def deflections(log: FlightLog) -> Figure:
     """Draw motor angle less link angle of every joint with a gear."""
     figure = page(70.0)
     axes = figure.subplots()
-    plot_lines(axes, tick_times(log), deflection(log))
+    plot_lines(axes, log.time, deflection(log))
     axes.set(xlabel="time (s)", ylabel="deflection (rad or m)")
     legend_above(figure, list(log.geared_names), dashed=False)
     return figure

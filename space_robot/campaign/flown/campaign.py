@@ -10,7 +10,7 @@ import re
 import shutil
 import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import closing, contextmanager
+from contextlib import closing, contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -26,7 +26,7 @@ from ...analysis.own_metric import SESSION, MetricFunction, check_names, text_of
 from ...console.files import make_folder
 from ...console.progress import check_progress, rated_progress
 from ...flight.ending import DIVERGED, UNANSWERED
-from ...flight.simulate import fly_blocks
+from ...flight.simulate import simulate
 from ...processes.pool import check_scheduler, cores, run_many
 from ...processes.scratch_folder import ScratchFolder
 from ..row.fly import RowFlyer
@@ -56,12 +56,8 @@ class BagFlyer:
         """Fly a task; the bag gets its final name once it is complete."""
         unfinished = self.folder / f".{bag_name(task)}"
         flight = self.flyer.draws.flight(task.run, task.law)
-        with closing(fly_blocks(flight, unfinished)) as blocks:
-            try:
-                for _ in blocks:
-                    pass
-            except FlightError:  # its row says so
-                pass
+        with suppress(FlightError):  # its row says so
+            simulate(flight, unfinished)
         unfinished.rename(self.folder / bag_name(task))
 
 

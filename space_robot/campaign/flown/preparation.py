@@ -19,9 +19,8 @@ from ...flight.simulate import simulate
 from ...processes.pool import run_many
 from ...processes.software import commit
 from ..row.bands import BINS
-from ..row.columns import Columns
 from ..row.fly import RowFlyer
-from ..row.measure import check_requirements
+from ..row.measure import check_requirements, planned, row_columns, row_metrics
 from ..store.manifest import Manifest
 from ..store.schema import Schema
 from ..store.software import file_digests, flight_digest, software
@@ -158,7 +157,7 @@ class Preparation:
             InputError: a name is taken, or a function cannot be imported.
         """
         try:
-            check_names(self.study.metrics, Columns.of_flight(flight).metrics)
+            check_names(self.study.metrics)
             for text in self.study.metrics.values():
                 function_of(text)
         except InputError as error:
@@ -166,13 +165,14 @@ class Preparation:
 
     def _schema(self) -> Schema:
         nominal = next(iter(self.flights.values()))
-        columns, draws = Columns.of_flight(nominal), self.flyer.draws
-        first = draws.values(0)
+        flight, draws = planned(nominal, self.study.pointing), self.flyer.draws
+        first, own = draws.values(0), self.study.metrics
+        metrics = row_metrics(flight, self.study.require.values())
         return Schema(
             vary={n: "str" if isinstance(first[n], str) else "float64" for n in draws.names},
             grid=draws.grid,
-            metrics=[*columns.metrics, *self.study.metrics],
+            metrics=[*(name for name in metrics if name not in own), *own],
             require=list(self.study.require),
-            bands=list(columns.names),
+            bands=row_columns(flight),
             bins=min(BINS, nominal.ticks),
         )

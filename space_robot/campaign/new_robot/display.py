@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from ...analysis.metrics import unit_of
-from ...analysis.report_lines import in_angles, named
+from ...analysis.measure import column_unit, describe
+from ...analysis.report_tables import short_name
 from ...console.tables import Column, Table
 from .make import NewRobot
 
@@ -11,9 +11,13 @@ from .make import NewRobot
 def rms_table(made: NewRobot) -> Table:
     """Return the RMS of errors and torques under every law, mean over the axes."""
     flights = made.flights
-    of_laws = {law: in_angles(flown.rms) for law, flown in flights.items()}
-    keys = list(dict.fromkeys(key for rms in of_laws.values() for key in rms))
-    columns = [Column("law", is_label=True), *(Column(named(k), unit_of(k), ".3g") for k in keys)]
+    of_laws = {law: flown.rms for law, flown in flights.items()}
+    keys = dict.fromkeys(key for rms in of_laws.values() for key in rms)
+    keys = [key for key in keys if describe(f"{key}.rms").is_shown]
+    columns = [
+        Column("law", is_label=True),
+        *(Column(short_name(k), column_unit(k), ".3g") for k in keys),
+    ]
     rows = [[law, *(rms.get(k, "ended") for k in keys)] for law, rms in of_laws.items()]
     seconds = made.duration
     title = f"{made.robot.name}, {made.robot.n} joints, {seconds:g} s: RMS, mean of axes"

@@ -27,11 +27,12 @@ from space_robot_msgs_py.config.validation import read_yaml
 from space_robot_msgs_py.errors import FlightError, InputError
 from space_robot_sim.environment.environment import EnvironmentSettings
 
-from ...analysis import Analysis
-from ...analysis.metrics import unit_of
+from ...analysis import measure
+from ...analysis.measure import column_unit
+from ...analysis.words import of_statistic
 from ...console.files import whole_folder
 from ...flight.plan import Flight, FlightPlan, resolve
-from ...flight.simulate import fly_blocks
+from ...flight.simulate import simulate
 from ...processes.pool import cores, run_all
 from ...tuning.demand import demand
 from ...tuning.task import AUTO, TuningOptions
@@ -232,12 +233,10 @@ def make_robot(
 def _fly(folder: Path, law: str) -> Outcome:
     plan = FlightPlan(controller=law, robot=str(folder), case=CASE)
     try:
-        report = _report(plan)
+        metrics = _metrics(plan)
     except FlightError as error:
         return Outcome({}, str(error), math.inf)
-    rms = dict(report["rms"]["mean_axis"])
-    if angles := report["attitude_error_deg"]:
-        rms["attitude_deg"] = angles["mean_axis"]
+    rms = {name: metrics[f"{name}.rms"] for name in of_statistic(metrics, "rms_eq64")}
     return Outcome(rms, "", *_trial(plan.model_copy(update=TRIAL)))
 
 
@@ -247,27 +246,25 @@ def _trial(plan: FlightPlan) -> tuple[float, str]:
     Equal ratios count alike in the score, so that units do not matter.
     """
     try:
-        report = _report(plan)
+        metrics = _metrics(plan)
     except FlightError:
         return math.inf, DIVERGED
-    if any(ticks["effort"] for ticks in report["beyond_limits"].values()):
+    if any(of_statistic(metrics, "beyond_effort").values()):
         return math.inf, BEYOND
-    ripple = (report["ripple"] or {"rms": {}})["rms"]
-    errors = {k: v for k, v in report["rms"]["mean_axis"].items() if not unit_of(k).startswith("N")}
-    values = np.maximum([*errors.values(), *ripple.values()], np.finfo(float).tiny)
+    columns = [name for name in of_statistic(metrics, "rms_eq64") if name != "attitude_angle"]
+    kinds = {name: "ripple" if column_unit(name).startswith("N") else "rms" for name in columns}
+    known = [f"{name}.{kind}" for name, kind in kinds.items() if f"{name}.{kind}" in metrics]
+    values = np.maximum([metrics[name] for name in known], np.finfo(float).tiny)
     return math.exp(float(np.mean(np.log(values)))), ""
 
 
-def _report(plan: FlightPlan) -> dict[str, Any]:
-    """Return the report of a flight.
+def _metrics(plan: FlightPlan) -> dict[str, float]:
+    """Return the metrics of a flight.
 
     Raises:
         FlightError: it diverged.
     """
-    analysis = Analysis()
-    for block in fly_blocks(Flight(resolve(plan))):
-        analysis.add(block)
-    return analysis.report()
+    return measure(simulate(Flight(resolve(plan))))
 
 
 def trial_remark(flights: Mapping[str, Outcome]) -> str:

@@ -10,10 +10,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from ...analysis.figures.overlay import words
 from ...analysis.figures.style import COLOURS, GREY, LineStyle, grid, house_style, page, plain
-from ...analysis.metrics import unit_of
-from ..row.columns import ANGLE
+from ...analysis.measure import column_label, column_unit
 from ..study import short_names
 from ..verdicts.values import GridPoint, laws_of, of_law
 from .axes import law_legend, number_log_axis
@@ -34,7 +32,7 @@ def series_of(table: DataFrame) -> list[str]:
     """Return the names of the series that have bands."""
     names = [c.removeprefix("band.") for c in map(str, table) if c.startswith("band.")]
     names = [name for name in names if table[f"band.{name}"].notna().any()]
-    return [name for name in names if name != "attitude" or ANGLE not in names]
+    return [name for name in names if name != "attitude"]
 
 
 def bands(rows: DataFrame, series: str) -> Array:
@@ -96,11 +94,13 @@ def band_figure(
             look = LineStyle.of(index)
             axes.plot(time, drawn[1], color=look.colour, linestyle=look.dashes)
             axes.plot(time, drawn[2], color=look.colour, linestyle=look.dashes, linewidth=0.5)
-    unit = unit_of(series).strip("-")
+    unit = column_unit(series).strip("-")
     for axes, title in zip(panels, titles, strict=True):
         axes.set_title(plain(title))
     for number in range(0, len(panels), columns):
-        panels[number].set_ylabel(f"{words(series)} ({unit})" if unit else f"{words(series)} error")
+        panels[number].set_ylabel(
+            f"{column_label(series)} ({unit})" if unit else f"{column_label(series)} error"
+        )
     for axes in panels[-columns:]:
         axes.set_xlabel("time (s)")
     _scale(panels[0], list(curves.values()))

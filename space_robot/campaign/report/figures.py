@@ -11,8 +11,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from ...analysis.figures.overlay import words
 from ...analysis.figures.style import GREY, LineStyle, grid, house_style, page, plain
+from ...analysis.measure import column_label
 from ..verdicts.values import GridPoint, is_known, laws_of, measured, of_law
 from .axes import law_legend, number_log_axis
 from .bands import MOST_PANELS, band_figure, columns_of, series_of
@@ -148,7 +148,7 @@ def drawings(findings: Findings) -> Iterator[CampaignDrawing]:
     first = f" (the first {MOST_PANELS} points of the grid)" if len(parts) > MOST_PANELS else ""
     lines = "median (thick) and 95 % (thin) of the runs" if several else "percentiles of the runs"
     for name in series_of(subject.table):
-        caption = f"{words(name)} over time: {lines} at each time{first}"
+        caption = f"{column_label(name)} over time: {lines} at each time{first}"
         draw = partial(band_figure, parts, laws, name, subject.time_s)
         yield CampaignDrawing("bands", f"band_{name}", caption, draw)
     required = [q for q in findings.required if is_known(subject.table, q.column)]

@@ -7,9 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from space_robot_msgs_py.config.validation import one_of
 
-from ...analysis.figures.overlay import words
-from ...analysis.metrics import unit_of
-from ..row.columns import ANGLE
+from ...analysis.measure import describe, label
 from ..verdicts.values import metrics_of
 
 if TYPE_CHECKING:
@@ -17,16 +15,15 @@ if TYPE_CHECKING:
 
     from ..study import Requirement
 
-ERRORS = ("attitude", "joints")
-RIPPLE, FAST = "ripple_", "fast_ripple_"
-SUFFIXES = {"_rms": "RMS", "_max": "largest"}
+ERRORS = ("attitude_angle", "attitude_drift", "joints")
+"""Beginnings of the columns of errors by which laws are compared."""
 
 
 class Quantity(NamedTuple):
     """A numeric column; smaller is better unless a requirement says otherwise."""
 
     column: str
-    """Name of the column, such as ``metric.attitude_rms`` or ``require.pointing``."""
+    """Name of the column, such as ``metric.attitude_angle.rms`` or ``require.pointing``."""
     heading: str
     unit: str
     requirement: Requirement | None = None
@@ -54,15 +51,8 @@ class Quantity(NamedTuple):
 
 def of_metric(name: str) -> Quantity:
     """Return the quantity of a metric."""
-    for prefix, word in ((FAST, "ripple above 25 Hz"), (RIPPLE, "ripple")):
-        if name.startswith(prefix):
-            column = name.removeprefix(prefix)
-            return Quantity(f"metric.{name}", f"{word}, {words(column)}", _unit(column))
-    for suffix, word in SUFFIXES.items():
-        if name.endswith(suffix):
-            column = name.removesuffix(suffix)
-            return Quantity(f"metric.{name}", f"{words(column)}, {word}", _unit(column))
-    return Quantity(f"metric.{name}", name.replace("_", " "), "")
+    unit = describe(name).unit
+    return Quantity(f"metric.{name}", label(name), "" if unit == "share" else unit.strip("-"))
 
 
 def of_requirement(name: str, requirement: Requirement) -> Quantity:
@@ -99,18 +89,8 @@ def chosen(
     if asked:
         return [of_metric(one_of(name, known, "metric")) for name in dict.fromkeys(asked)]
     there = metrics_of(table)
-    usual = [name for name in there if name.startswith(ERRORS) and name.endswith("_rms")]
-    if f"{ANGLE}_rms" in usual:
-        usual.remove("attitude_rms")
-        usual.insert(0, usual.pop(usual.index(f"{ANGLE}_rms")))
-    usual += [name for name in there if name == f"{RIPPLE}base_torque"]
+    usual = [name for name in there if name.startswith(ERRORS) and name.endswith(".rms")]
+    usual += [name for name in there if name == "base_torque.ripple"]
     usual += [name for name in own if name in there]
     usual += [r.metric for r in require.values() if r.metric in there]
     return [of_metric(name) for name in dict.fromkeys(usual or there[:4])]
-
-
-def _unit(column: str) -> str:
-    try:
-        return unit_of(column).strip("-")
-    except StopIteration:
-        return ""

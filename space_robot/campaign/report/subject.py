@@ -12,9 +12,9 @@ import yaml
 from space_robot_msgs_py.config.validation import short
 from space_robot_msgs_py.errors import InputError
 
+from ...analysis.measure import Window
 from ..flown import FlownCampaign
 from ..flown.current_table import recover_table
-from ..row.window import Window
 from ..store.manifest import differences
 from ..study import Requirement, Study
 

@@ -49,7 +49,7 @@ def demanded(quantity: Quantity) -> str:
     assert requirement is not None
     way = "below" if requirement.above is None else "above"
     angle = ""
-    if requirement.metric in ("attitude_rms", "attitude_max") and 0.0 <= requirement.bound <= 1.0:
+    if requirement.metric in ("attitude.rms", "attitude.max") and 0.0 <= requirement.bound <= 1.0:
         angle = f" (an angle of {math.degrees(2.0 * math.asin(requirement.bound)):.3g} deg)"
     return (
         f"{quantity.heading} {way} {quantity.limit:g} {quantity.unit}".rstrip()

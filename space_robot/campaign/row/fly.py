@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from contextlib import closing
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 
-from space_robot_msgs_py.bag.flight_log import FlightLog, blocks_of
+from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.compiled.lanes import WIDTH
 from space_robot_msgs_py.config.text import one_line_of
 from space_robot_msgs_py.errors import FlightError, InputError, SpaceRobotError
@@ -18,10 +17,10 @@ from ...flight.batch.sharing import batches
 from ...flight.ending import FAILED, Ending
 from ...flight.flown_log import row_bytes
 from ...flight.plan import Flight
-from ...flight.simulate import fly_blocks, simulate
+from ...flight.simulate import simulate
 from ..draws import Draws
 from ..study import Study
-from .measure import Measure
+from .measure import measure, needs_truth_only
 from .row import REFUSED, Row, Task, Value
 
 LARGEST_LOGS = 2**30
@@ -68,7 +67,7 @@ class RowFlyer:
         vary: dict[str, Value] = {}
         try:
             vary = self.draws.values(task.run)
-            return self.row_of(task, vary, self.draws.flight(task.run, task.law))
+            return self.row_of(task, self.draws.flight(task.run, task.law))
         except Exception as error:  # a defect of this package must not end a campaign either
             return _unflown(task, vary, error)
 
@@ -99,39 +98,22 @@ class RowFlyer:
 
     def _rows_of(self, tasks: Sequence[Task], flights: Sequence[Flight]) -> list[Row]:
         """Fly flights that can share a batch."""
-        has_own = bool(self.study.metrics)
-        measures = [self._measure(flight) for flight in flights]
-        endings = [Ending.complete(flight.ticks, flight.period) for flight in flights]
-        batch = FlightBatch(flights).fly(is_whole=has_own, is_brief=not has_own)
-        with closing(batch) as blocks:
-            for block in blocks:
-                if has_own and block.error is None:
-                    _measure_whole(measures[block.flight], block.log)
-                elif not has_own:
-                    measures[block.flight].add(block.log)
-                if block.error is not None:
-                    endings[block.flight] = Ending.early(block.error, flights[block.flight].period)
+        is_brief = not self.study.metrics and needs_truth_only(self.study.require.values())
+        batch = FlightBatch(flights).fly(is_brief=is_brief)
         return [
-            _row(task, self.draws.values(task.run), flights[k], endings[k], measures[k])
-            for k, task in enumerate(tasks)
+            self.row_of_log(tasks[flown.flight], flights[flown.flight], flown.ending, flown.log)
+            for flown in batch
         ]
 
-    def row_of(self, task: Task, vary: dict[str, Value], flight: Flight) -> Row:
-        """Fly a flight and return its row.
-
-        Memory holds one block, or with own metrics the whole log.
-        """
-        if self.study.metrics:
-            return self._row_of_whole(task, flight)
-        ending = Ending.complete(flight.ticks, flight.period)
-        measure = self._measure(flight)
-        with closing(fly_blocks(flight)) as blocks:
-            try:
-                for block in blocks:
-                    measure.add(block)
-            except FlightError as error:
-                ending = Ending.early(error, flight.period)
-        return _row(task, vary, flight, ending, measure)
+    def row_of(self, task: Task, flight: Flight) -> Row:
+        """Fly a flight and return its row."""
+        try:
+            log, ending = simulate(flight), Ending.complete(flight.ticks, flight.period)
+        except FlightError as error:
+            if error.log is None:
+                raise
+            log, ending = error.log, Ending.early(error, flight.period)
+        return self.row_of_log(task, flight, ending, log)
 
     def row_of_log(self, task: Task, flight: Flight, ending: Ending, log: FlightLog) -> Row:
         """Return the row of a flown flight, bit for bit equal to that of `row_of`.
@@ -145,54 +127,19 @@ class RowFlyer:
         Raises:
             MetricError: an own metric's function raised an error, or returned no number.
         """
-        measure = self._measure(flight)
+        row = Row(
+            task, ending.outcome, ending.reason, ending.ended_at_s, self.draws.values(task.run)
+        )
         if ending.error is None:
-            _measure_whole(measure, log)
-        return _row(task, self.draws.values(task.run), flight, ending, measure)
-
-    def _row_of_whole(self, task: Task, flight: Flight) -> Row:
-        try:
-            log, ending = simulate(flight), Ending.complete(flight.ticks, flight.period)
-        except FlightError as error:
-            if error.log is None:
-                raise
-            log, ending = error.log, Ending.early(error, flight.period)
-        return self.row_of_log(task, flight, ending, log)
-
-    def _measure(self, flight: Flight) -> Measure:
-        study = self.study
-        return Measure(flight, study.require, of_mapping(study.metrics), study.pointing)
+            study, own = self.study, of_mapping(self.study.metrics)
+            row = replace(
+                row, **measure(log, flight.ticks, study.require, own, study.pointing)._asdict()
+            )
+        return row.digested(flight.plant.truth.block.tobytes())
 
     def _fits(self, flight: Flight) -> bool:
         """Return True if flights like this one may be flown together."""
         return not self.study.metrics or WIDTH * flight.ticks * row_bytes(flight) < LARGEST_LOGS
-
-
-def _measure_whole(measure: Measure, log: FlightLog) -> None:
-    """Evaluate a complete flight, block by block as without its log."""
-    for block in blocks_of(log):
-        measure.add(block)
-    measure.add_whole(log)
-
-
-def _row(
-    task: Task, vary: dict[str, Value], flight: Flight, ending: Ending, measure: Measure
-) -> Row:
-    state = flight.plant.truth.block.tobytes()
-    if ending.error is not None:
-        row = Row(task, ending.outcome, ending.reason, ending.ended_at_s, vary)
-    else:
-        row = Row(
-            task,
-            ending.outcome,
-            "",
-            ending.ended_at_s,
-            vary,
-            measure.metrics(),
-            measure.require(),
-            measure.bands(),
-        )
-    return row.digested(state)
 
 
 def _unflown(task: Task, vary: dict[str, Value], error: Exception) -> Row:

@@ -1,132 +1,143 @@
-"""Evaluates the blocks of one flight for the numbers of its row."""
+"""The numbers of a flight's row: its metrics, those that are required, and bands over time."""
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
-from functools import cached_property
+from collections.abc import Collection, Iterable, Mapping
+from fnmatch import fnmatchcase
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from space_robot_model.elementary.matrices import norms
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.config.validation import one_of
 from space_robot_msgs_py.errors import InputError
-from space_robot_sim.environment.captures import Captures
-from space_robot_sim.environment.environment import with_payload
 
-from ...analysis.attitude_drift import attitude_drift
-from ...analysis.metrics import tracking_error
+from ...analysis.analysed_log import AnalysedLog
+from ...analysis.measure import GROUPS, SeriesGroup, Window, evaluate, group_of, names
 from ...analysis.own_metric import OwnMetric
-from ...analysis.pointing import PointingBudget, base_pointing_error
-from ...analysis.tool_error import ToolError
+from ...analysis.pointing import lacking_for_jitter
+from ...analysis.pointing_budget import PointingBudget
+from ...analysis.tool_path import leads_tool
+from ...analysis.torques import lacking_for_ripple
+from ...flight.flown_log import empty_log
 from ...flight.plan import Flight
 from ..study import Requirement
-from .bands import Bands
-from .columns import DRIFT, Columns, missing_for_jitter, missing_for_ripple
-from .window import Window, WindowMetrics
+from .bands import bands
+
+COLUMNS = (
+    "attitude_angle",
+    "attitude",
+    "joints_*",
+    "base_torque",
+    "force_prismatic",
+    "torque_*",
+    "attitude_drift",
+    "tool",
+    "tool_rotation",
+    "half_cone",
+    "about_axis",
+)
+"""Columns of series whose RMS and maximum every row has, and their bands over time."""
+SERIES = ("errors", "torques", "drift", "tool")
+"""The series with these columns."""
+FURTHER = (
+    *(f"{torque}.{key}" for key in ("ripple", "ripple_fast") for torque in COLUMNS[3:6]),
+    "half_cone.outside_band",
+    *(f"{angle}.jitter_{key}" for angle in COLUMNS[-2:] for key in ("rms", "max")),
+    "*.settling",
+    "wheels.saturation",
+)
+"""Further metrics of every row, as far as a flight has them."""
+FURTHER_GROUPS = ("steadiness", "ripple", "settling", "wheel_saturation")
+"""The groups with these metrics."""
+OF_MESSAGES = ("navigation", "saturation", "latency", "commands", "estimate_error")
+"""Groups that need more of a flight than its true states: measurements, commands."""
 
 
-class Measure:
-    """Accumulates metrics, requirements' metrics and bands of a flight block by block."""
+class Measured(NamedTuple):
+    """The numbers of a flight."""
 
-    def __init__(
-        self,
-        flight: Flight,
-        require: Mapping[str, Requirement],
-        own: Sequence[OwnMetric] = (),
-        budget: PointingBudget | None = None,
-    ) -> None:
-        """Prepare the sums for a flight.
-
-        Args:
-            flight: not flown yet.
-            require: the requirements by name.
-            own: metrics of the user, which need `add_whole`.
-            budget: of the base's pointing; None: the default.
-        """
-        self._own, self._demands = own, require
-        self._own_results: dict[str, float] = {}
-        self._own_windows: dict[str, float] = {}
-        """By requirement."""
-        names = {metric.name for metric in own}
-        self._robot, columns = flight.robot, Columns.of_flight(flight)
-        self._columns = columns
-        self._flight = flight
-        self._start: NDArray[np.float64] | None = None
-        """(4,) attitude at the first tick."""
-        self._tool: ToolError | None = None
-        mission = flight.mission_settings
-        budget = (budget or PointingBudget()).of(mission.written_segments, mission.base_point)
-        self._axis = np.array(budget.axis)
-        self._whole = WindowMetrics(Window(), columns.metrics, columns, budget)
-        self._require = {
-            name: WindowMetrics(_window(demand), [demand.metric], columns, budget)
-            for name, demand in require.items()
-            if not _is_whole(demand) and demand.metric not in names
-        }
-        self._same = {name: demand.metric for name, demand in require.items() if _is_whole(demand)}
-        self._bands = Bands(flight.ticks)
-
-    def add(self, block: FlightLog) -> None:
-        """Add the next block of the flight."""
-        error = tracking_error(block)
-        sizes = self._columns.sizes(block, error)
-        if self._columns.drift:
-            self._start = block.quaternion[0].copy() if self._start is None else self._start
-            sizes[DRIFT] = np.radians(norms(attitude_drift(block, self._start)))
-        if self._columns.tool:
-            self._tool = self._tool or _tool_error(block, self._flight)
-            sizes |= zip(self._columns.tool, self._tool.errors(block).T, strict=True)
-        pointing = None
-        if self._columns.angles:
-            pointing = base_pointing_error(block, self._axis)
-            angles = np.degrees(pointing.rotation), *pointing.angles.T
-            sizes |= zip(self._columns.angles, angles, strict=False)
-        self._bands.add(block.first_tick, sizes)
-        for metrics in (self._whole, *self._require.values()):
-            metrics.add(block, error, sizes, self._robot, pointing)
-
-    def add_whole(self, log: FlightLog) -> None:
-        """Evaluate the user's own metrics of a complete flight, and those that are required.
-
-        Raises:
-            MetricError: a function raised an error, or returned no number.
-        """
-        for metric in self._own:
-            self._own_results[metric.name] = metric.value(log)
-            for name, demand in self._demands.items():
-                if demand.metric == metric.name and not _is_whole(demand):
-                    within = _window(demand).rows(log)
-                    self._own_windows[name] = metric.value(log.rows(within.start, within.stop))
-
-    def metrics(self) -> dict[str, float]:
-        """Return the available metrics of the whole flight, by name."""
-        return self._results | _finite(self._own_results)
-
-    @cached_property
-    def _results(self) -> dict[str, float]:
-        return self._whole.result()
-
-    def require(self) -> dict[str, float]:
-        """Return the metric of each requirement in its window, by the requirement's name."""
-        whole = self.metrics()
-        values = {name: whole.get(metric) for name, metric in self._same.items()}
-        for name, window in self._require.items():
-            values[name] = next(iter(window.result().values()), None)
-        values |= _finite(self._own_windows)
-        return {name: value for name, value in values.items() if value is not None}
-
-    def bands(self) -> dict[str, NDArray[np.float32]]:
-        """Return the bands of each column over time."""
-        return self._bands.result()
+    metrics: dict[str, float]
+    require: dict[str, float]
+    """The metric of each requirement in its window, by the requirement's name."""
+    bands: dict[str, NDArray[np.float32]]
 
 
-def _tool_error(log: FlightLog, flight: Flight) -> ToolError:
-    settings = flight.plant_settings
-    robot = with_payload(flight.robot, settings.payload)
-    captures = Captures(settings.parsed_events, robot, flight.period, settings)  # not the plant's
-    return ToolError(log, captures, flight.scenario.robots.controller)
+def planned(flight: Flight, budget: PointingBudget | None = None) -> AnalysedLog:
+    """Return a flight before it is flown, for the names of its metrics."""
+    return AnalysedLog(empty_log(flight, 0, 1, is_brief=True), budget)
+
+
+def row_metrics(flight: AnalysedLog, require: Iterable[Requirement] = ()) -> list[str]:
+    """Return the metrics that the row of a flight has: the usual ones, and those required."""
+    columns = row_columns(flight)
+    known = list(names(flight, FURTHER_GROUPS))
+    usual = [f"{column}.{statistic}" for statistic in ("rms", "max") for column in columns]
+    for template in FURTHER:
+        usual += [name for name in known if fnmatchcase(name, template)]
+    asked = [demand.metric for demand in require if window_of(demand) == Window()]
+    return list(dict.fromkeys([*usual, *asked]))
+
+
+def needs_truth_only(require: Iterable[Requirement]) -> bool:
+    """Return True if a log of the true states alone has all metrics that are required."""
+    groups = (group_of(demand.metric) for demand in require)
+    return not any(group and group.name in OF_MESSAGES for group in groups)
+
+
+def row_columns(flight: AnalysedLog) -> list[str]:
+    """Return the columns of a row's bands."""
+    known = [name.rpartition(".")[0] for name in names(flight, SERIES)]
+    if not leads_tool(flight.log):
+        known = [name for name in known if name not in ("tool", "tool_rotation")]
+    matching = (name for pattern in COLUMNS for name in known if fnmatchcase(name, pattern))
+    return list(dict.fromkeys(matching))
+
+
+def measure(
+    log: FlightLog,
+    ticks: int,
+    require: Mapping[str, Requirement],
+    own: Collection[OwnMetric] = (),
+    budget: PointingBudget | None = None,
+) -> Measured:
+    """Return the numbers of a complete flight.
+
+    Args:
+        log: of the flight.
+        ticks: of the flight as it was planned.
+        require: the requirements by name.
+        own: metrics of the user's own.
+        budget: of the base's pointing; None: the default.
+
+    Raises:
+        MetricError: an own metric's function raised an error, or returned no number.
+    """
+    flight = AnalysedLog(log, budget)
+    columns, of_own = row_columns(flight), {metric.name: metric for metric in own}
+    wanted = [m for m in row_metrics(flight, require.values()) if m not in of_own]
+    metrics = evaluate(flight, wanted)[0]
+    metrics |= {metric.name: metric.value(log) for metric in own}
+    values = {}
+    for name, demand in require.items():
+        window, metric = window_of(demand), demand.metric
+        if window == Window():
+            values[name] = metrics.get(metric, np.nan)
+        elif metric in of_own:
+            rows = window.ticks(log.ticks, log.timebase.period)
+            values[name] = of_own[metric].value(log.rows(rows.start, rows.stop))
+        else:
+            values[name] = evaluate(flight, [metric], window)[0].get(metric, np.nan)
+    sizes: list[tuple[int, dict[str, NDArray[np.float64]]]] = []
+    for name in SERIES:
+        group = GROUPS[name]
+        if isinstance(group, SeriesGroup) and (name != "tool" or "tool" in columns):
+            sizes += [
+                (start, {c: size for c, size in own_sizes.items() if c in columns})
+                for start, own_sizes in group.sizes(flight)
+            ]
+    return Measured(_finite(metrics), _finite(values), bands(sizes, ticks))
 
 
 def check_requirements(
@@ -150,12 +161,14 @@ def check_requirements(
     Raises:
         InputError: an unknown metric, a window without ticks, or one too short for the metric.
     """
-    columns, end = Columns.of_flight(flight), flight.ticks * flight.period
+    if not require:
+        return
+    known, end = list(names(planned(flight, budget))), flight.ticks * flight.period
     context = context and f" ({context})"
     for name, demand in require.items():
         key = f"{where}: require.{name}"
         try:
-            one_of(demand.metric, (*columns.metrics, *own), "metric", f" in {key}.metric")
+            one_of(demand.metric, (*known, *own), "metric", f" in {key}.metric")
         except InputError as error:
             raise InputError(f"{error}{context}") from None
         if demand.from_s >= end:
@@ -163,26 +176,23 @@ def check_requirements(
                 f"{key}.from_s: must be before the end of the flight ({end:g} s), "
                 f"got {demand.from_s:g}{context}"
             )
-        ticks = len(_window(demand).ticks(flight.ticks, flight.period))
+        ticks = len(window_of(demand).ticks(flight.ticks, flight.period))
         if not ticks:
             raise InputError(
                 f"{key}.to_s: no tick between {demand.from_s:g} and {demand.to_s:g} s, "
                 f"the period is {flight.period:g} s{context}"
             )
-        seconds = (budget or PointingBudget()).window_s
-        lacking = missing_for_ripple(demand.metric, ticks, flight.period)
-        lacking = lacking or missing_for_jitter(demand.metric, ticks, flight.period, seconds)
+        seconds, window_s = ticks * flight.period, (budget or PointingBudget()).window_s
+        lacking = lacking_for_ripple(demand.metric, seconds, flight.period)
+        lacking = lacking or lacking_for_jitter(demand.metric, seconds, window_s, flight.period)
         if lacking and demand.metric not in own:
             raise InputError(f"{key}.metric: {demand.metric} {lacking}{context}")
 
 
-def _finite(values: Mapping[str, float]) -> dict[str, float]:
-    return {name: value for name, value in values.items() if np.isfinite(value)}
-
-
-def _window(demand: Requirement) -> Window:
+def window_of(demand: Requirement) -> Window:
+    """Return the time window of a requirement."""
     return Window(demand.from_s, demand.to_s)
 
 
-def _is_whole(demand: Requirement) -> bool:
-    return _window(demand) == Window()
+def _finite(values: Mapping[str, float]) -> dict[str, float]:
+    return {name: value for name, value in values.items() if np.isfinite(value)}

@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Generator, Sequence
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 from space_robot_control.controller.controller import unusable
 from space_robot_control.controller.law_choice import LawChoice
 from space_robot_control.controller.signals import USABLE
-from space_robot_msgs_py.bag.flight_log import FlightLog, block_bounds
+from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.compiled.records import assign
 from space_robot_msgs_py.errors import FlightError
-from space_robot_msgs_py.samples import LawInForce
 
 from ..closed_loop import measured_ticks
+from ..ending import Ending
 from ..flown_log import ended_early, note_assumed_errors
 from ..plan import Flight
 from .lane_log import LogsInLanes
@@ -25,14 +25,13 @@ STRETCH_TICKS = 4000
 """Ticks between two reports of progress."""
 
 
-class FlownBlock(NamedTuple):
-    """Rows that a flight has added to its log."""
+class FlownInBatch(NamedTuple):
+    """A flight of a batch that is over."""
 
     flight: int
     """Its number in the batch."""
     log: FlightLog
-    error: FlightError | None
-    """What ended the flight in this block; None: it goes on, or is complete."""
+    ending: Ending
 
 
 class FlightBatch:
@@ -49,50 +48,36 @@ class FlightBatch:
         self._law = LawInLanes([flight.controller.law for flight in flights], first.robot.n)
         self._memory = memory_of(self.flights)
         self._choices = [LawChoice(flight.law, flight.swaps) for flight in flights]
-        self._laws: list[tuple[LawInForce, ...]] = [() for _ in flights]
 
     @property
     def _flying(self) -> list[int]:
         return [k for k in range(len(self.flights)) if self._memory.flies[0, k]]
 
     def fly(
-        self,
-        progress: Callable[[int], None] = lambda tick: None,
-        is_whole: bool = False,
-        is_brief: bool = False,
-    ) -> Generator[FlownBlock, None, None]:
-        """Fly every tick; yield the blocks of all flights that fly, as `fly_blocks` does.
-
-        ``is_whole``: in one block, for those who need a whole flight as one log. ``is_brief``: see
-        `empty_log`.
-        """
-        first = self.flights[0]
-        for start, stop in [(0, first.ticks)] if is_whole else block_bounds(first.ticks):
-            flying = self._flying
-            if not flying:
-                return
-            logs = LogsInLanes(self.flights, start, stop, is_brief)
-            for k in flying:
-                logs.logs[k].laws = self._laws[k]
-            self._fly_block(logs, start, stop, progress)
-            for k in flying:
-                yield self._flown_block(k, logs.logs[k])
-        for k in self._flying:
+        self, progress: Callable[[int], None] = lambda tick: None, is_brief: bool = False
+    ) -> list[FlownInBatch]:
+        """Fly every tick; return the flights as they ended. ``is_brief``: see `empty_log`."""
+        ticks = self.flights[0].ticks
+        logs = LogsInLanes(self.flights, ticks, is_brief)
+        self._fly(logs, ticks, progress)
+        flying = self._flying
+        flown = [self._flown(k, log) for k, log in enumerate(logs.logs)]
+        for k in flying:
             copy_back(self._memory, self.flights, k)
             self._law.copy_back(k)
-        progress(first.ticks)
+        progress(ticks)
+        return flown
 
-    def _flown_block(self, k: int, log: FlightLog) -> FlownBlock:
-        flight, start, error = self.flights[k], log.first_tick, None
-        reached = int(self._memory.tick[0, k]) if not self._memory.flies[0, k] else None
-        stop = start + log.ticks if reached is None else reached
-        note_assumed_errors(flight, log, start, stop)
-        self._laws[k] = log.laws
-        if reached is not None:
-            error = self._error(k, reached)
-            measured = measured_ticks(flight.plant, error)
-            log = ended_early(log, measured - start, reached - start)
-        return FlownBlock(k, log, error)
+    def _flown(self, k: int, log: FlightLog) -> FlownInBatch:
+        flight = self.flights[k]
+        if self._memory.flies[0, k]:
+            note_assumed_errors(flight, log, 0, log.ticks)
+            return FlownInBatch(k, log, Ending.complete(flight.ticks, flight.period))
+        reached = int(self._memory.tick[0, k])
+        note_assumed_errors(flight, log, 0, reached)
+        error = self._error(k, reached)
+        log = ended_early(log, measured_ticks(flight.plant, error), reached)
+        return FlownInBatch(k, log, Ending.early(error, flight.period))
 
     def _error(self, k: int, reached: int) -> FlightError:
         """Return the error that ended a flight, and leave its plant as it was then."""
@@ -104,11 +89,9 @@ class FlightBatch:
             return unusable(status, reached, plant.state.quaternion)
         return plant.diverged(float(memory.fastest[0, k]))
 
-    def _fly_block(
-        self, logs: LogsInLanes, first: int, last: int, progress: Callable[[int], None]
-    ) -> None:
-        swaps = {tick for tick, _ in self.flights[0].swaps if first <= tick < last}
-        cuts = {*range(first, last, STRETCH_TICKS), *swaps, last}
+    def _fly(self, logs: LogsInLanes, ticks: int, progress: Callable[[int], None]) -> None:
+        swaps = {tick for tick, _ in self.flights[0].swaps if tick < ticks}
+        cuts = {*range(0, ticks, STRETCH_TICKS), *swaps, ticks}
         for start, stop in itertools.pairwise(sorted(cuts)):
             progress(start)
             self._choose_laws(logs, start)
@@ -128,7 +111,7 @@ class FlightBatch:
             memory,
             logs.lanes,
             logs.references,
-            start - logs.logs[0].first_tick,
+            start,
             start,
             stop,
             first.period,

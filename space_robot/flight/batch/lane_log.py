@@ -12,7 +12,7 @@ from space_robot_msgs_py.compiled.lanes import WIDTH
 from space_robot_msgs_py.samples import ALL_FIELDS, ReferenceChunk, State
 from space_robot_sim.plant.tick import PlantMemory
 
-from ..flown_log import columns_of, empty_log
+from ..flown_log import LARGE, columns_of, empty_log, mapped
 from ..plan import Flight
 from .lane_loop import LaneLog, References
 
@@ -22,20 +22,18 @@ Array = NDArray[np.float64]
 class LogsInLanes:
     """Logs of up to eight flights over the same ticks."""
 
-    def __init__(
-        self, flights: Sequence[Flight], start: int, stop: int, is_brief: bool = False
-    ) -> None:
-        """Allocate logs of the ticks ``start`` to ``stop``; ``is_brief``: see `empty_log`."""
-        columns = _columns(flights[0], stop - start, is_brief)
+    def __init__(self, flights: Sequence[Flight], ticks: int, is_brief: bool = False) -> None:
+        """Allocate logs of ``ticks`` rows; ``is_brief``: see `empty_log`."""
+        columns = _columns(flights[0], ticks, is_brief)
         self.logs = []
         """One of each flight."""
         chunks: dict[int, ReferenceChunk] = {}
         for lane, flight in enumerate(flights):
             mission = flight.mission
             if id(mission) not in chunks:
-                chunks[id(mission)] = mission.chunk(start, stop - start)
+                chunks[id(mission)] = mission.chunk(0, ticks)
             own = partial(_next, iter([column[lane] for column in columns]))
-            self.logs.append(empty_log(flight, start, stop, own, chunks[id(mission)], is_brief))
+            self.logs.append(empty_log(flight, 0, ticks, own, chunks[id(mission)], is_brief))
         by_address = {column.ctypes.data: column for column in columns if column.size}
         log = self.logs[0]
 
@@ -64,7 +62,8 @@ class LogsInLanes:
 def _columns(flight: Flight, ticks: int, is_brief: bool) -> list[Array]:
     """Return the columns (8, N, ...) that `empty_log` asks for, in its order.
 
-    They are parts of one array, large enough for the pages of memory that the system has for such.
+    They are parts of one array, large enough for the pages of memory that the system has for such,
+    or in a file if it is too large for memory.
     """
     shapes: list[tuple[int, ...]] = []
 
@@ -74,7 +73,8 @@ def _columns(flight: Flight, ticks: int, is_brief: bool) -> list[Array]:
 
     columns_of(flight, 1, asked, is_brief)
     counts = [WIDTH * ticks * int(np.prod(shape, dtype=int)) for shape in shapes]
-    parts = np.split(np.empty(sum(counts)), np.cumsum(counts)[:-1])
+    room = mapped((sum(counts),)) if 8 * sum(counts) >= LARGE else np.empty(sum(counts))
+    parts = np.split(room, np.cumsum(counts)[:-1])
     return [part.reshape(WIDTH, ticks, *shape) for part, shape in zip(parts, shapes, strict=True)]
 
 

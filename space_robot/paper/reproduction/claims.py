@@ -54,7 +54,7 @@ def claims_table(records: Iterable[dict[str, Any]]) -> Table:
 
 def claims(results: Sequence[Result], comparison: Sequence[Cell]) -> list[Claim]:
     """Return every claim whose flights are among the results."""
-    paper = [c for c in comparison if c.definition == "mean_axis" and c.gains == "printed"]
+    paper = [c for c in comparison if c.definition == "rms" and c.gains == "printed"]
     claims = list(_torques(paper))
     claims += _tracking(paper)
     claims += _chatter(results)
@@ -86,9 +86,9 @@ def _tracking(cells: Iterable[Cell]) -> Iterator[Claim]:
 
 def _chatter(results: Sequence[Result]) -> Iterator[Claim]:
     variation = {
-        (r.row.controller, r.variant.gains): r.chatter["total_variation_per_s"]["base_torque"]
+        (r.row.controller, r.variant.gains): r.metrics["base_torque.variation"]
         for r in results
-        if r.chatter is not None
+        if r.chatters and r.metrics
     }
     own = variation.get(("tde_stc", "printed"))
     if not own:

@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 
 from ...analysis.figures import chatter, desired_joints, junctions
 from ...analysis.figures.figure_set import FigureFolder, SavedFigure
-from ...analysis.plot_series import BaseTorque
+from ...analysis.figures.flight_curves import BaseTorque
 from ...flight.flown_log import empty_log
 from ...flight.plan import Flight, FlightPlan, resolve
 from .flights import ROBOT, Result, TableRow

@@ -13,14 +13,16 @@ from space_robot_msgs_py.errors import DivergedError, InputError
 
 from ...analysis.figures import control_results
 from ...analysis.figures.figure_set import FigureFolder
-from ...analysis.metrics import Chatter, Rms, of_log
-from ...analysis.plot_series import BaseTorque
+from ...analysis.figures.flight_curves import BaseTorque
+from ...analysis.measure import measure
 from ...flight.plan import Flight, FlightPlan, resolve
 from ...flight.simulate import simulate
-from .table_v import PRINTED
+from .table_v import COLUMNS, PRINTED, TORQUE
 
 ROBOT = "paper"
-DEFINITIONS = {"mean_axis": "mean of the axes' RMS", "eq64": "RMS by (64)"}
+DEFINITIONS = {"rms": "mean of the axes' RMS", "rms_eq64": "RMS by (64)"}
+"""Statistics that are compared with Table V."""
+CHATTER = ("variation", "chatter")
 COMPARED_CASE = "1"
 """The case in which the laws are compared."""
 
@@ -126,12 +128,16 @@ class Result:
     parameters: dict[str, Any]
     """Settings of plant, controller and mission."""
     diverged_tick: int | None = None
-    rms: dict[str, dict[str, float]] | None = None
-    """RMS values by definition and column; None if the flight diverged."""
-    chatter: dict[str, dict[str, float]] | None = None
-    """Chatter by measure and column, for the compared case with friction."""
+    metrics: dict[str, float] | None = None
+    """RMS values and chatter of the columns; None if the flight diverged."""
     base_torque: BaseTorque | None = None
     """Base torque over time, only of compared flights."""
+
+    @property
+    def chatters(self) -> bool:
+        """Whether its chatter is judged: flown to its end, compared case, with friction."""
+        is_judged = self.row.case == COMPARED_CASE and self.variant.friction
+        return is_judged and self.metrics is not None
 
 
 def fly(
@@ -165,14 +171,14 @@ def fly(
     if planned.shown and figures is not None:
         title = f"{row.controller}, case {row.case}: {variant.title}"
         figures.save(control_results(log, title), row.stem)
-    is_judged = row.case == COMPARED_CASE and variant.friction
+    wanted = [f"{column}.{statistic}" for statistic in DEFINITIONS for column in COLUMNS]
+    wanted += [f"{column}.{statistic}" for statistic in CHATTER for column in TORQUE]
     return Result(
         row,
         variant,
         flown,
         None,
-        of_log(Rms(log.axes), log),
-        of_log(Chatter(log.axes, log.timebase.period), log) if is_judged else None,
+        measure(log, wanted),
         BaseTorque.of(log) if planned.compared else None,
     )
 

@@ -7,7 +7,7 @@ from dataclasses import astuple
 from typing import NamedTuple
 
 from ...console.tables import Column, Table
-from .flights import DEFINITIONS, VARIANTS, Result, Variant
+from .flights import CHATTER, DEFINITIONS, VARIANTS, Result, Variant
 from .table_v import COLUMNS, HEADINGS, TORQUE, printed
 
 COLUMN_HEADS = (
@@ -46,7 +46,7 @@ def cells(results: Sequence[Result]) -> list[Cell]:
 def _cell(result: Result, definition: str, column: str) -> Cell:
     row, variant = result.row, result.variant
     expected = printed(row.controller, row.case, column)
-    measured = result.rms[definition][column] if result.rms else None
+    measured = result.metrics[f"{column}.{definition}"] if result.metrics else None
     return Cell(
         row.controller,
         row.case,
@@ -99,18 +99,22 @@ class LawChatter(NamedTuple):
 
     controller: str
     gains: str
-    total_variation_per_s: dict[str, float]
+    variation: dict[str, float]
     """Total variation per time, mean of the axes, N m/s."""
-    power_above_100_hz: dict[str, float]
+    chatter: dict[str, float]
     """Share of the power above 100 Hz, mean of the axes."""
 
 
 def chatter(results: Sequence[Result]) -> list[LawChatter]:
     """Return the chatter of every compared flight that did not diverge."""
     return [
-        LawChatter(r.row.controller, r.variant.gains, **r.chatter)
+        LawChatter(
+            r.row.controller,
+            r.variant.gains,
+            *({c: r.metrics[f"{c}.{key}"] for c in TORQUE} for key in CHATTER),
+        )
         for r in results
-        if r.chatter is not None
+        if r.chatters and r.metrics
     ]
 
 
@@ -127,8 +131,8 @@ def chatter_table(chatter: Sequence[LawChatter]) -> Table:
         [
             x.controller,
             x.gains,
-            *(x.total_variation_per_s[column] for column in TORQUE),
-            *(x.power_above_100_hz[column] for column in TORQUE),
+            *(x.variation[column] for column in TORQUE),
+            *(x.chatter[column] for column in TORQUE),
         ]
         for x in chatter
     ]

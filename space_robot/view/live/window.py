@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from space_robot_model.robot import Robot
 
-from ...analysis.figures.overlay import words
-from ...analysis.metrics import angles_of, error_columns, torque_columns, unit_of
+from ...analysis.errors import angles_of, axis_groups, error_columns, torque_columns
+from ...analysis.measure import column_label, column_unit
 from ..plotted_quantity import AXES
 
 if TYPE_CHECKING:
@@ -58,11 +58,11 @@ class Curves:
         axes = np.arange(len(labels))
         curves: list[tuple[str, str, str, dict[str, int]]] = []
         for columns, first in ((error_columns, 0), (torque_columns, len(labels))):
-            for name, part in columns(len(labels), True, prismatic).items():
+            for name, part in columns(axis_groups(robot.n, True, prismatic)).items():
                 kind = "torques" if first else "attitude" if name == "attitude" else "joints"
                 shown = {labels[axis]: first + axis for axis in axes[part].tolist()}
-                unit = "deg" if kind == "attitude" else unit_of(name)
-                curves.append((kind, words(name), unit, shown))
+                unit = "deg" if kind == "attitude" else column_unit(name)
+                curves.append((kind, column_label(name), unit, shown))
         if wheels:
             shown = {f"wheel_{k + 1}": 2 * len(labels) + k for k in range(wheels)}
             curves.append(("wheels", "wheel speed", "rad/s", shown))

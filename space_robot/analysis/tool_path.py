@@ -21,16 +21,15 @@ from space_robot_model.elementary.matrices import norms, unit_rows
 from space_robot_model.robot import Robot
 from space_robot_model.robot.momentum import Motion, robot_momentum
 from space_robot_model.robot.placements import tool_pose
-from space_robot_msgs_py.bag.flight_log import FlightLog, Metric
+from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.config.validation import validate
 from space_robot_msgs_py.errors import InputError
-from space_robot_sim.environment.captures import Captures
 
+from .analysed_log import AnalysedLog
 from .described import assumed_robot_of, captures_of
-from .metrics import AxisMaximum, AxisRms
 from .momentum import happens_in
-from .plot_series import tick_times
 from .pointing import rotation_angle
+from .series import Quantity, Series, series
 
 Array = NDArray[np.float64]
 
@@ -42,55 +41,65 @@ rounding."""
 
 
 class ToolPath:
-    """The path that a mission leads the first tool along, on inertial axes, block by block."""
+    """The path that a mission leads the first tool along; rows are asked for in their order."""
 
-    def __init__(self, log: FlightLog, captures: Captures, assumed: Robot) -> None:
+    def __init__(self, log: FlightLog) -> None:
         """Take the place where the path begins.
 
         The flight software knows where the base is, and places it by the frame of the assumed
-        robot, which is not the true one's if the true base's centre of mass is elsewhere.
+        robot, which is not the true one's if the true base's centre of mass is elsewhere. That
+        frame is at the path's origin at the first row.
 
-        Args:
-            log: the first rows; the assumed base's frame is at the path's origin at the first one.
-            captures: of the robot that flew, payload included.
-            assumed: robot as the flight software knows it.
+        Raises:
+            InputError: the robot that flew or the assumed one is not known.
         """
-        self._robot, self._captures = assumed.nominal, captures
+        self._log, self._captures = log, captures_of(log)
+        self._robot = assumed_robot_of(log).nominal
         first = log.rows(0, 1)
-        true = captures.robot_at(first.first_tick - 1)  # the first tick's events follow
+        true = self._captures.robot_at(first.first_tick - 1)  # the first tick's events follow
         reference = unit_rows(first.reference_base[:, :4]), first.reference_joints[:, 0]
         rest = [[spring.rest for spring in true.springs]]
         _, known = tool_pose(self._robot, *reference)
         _, place = tool_pose(true, reference[0], np.hstack([reference[1], rest]))
         self._origin = first.base_position + (place - known) + _centre(self._robot, *reference)
         self._begin = _true_centre(true, first)
-        """Where the common centre of mass of what flies would be without `drift`."""
+        """Where the common centre of mass of what flies would be without drift."""
+        self._true = self._captures.robot_at(log.first_tick)
 
-    def poses(self, log: FlightLog) -> tuple[Array, Array, Array]:
-        """Return orientations and positions that are wanted, and the `drift` that they have."""
-        quaternion, joints = unit_rows(log.reference_base[:, :4]), log.reference_joints[:, 0]
+    def wanted(self, start: int, stop: int) -> tuple[Array, Array, Array]:
+        """Return orientations and positions that are wanted, and the drift that they have."""
+        rows = self._log.rows(start, stop)
+        quaternion, joints = unit_rows(rows.reference_base[:, :4]), rows.reference_joints[:, 0]
         orientation, place = tool_pose(self._robot, quaternion, joints)
-        drift = self._drift(log)
+        drift = self._drift(rows)
         wanted = self._origin + place - _centre(self._robot, quaternion, joints) + drift
         return orientation, wanted, drift
 
-    def _drift(self, log: FlightLog) -> Array:
+    def errors(self, start: int, stop: int) -> Array:
+        """Return distance, m, rotation, rad, and drift of the path, m, (stop - start, 3)."""
+        desired, wanted, drift = self.wanted(start, stop)
+        rows = self._log.rows(start, stop)
+        actual, offset = tool_pose(self._true, unit_rows(rows.quaternion), rows.all_positions)
+        away = rows.base_position + offset - wanted
+        return np.column_stack([norms(away), rotation_angle(actual, desired), norms(drift)])
+
+    def _drift(self, rows: FlightLog) -> Array:
         """Return (N, 3) m, how far the common centre of mass has moved since the first row.
 
         A capture or a release changes which bodies it is of, and moves none of them.
         """
-        start, stop = log.first_tick, log.first_tick + log.ticks
-        drift = np.empty((log.ticks, 3))
+        start, stop = rows.first_tick, rows.first_tick + rows.ticks
+        drift = np.empty((rows.ticks, 3))
         events = self._captures.ticks(start, stop)
         for begin, end in pairwise(sorted({start, *events, stop})):
-            rows = log.rows(begin - start, end - start)
+            part = rows.rows(begin - start, end - start)
             if begin in events:
-                row = rows.rows(0, 1)
+                row = part.rows(0, 1)
                 before = _true_centre(self._captures.robot_at(begin - 1), row) - self._begin
                 for exchange in self._captures.at(begin):
                     happens_in(self._captures, exchange, row)
                 self._begin = _true_centre(self._captures.robot_at(begin), row) - before
-            centre = _true_centre(self._captures.robot_at(begin), rows)
+            centre = _true_centre(self._captures.robot_at(begin), part)
             drift[begin - start : end - start] = centre - self._begin
         return drift
 
@@ -105,46 +114,31 @@ def _true_centre(robot: Robot, log: FlightLog) -> Array:
     return log.base_position + _centre(robot, unit_rows(log.quaternion), log.all_positions)
 
 
-class ToolError(Metric):
-    """Takes RMS and maximum of the tool's error in position and rotation."""
-
-    def __init__(self, log: FlightLog, captures: Captures, assumed: Robot) -> None:
-        """Take the place where the path begins; see `ToolPath`."""
-        self._robot = captures.robot_at(log.first_tick)
-        self._path = ToolPath(log, captures, assumed)
-        self._rms, self._maximum, self._drift = AxisRms(2), AxisMaximum(2), 0.0
-
-    def add(self, log: FlightLog, error: Array) -> None:
-        """Take further rows."""
-        values = self.errors(log)
-        self._rms.add(values)
-        self._maximum.add(values)
-
-    def errors(self, log: FlightLog) -> Array:
-        """Return (N, 2): distance, m, and angle of the one rotation between both frames, rad."""
-        desired, wanted, drift = self._path.poses(log)
-        self._drift = max(self._drift, float(norms(drift).max()))
-        actual, offset = tool_pose(self._robot, unit_rows(log.quaternion), log.all_positions)
-        away = log.base_position + offset - wanted
-        return np.column_stack((norms(away), rotation_angle(actual, desired)))
-
-    def result(self) -> dict[str, float]:
-        """``rms_m``, ``largest_m``, ``rms_deg``, ``largest_deg``, and ``drift_m`` of the path."""
-        rms, largest = self._rms.value, self._maximum.value
-        return {
-            "rms_m": float(rms[0]),
-            "largest_m": float(largest[0]),
-            "rms_deg": float(np.degrees(rms[1])),
-            "largest_deg": float(np.degrees(largest[1])),
-            "drift_m": self._drift,
-        }
+@series(
+    "tool on its path",
+    {
+        "tool": Quantity("m", "distance of the end effector from the path of its mission"),
+        "tool_rotation": Quantity("rad", "rotation of the end effector from its path"),
+        "path_drift": Quantity(
+            "m",
+            "of the path, with the common centre of mass that forces from outside move",
+            ("max",),
+        ),
+    },
+)
+def tool(flight: AnalysedLog) -> Series:
+    """Return the tool's error on inertial axes."""
+    path = ToolPath(flight.log)
+    return Series({"tool": [0], "tool_rotation": [1], "path_drift": [2]}, path.errors)
 
 
 def leads_tool(log: FlightLog) -> bool:
-    """Return whether the mission of a bag leads the tool, or was changed in flight.
+    """Return whether the mission of a log leads the tool, or was changed in flight.
 
     One of the joints only does not; the bag tells whether it was flown as planned.
     """
+    if log.scenario is not None:
+        return bool(log.scenario.reference.leads_tool)
     scenario = log.flight.get("scenario")
     planned = scenario.get("mission") if isinstance(scenario, dict) else None
     if not isinstance(planned, dict) or not log.ticks:
@@ -152,7 +146,7 @@ def leads_tool(log: FlightLog) -> bool:
     try:
         own = {key: planned[key] for key in MissionSettings.model_fields if key in planned}
         settings = validate(MissionSettings, own, "mission of the bag")
-        period, last = log.timebase.period, float(tick_times(log)[-1])
+        period, last = log.timebase.period, float(log.time[-1])
         mission = Mission(assumed_robot_of(log), settings, period)
         if mission.leads_tool:
             return True
@@ -172,7 +166,7 @@ def wanted_poses(log: FlightLog) -> Poses | None:
     if not leads_tool(log):
         return None
     try:
-        orientation, position, _ = ToolPath(log, captures_of(log), assumed_robot_of(log)).poses(log)
+        orientation, position, _ = ToolPath(log).wanted(0, log.ticks)
         return orientation, position
     except InputError:
         return None

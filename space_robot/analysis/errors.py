@@ -1,0 +1,159 @@
+"""Tracking error of a flight, and the groups of axes that errors and torques are summed up by."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from space_robot_model.dynamics.attitude import attitude_error_into
+from space_robot_model.elementary.matrices import dot_rows
+from space_robot_msgs_py.bag.flight_log import FlightLog
+from space_robot_msgs_py.compiled.kernels import kernel
+
+Array = NDArray[np.float64]
+AxisIndex = slice | list[int]
+"""Some of the n+3 axes, as an index."""
+
+FREE = "nothing turns the base"
+UNAVAILABLE = {
+    "attitude": f"{FREE}, so its attitude drifts and is no error",
+    "base_torque": f"{FREE}, for it has no actuators",
+}
+"""Columns that a flight with a free base does not have, and why."""
+
+
+def controls_base(log: FlightLog) -> bool:
+    """Return whether the base had actuators; else it floated freely."""
+    described = log.flight.get("base_actuators")
+    return not (isinstance(described, dict) and described.get("base_actuation") == "none")
+
+
+def axis_groups(
+    n: int, controls_base: bool = True, prismatic: Sequence[bool] = (), branches: Sequence[int] = ()
+) -> dict[str, AxisIndex]:
+    """Divide the n+3 axes into the base and groups of joints, by their keys' suffix.
+
+    Those of one arm are inner (1 to 3) and outer joints; where there are several ``branches`` on
+    the base, each of so many joints, a branch is a group. Joints are divided by their kind instead
+    if some are ``prismatic`` (of n joints at least, or empty: none is), for no number may be of rad
+    and of m. The base is no group of a flight in which nothing turns it.
+    """
+    groups: dict[str, AxisIndex] = {"base": slice(0, 3)} if controls_base else {}
+    if any(prismatic[:n]):
+        for key, is_prismatic in (("revolute", False), ("prismatic", True)):
+            joints = [3 + joint for joint in range(n) if prismatic[joint] == is_prismatic]
+            groups |= {key: joints} if joints else {}
+        return groups
+    if len(branches) > 1:
+        first = 1
+        for count in branches:
+            last = first + count - 1
+            groups[f"{first}_{last}" if count > 1 else f"{first}"] = slice(first + 2, last + 3)
+            first = last + 1
+        return groups
+    groups[f"1_{min(n, 3)}"] = slice(3, 3 + min(n, 3))
+    if n > 3:
+        groups[f"4_{n}"] = slice(6, 3 + n)
+    return groups
+
+
+def groups_of(log: FlightLog) -> dict[str, AxisIndex]:
+    """Return the `axis_groups` of a flight."""
+    return axis_groups(log.axes - 3, controls_base(log), log.prismatic, log.branches)
+
+
+def error_columns(groups: dict[str, AxisIndex]) -> dict[str, AxisIndex]:
+    """Return the axes of each error column of Table V."""
+    return {"attitude" if k == "base" else f"joints_{k}": axes for k, axes in groups.items()}
+
+
+def torque_columns(groups: dict[str, AxisIndex]) -> dict[str, AxisIndex]:
+    """Return the axes of each torque column of Table V."""
+    names = {"base": "base_torque", "prismatic": "force_prismatic"}
+    return {names.get(k, f"torque_{k}"): axes for k, axes in groups.items()}
+
+
+def tracking_error(log: FlightLog) -> Array:
+    """Compute ``e = rho_d - rho = [-eps_e, theta_d - theta]`` (N, n+3): -, then rad or m.
+
+    ``eps_e`` is the vector part of `attitude_error`.
+    """
+    return joined_error(log, attitude_error(log))
+
+
+def joined_error(log: FlightLog, attitude: Array) -> Array:
+    """Return the `tracking_error` with ``attitude`` (N, 4) as the `attitude_error`."""
+    error = np.empty((log.ticks, log.axes))
+    np.subtract(0.0, attitude[:, 1:], out=error[:, :3])
+    np.subtract(log.reference_joints[:, 0], log.joint_positions, out=error[:, 3:])
+    return error
+
+
+def attitude_error(log: FlightLog) -> Array:
+    """Compute ``q_e = q_d* (x) q`` (N, 4), the rotation from the desired attitude to the true one.
+
+    Of +-q_e it is the one with eta >= 0. Its vector part is the same on the axes of both frames.
+    """
+    return relative_attitude(log.reference_base, log.quaternion)
+
+
+def relative_attitude(first: Array, second: Array) -> Array:
+    """Compute ``first* (x) second`` (N, 4), of quaternions ``[w, x, y, z]``; eta >= 0.
+
+    Args:
+        first: (N, 4 or more) columns after the fourth are ignored.
+        second: (N, 4).
+    """
+    error = np.zeros((len(second), 4))
+    _relative_attitudes(np.ascontiguousarray(first), np.ascontiguousarray(second), error)
+    return error
+
+
+@kernel
+def _relative_attitudes(first: Array, second: Array, out: Array) -> None:
+    for i in range(len(out)):
+        attitude_error_into(first[i], second[i], out[i])
+
+
+def attitude_angles(log: FlightLog) -> Array:
+    """Compute the error of the attitude, (N, 3) deg: the rotation vector of ``q_e*``.
+
+    Like `tracking_error` it is that of the desired attitude less the true one.
+    """
+    angles: Array = -np.degrees(rotation_vectors(attitude_error(log)))
+    return angles
+
+
+def angles_of(eps: Array) -> Array:
+    """Compute rotation vectors (N, 3), deg, of the vector parts (N, 3) of quaternions."""
+    angles: Array = np.degrees(rotation_vectors(quaternions_of(eps)))
+    return angles
+
+
+def quaternions_of(eps: Array) -> Array:
+    """Return the unit quaternions (N, 4) with the vector parts (N, 3), and eta >= 0."""
+    return np.hstack([np.sqrt(np.maximum(1.0 - dot_rows(eps, eps), 0.0)), eps])
+
+
+def rotation_vectors(quaternions: Array) -> Array:
+    """Compute the rotation vectors (N, 3), rad, of quaternions (N, 4) with eta >= 0."""
+    vectors = quaternions[:, 1:]
+    sine = np.linalg.norm(vectors, axis=1)
+    angle, is_turned = 2.0 * np.arctan2(sine, quaternions[:, 0]), sine > 0.0
+    rotations: Array = np.divide(angle, sine, out=np.full_like(sine, 2.0), where=is_turned)
+    return rotations[:, np.newaxis] * vectors
+
+
+def attitude_drift(log: FlightLog, start: Array | None = None) -> Array:
+    """(N, 3) rad, the rotation vector of the base, on its axes, from where it was to each tick.
+
+    The arm's motion turns a base without actuators by momentum exchange, so its attitude has no
+    error: this angle is measured in its place.
+
+    ``start``: (4,) the attitude to count from (None: that of the first row).
+    """
+    first = log.quaternion[0] if start is None else start
+    turned = relative_attitude(np.broadcast_to(first, log.quaternion.shape), log.quaternion)
+    return rotation_vectors(turned)

@@ -1,0 +1,106 @@
+"""What figures of several flights draw of each; the logs need not stay in memory."""
+
+from __future__ import annotations
+
+from contextlib import suppress
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from typing_extensions import Self
+
+from space_robot_msgs_py.bag.flight_log import FlightLog
+from space_robot_msgs_py.errors import InputError
+
+from ..analysed_log import AnalysedLog
+from ..described import event_times
+from ..errors import AxisIndex, controls_base
+from ..measure import GROUPS, SeriesGroup
+from ..pointing_budget import PointingBudget
+from ..torques import RippleSpectrum, ripple_spectrum
+from ..waypoints import junction_ticks
+
+Array = NDArray[np.float64]
+
+DRAWN = ("errors", "torques", "end_effector")
+"""Series whose columns are drawn over time."""
+
+
+class BaseTorque(NamedTuple):
+    """The base's torque over a flight: a fiftieth of its log, to hand from process to process."""
+
+    torque: Array
+    """(N, 3) N m, applied in the base frame."""
+    period: float
+    """s, of a tick."""
+    junctions: NDArray[np.intp]
+    """Rows at which one motion has ended and another begins."""
+    start: float = 0.0
+    """s, time of the first row: not 0 in an excerpt of a flight."""
+
+    @classmethod
+    def of(cls, log: FlightLog) -> Self:
+        """Copy it from a whole flight or an excerpt."""
+        period = log.timebase.period
+        return cls(
+            log.applied_torque[:, :3].copy(), period, junction_ticks(log), log.first_tick * period
+        )
+
+    @property
+    def time(self) -> Array:
+        """Times of the rows, (N,) s."""
+        return self.start + np.arange(len(self.torque), dtype=np.float64) * self.period
+
+    @property
+    def end(self) -> float:
+        """End of the flight, s."""
+        return self.start + len(self.torque) * self.period
+
+
+class FlightCurves(NamedTuple):
+    """Sizes of a flight's series over time, its base torque, ripple and latency."""
+
+    time: Array
+    """(N,) s."""
+    sizes: dict[str, Array]
+    """(N,) size of each column of the series in `DRAWN`, in its unit."""
+    base_torque: BaseTorque | None
+    """None where nothing turned the base."""
+    latency_ms: Array | None
+    """(K,) of every answer, by the wall clock; None for flights without any."""
+    ripple: RippleSpectrum | None
+    """None where the robot is not known, or the flight is too short."""
+    torque_axes: dict[str, AxisIndex]
+    """The axes of each column of torques."""
+    events: Array
+    """Times of what was captured and released, s."""
+
+    @classmethod
+    def of(cls, log: FlightLog, budget: PointingBudget | None = None) -> Self:
+        """Compute them from a whole flight or an excerpt.
+
+        ``budget``: of the base's pointing; None: the default.
+        """
+        flight, parts = AnalysedLog(log, budget), dict[str, list[Array]]()
+        for name in DRAWN:
+            group = GROUPS[name]
+            assert isinstance(group, SeriesGroup)
+            with suppress(InputError):
+                for _, sizes in group.sizes(flight):
+                    for column, size in sizes.items():
+                        parts.setdefault(column, []).append(size)
+        ripple = latency = None
+        with suppress(InputError):
+            ripple = ripple_spectrum(flight)
+        if log.latency_s is not None:
+            known = log.latency_s[np.isfinite(log.latency_s)]
+            latency = 1e3 * known if len(known) else None
+        return cls(
+            log.time,
+            {column: np.concatenate(sizes) for column, sizes in parts.items()},
+            BaseTorque.of(log) if controls_base(log) else None,
+            latency,
+            ripple,
+            flight.torque_columns,
+            event_times(log),
+        )

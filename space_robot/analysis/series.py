@@ -1,0 +1,275 @@
+"""Series over a flight, the statistics of them, and the registry of all metrics.
+
+A metric is named ``<column>.<statistic>``: ``joints_1_3.rms``, ``base_torque.ripple``. Most are
+statistics of a series, declared with `series`; the others are functions, declared with `metrics`.
+The declaration says each once: where names, units and texts are needed, they come from here.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from fnmatch import fnmatchcase
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from space_robot_model.elementary.matrices import norm, norms
+from space_robot_msgs_py.errors import InputError
+
+from .analysed_log import AnalysedLog
+from .errors import AxisIndex
+
+Array = NDArray[np.float64]
+PLACEHOLDER = re.compile(r"{(\w+)}")
+
+
+class Quantity(NamedTuple):
+    """Unit and meaning of a column of a series, or of a metric."""
+
+    unit: str
+    text: str
+    statistics: tuple[str, ...] = ("rms", "max")
+    """Of a column."""
+    is_vector: bool = False
+    """The size of a column at a tick is its norm; else its largest absolute value."""
+    is_shown: bool = True
+    """Whether tables of reports have it; all are in JSON."""
+
+
+class Series(NamedTuple):
+    """What a flight did over time."""
+
+    axes: Mapping[str, AxisIndex]
+    """Columns of the values, by name."""
+    values: Callable[[int, int], Array]
+    """Returns the values (stop - start, k) of the rows from ``start`` to before ``stop``; rows that
+    are not known are NaN."""
+    unknown: str = "no tick is known"
+    """Why there are no statistics, where no row is known."""
+    derive: Callable[[dict[str, float]], dict[str, float]] | None = None
+    """Makes further metrics of the statistics."""
+
+
+class Summary(NamedTuple):
+    """Sums over the known rows of a series."""
+
+    rms: Array
+    """(k,) of each axis."""
+    largest: dict[str, float]
+    """The largest size of each column."""
+    end: dict[str, float]
+    """The size of each column at the last known row."""
+
+    def statistics(self, axes: Mapping[str, AxisIndex], group: SeriesGroup) -> dict[str, float]:
+        """Return the statistics that each column has, by the metrics' names."""
+        numbers = {}
+        for column, index in axes.items():
+            each = self.rms[index]
+            values = {
+                "rms": np.mean(each),
+                "rms_eq64": norm(each) / len(each),
+                "max": self.largest[column],
+                "end": self.end[column],
+            }
+            for statistic in group.quantity(column).statistics:
+                numbers[f"{column}.{statistic}"] = float(values[statistic])
+        return numbers
+
+
+STATISTICS = {
+    "rms": "root mean square, mean over the axes (Table V of the paper)",
+    "rms_eq64": "a third of the vector's root mean square (eq. (64))",
+    "max": "largest size: norm of a vector, largest absolute value of joints",
+    "end": "size at the last tick",
+}
+
+
+@dataclass(frozen=True, eq=False)
+class Group:
+    """Metrics that are computed together."""
+
+    name: str
+    title: str
+    quantities: Mapping[str, Quantity]
+    """By pattern of a metric's name, or of a series' column; `expand` fills ``{places}`` in."""
+
+    def evaluate(self, flight: AnalysedLog, window: range) -> dict[str, float]:
+        """Return the metrics of the rows in a window.
+
+        Raises:
+            InputError: the flight does not have them.
+        """
+        raise NotImplementedError
+
+    def names(self, flight: AnalysedLog) -> list[str]:
+        """Return the names of the metrics that a flight has; it need not have been flown."""
+        raise NotImplementedError
+
+    def describe(self) -> Iterator[tuple[str, Quantity]]:
+        """Yield pattern, unit and meaning of each metric."""
+        yield from self.quantities.items()
+
+
+@dataclass(frozen=True, eq=False)
+class SeriesGroup(Group):
+    """The statistics of a series."""
+
+    source: Callable[[AnalysedLog], Series | None]
+    derived: Mapping[str, Quantity]
+
+    def evaluate(self, flight: AnalysedLog, window: range) -> dict[str, float]:
+        """Sum up the rows in a window."""
+        series = self.source(flight)
+        if series is None:
+            return {}
+        summary = self.summarise(flight, series, window)
+        numbers = summary.statistics(series.axes, self)
+        return numbers | (series.derive(numbers) if series.derive else {})
+
+    def names(self, flight: AnalysedLog) -> list[str]:
+        """Return a name for each statistic of each column."""
+        series = self.source(flight)
+        columns = series.axes if series else ()
+        return [
+            *(f"{column}.{s}" for column in columns for s in self.quantity(column).statistics),
+            *(self.derived if columns else ()),
+        ]
+
+    def describe(self) -> Iterator[tuple[str, Quantity]]:
+        """Yield each statistic of each column."""
+        for column, quantity in self.quantities.items():
+            for statistic in quantity.statistics:
+                text = f"{quantity.text}: {STATISTICS[statistic]}"
+                yield f"{column}.{statistic}", quantity._replace(text=text)
+        yield from self.derived.items()
+
+    def quantity(self, column: str) -> Quantity:
+        """Return unit and meaning of a column."""
+        return next(q for name, q in self.quantities.items() if fnmatchcase(column, pattern(name)))
+
+    def blocks(self, flight: AnalysedLog, series: Series) -> Iterator[tuple[int, Array]]:
+        """Yield the first row and the values of each block; of a short flight computed once."""
+        if len(blocks := list(flight.blocks())) > 1:
+            for start, stop in blocks:
+                yield start, series.values(start, stop)
+            return
+        if self.name not in flight.values:
+            flight.values[self.name] = series.values(0, flight.log.ticks)
+        yield 0, flight.values[self.name]
+
+    def sizes(self, flight: AnalysedLog) -> Iterator[tuple[int, dict[str, Array]]]:
+        """Yield the first row and the size of each column at each tick, block by block."""
+        if series := self.source(flight):
+            for start, values in self.blocks(flight, series):
+                yield start, {c: self._size(c, values[:, axes]) for c, axes in series.axes.items()}
+
+    def summarise(self, flight: AnalysedLog, series: Series, window: range) -> Summary:
+        """Sum up the known rows in a window.
+
+        Raises:
+            InputError: there are none.
+        """
+        count, squares = 0, np.zeros(1)
+        largest, last = dict.fromkeys(series.axes, 0.0), np.zeros((1, 0))
+        for start, values in self.blocks(flight, series):
+            rows = values[max(window.start - start, 0) : max(window.stop - start, 0)]
+            sums = np.einsum("ij,ij->j", rows, rows)
+            if np.isnan(sums).any():
+                rows = rows[~np.isnan(rows).any(axis=1)]
+                sums = np.einsum("ij,ij->j", rows, rows)
+            if len(rows):
+                count, squares, last = count + len(rows), squares + sums, rows[-1:].copy()
+                for column, axes in series.axes.items():
+                    size = float(self._size(column, rows[:, axes]).max())
+                    largest[column] = max(largest[column], size)
+        if not count:
+            raise InputError(series.unknown)
+        end = {c: float(self._size(c, last[:, axes])[0]) for c, axes in series.axes.items()}
+        return Summary(np.sqrt(squares / count), largest, end)
+
+    def _size(self, column: str, values: Array) -> Array:
+        """(N,) size of a column (N, axes) at each row."""
+        if self.quantity(column).is_vector:
+            return norms(values)
+        size = np.abs(values[:, 0])
+        for k in range(1, values.shape[1]):  # faster than a maximum along short rows
+            np.maximum(size, np.abs(values[:, k]), out=size)
+        return size
+
+
+@dataclass(frozen=True, eq=False)
+class FunctionGroup(Group):
+    """Metrics that a function returns."""
+
+    function: Callable[[AnalysedLog], dict[str, float]]
+    applies: Callable[[AnalysedLog], bool]
+
+    def evaluate(self, flight: AnalysedLog, window: range) -> dict[str, float]:
+        """Return what the function makes of the rows in a window."""
+        return self.function(flight.part(window)) if self.applies(flight) else {}
+
+    def names(self, flight: AnalysedLog) -> list[str]:
+        """Return the names, with all places filled in."""
+        if not self.applies(flight):
+            return []
+        return [name for template in self.quantities for name in expand(template, flight)]
+
+
+GROUPS: dict[str, Group] = {}
+"""By name, in the order of reports; `space_robot.analysis.measure` imports all."""
+
+
+def series(
+    title: str, quantities: Mapping[str, Quantity], derived: Mapping[str, Quantity] | None = None
+) -> Callable[[Callable[[AnalysedLog], Series | None]], SeriesGroup]:
+    """Register a function from a flight to its `Series`; None: it is not of this flight.
+
+    Args:
+        title: of the metrics in reports.
+        quantities: by name or pattern of a column; the first that fits holds.
+        derived: what `Series.derive` returns, by the metrics' names.
+    """
+
+    def register(source: Callable[[AnalysedLog], Series | None]) -> SeriesGroup:
+        group = SeriesGroup(source.__name__, title, quantities, source, derived or {})
+        GROUPS[group.name] = group
+        return group
+
+    return register
+
+
+def metrics(
+    title: str,
+    quantities: Mapping[str, Quantity],
+    applies: Callable[[AnalysedLog], bool] = lambda flight: True,
+) -> Callable[[Callable[[AnalysedLog], dict[str, float]]], FunctionGroup]:
+    """Register a function from a flight to some of its metrics.
+
+    Args:
+        title: of the metrics in reports.
+        quantities: by the metrics' names, in which ``{joint}`` stands for each joint, see `expand`.
+        applies: whether a flight has them; where it should and cannot, the function raises.
+    """
+
+    def register(function: Callable[[AnalysedLog], dict[str, float]]) -> FunctionGroup:
+        group = FunctionGroup(function.__name__, title, quantities, function, applies)
+        GROUPS[group.name] = group
+        return group
+
+    return register
+
+
+def pattern(template: str) -> str:
+    """Return the pattern that the names of a template match."""
+    return PLACEHOLDER.sub("*", template)
+
+
+def expand(template: str, flight: AnalysedLog) -> list[str]:
+    """Fill the place of a template in with the names that a flight has for it."""
+    place = PLACEHOLDER.search(template)
+    if place is None:
+        return [template]
+    return [template.replace(place[0], name) for name in flight.parts(place[1])]
