@@ -44,8 +44,8 @@ class Metric(NamedTuple):
 
 
 METRICS = {
-    "drift": Metric("metric.attitude_drift_max", "band", "°", 180.0 / np.pi),
-    "torque": Metric("metric.base_torque_max", "torque", "N m", 1.0),
+    "drift": Metric("metric.attitude_drift.max", "band", "°", 180.0 / np.pi),
+    "torque": Metric("metric.base_torque.max", "torque", "N m", 1.0),
 }
 
 

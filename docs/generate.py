@@ -1,4 +1,4 @@
-"""Writes docs/reference from the code: parameters, faults, topics; and the overrides of their QoS.
+"""Writes docs/reference from the code: parameters, faults, topics, metrics; and QoS overrides.
 
     python docs/generate.py
 
@@ -13,6 +13,7 @@ from pathlib import Path
 from types import GenericAlias
 from typing import Annotated, Any, get_args, get_origin
 
+from space_robot.analysis.series import GROUPS, STATISTICS, SeriesGroup
 from space_robot.scenario.faults import PROCESS_KINDS
 from space_robot_control.controller.settings import ControllerNodeSettings
 from space_robot_control.guidance.mission import MissionNodeSettings
@@ -93,7 +94,12 @@ FIELDS = {
 
 def pages() -> dict[str, str]:
     """The text of each page by the name of its file."""
-    return {"parameters.md": parameters(), "faults.md": faults(), "topics.md": topic_page()}
+    return {
+        "parameters.md": parameters(),
+        "faults.md": faults(),
+        "topics.md": topic_page(),
+        "metrics.md": metrics(),
+    }
 
 
 def table(head: Sequence[str], rows: Iterator[Sequence[str]]) -> str:
@@ -315,6 +321,36 @@ def _occasion(topic: topics.Topic) -> str:
     if topic.is_optional:
         return "every 20 ticks, if sensors or actuators have errors"
     return "each tick" if topic.per_tick else "at an event" if topic.is_event else "periodically"
+
+
+def metrics() -> str:
+    """Metrics by name: a table for each group of them in reports."""
+    groups: dict[str, list[Sequence[str]]] = {}
+    for group in GROUPS.values():
+        rows = groups.setdefault(group.title, [])
+        of_series = group.quantities if isinstance(group, SeriesGroup) else {}
+        for column, q in of_series.items():
+            first, *others = q.statistics
+            names = [f"`{column}.{first}`", *(f"`.{statistic}`" for statistic in others)]
+            rows.append((", ".join(names), q.unit, q.text))
+        further = group.derived if isinstance(group, SeriesGroup) else group.quantities
+        rows += [(f"`{name}`", q.unit, q.text) for name, q in further.items()]
+    statistics = "\n".join(f"- `{name}`: {text}" for name, text in STATISTICS.items())
+    text = f"""# Metrics
+
+{MADE}
+
+Names of metrics in tables and JSON of `space-robot analyze`, in `flight.metrics`, and in `require`
+and the tables of campaigns ([explained](../manual/analysis.md#what-each-metric-means)). `*` stands
+for columns, sources and joints, `{{joint}}`, `{{wheel}}`, ... for each that the robot has, and
+`{{unit}}` for the unit of the column. Statistics of series over a flight:
+
+{statistics}
+"""
+    for title, rows in groups.items():
+        head = ("metric", "unit", "meaning")
+        text += f"\n## {title.capitalize()}\n\n{table(head, iter(rows))}\n"
+    return text
 
 
 def overrides() -> str:

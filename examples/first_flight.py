@@ -11,7 +11,7 @@ prints the following, and draws the second flight:
 
     nothing turns the base: it turned by 8.01 deg and drifted by 0.131 m
     tde_stc holds the base: it turned by 3.92e-06 deg and drifted by 0.132 m
-    to hold it took up to 2.40 N m, and wheels would have to take up 11.3 N m s
+    to hold it took up to 2.66 N m, and wheels would have to take up 11.3 N m s
 """
 
 from __future__ import annotations
@@ -36,8 +36,8 @@ def main(out: str | None = None) -> None:
     print(f"nothing turns the base: {base_motion(free)}")
     held = Scenario(controller="tde_stc", case="1").fly()
     print(f"tde_stc holds the base: {base_motion(held)}")
-    torque_nm = held.metrics["maxima"]["base_torque"]
-    momentum_nms = held.metrics["sizing"]["peak_momentum_n_m_s"]
+    torque_nm = held.metrics["base_torque.max"]
+    momentum_nms = held.report()["sizing"]["peak_momentum_n_m_s"]
     print(
         f"to hold it took up to {torque_nm:.2f} N m, "
         f"and wheels would have to take up {momentum_nms:.1f} N m s"

@@ -91,7 +91,7 @@ def main() -> None:
         ("mpc, attitude first:", mpc.replace(gains={**gains, "weight": [1e4] * 3 + [1.0] * 6})),
     ):
         rms = flown.fly().metrics
-        attitude, joints = rms["attitude_deg"], rms["joints_1_3"]
+        attitude, joints = rms["attitude_angle.rms"], rms["joints_1_3.rms"]
         print(f"{title:20} attitude {attitude:.1e} deg, joints 1-3 {joints:.1e} rad")
 
 

@@ -9,7 +9,7 @@ in place of K_P and K_D.
 
 prints the largest errors in 5 s of case 1 with friction:
 
-    tde:     attitude 1.3e-05 deg, joints 1-3 1.7e-06 rad
+    tde:     attitude 1.4e-05 deg, joints 1-3 1.7e-06 rad
     tde_stc: attitude 3.9e-06 deg, joints 1-3 5.4e-08 rad
 """
 
@@ -52,8 +52,8 @@ def main() -> None:
         ("tde:", scenario.replace(controller=TimeDelayControl, gains=gains).fly()),
         ("tde_stc:", scenario.replace(controller="tde_stc").fly()),
     ):
-        attitude = flight.metrics["attitude_error_deg"]["max"]
-        joints = flight.metrics["maxima"]["joints_1_3"]
+        attitude = flight.metrics["attitude_angle.max"]
+        joints = flight.metrics["joints_1_3.max"]
         print(f"{title:8} attitude {attitude:.1e} deg, joints 1-3 {joints:.1e} rad")
 
 

@@ -10,9 +10,9 @@ off.
 
 prints:
 
-    20 s: base torque  2.84 N m, momentum 14.0 N m s
-    10 s: base torque 11.34 N m, momentum 28.1 N m s
-    in half the time: torque x 4.00, momentum x 2.00
+    20 s: base torque  3.03 N m, momentum 14.0 N m s
+    10 s: base torque 12.12 N m, momentum 28.1 N m s
+    in half the time: torque x 3.99, momentum x 2.00
 """
 
 from __future__ import annotations
@@ -35,9 +35,9 @@ def main() -> None:
     """Fly the motion twice and compare the demands on the base."""
     torques, momenta = [], []
     for seconds in (20.0, 10.0):
-        metrics = fly_in(seconds).metrics
-        torques.append(metrics["maxima"]["base_torque"])
-        momenta.append(metrics["sizing"]["peak_momentum_n_m_s"])
+        flight = fly_in(seconds)
+        torques.append(flight.metrics["base_torque.max"])
+        momenta.append(flight.report()["sizing"]["peak_momentum_n_m_s"])
         print(
             f"{seconds:.0f} s: base torque {torques[-1]:5.2f} N m, "
             f"momentum {momenta[-1]:4.1f} N m s"

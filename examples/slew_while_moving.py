@@ -32,7 +32,7 @@ def main() -> None:
     """Fly the turn under each law."""
     for law in LAWS:
         metrics = Scenario(controller=law, mission=MISSION, case="1").fly().metrics
-        arcsec = metrics["base_pointing"]["rotation_arcsec"]["max"]
+        arcsec = metrics["base_rotation.max"]
         print(f"{law:8} attitude error at most {arcsec:.4f} arcsec")
 
 

@@ -28,7 +28,7 @@ STUDY = {
         "robot.base.mass": {"uniform": [0.8, 1.2], "relative": True},
     },
     "fixed_runs": True,
-    "require": {"pointing": {"metric": "attitude_max", "below": 2e-5, "in": 0.8}},
+    "require": {"pointing": {"metric": "attitude.max", "below": 2e-5, "in": 0.8}},
 }
 
 

@@ -48,7 +48,7 @@ def main() -> None:
         flight = Scenario(controller="tde_tsmc", mission=mission).fly()
     print(f"{rows} rows from 0 to 8 s, flown in {flight.log.ticks} ticks")
     joint = np.degrees(flight.log.joint_positions[:, 1])
-    rms = 1e3 * flight.metrics["joints_1_3"]
+    rms = 1e3 * flight.metrics["joints_1_3.rms"]
     print(f"joint2 from {joint.min():.1f} to {joint.max():.1f} deg, RMS error {rms:.4f} mrad")
 
 

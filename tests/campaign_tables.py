@@ -52,10 +52,10 @@ def made_table(
             if places is not None:
                 row["vary.scenario.sensors"] = places[run]
             for name, factor in (
-                ("attitude_rms", 1.0),
-                ("attitude_max", 5.0),
-                ("joints_1_3_rms", 2.0),
-                ("ripple_base_torque", 3e3),
+                ("attitude.rms", 1.0),
+                ("attitude.max", 5.0),
+                ("joints_1_3.rms", 2.0),
+                ("base_torque.ripple", 3e3),
             ):
                 row[f"metric.{name}"] = None if bad else factor * value
             row["require.pointing"] = None if bad else 2.0 * value

@@ -38,7 +38,7 @@ def test_the_worst_flight_of_a_point_of_a_grid_is_that_of_the_page(
     draws = Draws(read_study(campaign), SEED, RUNS[campaign], check=False)
     flown = draws.scenario(int(worst), "ctc").fly()
     if campaign == "ets_vii":
-        reached = flown.report()["attitude_drift"]["max_deg"]
+        reached = np.degrees(flown.metrics["attitude_drift.max"])
     else:
         reached = float(np.linalg.norm(flown.log.applied_torque[:, :3], axis=1).max())
     assert float(largest) == pytest.approx(reached, abs=6e-4)

@@ -152,5 +152,5 @@ def test_with_a_weak_base_it_errs_less_than_computed_torque() -> None:
     mpc = scenario.replace(controller=LAW, gains=gains).fly().check()
     commanded = np.abs(mpc.log.commanded_torque[:-1, :3])
     assert 0.7 * (1.0 - 1e-9) < commanded.max() < 0.7 * (1.0 + 1e-5)
-    for name in ("attitude", "joints_1_3", "joints_4_6"):
+    for name in ("attitude.rms", "joints_1_3.rms", "joints_4_6.rms"):
         assert mpc.metrics[name] < 0.5 * ctc.metrics[name]

@@ -56,7 +56,7 @@ def test_the_errata_have_the_torques_and_variations_of_their_commands(tmp_path: 
         return report
 
     ours, *others = (
-        simulated("--no-friction", *options)["rms"]["mean_axis"]
+        simulated("--no-friction", *options)["metrics"]
         for options in (
             (),
             *(
@@ -69,18 +69,18 @@ def test_the_errata_have_the_torques_and_variations_of_their_commands(tmp_path: 
     rows = block("docs/explanation/errata.md", "| base torque |", "| joints 4-6 |")
     for row, group in zip(rows, groups, strict=True):
         shown = [cell.strip() for cell in row.split("|")[2:-1]]
-        flown = [f"{report[group]:.4f}" for report in (ours, *others)]
+        flown = [f"{report[f'{group}.rms']:.4f}" for report in (ours, *others)]
         assert [shown[0], *shown[2:]] == flown
     (head,) = re.findall(r"^\| \| (ctc, tuned .*) \|$", text, re.MULTILINE)
     smoothness = [
-        simulated("--controller", law, "--gains", gain_set)["chatter"]
+        simulated("--controller", law, "--gains", gain_set)["metrics"]
         for law, gain_set in (column.split(", ") for column in head.split(" | "))
     ]
     rows = text.split(head)[1].splitlines()[2:5]
     for row, group in zip(rows, groups, strict=True):
         shown = [cell.strip() for cell in row.split("|")[2:-1]]
         assert shown == [
-            f"{report['total_variation_per_s'][group]:#.3g}".rstrip(".") for report in smoothness
+            f"{metrics[f'{group}.variation']:#.3g}".rstrip(".") for metrics in smoothness
         ]
 
 
@@ -146,7 +146,7 @@ def test_the_page_on_stability_has_the_numbers_of_its_command() -> None:
     assert set(lmi["measured_beta"]) == {None}
 
 
-METRICS = ("attitude_rms", "joints_4_6_rms", "ripple_base_torque")
+METRICS = ("attitude.rms", "joints_4_6.rms", "base_torque.ripple")
 """Columns of the page's tables."""
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from base_numbers import ATTITUDE, DRIFT, asked_of_a_wheel, impulse, largest_wheel_torque
+from base_numbers import ATTITUDE, DEGREES, DRIFT, asked_of_a_wheel, impulse, largest_wheel_torque
 from flown_tables import Number, Options, Page, Sentence, Table, Text
 
 MODULATIONS = ("schmitt", "sigma_delta", "pwm")
@@ -54,7 +54,7 @@ PAGE = Page(
         ),
         Sentence(
             "The base turns by {}° in case 1 with every law",
-            (Number({"actuators": "none", "controller": "tde_stc"}, DRIFT, ".1f"),),
+            (Number({"actuators": "none", "controller": "tde_stc"}, DRIFT, ".1f", DEGREES),),
         ),
         Sentence(
             "the largest motor torque of a wheel is {} N m with `pseudo_inverse`, {} with "

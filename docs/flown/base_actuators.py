@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from base_numbers import (
     ATTITUDE,
+    DEGREES,
     DRIFT,
     JOINTS_1_3,
     LAWS,
@@ -104,13 +105,13 @@ PAGE = Page(
         Sentence(
             "With TDE-STC they are at their limit in {} % of the ticks, first after {} s.",
             (
-                Number(STC_ON_SMALL_WHEELS, "wheel_saturation.share", ".0f", 100.0),
+                Number(STC_ON_SMALL_WHEELS, "wheels.saturation", ".0f", 100.0),
                 Number(STC_ON_SMALL_WHEELS, first_at_limit, ".1f"),
             ),
         ),
         Sentence(
             "the base turns by {}° with every law",
-            (Number({"actuators": "none", "controller": "tde_stc"}, DRIFT, ".1f"),),
+            (Number({"actuators": "none", "controller": "tde_stc"}, DRIFT, ".1f", DEGREES),),
         ),
         Sentence(
             "`--fault wheel_fail@10:3` on `wheels` causes an error of at most {} with TDE-STC",
@@ -131,7 +132,7 @@ PAGE = Page(
             (
                 Number(ROBUST_THRUSTERS, propellant, ".0f", 1e3),
                 Number(ROBUST_THRUSTERS, pulses, ".0f"),
-                Number(ROBUST_THRUSTERS, "momentum.pushed_m.max", ".0f", 1e3),
+                Number(ROBUST_THRUSTERS, "pushed.max", ".0f", 1e3),
             ),
         ),
     ),

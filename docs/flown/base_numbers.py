@@ -8,15 +8,16 @@ import numpy as np
 
 from space_robot.analysis import analyze
 from space_robot.analysis.described import robot_of
-from space_robot.analysis.metrics import tracking_error
+from space_robot.analysis.errors import tracking_error
 from space_robot.analysis.sizing import ActuatorSet
+from space_robot.analysis.words import of_statistic
 from space_robot.api.flown_flight import FlownFlight
 from space_robot_control.allocation.settings import assumed_actuators
 
-ATTITUDE = "rms.mean_axis.attitude"
-JOINTS_1_3 = "rms.mean_axis.joints_1_3"
+ATTITUDE = "attitude.rms"
+JOINTS_1_3 = "joints_1_3.rms"
 LAWS = ("ctc", "ctc_smc", "tde_smc", "tde_tsmc", "tde_stc")
-DRIFT = "attitude_drift.end_deg"
+DRIFT, DEGREES = "attitude_drift.end", 180.0 / np.pi
 PEAKS = tuple(f"sizing.axes.base_{axis}.peak_torque_n_m" for axis in "xyz")
 
 
@@ -59,8 +60,12 @@ def attitude_error_at(time: float) -> Callable[[FlownFlight], float]:
 
 def first_at_limit(flown: FlownFlight) -> float:
     """Return the time at which a wheel was first at a limit, s."""
-    wheels = flown.report()["wheel_saturation"]["wheels"].values()
-    return float(min(w["first_s"] for w in wheels if w["first_s"] is not None))
+    return min(of_statistic(flown.metrics, "first_limit").values())
+
+
+def largest_base_torque(flown: FlownFlight) -> float:
+    """Return the largest torque on an axis of the base, N m."""
+    return float(np.max(np.abs(flown.log.applied_torque[:, :3])))
 
 
 def asked_of_a_wheel(quantity: str) -> Callable[[FlownFlight], float]:

@@ -13,8 +13,8 @@ def _row(sigma: str, corner_hz: int) -> list[str | Number]:
     return [
         sigma,
         str(corner_hz or "none"),
-        Number(options, "rms.mean_axis.joints_1_3"),
-        Number(options, "chatter.total_variation_per_s.torque_1_3", ".3g"),
+        Number(options, "joints_1_3.rms"),
+        Number(options, "torque_1_3.variation", ".3g"),
     ]
 
 

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import yaml
+from base_numbers import largest_base_torque
 from flown_tables import Number, Options, Page, Sentence, Table, Text
 
 PATH = "explanation/ets_vii.md"
 MISSIONS = ("ets_vii_out_and_back", "ets_vii_lift", "ets_vii_reactionless")
-LARGEST, END = "attitude_drift.max_deg", "attitude_drift.end_deg"
+LARGEST, END, DEGREES = "attitude_drift.max", "attitude_drift.end", 180.0 / np.pi
 ROBOT: Options = {"robot": "ets_vii", "controller": "ctc", "period": 0.002}
 FREE: Options = {**ROBOT, "actuators": "none"}
 OTHER_READING = "ets_vii_traceable.yaml"
@@ -28,9 +30,9 @@ def _nominal(mission: str) -> list[str | Number | Text]:
     held = {**wheels, "mission": mission}
     return [
         f"`{mission}`",
-        Number(free, LARGEST, ".3g"),
-        Number(orbit, LARGEST, ".3g"),
-        Number(held, "maxima.base_torque", ".3g"),
+        Number(free, LARGEST, ".3g", DEGREES),
+        Number(orbit, LARGEST, ".3g", DEGREES),
+        Number(held, largest_base_torque, ".3g"),
         Number(held, "sizing.peak_momentum_n_m_s", ".3g"),
     ]
 
@@ -38,8 +40,10 @@ def _nominal(mission: str) -> list[str | Number | Text]:
 def _read(mission: str) -> Number:
     text = Path(__file__).with_name(OTHER_READING).read_text("utf-8")
     options = {**FREE, "mission": mission, "plant_robot": yaml.safe_load(text)}
-    return Number(options, LARGEST, ".3g")
+    return Number(options, LARGEST, ".3g", DEGREES)
 
+
+LONG = (LEFT_ALONE, {**LEFT_ALONE, "duration": 600.0})
 
 PAGE = Page(
     "ets_vii",
@@ -62,9 +66,7 @@ PAGE = Page(
         ),
         Sentence(
             "At its end the base has drifted by {}°, after 600 s by {}°",
-            tuple(
-                Number(own, END, ".3g") for own in (LEFT_ALONE, {**LEFT_ALONE, "duration": 600.0})
-            ),
+            tuple(Number(own, END, ".3g", DEGREES) for own in LONG),
         ),
     ),
 )

@@ -45,8 +45,8 @@ def largest_error(flown: FlownFlight) -> float | None:
     """Return the largest error of a joint, rad; None if the flight diverged."""
     if flown.ending.outcome != "complete":
         return None
-    maxima = flown.report()["maxima"]
-    return float(f"{max(maxima['joints_1_3'], maxima['joints_4_6']):.6g}")
+    joints = (flown.metrics[f"joints_{group}.max"] for group in ("1_3", "4_6"))
+    return float(f"{max(joints):.6g}")
 
 
 def _flight(law: str, stiffness: float, encoder: str, **options: Any) -> Options:

@@ -31,7 +31,7 @@ SAME = 1e-3
 """Relative to the largest of the torques: so much may switching laws make of a last bit."""
 NUMBER = r"(-?\d+(?:\.\d+)?(?:e-?\d+)?|-)"
 Quantity = str | Callable[[FlownFlight], float]
-"""Path of a number in `FlownFlight.report`, as ``rms.mean_axis.attitude``, or what computes it."""
+"""Name of a metric, path of another number in `FlownFlight.report`, or what computes it."""
 Options = Mapping[str, Any]
 """Of a `Scenario`."""
 Kept = dict[str, dict[str, Any]]
@@ -235,10 +235,12 @@ def is_same(kept: Mapping[str, Any], options: Options) -> bool:
 def _value(flown: FlownFlight, quantity: Quantity) -> float | None:
     if not isinstance(quantity, str):
         return quantity(flown)
+    if (metric := flown.metrics.get(quantity)) is not None:
+        return float(f"{metric:.6g}")
     value: Any = flown.report()
     *parts, last = quantity.split(".")
     for part in parts:
-        value = None if value is None else value[part]
+        value = (value or {}).get(part)
     value = None if value is None else value.get(last)  # no attitude of a base that is free
     return None if value is None else float(f"{value:.6g}")
 

@@ -7,6 +7,7 @@ from functools import cache
 from typing import Any
 
 import numpy as np
+from base_numbers import largest_base_torque
 from flown_tables import Number, Options, Page, Table
 from orbit import stored
 from scipy.spatial.transform import Rotation
@@ -84,15 +85,15 @@ def given(flown: FlownFlight) -> float:
 
 
 def _pointing(options: Options) -> list[str | Number]:
-    angle = "base_pointing.half_cone_arcsec"
+    angle = "half_cone"
     return [
         Number(options, f"{angle}.rms", ".2g"),
         Number(options, f"{angle}.max", ".2g"),
         Number(options, f"{angle}.jitter_rms", ".2g"),
-        Number(options, "tool.rms_m", ".2g", 1e3),
-        Number(options, "tool.largest_m", ".2g", 1e3),
-        Number(options, "rms.mean_axis.base_torque", ".2g"),
-        Number(options, "maxima.base_torque", ".2g"),
+        Number(options, "tool.rms", ".2g", 1e3),
+        Number(options, "tool.max", ".2g", 1e3),
+        Number(options, "base_torque.rms", ".2g"),
+        Number(options, largest_base_torque, ".2g"),
     ]
 
 
@@ -100,7 +101,7 @@ def _source(source: str) -> list[str | Number]:
     return [
         f"{SOURCES[source]}, N m s",
         Number(LOADED, planned(source), ".3g"),
-        Number(LOADED, f"disturbance_by_source.{source}.impulse_n_m_s", ".3g"),
+        Number(LOADED, f"impulse_{source}.max", ".3g"),
     ]
 
 

@@ -6,7 +6,7 @@ from base_numbers import ATTITUDE, LAWS
 from flown_tables import Number, Options, Page, Table, Text
 
 GRADES = ("fine", "coarse")
-RIPPLE = "ripple.rms.base_torque"
+RIPPLE = "base_torque.ripple"
 SMOOTH = {"controller": {"acceleration_filter_hz": 100.0}}
 DIVERGE = {("fine", "ctc"), ("coarse", "tde_smc"), ("coarse", "tde_tsmc"), ("coarse", "tde_stc")}
 """Without the filter."""

@@ -6,6 +6,7 @@ from typing import Any
 
 from flown_tables import Number, Options, Page, Table
 
+from space_robot.analysis.words import of_statistic
 from space_robot.api.flown_flight import FlownFlight
 
 ROBOTS = ("paper", "seven_joint", "dual_arm", "ets_vii", "canadarm", "canadarm2")
@@ -22,8 +23,8 @@ def largest_rms(flown: FlownFlight) -> float | None:
     """Return the largest RMS error of attitude and joints; None if the flight diverged."""
     if flown.ending.outcome != "complete":
         return None
-    errors = flown.report()["rms"]["mean_axis"]
-    own = [errors[key] for key in errors if key.startswith(("attitude", "joints"))]
+    errors = of_statistic(flown.metrics, "rms")
+    own = [errors[key] for key in errors if key == "attitude" or key.startswith("joints")]
     return float(f"{max(own):.6g}")
 
 
@@ -62,7 +63,7 @@ def base_ripple(flown: FlownFlight) -> float | None:
     """Return the ripple of the torque on the base, N m; None if the flight diverged."""
     if flown.ending.outcome != "complete":
         return None
-    return float(f"{flown.report()['ripple']['rms']['base_torque']:.6g}")
+    return float(f"{flown.metrics['base_torque.ripple']:.6g}")
 
 
 PAGE = Page(

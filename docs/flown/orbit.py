@@ -56,7 +56,7 @@ def stored(share: float) -> Callable[[FlownFlight], float]:
 
 
 def _source(key: str, label: str) -> list[str | Number]:
-    quantities = [f"disturbance_by_source.{key}.{name}" for name in ("rms_n_m", "impulse_n_m_s")]
+    quantities = [f"disturbance_{key}.rms", f"impulse_{key}.max"]
     return [label, *(Number(o, q, ".2g") for o in (AT_400_KM, AT_700_KM) for q in quantities)]
 
 

@@ -12,7 +12,7 @@ from space_robot_msgs_py.errors import InputError
 from .analysed_log import AnalysedLog
 from .described import NO_LIMITS, torque_limits
 from .generalised_motion import measured_rows
-from .series import Quantity, Series, metrics, series
+from .series import Definition, TimeSeries, metrics, series
 
 Array = NDArray[np.float64]
 
@@ -28,10 +28,10 @@ PERCENTILES = {"p50": 50.0, "p99": 99.0, "max": 100.0}
 @metrics(
     "saturation",
     {
-        "torque_limits.ticks": Quantity("ticks", "ticks with a reported torque at its limit"),
-        "torque_limits.share": Quantity("share", "share of these ticks"),
-        "torque_limits.base": Quantity("N m", "limit of the base's torque; missing: none"),
-        "torque_limits.joints": Quantity("N m", "limit of the joints' torques; missing: none"),
+        "torque_limits.ticks": Definition("ticks", "ticks with a reported torque at its limit"),
+        "torque_limits.share": Definition("share", "share of these ticks"),
+        "torque_limits.base": Definition("N m", "limit of the base's torque; missing: none"),
+        "torque_limits.joints": Definition("N m", "limit of the joints' torques; missing: none"),
     },
     applies=lambda flight: bool(np.isfinite(torque_limits(flight.log)).any()),
 )
@@ -54,11 +54,11 @@ def saturation(flight: AnalysedLog) -> dict[str, float]:
 @metrics(
     "saturation",
     {
-        "wheels.saturation": Quantity("share", "share of the ticks with any wheel at a limit"),
-        "wheels.saturation_ticks": Quantity("ticks", "these ticks"),
-        "{wheel}.torque_limit_ticks": Quantity("ticks", "ticks at the motor's largest torque"),
-        "{wheel}.momentum_limit_ticks": Quantity("ticks", "ticks at the largest momentum"),
-        "{wheel}.first_limit": Quantity("s", "when the wheel was first at a limit"),
+        "wheels.saturation": Definition("share", "share of the ticks with any wheel at a limit"),
+        "wheels.saturation_ticks": Definition("ticks", "these ticks"),
+        "{wheel}.torque_limit_ticks": Definition("ticks", "ticks at the motor's largest torque"),
+        "{wheel}.momentum_limit_ticks": Definition("ticks", "ticks at the largest momentum"),
+        "{wheel}.first_limit": Definition("s", "when the wheel was first at a limit"),
     },
     applies=lambda flight: flight.log.wheel_velocities.shape[1] > 0,
 )
@@ -112,7 +112,7 @@ def wheel_motion(
 @metrics(
     "joints",
     {
-        "{joint}.standing": Quantity(
+        "{joint}.standing": Definition(
             "share", "share of the way that the joint is to move on which friction holds it"
         )
     },
@@ -139,7 +139,7 @@ def standing(flight: AnalysedLog) -> dict[str, float]:
 @metrics(
     "joints",
     {
-        f"{{joint}}.beyond_{kind}": Quantity(
+        f"{{joint}}.beyond_{kind}": Definition(
             "ticks", f"ticks beyond the {kind} of the robot's file"
         )
         for kind in ("position", "velocity", "effort")
@@ -175,11 +175,11 @@ def beyond_limits(flight: AnalysedLog) -> dict[str, float]:
 @metrics(
     "latency",
     {
-        f"latency.{name}_{unit}": Quantity(unit, "from a state's sending to its command's")
+        f"latency.{name}_{unit}": Definition(unit, "from a state's sending to its command's")
         for unit in ("ms", "ticks")
         for name in PERCENTILES
     }
-    | {"latency.answers": Quantity("", "commands whose wall-clock time is known")},
+    | {"latency.answers": Definition("", "commands whose wall-clock time is known")},
 )
 def latency(flight: AnalysedLog) -> dict[str, float]:
     """Compute percentiles of the wall-clock time from sending a state to sending its command."""
@@ -199,9 +199,9 @@ def latency(flight: AnalysedLog) -> dict[str, float]:
 @metrics(
     "commands",
     {
-        "commands.unanswered": Quantity("ticks", "ticks that no command was ever recorded for"),
-        "commands.compared": Quantity("ticks", "ticks with a command and the torque applied"),
-        "commands.differing": Quantity(
+        "commands.unanswered": Definition("ticks", "ticks that no command was ever recorded for"),
+        "commands.compared": Definition("ticks", "ticks with a command and the torque applied"),
+        "commands.differing": Definition(
             "ticks", "of these, ticks with another torque than commanded, as the command was late"
         ),
     },
@@ -250,15 +250,15 @@ def commands(flight: AnalysedLog) -> dict[str, float]:
 
 @series(
     "deflection",
-    {"deflection_*": Quantity("rad or m", "motor angle less link angle of a joint with a gear")},
+    {"deflection_*": Definition("rad or m", "motor angle less link angle of a joint with a gear")},
 )
-def deflections(flight: AnalysedLog) -> Series | None:
+def deflections(flight: AnalysedLog) -> TimeSeries | None:
     """Return the deflection of each joint with a gear."""
     log = flight.log
     if not log.geared_names:
         return None
     axes = {f"deflection_{name}": [k] for k, name in enumerate(log.geared_names)}
-    return Series(axes, lambda start, stop: deflection(log.rows(start, stop)))
+    return TimeSeries(axes, lambda start, stop: deflection(log.rows(start, stop)))
 
 
 def deflection(log: FlightLog) -> Array:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from functools import cached_property
 
 import numpy as np
@@ -89,16 +89,16 @@ class AnalysedLog:
     def parts(self, place: str) -> list[str]:
         """Return the names that a place in a metric's name stands for, see `series.expand`."""
         log = self.log
-        names = {
-            "error": lambda: self.error_columns,
-            "torque": lambda: self.torque_columns,
-            "axis": lambda: self.axis_names,
-            "joint": lambda: log.joint_names,
-            "wheel": lambda: [f"wheel_{i + 1}" for i in range(log.wheel_velocities.shape[1])],
-            "angle": lambda: ANGLES,
-            "event": lambda: described.event_labels(log),
+        names: dict[str, Iterable[str]] = {
+            "error": self.error_columns,
+            "torque": self.torque_columns,
+            "axis": self.axis_names,
+            "joint": log.joint_names,
+            "wheel": [f"wheel_{i + 1}" for i in range(log.wheel_velocities.shape[1])],
+            "angle": ANGLES,
+            "event": () if place != "event" else described.event_labels(log),
         }
-        return list(names[place]())
+        return list(names[place])
 
     def blocks(self) -> Iterator[tuple[int, int]]:
         """Yield first row and stop of each block, small enough for temporary arrays."""

@@ -26,7 +26,7 @@ from space_robot_msgs_py.errors import InputError
 from .analysed_log import AnalysedLog
 from .described import DIRECT, NotDescribedError, check_files, navigation_of, parameters_of
 from .generalised_motion import applied_force, continuous_error, mean_acceleration, measured_rows
-from .series import Quantity, Series, series
+from .series import Definition, TimeSeries, series
 
 Array = NDArray[np.float64]
 HBar = Callable[[FlightLog], Array]
@@ -37,22 +37,22 @@ with one of the nominal inertia."""
 @series(
     "estimate error",
     {
-        "estimate_error_base": Quantity(
+        "estimate_error_base": Definition(
             "N m",
             "N - N_hat on the base, of the generalised force of eps_e (about twice the torque)",
             is_vector=True,
         ),
-        "estimate_error_prismatic": Quantity("N", "N - N_hat of the time-delay estimate"),
-        "estimate_error_*": Quantity("N m", "N - N_hat of the time-delay estimate"),
+        "estimate_error_prismatic": Definition("N", "N - N_hat of the time-delay estimate"),
+        "estimate_error_*": Definition("N m", "N - N_hat of the time-delay estimate"),
     },
 )
-def estimate_error(flight: AnalysedLog) -> Series:
+def estimate_error(flight: AnalysedLog) -> TimeSeries:
     """Return the error of the time-delay estimate of the laws in force."""
     log = flight.log
     axes = {f"estimate_error_{name}": index for name, index in flight.groups.items()}
     h_bar, smoothing = estimator(log)
     values = errors_of(log, h_bar, smoothing, rest=log.first_tick == 0)
-    return Series(axes, values, _unknown(log))
+    return TimeSeries(axes, values, _unknown(log))
 
 
 def errors_of(
@@ -70,7 +70,7 @@ def errors_of(
         smoothing: weight of a new pair in the low-pass, see `low_pass_weight`; 0: no low-pass.
         rest: whether the flight begins at rest; else the low-pass begins at the first row.
     """
-    told, low_pass = log.as_measured(), LowPass(smoothing, rest)
+    reported, low_pass = log.as_measured(), PairFilter(smoothing, rest)
 
     def values(start: int, stop: int) -> Array:
         first, last = max(start - 1, 0), min(stop + 1, log.ticks)
@@ -78,15 +78,15 @@ def errors_of(
         if rows.ticks < 3:
             return errors
         true = _pairs(rows)
-        as_told = true if told is log else _pairs(told.rows(first, last))
-        estimates = low_pass.of(first, as_told)
+        as_reported = true if reported is log else _pairs(reported.rows(first, last))
+        estimates = low_pass.of(first, as_reported)
         of_laws = h_bar(rows)
         own = of_laws[1:-1] if of_laws.ndim == 2 else of_laws
         # force and acceleration outlast a change of law or gains, their h_bar does not
         estimate = estimates[:-1, 0] - own * estimates[:-1, 1]
         error = true[1:, 0] - own * true[1:, 1] - estimate
         known = np.broadcast_to(np.isfinite(own).all(axis=-1), len(error))
-        is_measured = measured_rows(told, first, last)
+        is_measured = measured_rows(reported, first, last)
         known = known & is_measured[:-2] & is_measured[1:-1] & is_measured[2:]
         if not np.isfinite(error[known]).all():
             raise InputError("the attitude's error was 180 degrees, where J0 of (1) is singular")
@@ -97,7 +97,7 @@ def errors_of(
     return values
 
 
-class LowPass:
+class PairFilter:
     """``N_hat`` as the controller forms it of force and acceleration, interval after interval.
 
     It is linear, so that it may be formed of both before h_bar is known.

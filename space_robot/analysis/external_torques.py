@@ -19,7 +19,7 @@ from space_robot_sim.environment.disturbance import DisturbanceSettings, LoadSch
 
 from .analysed_log import AnalysedLog
 from .described import captures_of, environment_of
-from .series import Quantity, Series, series
+from .series import Definition, TimeSeries, series
 
 Array = NDArray[np.float64]
 
@@ -32,13 +32,13 @@ OWN = "own"
 @series(
     "disturbance torque",
     {
-        "disturbance_*": Quantity("N m", "torque of the source about the common centre of mass"),
-        "impulse_*": Quantity(
+        "disturbance_*": Definition("N m", "torque of the source about the common centre of mass"),
+        "impulse_*": Definition(
             "N m s", "angular momentum that the source has given since the first tick", ("max",)
         ),
     },
 )
-def disturbance(flight: AnalysedLog) -> Series | None:
+def disturbance(flight: AnalysedLog) -> TimeSeries | None:
     """Return size and impulse of each source in an orbit.
 
     The impulse is what wheels have to store if nothing unloads them.
@@ -47,19 +47,19 @@ def disturbance(flight: AnalysedLog) -> Series | None:
     if not log.orbit_position.shape[1]:
         return None
     sources = torques_by_source(log)
-    given = dict.fromkeys(sources, np.zeros(3))
+    impulses = dict.fromkeys(sources, np.zeros(3))
 
     def values(start: int, stop: int) -> Array:
         torques = {name: torque(start, stop) for name, torque in sources.items()}
         sizes = [norms(torque) for torque in torques.values()]
         for name, torque in torques.items():
-            impulse = given[name] + log.timebase.period * np.cumsum(torque, axis=0)
-            given[name] = impulse[-1].copy()
+            impulse = impulses[name] + log.timebase.period * np.cumsum(torque, axis=0)
+            impulses[name] = impulse[-1].copy()
             sizes.append(norms(impulse))
         return np.column_stack(sizes)
 
     names = [f"{kind}_{name}" for kind in ("disturbance", "impulse") for name in sources]
-    return Series({name: [k] for k, name in enumerate(names)}, values)
+    return TimeSeries({name: [k] for k, name in enumerate(names)}, values)
 
 
 def torques_by_source(log: FlightLog) -> dict[str, Callable[[int, int], Array]]:

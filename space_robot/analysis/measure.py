@@ -19,7 +19,7 @@ from space_robot_msgs_py.errors import InputError
 
 from .analysed_log import AnalysedLog
 from .pointing_budget import PointingBudget
-from .series import GROUPS, Group, Quantity, SeriesGroup, pattern
+from .series import GROUPS, Definition, MetricGroup, SeriesGroup, pattern
 
 MODULES = (
     "pointing",
@@ -107,7 +107,7 @@ def evaluate(
     return numbers, unavailable
 
 
-def _groups_of(wanted: Collection[str]) -> list[Group]:
+def _groups_of(wanted: Collection[str]) -> list[MetricGroup]:
     """Return the groups of metrics by name.
 
     Raises:
@@ -134,7 +134,7 @@ def names(flight: AnalysedLog, groups: Iterable[str] | None = None) -> Iterator[
             continue
 
 
-def declared() -> Iterator[tuple[Group, str, Quantity]]:
+def declared() -> Iterator[tuple[MetricGroup, str, Definition]]:
     """Yield group, pattern, unit and meaning of each metric."""
     for group in GROUPS.values():
         for name, quantity in group.describe():
@@ -142,19 +142,19 @@ def declared() -> Iterator[tuple[Group, str, Quantity]]:
 
 
 @lru_cache(maxsize=4096)
-def group_of(name: str) -> Group | None:
+def group_of(name: str) -> MetricGroup | None:
     """Return the group of a metric; None: there is none, as of a user's own."""
     matching = (group for group, template, _ in declared() if fnmatchcase(name, pattern(template)))
     return next(matching, None)
 
 
 @lru_cache(maxsize=4096)
-def describe(name: str) -> Quantity:
+def describe(name: str) -> Definition:
     """Return unit and meaning of a metric; of an unknown one, such as a user's own, none."""
     for _, template, quantity in declared():
         if fnmatchcase(name, pattern(template)):
             return quantity._replace(unit=quantity.unit.replace("{unit}", column_unit(name)))
-    return Quantity("", "")
+    return Definition("", "")
 
 
 @lru_cache(maxsize=4096)

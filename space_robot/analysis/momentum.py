@@ -32,7 +32,7 @@ from space_robot_sim.environment.impact import Impact
 from .analysed_log import AnalysedLog
 from .described import NotDescribedError, captures_of, environment_of, events_of
 from .external_torques import axes_of, base_loads, torque_about_centre
-from .series import Quantity, Series, metrics, series
+from .series import Definition, TimeSeries, metrics, series
 
 Array = NDArray[np.float64]
 
@@ -188,18 +188,20 @@ def momentum_of(log: FlightLog) -> Momentum:
 @series(
     "momentum",
     {
-        "momentum_robot": Quantity("N m s", "of the robot, its wheels locked", ("max",)),
-        "momentum_base": Quantity("N m s", "the base's share of that", ("max",)),
-        "momentum_wheels": Quantity("N m s", "of the wheels' spin", ("max",)),
-        "momentum_outside": Quantity("N m s", "what came from outside", ("max",)),
-        "momentum_drift": Quantity("N m s", "of robot and wheels from what is conserved", ("max",)),
-        "pushed": Quantity(
+        "momentum_robot": Definition("N m s", "of the robot, its wheels locked", ("max",)),
+        "momentum_base": Definition("N m s", "the base's share of that", ("max",)),
+        "momentum_wheels": Definition("N m s", "of the wheels' spin", ("max",)),
+        "momentum_outside": Definition("N m s", "what came from outside", ("max",)),
+        "momentum_drift": Definition(
+            "N m s", "of robot and wheels from what is conserved", ("max",)
+        ),
+        "pushed": Definition(
             "m", "of the whole robot's centre of mass, by thrusters, from its start", ("max", "end")
         ),
     },
-    {"momentum_drift.relative": Quantity("-", "the drift by the largest momentum of the robot")},
+    {"momentum_drift.relative": Definition("-", "the drift by the largest momentum of the robot")},
 )
-def momentum(flight: AnalysedLog) -> Series | None:
+def momentum(flight: AnalysedLog) -> TimeSeries | None:
     """Return the sizes of the momentum's parts, of a base that ideal torques do not turn."""
     if not flight.log.flight.get("base_actuators"):
         return None
@@ -225,7 +227,7 @@ def momentum(flight: AnalysedLog) -> Series | None:
         drift = numbers["momentum_drift.max"]
         return {"momentum_drift.relative": drift / size} if size else {}
 
-    return Series(axes, values, derive=derive)
+    return TimeSeries(axes, values, derive=derive)
 
 
 def disturbance_impulse(disturbance: DisturbanceSettings, time: Array) -> Array:
@@ -303,7 +305,7 @@ def _has_free_targets(flight: AnalysedLog) -> bool:
 
 @metrics(
     "captures",
-    {"missed.{event}": Quantity("m", "of the target from where the tool would have held it")},
+    {"missed.{event}": Definition("m", "of the target from where the tool would have held it")},
     applies=_has_free_targets,
 )
 def missed_captures(flight: AnalysedLog) -> dict[str, float]:

@@ -173,24 +173,15 @@ def name_of(text: str) -> str:
     return text.rpartition(":")[2].rpartition(".")[2]
 
 
-def check_names(names: Iterable[str], known: Iterable[str] = ()) -> None:
-    """Check the names of own metrics.
-
-    Args:
-        names: to be checked.
-        known: metrics that every flight has.
+def check_names(names: Iterable[str]) -> None:
+    """Check the names of own metrics: other metrics have a point in their names.
 
     Raises:
-        InputError: a name is no identifier or is one of ``known``.
+        InputError: a name is no identifier.
     """
-    taken = set(known)
     for name in names:
         if not (name.isidentifier() and name.isascii()):
             raise InputError(f"{short(name)} is no name of a metric: letters, digits and _ only")
-        if name in taken:
-            raise InputError(
-                f"{name} is the name of a metric that every flight has: choose another"
-            )
 
 
 def parse(text: str) -> OwnMetric:

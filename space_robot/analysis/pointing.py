@@ -26,7 +26,7 @@ from .errors import (
     rotation_vectors,
 )
 from .pointing_budget import window_ticks
-from .series import Quantity, Series, metrics, series
+from .series import Definition, TimeSeries, metrics, series
 
 Array = NDArray[np.float64]
 
@@ -39,28 +39,28 @@ ALL = ("rms", "max", "end")
 @series(
     "errors",
     {
-        "attitude_angle": Quantity(
+        "attitude_angle": Definition(
             "deg", "error of the base's attitude, as rotation vector", TABLE_V, True
         ),
-        "attitude": Quantity(
+        "attitude": Definition(
             "-",
             "error of the base's attitude, vector part of the quaternion (half the angle, rad)",
             TABLE_V,
             is_vector=True,
             is_shown=False,
         ),
-        "joints_prismatic": Quantity("m", "desired less true position of these joints", TABLE_V),
-        "joints_*": Quantity("rad", "desired less true angle of these joints", TABLE_V),
-        "half_cone": Quantity(
+        "joints_prismatic": Definition("m", "desired less true position of these joints", TABLE_V),
+        "joints_*": Definition("rad", "desired less true angle of these joints", TABLE_V),
+        "half_cone": Definition(
             "arcsec",
             "angle between the true and the desired direction of the axis that points",
             ALL,
         ),
-        "about_axis": Quantity("arcsec", "rotation of the base about the axis that points", ALL),
-        "base_rotation": Quantity("arcsec", "rotation between desired and true attitude", ALL),
+        "about_axis": Definition("arcsec", "rotation of the base about the axis that points", ALL),
+        "base_rotation": Definition("arcsec", "rotation between desired and true attitude", ALL),
     },
 )
-def errors(flight: AnalysedLog) -> Series:
+def errors(flight: AnalysedLog) -> TimeSeries:
     """Return the errors of base and joints, and the angles of the base's pointing."""
     log, m, is_held = flight.log, flight.log.axes, flight.controls_base
     axes = dict(flight.error_columns)
@@ -76,7 +76,7 @@ def errors(flight: AnalysedLog) -> Series:
         vectors = rotation_vectors(attitude)
         return np.hstack([error, np.degrees(vectors), base_angles(attitude, vectors, flight)])
 
-    return Series(axes, values)
+    return TimeSeries(axes, values)
 
 
 def base_angles(attitude: Array, vectors: Array, flight: AnalysedLog) -> Array:
@@ -99,12 +99,12 @@ def base_angles(attitude: Array, vectors: Array, flight: AnalysedLog) -> Array:
 @metrics(
     "errors",
     {
-        "{angle}.within_band": Quantity("share", "share of time within the band (--band)"),
-        "{angle}.outside_band": Quantity("share", "share of time outside of it", is_shown=False),
-        "{angle}.jitter_rms": Quantity(
+        "{angle}.within_band": Definition("share", "share of time within the band (--band)"),
+        "{angle}.outside_band": Definition("share", "share of time outside of it", is_shown=False),
+        "{angle}.jitter_rms": Definition(
             "arcsec", "RMS of the difference from the mean in a window (--window)"
         ),
-        "{angle}.jitter_max": Quantity("arcsec", "largest such difference"),
+        "{angle}.jitter_max": Definition("arcsec", "largest such difference"),
     },
     applies=lambda flight: flight.controls_base,
 )
@@ -126,7 +126,7 @@ def steadiness(flight: AnalysedLog) -> dict[str, float]:
         angles = np.stack(sizes, axis=1) / ARCSEC
         squares += np.einsum("ij,ij->j", angles, angles)
         largest = np.maximum(largest, angles.max(axis=0, initial=0.0))
-    numbers = {}
+    numbers: dict[str, float] = {}
     for k, name in enumerate(ANGLES):
         share = float(within[k]) / flight.log.ticks
         numbers |= {f"{name}.within_band": share, f"{name}.outside_band": 1.0 - share}
@@ -146,12 +146,12 @@ def lacking_for_jitter(name: str, seconds: float, window_s: float, period: float
 @series(
     "attitude drift",
     {
-        "attitude_drift": Quantity(
+        "attitude_drift": Definition(
             "rad", "rotation of a base without actuators since the first tick", ALL
         )
     },
 )
-def drift(flight: AnalysedLog) -> Series | None:
+def drift(flight: AnalysedLog) -> TimeSeries | None:
     """Return the angle by which a free base has turned since the first tick."""
     if flight.controls_base:
         return None
@@ -160,7 +160,7 @@ def drift(flight: AnalysedLog) -> Series | None:
     def values(start: int, stop: int) -> Array:
         return norms(attitude_drift(log.rows(start, stop), log.quaternion[0]))[:, np.newaxis]
 
-    return Series({"attitude_drift": [0]}, values)
+    return TimeSeries({"attitude_drift": [0]}, values)
 
 
 NAVIGATION = "true less assumed"
@@ -169,18 +169,18 @@ NAVIGATION = "true less assumed"
 @series(
     "navigation error",
     {
-        "navigation_attitude_angle": Quantity("deg", f"{NAVIGATION} attitude", is_vector=True),
-        "navigation_attitude": Quantity(
+        "navigation_attitude_angle": Definition("deg", f"{NAVIGATION} attitude", is_vector=True),
+        "navigation_attitude": Definition(
             "-",
             f"{NAVIGATION} attitude, vector part of the quaternion",
             is_vector=True,
             is_shown=False,
         ),
-        "navigation_joints_prismatic": Quantity("m", f"{NAVIGATION} position of these joints"),
-        "navigation_joints_*": Quantity("rad", f"{NAVIGATION} angle of these joints"),
+        "navigation_joints_prismatic": Definition("m", f"{NAVIGATION} position of these joints"),
+        "navigation_joints_*": Definition("rad", f"{NAVIGATION} angle of these joints"),
     },
 )
-def navigation(flight: AnalysedLog) -> Series | None:
+def navigation(flight: AnalysedLog) -> TimeSeries | None:
     """Return how far the state that the law assumed was from the true one.
 
     The law tells the error e that it sees in its telemetry. Less the true one this is the true
@@ -204,7 +204,7 @@ def navigation(flight: AnalysedLog) -> Series | None:
             turned[rows] = np.degrees(rotation_vectors(relative_attitude(assumed, true)))
         return np.hstack([seen - error, turned])
 
-    return Series(axes, values, "no telemetry was recorded")
+    return TimeSeries(axes, values, "no telemetry was recorded")
 
 
 POSE = "of the end effector, true less desired"
@@ -213,17 +213,17 @@ POSE = "of the end effector, true less desired"
 @series(
     "end effector",
     {
-        "boresight": Quantity("arcsec", f"direction of the z axis {POSE}", ALL),
-        "tool_attitude": Quantity("arcsec", f"rotation {POSE}", ALL),
-        "tool_position": Quantity(
+        "boresight": Definition("arcsec", f"direction of the z axis {POSE}", ALL),
+        "tool_attitude": Definition("arcsec", f"rotation {POSE}", ALL),
+        "tool_position": Definition(
             "m", f"position {POSE}, the base at its true position in both", ALL
         ),
-        "base_drift": Quantity(
+        "base_drift": Definition(
             "m", "of the base's centre of mass from where it began; nothing holds it", ALL
         ),
     },
 )
-def end_effector(flight: AnalysedLog) -> Series:
+def end_effector(flight: AnalysedLog) -> TimeSeries:
     """Return the error of the tool's pose; joints without motors are to rest on their springs."""
     log, robot = flight.log, flight.robot
     rest = np.array([[spring.rest for spring in robot.springs]])
@@ -244,7 +244,7 @@ def end_effector(flight: AnalysedLog) -> Series:
         )
 
     names = ("boresight", "tool_attitude", "tool_position", "base_drift")
-    return Series({name: [k] for k, name in enumerate(names)}, values)
+    return TimeSeries({name: [k] for k, name in enumerate(names)}, values)
 
 
 def angle_between(first: Array, second: Array) -> Array:

@@ -10,7 +10,8 @@ import numpy as np
 
 from ..console.tables import NONE, Column, Group, Table
 from .described import IDEAL
-from .measure import GROUPS, column_unit, describe, group_of
+from .measure import column_unit, describe, group_of
+from .series import GROUPS
 from .words import Report, analyzed, flown, law_of, notes, remarks, seen_through
 
 TABLE_V = ("rms", "rms_eq64", "variation", "chatter", "ripple")

@@ -26,7 +26,7 @@ Array = NDArray[np.float64]
 PLACEHOLDER = re.compile(r"{(\w+)}")
 
 
-class Quantity(NamedTuple):
+class Definition(NamedTuple):
     """Unit and meaning of a column of a series, or of a metric."""
 
     unit: str
@@ -39,7 +39,7 @@ class Quantity(NamedTuple):
     """Whether tables of reports have it; all are in JSON."""
 
 
-class Series(NamedTuple):
+class TimeSeries(NamedTuple):
     """What a flight did over time."""
 
     axes: Mapping[str, AxisIndex]
@@ -68,14 +68,14 @@ class Summary(NamedTuple):
         numbers = {}
         for column, index in axes.items():
             each = self.rms[index]
-            values = {
-                "rms": np.mean(each),
+            values: dict[str, float] = {
+                "rms": float(np.mean(each)),
                 "rms_eq64": norm(each) / len(each),
                 "max": self.largest[column],
                 "end": self.end[column],
             }
             for statistic in group.quantity(column).statistics:
-                numbers[f"{column}.{statistic}"] = float(values[statistic])
+                numbers[f"{column}.{statistic}"] = values[statistic]
         return numbers
 
 
@@ -88,12 +88,12 @@ STATISTICS = {
 
 
 @dataclass(frozen=True, eq=False)
-class Group:
+class MetricGroup:
     """Metrics that are computed together."""
 
     name: str
     title: str
-    quantities: Mapping[str, Quantity]
+    quantities: Mapping[str, Definition]
     """By pattern of a metric's name, or of a series' column; `expand` fills ``{places}`` in."""
 
     def evaluate(self, flight: AnalysedLog, window: range) -> dict[str, float]:
@@ -108,17 +108,17 @@ class Group:
         """Return the names of the metrics that a flight has; it need not have been flown."""
         raise NotImplementedError
 
-    def describe(self) -> Iterator[tuple[str, Quantity]]:
+    def describe(self) -> Iterator[tuple[str, Definition]]:
         """Yield pattern, unit and meaning of each metric."""
         yield from self.quantities.items()
 
 
 @dataclass(frozen=True, eq=False)
-class SeriesGroup(Group):
+class SeriesGroup(MetricGroup):
     """The statistics of a series."""
 
-    source: Callable[[AnalysedLog], Series | None]
-    derived: Mapping[str, Quantity]
+    source: Callable[[AnalysedLog], TimeSeries | None]
+    derived: Mapping[str, Definition]
 
     def evaluate(self, flight: AnalysedLog, window: range) -> dict[str, float]:
         """Sum up the rows in a window."""
@@ -138,7 +138,7 @@ class SeriesGroup(Group):
             *(self.derived if columns else ()),
         ]
 
-    def describe(self) -> Iterator[tuple[str, Quantity]]:
+    def describe(self) -> Iterator[tuple[str, Definition]]:
         """Yield each statistic of each column."""
         for column, quantity in self.quantities.items():
             for statistic in quantity.statistics:
@@ -146,11 +146,11 @@ class SeriesGroup(Group):
                 yield f"{column}.{statistic}", quantity._replace(text=text)
         yield from self.derived.items()
 
-    def quantity(self, column: str) -> Quantity:
+    def quantity(self, column: str) -> Definition:
         """Return unit and meaning of a column."""
         return next(q for name, q in self.quantities.items() if fnmatchcase(column, pattern(name)))
 
-    def blocks(self, flight: AnalysedLog, series: Series) -> Iterator[tuple[int, Array]]:
+    def blocks(self, flight: AnalysedLog, series: TimeSeries) -> Iterator[tuple[int, Array]]:
         """Yield the first row and the values of each block; of a short flight computed once."""
         if len(blocks := list(flight.blocks())) > 1:
             for start, stop in blocks:
@@ -166,7 +166,7 @@ class SeriesGroup(Group):
             for start, values in self.blocks(flight, series):
                 yield start, {c: self._size(c, values[:, axes]) for c, axes in series.axes.items()}
 
-    def summarise(self, flight: AnalysedLog, series: Series, window: range) -> Summary:
+    def summarise(self, flight: AnalysedLog, series: TimeSeries, window: range) -> Summary:
         """Sum up the known rows in a window.
 
         Raises:
@@ -201,7 +201,7 @@ class SeriesGroup(Group):
 
 
 @dataclass(frozen=True, eq=False)
-class FunctionGroup(Group):
+class FunctionGroup(MetricGroup):
     """Metrics that a function returns."""
 
     function: Callable[[AnalysedLog], dict[str, float]]
@@ -218,22 +218,24 @@ class FunctionGroup(Group):
         return [name for template in self.quantities for name in expand(template, flight)]
 
 
-GROUPS: dict[str, Group] = {}
+GROUPS: dict[str, MetricGroup] = {}
 """By name, in the order of reports; `space_robot.analysis.measure` imports all."""
 
 
 def series(
-    title: str, quantities: Mapping[str, Quantity], derived: Mapping[str, Quantity] | None = None
-) -> Callable[[Callable[[AnalysedLog], Series | None]], SeriesGroup]:
-    """Register a function from a flight to its `Series`; None: it is not of this flight.
+    title: str,
+    quantities: Mapping[str, Definition],
+    derived: Mapping[str, Definition] | None = None,
+) -> Callable[[Callable[[AnalysedLog], TimeSeries | None]], SeriesGroup]:
+    """Register a function from a flight to its `TimeSeries`; None: it is not of this flight.
 
     Args:
         title: of the metrics in reports.
         quantities: by name or pattern of a column; the first that fits holds.
-        derived: what `Series.derive` returns, by the metrics' names.
+        derived: what `TimeSeries.derive` returns, by the metrics' names.
     """
 
-    def register(source: Callable[[AnalysedLog], Series | None]) -> SeriesGroup:
+    def register(source: Callable[[AnalysedLog], TimeSeries | None]) -> SeriesGroup:
         group = SeriesGroup(source.__name__, title, quantities, source, derived or {})
         GROUPS[group.name] = group
         return group
@@ -243,7 +245,7 @@ def series(
 
 def metrics(
     title: str,
-    quantities: Mapping[str, Quantity],
+    quantities: Mapping[str, Definition],
     applies: Callable[[AnalysedLog], bool] = lambda flight: True,
 ) -> Callable[[Callable[[AnalysedLog], dict[str, float]]], FunctionGroup]:
     """Register a function from a flight to some of its metrics.

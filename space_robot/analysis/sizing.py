@@ -67,8 +67,8 @@ def sizing(flight: AnalysedLog, other: ActuatorSet | None = None) -> dict[str, A
         for load in loads:
             load.add(start, stop, demand)
     thrusters = next((load for load in loads if isinstance(load, ThrusterLoad)), None)
-    pulses = thrusters and thrusters.pulses()
-    propellant = thrusters and thrusters.propellant(period)
+    pulses = thrusters.pulses() if thrusters else None
+    propellant = thrusters.propellant(period) if thrusters else None
     requirements = _requirements(asked, torque, momentum, loads, period)
     return {
         "actuators": name,

@@ -17,7 +17,7 @@ BY_AXIS = (
     ("pulses", "-", "pulses"),
     ("propellant", "kg", "propellant_kg"),
 )
-"""Quantity, unit and key of what is asked of each axis."""
+"""Definition, unit and key of what is asked of each axis."""
 
 MANY_TIMES = 10.0
 """Lack, as a share of what a part has, from which on the table has a multiple, not a margin."""

@@ -29,7 +29,7 @@ from .analysed_log import AnalysedLog
 from .described import assumed_robot_of, captures_of
 from .momentum import happens_in
 from .pointing import rotation_angle
-from .series import Quantity, Series, series
+from .series import Definition, TimeSeries, series
 
 Array = NDArray[np.float64]
 
@@ -117,19 +117,19 @@ def _true_centre(robot: Robot, log: FlightLog) -> Array:
 @series(
     "tool on its path",
     {
-        "tool": Quantity("m", "distance of the end effector from the path of its mission"),
-        "tool_rotation": Quantity("rad", "rotation of the end effector from its path"),
-        "path_drift": Quantity(
+        "tool": Definition("m", "distance of the end effector from the path of its mission"),
+        "tool_rotation": Definition("rad", "rotation of the end effector from its path"),
+        "path_drift": Definition(
             "m",
             "of the path, with the common centre of mass that forces from outside move",
             ("max",),
         ),
     },
 )
-def tool(flight: AnalysedLog) -> Series:
+def tool(flight: AnalysedLog) -> TimeSeries:
     """Return the tool's error on inertial axes."""
     path = ToolPath(flight.log)
-    return Series({"tool": [0], "tool_rotation": [1], "path_drift": [2]}, path.errors)
+    return TimeSeries({"tool": [0], "tool_rotation": [1], "path_drift": [2]}, path.errors)
 
 
 def leads_tool(log: FlightLog) -> bool:

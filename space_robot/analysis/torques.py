@@ -25,7 +25,7 @@ from space_robot_msgs_py.errors import InputError
 from .analysed_log import AnalysedLog
 from .errors import AxisIndex, controls_base
 from .pointing import TABLE_V
-from .series import Quantity, Series, metrics, series
+from .series import Definition, TimeSeries, metrics, series
 from .spectrum import hann, segment_spectra
 
 Array = NDArray[np.float64]
@@ -50,24 +50,24 @@ LINE = 2
 @series(
     "torques",
     {
-        "base_torque": Quantity("N m", "torque applied to the base", TABLE_V, True),
-        "force_prismatic": Quantity("N", "forces applied to the prismatic joints", TABLE_V),
-        "torque_*": Quantity("N m", "torques applied to these joints", TABLE_V),
+        "base_torque": Definition("N m", "torque applied to the base", TABLE_V, True),
+        "force_prismatic": Definition("N", "forces applied to the prismatic joints", TABLE_V),
+        "torque_*": Definition("N m", "torques applied to these joints", TABLE_V),
     },
 )
-def torques(flight: AnalysedLog) -> Series:
+def torques(flight: AnalysedLog) -> TimeSeries:
     """Return the torques that were applied."""
     log = flight.log
-    return Series(flight.torque_columns, lambda start, stop: log.applied_torque[start:stop])
+    return TimeSeries(flight.torque_columns, lambda start, stop: log.applied_torque[start:stop])
 
 
 @metrics(
     "torques",
     {
-        "{torque}.variation": Quantity(
+        "{torque}.variation": Definition(
             "{unit}/s", "how far the torque moves up and down in a second, mean over the axes"
         ),
-        "{torque}.chatter": Quantity(
+        "{torque}.chatter": Definition(
             "share", "share of the torque's power above 100 Hz, mean over the axes"
         ),
     },
@@ -153,20 +153,22 @@ class RippleSpectrum(NamedTuple):
 @metrics(
     "torques",
     {
-        "{torque}.ripple": Quantity(
+        "{torque}.ripple": Definition(
             "{unit}",
             "RMS above 2 Hz of the torque beside the one that inverse dynamics asks for along "
             "the reference, mean over the axes: limit cycles, noise and switching",
         ),
-        "{torque}.ripple_fast": Quantity("{unit}", "the same above 25 Hz: noise and switching"),
-        "{torque}.ripple_peak_hz": Quantity("Hz", "frequency at which the ripple is largest"),
-        "{torque}.ripple_peak": Quantity(
+        "{torque}.ripple_fast": Definition("{unit}", "the same above 25 Hz: noise and switching"),
+        "{torque}.ripple_peak_hz": Definition("Hz", "frequency at which the ripple is largest"),
+        "{torque}.ripple_peak": Definition(
             "{unit}", "RMS of the ripple within 0.5 Hz of that frequency"
         ),
-        "{torque}.ripple_lasting": Quantity(
+        "{torque}.ripple_lasting": Definition(
             "share", "share of the segments of 4 s with a tenth of the mean ripple power or more"
         ),
-        "{axis}.ripple": Quantity("N m or N", "RMS of the ripple of one axis", is_shown=False),
+        "{axis}.ripple_axis": Definition(
+            "N m or N", "RMS of the ripple of one axis", is_shown=False
+        ),
     },
 )
 def ripple(flight: AnalysedLog) -> dict[str, float]:
@@ -184,7 +186,7 @@ def ripple(flight: AnalysedLog) -> dict[str, float]:
         if (lasting := spectrum.lasting(axes)) is not None:
             numbers[f"{name}.ripple_lasting"] = lasting
     axes_of = zip(flight.axis_names, rms, strict=True)
-    return numbers | {f"{name}.ripple": float(value) for name, value in axes_of}
+    return numbers | {f"{name}.ripple_axis": float(value) for name, value in axes_of}
 
 
 def lacking_for_ripple(name: str, seconds: float, period: float) -> str:

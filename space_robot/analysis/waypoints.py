@@ -12,7 +12,7 @@ from space_robot_msgs_py.errors import InputError
 
 from .analysed_log import AnalysedLog
 from .errors import joined_error
-from .series import Quantity, metrics
+from .series import Definition, metrics
 
 Array = NDArray[np.float64]
 
@@ -60,12 +60,12 @@ def junction_ticks(log: FlightLog) -> NDArray[np.intp]:
 @metrics(
     "settling",
     {
-        "{error}.settling": Quantity(
+        "{error}.settling": Definition(
             "s",
             "time from the last waypoint after which the error stays to the end within "
             f"{BAND:g} rad or m on joints, and 4.1 arcsec of the attitude's error on each axis",
         ),
-        "settling.after": Quantity("s", "time of the waypoint from which settling counts"),
+        "settling.after": Definition("s", "time of the waypoint from which settling counts"),
     },
 )
 def settling(flight: AnalysedLog) -> dict[str, float]:

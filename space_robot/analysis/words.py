@@ -154,9 +154,10 @@ def _standing_joints(metrics: Metrics) -> list[str]:
 def _beyond_limits(metrics: Metrics) -> list[str]:
     """Say which joints were beyond which limits of their file, and at how many ticks."""
     beyond: dict[str, list[str]] = {}
-    for kind in ("position", "velocity", "effort"):
-        for name, ticks in of_statistic(metrics, f"beyond_{kind}").items():
-            if ticks:
+    kinds = ("position", "velocity", "effort")
+    for name in of_statistic(metrics, "beyond_position"):
+        for kind in kinds:
+            if ticks := metrics[f"{name}.beyond_{kind}"]:
                 beyond.setdefault(name, []).append(f"{kind} at {ticks:.0f} ticks")
     joints = [f"{name} ({', '.join(texts)})" for name, texts in beyond.items()]
     return [f"joints beyond the limits of the robot's file: {', '.join(joints)}"] if joints else []

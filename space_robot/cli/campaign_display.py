@@ -24,7 +24,7 @@ from ..console.terminal_tables import print_table
 if TYPE_CHECKING:
     from pandas import DataFrame
 
-SHOWN = ("attitude_angle.rms", "joints_4_6.rms", "base_torque.ripple")
+SHOWN = ("attitude_angle.rms", "attitude.rms", "joints_4_6.rms", "base_torque.ripple")
 """Metrics whose medians are shown if they were computed; of the attitude in degrees if it is known
 so."""
 
@@ -93,6 +93,8 @@ def medians(table: DataFrame, names: dict[str, str], seed: int, own: Sequence[st
         own: names of the user's own metrics.
     """
     shown = [name for name in (*SHOWN, *own) if is_known(table, f"metric.{name}")]
+    if SHOWN[0] in shown:
+        shown.remove(SHOWN[1])
     rows = []
     for law in laws_of(table):
         own = of_law(table, law)

@@ -38,12 +38,6 @@ def _is_law(name: str) -> bool:
     return name in laws() or name == NoLaw.name
 
 
-def _is_metric(name: str) -> bool:
-    from ..analysis.measure import group_of
-
-    return group_of(name) is not None
-
-
 def _is_file_of(kind: str) -> Callable[[str], bool]:
     def is_shipped(name: str) -> bool:
         from space_robot_msgs_py.config.files import is_named
@@ -70,7 +64,7 @@ METRIC = PieceTemplate(
     {"metric.py": "$name.py", "test_metric.py": "test_$name.py"},
     "space-robot simulate --bag flights/$name\n"
     "space-robot analyze flights/$name --metric $metric_py:$name",
-    _is_metric,
+    lambda name: False,  # names of metrics have a point
 )
 MISSION = PieceTemplate(
     "mission",

@@ -135,7 +135,7 @@ class FlightLog(StateSignals):
     For a bag it is true only if the user says so.
     """
     scenario: Any = None
-    """The resolved scenario of a flight in this process; None: see ``flight``. It is not pickled."""
+    """The resolved scenario of a flight in this process, which is not pickled; None: unknown."""
 
     def __getstate__(self) -> dict[str, Any]:
         return {**self.__dict__, "scenario": None}

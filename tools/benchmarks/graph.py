@@ -45,11 +45,11 @@ def _fly(**plan: Any) -> Flown:
     flight = flight_of(**plan)
     with TemporaryDirectory(prefix="space_robot_bench_") as folder:
         bag, name = Path(folder) / "bag", topics.JOINT_STATES.full_name
-        missed = orchestrator.fly(flight, bag, analyze)["missed_deadlines"]
+        missed = orchestrator.fly(flight, bag, analyze)["metrics"]
         with (bag / "bag_0.mcap").open("rb") as stream:
             messages = make_reader(stream).iter_messages([name])
             sent = [message.publish_time for _, _, message in messages][WARM_UP_TICKS:]
-    late = missed["unanswered_ticks"] + missed["differing_ticks"]
+    late = missed["commands.unanswered"] + missed["commands.differing"]
     rate = 1e9 * (len(sent) - 1) / (sent[-1] - sent[0])
     return Flown(rate, 100.0 * (1.0 - late / flight.ticks))
 

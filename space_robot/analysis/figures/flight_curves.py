@@ -15,8 +15,8 @@ from space_robot_msgs_py.errors import InputError
 from ..analysed_log import AnalysedLog
 from ..described import event_times
 from ..errors import AxisIndex, controls_base
-from ..measure import GROUPS, SeriesGroup
 from ..pointing_budget import PointingBudget
+from ..series import GROUPS, SeriesGroup
 from ..torques import RippleSpectrum, ripple_spectrum
 from ..waypoints import junction_ticks
 

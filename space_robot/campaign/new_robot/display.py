@@ -12,8 +12,8 @@ def rms_table(made: NewRobot) -> Table:
     """Return the RMS of errors and torques under every law, mean over the axes."""
     flights = made.flights
     of_laws = {law: flown.rms for law, flown in flights.items()}
-    keys = dict.fromkeys(key for rms in of_laws.values() for key in rms)
-    keys = [key for key in keys if describe(f"{key}.rms").is_shown]
+    every = dict.fromkeys(key for rms in of_laws.values() for key in rms)
+    keys = [key for key in every if describe(f"{key}.rms").is_shown]
     columns = [
         Column("law", is_label=True),
         *(Column(short_name(k), column_unit(k), ".3g") for k in keys),

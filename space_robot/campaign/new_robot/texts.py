@@ -40,7 +40,7 @@ vary:
   robot.base.inertia: {{scale: 0.1, rotate_deg: 3.0}}
   mission.start_deg: {{uniform: [-0.1, 0.1], offset: true}}
 require:
-  pointing: {{metric: attitude_max, below: 1.0e-3, in: 0.9, confidence: 0.9}}
+  pointing: {{metric: attitude.max, below: 1.0e-3, in: 0.9, confidence: 0.9}}
 runs: 40
 """
 

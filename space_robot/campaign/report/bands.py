@@ -32,7 +32,7 @@ def series_of(table: DataFrame) -> list[str]:
     """Return the names of the series that have bands."""
     names = [c.removeprefix("band.") for c in map(str, table) if c.startswith("band.")]
     names = [name for name in names if table[f"band.{name}"].notna().any()]
-    return [name for name in names if name != "attitude"]
+    return [name for name in names if name != "attitude" or "attitude_angle" not in names]
 
 
 def bands(rows: DataFrame, series: str) -> Array:

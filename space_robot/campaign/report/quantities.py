@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
     from ..study import Requirement
 
-ERRORS = ("attitude_angle", "attitude_drift", "joints")
+ERRORS = ("attitude", "joints")
 """Beginnings of the columns of errors by which laws are compared."""
 
 
@@ -90,6 +90,9 @@ def chosen(
         return [of_metric(one_of(name, known, "metric")) for name in dict.fromkeys(asked)]
     there = metrics_of(table)
     usual = [name for name in there if name.startswith(ERRORS) and name.endswith(".rms")]
+    if "attitude_angle.rms" in usual:
+        usual = [name for name in usual if name != "attitude.rms"]
+        usual.sort(key=lambda name: name != "attitude_angle.rms")
     usual += [name for name in there if name == "base_torque.ripple"]
     usual += [name for name in own if name in there]
     usual += [r.metric for r in require.values() if r.metric in there]

@@ -14,10 +14,11 @@ from space_robot_msgs_py.config.validation import one_of
 from space_robot_msgs_py.errors import InputError
 
 from ...analysis.analysed_log import AnalysedLog
-from ...analysis.measure import GROUPS, SeriesGroup, Window, evaluate, group_of, names
+from ...analysis.measure import Window, evaluate, group_of, names
 from ...analysis.own_metric import OwnMetric
 from ...analysis.pointing import lacking_for_jitter
 from ...analysis.pointing_budget import PointingBudget
+from ...analysis.series import GROUPS, SeriesGroup
 from ...analysis.tool_path import leads_tool
 from ...analysis.torques import lacking_for_ripple
 from ...flight.flown_log import empty_log
@@ -137,7 +138,8 @@ def measure(
                 (start, {c: size for c, size in own_sizes.items() if c in columns})
                 for start, own_sizes in group.sizes(flight)
             ]
-    return Measured(_finite(metrics), _finite(values), bands(sizes, ticks))
+    of_columns = bands(sizes, ticks)
+    return Measured(_finite(metrics), _finite(values), {name: of_columns[name] for name in columns})
 
 
 def check_requirements(

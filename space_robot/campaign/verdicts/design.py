@@ -45,7 +45,7 @@ def saltelli_values(table: DataFrame, law: str, column: str) -> Array:
     Args:
         table: rows of a campaign with the design ``saltelli``.
         law: as in the table.
-        column: such as ``metric.attitude_rms``.
+        column: such as ``metric.attitude.rms``.
     """
     rows, step = of_law(table, law), len(variables(table)) + 2
     count = int(rows["run"].max()) // step + 1 if len(rows) else 0

@@ -49,7 +49,7 @@ def league(table: DataFrame, column: str, confidence: float = 0.95) -> League:
 
     Args:
         table: rows of a campaign, at one point of its grid.
-        column: such as ``metric.attitude_rms``.
+        column: such as ``metric.attitude.rms``.
         confidence: of intervals, and of all findings of this league together.
     """
     comparisons = compare_all(table, column, confidence)

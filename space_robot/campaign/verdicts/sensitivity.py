@@ -70,7 +70,7 @@ def sensitivity(
     Args:
         table: rows of a campaign, at one point of its grid.
         law: as in the table.
-        column: such as ``metric.attitude_rms``.
+        column: such as ``metric.attitude.rms``.
         confidence: of the intervals.
 
     Returns:

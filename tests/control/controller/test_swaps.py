@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from space_robot.analysis.metrics import tracking_error
+from space_robot.analysis.errors import tracking_error
 from space_robot.flight.closed_loop import close_loop
 from space_robot.flight.flown_log import empty_log
 from space_robot.flight.plan import Flight, FlightPlan, resolve

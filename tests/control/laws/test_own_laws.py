@@ -288,7 +288,7 @@ def test_analyze_imports_none_and_says_so(
     log.flight.pop("gains_used")
     report = analyze(log)
     assert "--trust imports a module:Class" in report["unavailable"]["estimate_error"]
-    assert report["rms"]["mean_axis"]["attitude"] >= 0.0
+    assert report["metrics"]["attitude.rms"] >= 0.0
     assert not ran()
     log.trusted = True
     assert "no file for controller 'stranger'" in analyze(log)["unavailable"]["estimate_error"]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -14,26 +15,17 @@ from hypothesis import strategies as st
 from strategies import random_log
 
 from space_robot import Scenario
-from space_robot.analysis import analyze
-from space_robot.analysis.actuation import (
-    Latency,
-    MissedDeadlines,
-    Saturation,
-    StandingJoints,
-    TorqueLimits,
-)
-from space_robot.analysis.metrics import of_log
-from space_robot.analysis.report_lines import lines
+from space_robot.analysis import analyze, measure
+from space_robot.analysis.actuation import standing
+from space_robot.analysis.analysed_log import AnalysedLog
 from space_robot.analysis.sizing_table import sizing_table
-from space_robot.analysis.words import remarks
+from space_robot.analysis.words import of_statistic, remarks
 from space_robot_model.hardware.base_actuators import BaseActuatorSettings
 from space_robot_model.robot import Robot
 from space_robot_model.robot.find import find_robot, robot_names
 from space_robot_msgs_py.bag.flight_log import FlightLog
-from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.samples import Timebase
 
-SOME = TorqueLimits(2.0, 1.5)
 LIMITED = hardware(
     wheels={
         "axes": flat(np.eye(3)),
@@ -49,10 +41,11 @@ def flown(**options: Any) -> FlightLog:
     return Scenario(**{"duration": 0.2, **options}).fly().log
 
 
-def differing(log: FlightLog, latency_ticks: int, limits: TorqueLimits) -> tuple[int, int]:
-    metric = MissedDeadlines(latency_ticks, limits)
-    metric.add(log, np.empty(0))
-    return metric.differing, metric.compared
+def described(log: FlightLog, latency_ticks: int, base: float, joint: float) -> FlightLog:
+    """The same flight as a bag tells it, with these limits of its torques."""
+    plant = {"base_torque_limit": base, "joint_torque_limit": joint}
+    flight = {"command_latency_ticks": latency_ticks, "parameters": {"plant": plant}}
+    return replace(log, scenario=None, flight=flight)
 
 
 @pytest.mark.parametrize("commands", [None, np.full((20, 9), np.nan)])
@@ -60,10 +53,9 @@ def test_without_commands_nothing_is_known(commands: np.ndarray | None) -> None:
     log = flown(duration=0.01)
     log.commanded_torque = commands
     report = analyze(log)
-    assert report["missed_deadlines"] is None
-    assert report["unavailable"]["missed_deadlines"] == "the commands were not recorded"
+    assert report["unavailable"]["commands"] == "the commands were not recorded"
     assert "not flown as a graph" in report["unavailable"]["latency"]
-    assert set(report["saturation"].values()) == {None, 0}
+    assert not [name for name in report["metrics"] if name.startswith(("commands", "torque_li"))]
 
 
 @settings(max_examples=40)
@@ -96,32 +88,32 @@ def test_missed_deadlines_and_saturation_are_those_of_plain_loops(
         compared += 1
         clipped = [max(-y, min(y, x)) for x, y in zip(commanded, limit, strict=True)]
         differ += clipped != applied
-    assert differing(log, latency_ticks, SOME) == (differ, compared)
-    assert of_log(Saturation(SOME), log) == {
-        "base_torque_limit_n_m": 2.0,
-        "joint_torque_limit_n_m": 1.5,
-        "ticks": saturated,
-        "share": saturated / 60,
+    expected = {
+        "torque_limits.base": 2.0,
+        "torque_limits.joints": 1.5,
+        "torque_limits.ticks": saturated,
+        "torque_limits.share": saturated / 60,
     }
+    if np.isfinite(log.commanded_torque[:, 0]).any():
+        expected |= {"commands.differing": differ, "commands.compared": compared}
+    assert measure(described(log, latency_ticks, 2.0, 1.5), list(expected)) == expected
 
 
 def test_percentiles_of_the_latency() -> None:
-    log, metric = random_log(1, 102, 0), Latency(0.0005)
+    log = random_log(1, 102, 0)
     log.latency_s = np.append(np.arange(101.0, 0.0, -1.0) * 1e-5, np.nan)
-    assert of_log(metric, log) == pytest.approx(
-        {
-            "answers": 101,
-            "p50_ms": 0.51,
-            "p99_ms": 1.0,
-            "max_ms": 1.01,
-            "p50_ticks": 1.02,
-            "p99_ticks": 2.0,
-            "max_ticks": 2.02,
-        }
-    )
+    expected = {
+        "latency.answers": 101,
+        "latency.p50_ms": 0.51,
+        "latency.p99_ms": 1.0,
+        "latency.max_ms": 1.01,
+        "latency.p50_ticks": 1.02,
+        "latency.p99_ticks": 2.0,
+        "latency.max_ticks": 2.02,
+    }
+    assert measure(log, list(expected)) == pytest.approx(expected)
     log.latency_s[:] = np.nan
-    with pytest.raises(InputError, match="not flown as a graph"):
-        of_log(Latency(0.0005), log)
+    assert "not flown as a graph" in analyze(log)["unavailable"]["latency"]
 
 
 def test_joints_stand_where_they_were_to_move() -> None:
@@ -132,8 +124,8 @@ def test_joints_stand_where_they_were_to_move() -> None:
     log.joint_velocities[:], log.reference_joints[:, :, 2] = 0.0, 0.0
     log.joint_velocities[:, 0] = ramp
     log.joint_velocities[100:, 1] = -0.5 * ramp[100:]
-    found = of_log(StandingJoints(log.rows(0, 1)), log)
-    assert found == {"a": 0.0, "b": pytest.approx(0.0625, abs=1e-3)}
+    found = standing.evaluate(AnalysedLog(log), range(400))
+    assert found == {"a.standing": 0.0, "b.standing": pytest.approx(0.0625, abs=1e-3)}
 
 
 def test_joints_that_stood_are_said_from_a_share_of_their_way_on() -> None:
@@ -141,11 +133,15 @@ def test_joints_that_stood_are_said_from_a_share_of_their_way_on() -> None:
     weak = {f"pd.{name}": [1e4] * 6 + [5.0] * 3 for name in ("k_p", "k_d")}
     own = {"plant": {"friction.coulomb": 2.0}, "controller": weak}
     report = analyze(flown(controller="pd", duration=4.0, parameters=own))
-    assert report["standing"]["joint4"] > 0.3
-    report["standing"] = {"a": 0.051, "b": 0.05, "c": 0.049}
+    metrics = report["metrics"]
+    assert metrics["joint4.standing"] > 0.3
+    for joint in range(1, 7):
+        del metrics[f"joint{joint}.standing"]
+    metrics |= {"a.standing": 0.051, "b.standing": 0.05, "c.standing": 0.049}
     (said,) = [x for x in remarks(report) if "stood still" in x]
     assert said.endswith("way they were to move: a 5%, b 5%")
-    assert not [x for x in remarks({**report, "standing": {"c": 0.049}}) if "stood still" in x]
+    metrics |= {"a.standing": 0.0, "b.standing": 0.0}
+    assert not [x for x in remarks(report) if "stood still" in x]
 
 
 def test_saturation_and_missed_deadlines_are_the_plants() -> None:
@@ -153,14 +149,15 @@ def test_saturation_and_missed_deadlines_are_the_plants() -> None:
     parameters = {"plant": {"base_torque_limit": 0.05, "joint_torque_limit": 0.02}}
     options = {"parameters": parameters, "command_latency_ticks": 1}
     flight = Scenario(duration=0.2, **options).fly()
-    log, report = flight.log, analyze(flight.log)
-    counted = report["saturation"]["ticks"]
+    log, metrics = flight.log, flight.metrics
+    counted = metrics["torque_limits.ticks"]
     # the plant's own count has no torque at tick 0, but one more at the end
     assert 0 < counted <= flight.flight.plant.saturated_ticks <= counted + 1
-    assert differing(log, 1, SOME)[0] > 0
-    assert differing(log, 2, TorqueLimits(0.05, 0.02))[0] > 0
-    assert [*report["missed_deadlines"].values()] == [0, 398, 0]
-    limits = [report["saturation"][f"{part}_torque_limit_n_m"] for part in ("base", "joint")]
+    for latency_ticks, base, joint in ((1, 2.0, 1.5), (2, 0.05, 0.02)):
+        assert measure(described(log, latency_ticks, base, joint))["commands.differing"] > 0
+    counts = [metrics[f"commands.{name}"] for name in ("unanswered", "compared", "differing")]
+    assert counts == [0, 398, 0]
+    limits = [metrics[f"torque_limits.{part}"] for part in ("base", "joints")]
     assert limits == [0.05, 0.02]
 
 
@@ -172,29 +169,30 @@ def test_wheels_at_their_limits_are_counted_and_said(paper_robot: Robot) -> None
     log.wheel_torques[50, 2], log.wheel_velocities[49, 2] = 0.25, (2.0 - 0.25 * 0.0005) / 0.1
     log.flight["parameters"] = {"plant": {"base_torque_limit": 0.5, "joint_torque_limit": 3.0}}
     report = analyze(log)
-    assert report["wheel_saturation"] == {
-        "ticks": 10 + 21 + 1,
-        "share": 0.32,
-        "wheels": {
-            "wheel_1": {"torque_limit_ticks": 10, "momentum_limit_ticks": 25, "first_s": 0.005},
-            "wheel_2": {"torque_limit_ticks": 0, "momentum_limit_ticks": 0, "first_s": None},
-            "wheel_3": {"torque_limit_ticks": 0, "momentum_limit_ticks": 1, "first_s": 0.025},
-        },
+    found = {name: x for name, x in report["metrics"].items() if name.startswith("wheel")}
+    assert found == {
+        "wheels.saturation": 0.32,
+        "wheels.saturation_ticks": 10 + 21 + 1,
+        "wheel_1.torque_limit_ticks": 10,
+        "wheel_1.momentum_limit_ticks": 25,
+        "wheel_1.first_limit": 0.005,
+        "wheel_2.torque_limit_ticks": 0,
+        "wheel_2.momentum_limit_ticks": 0,
+        "wheel_3.torque_limit_ticks": 0,
+        "wheel_3.momentum_limit_ticks": 1,
+        "wheel_3.first_limit": 0.025,
     }
     said = "at a limit of torque or momentum at 32 ticks (32.00%), wheel_1 first at 0.005 s"
     assert any(said in text for text in remarks(report))
-    texts = {(x.group, x.name): x.texts for x in lines([report])}
-    assert texts["saturation", "wheel_1"] == ["torque 10, momentum 25\nfirst at 0.005 s"]
-    assert texts["saturation", "wheel_2"] == ["never"]
     asked = sizing_table(report)
     assert asked is not None
     assert "what the law then asked for is not what the mission asks" in asked.notes[0]
-    assert report["saturation"]["base_torque_limit_n_m"] is None  # that of its hardware
-    assert report["saturation"]["joint_torque_limit_n_m"] == 3.0
+    assert "torque_limits.base" not in report["metrics"]  # that of its hardware
+    assert report["metrics"]["torque_limits.joints"] == 3.0
     unlimited = still_log(paper_robot, 10, hardware(wheels={"axes": PYRAMID}))
     unlimited.wheel_velocities[:] = unlimited.wheel_torques[:] = 1e6
     report = analyze(unlimited)
-    assert report["wheel_saturation"]["ticks"] == 0
+    assert report["metrics"]["wheels.saturation"] == 0
     assert not any("limit" in text for text in remarks(report))
 
 
@@ -208,12 +206,12 @@ def test_a_base_that_gives_another_torque_missed_no_deadline(
     assert log.commanded_torque is not None
     log.commanded_torque[:] = rng.normal(size=log.commanded_torque.shape)
     log.applied_torque[1:, 3:] = log.commanded_torque[:-1, 3:]
-    found = analyze(log)["missed_deadlines"]
-    assert found["differing_ticks"] == (99 if actuators is IDEAL else 0)
-    assert found["compared_ticks"] == 99
+    found = analyze(log)["metrics"]
+    assert found["commands.differing"] == (99 if actuators is IDEAL else 0)
+    assert found["commands.compared"] == 99
     log.applied_torque[50] = log.applied_torque[49]
-    found = analyze(log)["missed_deadlines"]
-    assert found["differing_ticks"] == (99 if actuators is IDEAL else 1)
+    found = analyze(log)["metrics"]
+    assert found["commands.differing"] == (99 if actuators is IDEAL else 1)
 
 
 @pytest.mark.parametrize("name", robot_names())
@@ -225,7 +223,7 @@ def test_shipped_robots_keep_to_the_limits_of_their_files(name: str) -> None:
 def test_a_limit_cycle_is_said_with_its_frequency_and_a_burst_is_none() -> None:
     """A torque that oscillates at 5 Hz with a quarter of what it does, and one of 1 %."""
     log = flown(controller="ctc", duration=8.0)
-    size = np.sqrt(2.0) * 0.25 * analyze(log)["rms"]["mean_axis"]["torque_4_6"]
+    size = np.sqrt(2.0) * 0.25 * measure(log)["torque_4_6.rms"]
     wave, torque = np.sin(2.0 * np.pi * 5.0 * log.time)[:, np.newaxis], log.applied_torque.copy()
     log.applied_torque[:, 6:] += size * wave
     log.applied_torque[:, :3] += 1e-3 * wave
@@ -240,13 +238,15 @@ def test_a_limit_cycle_is_said_with_its_frequency_and_a_burst_is_none() -> None:
 def test_joints_beyond_their_limits_are_said() -> None:
     """Where the file has limits, and not by rounding."""
     log = flown(controller="ctc", duration=0.01)
+    log.scenario = None
     joints = find_robot("paper").content
     for number, link in enumerate(joints["robot"]["links"]):
         link["limits"] = [-3.0, 3.0, 2.0, 60.0] if number < 3 else [None] * 4
     log.flight["robot_file"] = joints
     log.joint_positions[:], log.joint_velocities[:], log.applied_torque[:] = 3.0, -2.0, 60.0
     report = analyze(log)
-    assert list(report["beyond_limits"]) == ["joint1", "joint2", "joint3"]
+    beyond = of_statistic(report["metrics"], "beyond_effort")
+    assert list(beyond) == ["joint1", "joint2", "joint3"]
     assert not [text for text in remarks(report) if "beyond" in text]
     log.applied_torque[:7, 4] = -60.1
     log.joint_positions[:2, 2], log.joint_velocities[3, 2] = -3.1, 2.1

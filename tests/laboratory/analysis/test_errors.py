@@ -17,15 +17,14 @@ from strategies import random_log
 
 from space_robot import Scenario
 from space_robot.analysis import analyze, excerpt, tracking_error
-from space_robot.analysis.described_estimator import estimator
-from space_robot.analysis.estimate_error import DelayedEstimate, EstimateErrors
+from space_robot.analysis.analysed_log import AnalysedLog
+from space_robot.analysis.estimate_error import PairFilter, errors_of, estimator
 from space_robot.analysis.generalised_motion import neglected_force
 from space_robot.analysis.report_tables import comparison_table, rms_table
-from space_robot.analysis.settling import Settling
-from space_robot.analysis.waypoints import Waypoints, junction_ticks, waypoint_ticks
+from space_robot.analysis.waypoints import junction_ticks, settling, waypoint_ticks
 from space_robot.flight.flown_log import empty_log
 from space_robot.flight.plan import Flight, FlightPlan, resolve
-from space_robot_msgs_py.bag.flight_log import FlightLog, blocks_of
+from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.samples import Timebase
 
@@ -46,6 +45,10 @@ def planned_log(duration: float) -> FlightLog:
     return empty_log(Flight(resolve(FlightPlan(duration=duration))))
 
 
+def settled(log: FlightLog) -> dict[str, float]:
+    return settling.evaluate(AnalysedLog(log), range(log.ticks))
+
+
 @given(
     arrays(np.float64, (300, 4), elements=st.floats(-2.0, 2.0)),
     st.integers(0, 100),
@@ -59,19 +62,20 @@ def test_after_it_the_error_stays_in_the_band_and_before_it_does_not(
     """Of the base's and the joint's column alike; the largest in size of the axes counts."""
     error[calm_from:] *= 0.4
     error[sorted(loud), 2] = -1.5
+    error *= 1e-5  # the band, as documented
     speed = np.ones(300)
     speed[start] = 0.0
     log = log_with(speed, first_tick)
-    metric = Settling(log, band=1.0)
-    metric.add(log, error)
-    found = metric.result()
-    assert found["band"] == 1.0
-    assert found["after_s"] == pytest.approx((first_tick + start) * PERIOD)
+    log.joint_positions[:] = -error[:, 3:]
+    log.reference_base[:, :4] = [1.0, 0.0, 0.0, 0.0]
+    log.quaternion[:] = np.hstack([np.ones((300, 1)), -error[:, :3]])
+    found, error = settled(log), tracking_error(log)
+    assert found["settling.after"] == pytest.approx((first_tick + start) * PERIOD)
     for name, axes in (("attitude", slice(0, 3)), ("joints_1_1", slice(3, 4))):
         size = np.max(np.abs(error[:, axes]), axis=1)
-        rows = [k for k in range(start, 300) if np.all(size[k:] <= 1.0)]
-        expected = (rows[0] - start) * PERIOD if rows else None
-        assert found["settled_s"][name] == pytest.approx(expected)
+        rows = [k for k in range(start, 300) if np.all(size[k:] <= 1e-5)]
+        expected = (rows[0] - start) * PERIOD if rows else np.inf
+        assert found[f"{name}.settling"] == pytest.approx(expected)
 
 
 @pytest.mark.parametrize(
@@ -86,25 +90,17 @@ def test_after_it_the_error_stays_in_the_band_and_before_it_does_not(
     ],
 )
 def test_the_last_waypoint_has_flight_after_it(log: FlightLog, expected: int | None) -> None:
-    metric = Settling(log)
-    for block in blocks_of(log):
-        metric.add(block, np.zeros((block.ticks, log.axes)))
-    assert metric.last_waypoint == expected
     if expected is None:
         with pytest.raises(InputError, match="does not come to rest"):
-            metric.result()
+            settled(log)
     else:
-        assert metric.result()["band"] == 1e-5  # as documented
+        assert settled(log)["settling.after"] == pytest.approx(expected * PERIOD)
 
 
-@given(st.lists(SPEEDS, max_size=60), st.integers(0, 60))
-def test_waypoints_are_those_of_a_plain_loop(speed: list[float], first: int) -> None:
+@given(st.lists(SPEEDS, min_size=1, max_size=60))
+def test_waypoints_are_those_of_a_plain_loop(speed: list[float]) -> None:
     """Slow stretches beside the highest speed so far, and in each the rest, or the slowest row."""
-    rows = np.zeros((len(speed), 3, 2))
-    rows[:, 1, 1] = np.negative(speed)
-    waypoints = Waypoints()
-    waypoints.add(rows[:first])
-    waypoints.add(rows[first:])
+    log = log_with(np.negative(speed))
     expected: set[int] = set()
     highest, stretch = 0.0, []
     for k, v in enumerate([*speed, np.inf]):
@@ -115,9 +111,7 @@ def test_waypoints_are_those_of_a_plain_loop(speed: list[float], first: int) -> 
             resting = [row for _, row, rests in stretch if rests]
             expected |= {resting[0], resting[-1]} if resting else {min(stretch)[1]}
             stretch = []
-    assert waypoints.found().tolist() == sorted(expected)
-    assert waypoints.rows == len(speed)
-    assert waypoints.highest == max(speed, default=0.0)
+    assert waypoint_ticks(log).tolist() == (sorted(expected) if max(speed) else [0])
 
 
 RESTS = [*[0.0] * 5, *[0.2] * 10, *[0.0] * 7, *[0.1] * 10]
@@ -161,7 +155,9 @@ def noisy() -> FlightLog:
 
 
 def estimate_error(log: FlightLog, h_bar: Array) -> Array:
-    return EstimateErrors(lambda log: h_bar, 0.0, rest=log.first_tick == 0).of(log)
+    errors = errors_of(log, lambda log: h_bar, 0.0, rest=log.first_tick == 0)(0, log.ticks)
+    assert np.isnan(errors[[0, -1]]).all()
+    return errors[~np.isnan(errors).any(axis=1)]
 
 
 @pytest.mark.parametrize(
@@ -176,7 +172,7 @@ def test_the_estimate_is_the_controllers(options: dict[str, Any]) -> None:
     log = flown(**options)
     assert log.telemetry is not None
     of_law, smoothing = estimator(log)
-    estimate = DelayedEstimate(smoothing, rest=True).of(neglected_force(log, of_law(log)))
+    estimate = PairFilter(smoothing).of(0, neglected_force(log, of_law(log)))
     expected = log.telemetry[1:, 2]
     np.testing.assert_allclose(estimate, expected, rtol=1e-9, atol=1e-9)
     assert np.ptp(expected, axis=0).min() > 1e-3
@@ -188,10 +184,11 @@ def test_the_error_is_what_changed_in_a_tick() -> None:
     h_bar = estimator(log)[0](log)
     assert log.telemetry is not None
     error = estimate_error(log, h_bar)
-    report = analyze(log)["estimate_error"]
-    assert report["max"]["base"] == pytest.approx(np.max(np.abs(error[:, :3])))
+    metrics = analyze(log)["metrics"]
+    largest = np.linalg.norm(error[:, :3], axis=1).max()
+    assert metrics["estimate_error_base.max"] == pytest.approx(largest)
     rms = np.sqrt(np.mean(error[:, 6:] ** 2, axis=0))
-    assert report["rms"]["4_6"] == pytest.approx(np.mean(rms))
+    assert metrics["estimate_error_4_6.rms"] == pytest.approx(np.mean(rms))
     part = estimate_error(excerpt(log, 0.1, 0.2), h_bar)
     np.testing.assert_array_equal(part, error[200 : 200 + len(part)])
     log.quaternion[200:300] *= -1.0
@@ -241,7 +238,7 @@ def test_at_180_degrees_there_is_none() -> None:
     w, x, y, z = log.reference_base[7, :4]
     log.quaternion[7] = [-x, w, z, -y]  # turned by 180 degrees about the desired x axis
     report = analyze(log)
-    assert report["estimate_error"] is None
+    assert "estimate_error_base.rms" not in report["metrics"]
     assert "180 degrees" in report["unavailable"]["estimate_error"]
 
 
@@ -256,7 +253,7 @@ def test_at_180_degrees_there_is_none() -> None:
 )
 def test_without_an_estimate_the_report_says_why(change: dict[str, Any], reason: str) -> None:
     log = flown(duration=0.01)
-    log.laws = ()  # as of a bag from before they were recorded
+    log.laws, log.scenario = (), None  # as of a bag from before they were recorded
     log.flight.pop("gains_used", None)
     log.flight |= change
     assert reason in analyze(log)["unavailable"]["estimate_error"]
@@ -269,21 +266,21 @@ def rms_of(values: Array) -> float:
 
 
 def test_the_navigation_error_is_measured_less_true_at_the_telemetry(noisy: FlightLog) -> None:
-    found, told = analyze(noisy)["navigation_error"], noisy.measured
+    found, told = analyze(noisy)["metrics"], noisy.measured
     assert told is not None
     joints = (told.joint_positions - noisy.joint_positions)[::20]
-    assert found["ticks"] == len(joints) == noisy.ticks // 20
     for name, error in (
         ("attitude", (told.quaternion - noisy.quaternion)[::20, 1:]),
         ("joints_1_3", joints[:, :3]),
         ("joints_4_6", joints[:, 3:]),
     ):
-        assert found["rms"][name] == pytest.approx(rms_of(error), rel=1e-9)
-        assert found["max"][name] == pytest.approx(float(np.abs(error).max()), rel=1e-9)
-    assert found["rms"]["joints_1_3"] == pytest.approx(2e-5, rel=0.2)
+        sizes = np.linalg.norm(error, axis=1) if name == "attitude" else np.abs(error)
+        assert found[f"navigation_{name}.rms"] == pytest.approx(rms_of(error), rel=1e-9)
+        assert found[f"navigation_{name}.max"] == pytest.approx(float(sizes.max()), rel=1e-9)
+    assert found["navigation_joints_1_3.rms"] == pytest.approx(2e-5, rel=0.2)
     for kind in ("rms", "max"):  # angles of small errors
-        angle = np.degrees(2.0 * found[kind]["attitude"])
-        assert found["attitude_deg"][kind] == pytest.approx(angle, rel=1e-6)
+        angle = np.degrees(2.0 * found[f"navigation_attitude.{kind}"])
+        assert found[f"navigation_attitude_angle.{kind}"] == pytest.approx(angle, rel=1e-6)
 
 
 def test_errors_and_torques_are_the_true_ones(noisy: FlightLog) -> None:
@@ -291,31 +288,31 @@ def test_errors_and_torques_are_the_true_ones(noisy: FlightLog) -> None:
     report, told = analyze(noisy), analyze(noisy.as_measured())
     error = noisy.reference_joints[:, 0] - noisy.joint_positions
     np.testing.assert_array_equal(tracking_error(noisy)[:, 3:], error)
-    true, reported = (r["rms"]["mean_axis"] for r in (report, told))
-    assert true["joints_1_3"] == pytest.approx(rms_of(error[:, :3]), rel=1e-12)
-    assert reported["joints_1_3"] > 20.0 * true["joints_1_3"]
-    assert true["base_torque"] == pytest.approx(0.999 * reported["base_torque"], rel=1e-12)
+    true, reported = (r["metrics"] for r in (report, told))
+    assert true["joints_1_3.rms"] == pytest.approx(rms_of(error[:, :3]), rel=1e-12)
+    assert reported["joints_1_3.rms"] > 20.0 * true["joints_1_3.rms"]
+    assert true["base_torque.rms"] == pytest.approx(0.999 * reported["base_torque.rms"], rel=1e-12)
     assert (report["truth_recorded"], told["truth_recorded"]) == (True, False)
     h_bar = np.array(noisy.flight["gains_used"]["h_bar"])
     force = neglected_force(replace(noisy, measured=None), h_bar)
     assert noisy.telemetry is not None
     estimated = force[1:] - noisy.telemetry[1:-1, 2]
-    np.testing.assert_allclose(EstimateErrors(lambda log: h_bar).of(noisy), estimated, atol=1e-7)
-    assert report["missed_deadlines"]["differing_ticks"] == 0
-    assert report["missed_deadlines"]["compared_ticks"] > 2900
+    np.testing.assert_allclose(estimate_error(noisy, h_bar), estimated, atol=1e-7)
+    assert true["commands.differing"] == 0
+    assert true["commands.compared"] > 2900
     table = rms_table(report)
     assert "errors and torques are the true ones" in table.title
     (row,) = (row for row in table.groups[0].rows if row[0] == "joints_1_3")
-    assert row[3] == f"{report['navigation_error']['rms']['joints_1_3']:.3e}"
+    assert row[3] == f"{true['navigation_joints_1_3.rms']:.3e}"
     both = comparison_table({"one": report, "other": analyze(random_log(6, 300, 0))})
     assert ["errors are of", "the truth", "the truth"] in both.groups[0].rows
 
 
 def test_without_telemetry_or_of_a_filter_there_is_none(noisy: FlightLog) -> None:
     report = analyze(noisy.rows(1, 15))
-    assert report["navigation_error"] is None
-    assert report["unavailable"]["navigation_error"] == "no telemetry was recorded"
-    log, parameters = noisy.rows(0, noisy.ticks), noisy.flight["parameters"]
+    assert "navigation_attitude.rms" not in report["metrics"]
+    assert report["unavailable"]["navigation"] == "no telemetry was recorded"
+    log, parameters = replace(noisy, scenario=None), noisy.flight["parameters"]
     controller = {**parameters["controller"], "navigation": "filtered"}
     log.flight = {**log.flight, "parameters": {**parameters, "controller": controller}}
     report = analyze(log)

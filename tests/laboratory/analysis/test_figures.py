@@ -24,7 +24,7 @@ from strategies import random_log, random_robot
 
 from space_robot import Scenario
 from space_robot.analysis import excerpt, tracking_error
-from space_robot.analysis.described import momentum_of
+from space_robot.analysis.errors import attitude_angles
 from space_robot.analysis.figures import (
     chatter,
     control_results,
@@ -40,10 +40,10 @@ from space_robot.analysis.figures import (
 )
 from space_robot.analysis.figures.base_torque import common_limits, power_spectral_density
 from space_robot.analysis.figures.figure_set import FigureSet
+from space_robot.analysis.figures.flight_curves import BaseTorque, FlightCurves
 from space_robot.analysis.figures.overlay import base_pointing
 from space_robot.analysis.figures.style import LineStyle, house_style, thinned
-from space_robot.analysis.metrics import attitude_angles
-from space_robot.analysis.plot_series import BaseTorque, PlotSeries
+from space_robot.analysis.momentum import momentum_of
 from space_robot_control.guidance.mission import Mission, MissionSettings
 from space_robot_model.hardware.base_actuators import BaseActuatorSettings
 from space_robot_model.robot import Robot
@@ -277,16 +277,16 @@ def test_files_are_180_mm_wide_small_and_the_same_bytes_whatever_the_users_setti
 
 
 @pytest.fixture(scope="module")
-def overlaid() -> dict[str, PlotSeries]:
+def overlaid() -> dict[str, FlightCurves]:
     found = {}
     for law in ("tde_stc", "ctc", "tde_smc"):
         log = Scenario(controller=law, duration=0.3).fly().log
         log.latency_s = None if law == "ctc" else np.linspace(1e-4, 2e-3, log.ticks)
-        found[law] = PlotSeries.of(excerpt(log, 0.1, None))
+        found[law] = FlightCurves.of(excerpt(log, 0.1, None))
     return found
 
 
-def test_each_panel_has_a_line_a_flight_over_its_time(overlaid: dict[str, PlotSeries]) -> None:
+def test_each_panel_has_a_line_a_flight_over_its_time(overlaid: dict[str, FlightCurves]) -> None:
     """The smoothest in front; a logarithmic one without the few values below its foot."""
     for figure, panels in ((errors_and_torques(overlaid), 6), (pointing(overlaid), 4)):
         assert len(figure.axes) == panels
@@ -299,18 +299,21 @@ def test_each_panel_has_a_line_a_flight_over_its_time(overlaid: dict[str, PlotSe
     front = max(torque.get_lines(), key=lambda line: line.get_zorder())
     assert rough[front.get_color()] == min(rough.values())
     assert error.get_yscale() == "log"
-    sizes = [series.errors["attitude_deg"] for series in overlaid.values()]
+    sizes = [curves.sizes["attitude_angle"] for curves in overlaid.values()]
     lowest = min(np.percentile(size[size > 0.0], 0.5) for size in sizes)
     assert error.get_ylim()[0] == pytest.approx(0.5 * lowest)
-    assert error.get_ylabel() == "|attitude error| (deg)"
-    unknown = {name: series._replace(pointing=None) for name, series in overlaid.items()}
+    assert error.get_ylabel() == "attitude angle error (deg)"
+    unknown = {
+        name: curves._replace(sizes={"joints_1_3": curves.sizes["joints_1_3"]})
+        for name, curves in overlaid.items()
+    }
     assert not pointing(unknown).axes
     drawn = base_pointing(overlaid, 0.5)
     limits = [data_of(axes.get_lines()[-1])[1].tolist() for axes in drawn.axes]
     assert limits == [[1800.0, 1800.0]] * 3
 
 
-def test_the_histogram_counts_every_answer(overlaid: dict[str, PlotSeries]) -> None:
+def test_the_histogram_counts_every_answer(overlaid: dict[str, FlightCurves]) -> None:
     figure = latency_histogram(overlaid)
     (axes,) = figure.axes
     steps = [patch.get_data() for patch in axes.patches]  # type: ignore[attr-defined]
@@ -334,7 +337,7 @@ def lively_log(robot: Robot, actuators: BaseActuatorSettings, ticks: int = 50) -
 def test_momentum_and_wheels_between_their_limits(paper_robot: Robot) -> None:
     """Of a free base what arm and base exchange."""
     log = lively_log(paper_robot, hardware(wheels=WHEELS))
-    found = momentum_of(log).add(log)
+    found = momentum_of(log)
     figure = momentum(log, found, hardware(wheels=WHEELS))
     assert legend_names(figure)[0] == ["robot", "wheels", "sum"]
     for i, axes in enumerate(figure.axes):
@@ -342,7 +345,7 @@ def test_momentum_and_wheels_between_their_limits(paper_robot: Robot) -> None:
         for wanted in (found.robot, found.wheels, found.robot + found.wheels):
             assert wanted[:, i].tolist() in drawn
     free = lively_log(paper_robot, FREE)
-    found = momentum_of(free).add(free)
+    found = momentum_of(free)
     assert legend_names(momentum(free, found, FREE))[0] == ["base", "arm", "sum"]
     outside = found._replace(outside=found.outside + 1.0)
     assert len(legend_names(momentum(free, outside, FREE))[0]) == 4

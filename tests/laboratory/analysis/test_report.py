@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import copy
-import itertools
 import json
 from dataclasses import replace
 from typing import Any
@@ -12,18 +11,17 @@ import numpy as np
 import pytest
 import yaml
 from numpy.typing import NDArray
-from paths import CONFIG, DATA
+from paths import CONFIG
 from robots import PLATES, driven_paper
 from strategies import random_log
 
 from space_robot import Scenario
-from space_robot.analysis import Analysis, analyze
-from space_robot.analysis.deflection import Deflection, deflection
-from space_robot.analysis.described import NotDescribedError, momentum_of, orbit_of, robot_of
-from space_robot.analysis.metrics import of_log
-from space_robot.analysis.report_lines import Line, lines
-from space_robot.analysis.report_tables import DEFINITIONS, comparison_table, rms_table
-from space_robot.console.tables import NONE
+from space_robot.analysis import analyze, describe, measure
+from space_robot.analysis.actuation import deflection
+from space_robot.analysis.described import NotDescribedError, orbit_of, robot_of
+from space_robot.analysis.momentum import momentum_of
+from space_robot.analysis.report_tables import comparison_table, metrics_table, rms_table
+from space_robot.console.tables import NONE, Table
 from space_robot_model.robot.gears import geared_joints
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.bag.reader import read_flight
@@ -31,140 +29,93 @@ from space_robot_msgs_py.samples import RobotNames, Timebase
 
 Array = NDArray[np.float64]
 Report = dict[str, Any]
-LINES = DATA / "report_lines.txt"
-DRIVEN_LINES, DRIVEN = DATA / "report_lines_driven.txt", {"disturbance torque", "deflection"}
-NOT_BRIEF = {
-    "RMS, mean of axes",
-    "RMS, eq. (64)",
-    "variation per s",
-    "power > 100 Hz",
-    "ripple",
-    "asked of the base",
-}
-OF_OTHER_FLIGHTS = {
-    "attitude drift",
-    "momentum",
-    "pushed by thrusters",
-    "disturbance torque",
-    "deflection",
-    "own metric",
-}
 HEIGHT = 543e3
 
 
-def numbers(report: Any, path: str = "") -> dict[str, Any]:
-    """Return the leaves of a report by their paths."""
-    if isinstance(report, (list, tuple)):
-        report = dict(enumerate(report))
-    if not isinstance(report, dict):
-        return {path: report}
-    parts = [numbers(value, f"{path}.{key}") for key, value in report.items()]
-    return {name: value for part in parts for name, value in part.items()}
-
-
-class Named(float):
-    """A number that shows its path in the report, and how it is written."""
-
-    path: str
-
-    def __format__(self, spec: str) -> str:
-        return f"{self.path}:{spec}"
-
-
-def named(value: Any, path: str = "") -> Any:
-    """The same report with a `Named` in the place of each number with a point, 1.5 in size."""
-    if isinstance(value, dict):
-        return {key: named(v, f"{path}.{key}".removeprefix(".")) for key, v in value.items()}
-    if not isinstance(value, float):
-        return value
-    number = Named(1.5)
-    number.path = path
-    return number
-
-
-def test_a_report_does_not_depend_on_the_blocks() -> None:
+def test_a_report_does_not_depend_on_the_blocks(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of a flight longer than one; nor on whether it is described by its scenario or in a bag."""
     own = {"case": "3", "sensors": "fine", "actuators": "small_wheels", "orbit": "iss"}
     log = Scenario(**own, swaps=["1.5:tde_smc"], duration=3.0).fly().check().log
-    parts = Analysis()
-    for start, stop in itertools.pairwise([0, 1, 2999, 3001, 5999, 6000]):
-        parts.add(log.rows(start, stop))
-    expected, found = numbers(analyze(log)), numbers(parts.report())
-    assert list(found) == list(expected)
-    for name, value in expected.items():
-        if isinstance(value, float):
-            np.testing.assert_allclose(found[name], value, rtol=1e-6, atol=1e-15, err_msg=name)
-        else:
-            assert found[name] == value, name
+    expected = analyze(log)
+    monkeypatch.setattr("space_robot.analysis.analysed_log.BLOCK_TICKS", 1700)
+    for part in (log, replace(log, scenario=None)):
+        found = analyze(part)
+        assert list(found["metrics"]) == list(expected["metrics"])
+        for name, value in expected["metrics"].items():
+            close = pytest.approx(value, rel=1e-9, abs=1e-12)
+            assert found["metrics"][name] == close, name
+        for key in ("peak_torque_n_m", "peak_momentum_n_m_s", "angular_impulse_n_m_s"):
+            one, other = (r["sizing"]["axes"]["base_x"][key] for r in (found, expected))
+            assert one == pytest.approx(other, rel=1e-9)
+        for key in found.keys() - {"metrics", "sizing"}:
+            assert found[key] == expected[key], key
 
 
 @pytest.fixture(scope="module")
 def report() -> Report:
     log = Scenario(duration=1.0, faults=["noise_gyro@0:1e-9"]).fly().log
     log.latency_s = np.linspace(1e-4, 3e-4, log.ticks)
+    log.scenario = None
     log.flight["parameters"]["plant"] |= {"base_torque_limit": 1.0, "joint_torque_limit": 1.0}
     report = analyze(log)
     assert report["unavailable"] == {}
     counts = {"filled_ticks": 3, "unanswered_ticks": 4, "lost": {"a": 5, "b": 6}}
-    report["saturation"]["ticks"], report["missed_deadlines"]["differing_ticks"] = 7, 8
     return {**report, **counts}
 
 
-def table_of(found: list[Line]) -> list[str]:
-    return [" | ".join((x.group, x.name, x.unit, *x.texts)).replace("\n", " / ") for x in found]
+def rows_of(table: Table) -> dict[str, list[str]]:
+    return {str(row[0]): [*map(str, row[1:])] for group in table.groups for row in group.rows}
 
 
-def test_every_line_is_its_figure(report: Report) -> None:
-    shown = named(report)
-    found = lines([shown])
-    assert table_of(found) == LINES.read_text("utf-8").splitlines()
-    assert {line.group for line in found} == DEFINITIONS.keys() - OF_OTHER_FLIGHTS
-    left_out = {line.group for line in found} - {x.group for x in lines([shown], brief=True)}
-    assert left_out == NOT_BRIEF
+def test_tables_show_every_metric_with_its_unit_and_meaning(report: Report) -> None:
+    """Those of the table of RMS are not said again."""
+    brief, whole = metrics_table(report), comparison_table({"one": report})
+    rows = rows_of(whole)
+    assert rows["joints_1_3.rms (rad)"] == [f"{report['metrics']['joints_1_3.rms']:.4g}"]
+    assert rows["base_torque.variation (N m/s)"]
+    assert rows["base_x torque (N m)"]
+    assert rows["messages lost"] == ["11"]
+    said = {name.partition(" ")[0] for name in rows}
+    hidden = report["metrics"].keys() - said
+    assert hidden == {name for name in report["metrics"] if not describe(name).is_shown}
+    for name in ("attitude.rms", "navigation_attitude.max", "joint1.ripple_axis"):
+        assert name in hidden
+    shown = rows_of(brief)
+    assert shown.keys() < rows.keys()
+    for name in ("joints_1_3.max (rad)", "base_drift.end (m)", "half_cone.end (arcsec)"):
+        assert name in shown
+    for statistic in ("rms", "rms_eq64", "variation", "chatter", "ripple"):
+        assert not [name for name in shown if name.startswith(f"base_torque.{statistic} ")]
+    notes = {group.name: group.note for group in whole.groups}
+    assert "ripple: RMS above 2 Hz" in notes["torques"]
 
 
-def test_what_is_special_in_a_line(report: Report) -> None:
+def test_what_is_special_in_a_row(report: Report) -> None:
     report = copy.deepcopy(report)
-    report["pointing"]["boresight_rad"] = {"rms": np.radians(1 / 3600), "max": 1e-2, "end": 1.0}
-    report["settling"]["settled_s"]["attitude"] = None
-    report["saturation"] |= {"base_torque_limit_n_m": None, "joint_torque_limit_n_m": None}
+    report["metrics"] |= {"attitude.settling": np.inf, "half_cone.max": 7200.0, "own": 3.0}
     report["unfinished"], report["damage"] = "cut", ["a", "b"]
-    found = {(x.group, x.name): x.texts for x in lines([report])}
-    for label, text in {
-        ("pointing", "RMS"): "4.85e-06 rad\n1 arcsec",
-        ("pointing", "max"): "0.01 rad\n2.06e+03 arcsec",
-        ("pointing", "end"): "1 rad\n57.3 deg",
-        ("settled after", "attitude"): "never",
-        ("saturation", "ticks at a limit"): "no limits",
-        ("recording", "finished"): "no",
-        ("recording", "damage found"): "2",
-    }.items():
-        assert found[label] == [text]
-
-
-def test_a_figure_that_a_flight_does_not_have_is_a_dash(report: Report) -> None:
     log = random_log(6, 300, 0)
     log.flight = {}
-    found = {(x.group, x.name): x.texts for x in lines([analyze(log), report])}
-    for label in (
-        ("saturation", "ticks at a limit"),
-        ("latency", "p99"),
-        ("estimate error", "base max"),
-        ("pointing", "RMS"),
-        ("ripple", "base_torque"),
-    ):
-        unknown, known = found[label]
+    rows = rows_of(comparison_table({"one": report, "other": analyze(log)}))
+    assert rows["attitude.settling (s)"][0] == "never"
+    assert rows["half_cone.max (arcsec)"][0] == "2 deg"
+    assert rows["own"] == ["3", NONE]
+    assert (rows["finished"][0], rows["damage found"][0]) == ("no", "2")
+    for name in ("latency.p99_ms (ms)", "estimate_error_base.max (N m)", "boresight.rms (arcsec)"):
+        known, unknown = rows[name]
         assert unknown == NONE
         assert known != NONE
-    assert found["maximum", "base_torque"][0] != NONE
 
 
 def test_the_attitude_is_shown_in_degrees_and_a_divergence_with_exponents(report: Report) -> None:
     """And gains of one's own in the title."""
     report = copy.deepcopy(report)
-    report["attitude_error_deg"] = {"mean_axis": 1.146e-3, "eq64": 6.6e-4, "max": 2e-3}
-    report["navigation_error"] = None
+    metrics = report["metrics"]
+    metrics |= {"attitude_angle.rms": 1.146e-3, "attitude_angle.rms_eq64": 6.6e-4}
+    for name in [name for name in metrics if name.startswith("navigation")]:
+        del metrics[name]
     for torque, shown in ((2.956e7, "2.956e+07"), (20.0, "20.0000")):
-        report["rms"]["mean_axis"]["base_torque"] = torque
+        metrics["base_torque.rms"] = torque
         rows = {row[0]: row for row in rms_table(report).groups[0].rows}
         assert rows["attitude"][:4] == ["attitude", "deg", "1.146e-03", "6.600e-04"]
         assert rows["base_torque"][2] == shown
@@ -180,10 +131,9 @@ def test_the_deflection_is_motor_less_link_of_joints_with_gears() -> None:
     log.motor_positions[:] = log.joint_positions[:, [1, 3]] + rng.normal(size=(500, 2)) * [1, 9]
     difference = log.motor_positions - log.joint_positions[:, [1, 3]]
     np.testing.assert_array_equal(deflection(log), difference)
-    found = of_log(Deflection(log.rows(0, 1)), log)
     largest, rms = np.abs(difference).max(axis=0), np.sqrt((difference**2).mean(axis=0))
-    for name, values in (("largest", largest), ("rms", rms)):
-        assert found[name] == pytest.approx(dict(zip("bd", values, strict=True)), rel=1e-12)
+    expected = {"deflection_b.max": largest[0], "deflection_d.rms": rms[1]}
+    assert measure(log, list(expected)) == pytest.approx(expected, rel=1e-12)
 
 
 @pytest.fixture(scope="module")
@@ -202,16 +152,21 @@ def driven(tmp_path_factory: pytest.TempPathFactory) -> FlightLog:
     return read_flight(folder / "bag")
 
 
-def test_every_line_on_orbit_and_gears_is_its_figure(driven: FlightLog) -> None:
+def test_on_orbit_and_with_gears_there_are_more_rows(driven: FlightLog) -> None:
     """And a dash where a flight is in no orbit and has no gears."""
     report = analyze(driven)
-    json.dumps(report, allow_nan=False)
+    json.dumps({**report, "metrics": {}}, allow_nan=False)
     plain = Scenario(duration=0.1).fly().report()
-    found = table_of([x for x in lines([named(report), plain]) if x.group in DRIVEN])
-    assert found == DRIVEN_LINES.read_text("utf-8").splitlines()
-    assert not {x.group for x in lines([plain])} & DRIVEN
-    notes = {group.name: group.note for group in comparison_table({"flight": report}).groups}
-    assert all(notes[name] == DEFINITIONS[name] for name in DRIVEN)
+    rows = rows_of(comparison_table({"driven": report, "plain": plain}))
+    for name in (
+        "disturbance_gravity_gradient.rms (N m)",
+        "disturbance_sines.max (N m)",
+        "impulse_drag.max (N m s)",
+        "deflection_joint2.max (rad or m)",
+    ):
+        known, unknown = rows[name]
+        assert float(known) >= 0.0
+        assert unknown == NONE
 
 
 def test_robot_and_orbit_are_those_that_flew(driven: FlightLog) -> None:

@@ -37,8 +37,8 @@ CONTENT: dict[str, Any] = {
     "laws": ["tde_stc", "ctc"],
     "vary": {"robot.links[*].mass": {"normal": 1.0, "sigma": 0.05, "relative": True}},
     "require": {
-        "pointing": {"metric": "attitude_max", "below": 1e-9, "in": 0.9},
-        "late": {"metric": "attitude_rms", "from_s": 0.005, "below": 1.0, "in": 0.9},
+        "pointing": {"metric": "attitude.max", "below": 1e-9, "in": 0.9},
+        "late": {"metric": "attitude.rms", "from_s": 0.005, "below": 1.0, "in": 0.9},
     },
 }
 
@@ -90,11 +90,11 @@ def test_another_study_judges_the_same_rows(whole: Path, reported: str) -> None:
 
     table = FlownCampaign.open(whole).table
     require = {
-        "by_rms": {"metric": "attitude_rms", "below": 1.0, "in": 0.5},
+        "by_rms": {"metric": "attitude.rms", "below": 1.0, "in": 0.5},
         "late_again": {**CONTENT["require"]["late"], "below": 1e-30},
     }
     subject = subject_of(FlownCampaign.open(whole), asked(require=require, runs=9))
-    assert subject.table["require.by_rms"].equals(table["metric.attitude_rms"])
+    assert subject.table["require.by_rms"].equals(table["metric.attitude.rms"])
     assert subject.table["require.late_again"].equals(table["require.late"])
     assert "require.pointing" not in subject.table
     failures = {v.requirement: v.failures for v in Findings(subject).verdicts}
@@ -106,7 +106,7 @@ def test_another_study_judges_the_same_rows(whole: Path, reported: str) -> None:
         ({"scenario": {"case": "1", "duration": 0.01}}, "scenario.case: '3' was flown, not '1'"),
         (
             {"require": {"p": {**CONTENT["require"]["late"], "from_s": 0.006}}},
-            r"other.yaml: require.p: the rows have no attitude_rms in that window",
+            r"other.yaml: require.p: the rows have no attitude.rms in that window",
         ),
     ):
         with pytest.raises(InputError, match=said):

@@ -42,12 +42,12 @@ from space_robot_msgs_py.errors import InputError
 
 pytest.importorskip("pyarrow")
 
-REQUIRE = {"pointing": {"metric": "attitude_max", "from_s": 2, "below": 4e-5, "in": 0.9}}
+REQUIRE = {"pointing": {"metric": "attitude.max", "from_s": 2, "below": 4e-5, "in": 0.9}}
 UNIFORM = {"uniform": [0.8, 1.2], "relative": True}
 
 
 def found(
-    table: DataFrame, metrics: tuple[str, ...] = ("attitude_rms",), runs: int = 0, **changes: Any
+    table: DataFrame, metrics: tuple[str, ...] = ("attitude.rms",), runs: int = 0, **changes: Any
 ) -> Findings:
     study = {
         "scenario": {"case": "3"},
@@ -167,9 +167,9 @@ def test_a_grid_has_a_row_a_point() -> None:
 
 
 def test_the_metrics_asked_for_are_shown_and_others_refused() -> None:
-    findings = found(made_table(20), ("attitude_max",))
-    assert [q.name for q in findings.metrics] == ["attitude_max"]
-    with pytest.raises(InputError, match=r"unknown metric 'x': choose one of attitude_rms, "):
+    findings = found(made_table(20), ("attitude.max",))
+    assert [q.name for q in findings.metrics] == ["attitude.max"]
+    with pytest.raises(InputError, match=r"unknown metric 'x': choose one of attitude.rms, "):
         found(made_table(20), ("x",))
 
 
@@ -200,7 +200,7 @@ FILE = """
 scenario: {duration: 0.1}
 laws: [tde_stc]
 vary: {"scenario.case": {choice: ["1", "3"]}}
-require: {p: {metric: attitude_max, below: 1.0, in: 0.5}}
+require: {p: {metric: attitude.max, below: 1.0, in: 0.5}}
 """
 
 
@@ -245,7 +245,7 @@ def test_the_same_line_again_flies_nothing_and_more_runs_go_on(file: Path, flown
 
 def test_a_report_is_printed_and_written(flown: Path, tmp_path: Path) -> None:
     html, markdown = tmp_path / "a.html", tmp_path / "a.md"
-    words = ("--html", html, "--markdown", markdown, "--metric", "attitude_rms")
+    words = ("--html", html, "--markdown", markdown, "--metric", "attitude.rms")
     result = campaign("report", flown, *words)
     assert result.exit_code == 0, result.output
     assert "p: attitude, largest below 1" in result.stdout
@@ -295,10 +295,10 @@ def test_who_ends_it_is_told_how_to_go_on(file: Path, tmp_path: Path) -> None:
 
 def test_the_attitude_is_shown_in_degrees_where_it_was_measured_so() -> None:
     table = made_table(runs=60)
-    table["metric.attitude_deg_rms"] = np.degrees(2.0 * table["metric.attitude_rms"])
-    assert chosen(table, {})[0].label == "attitude, RMS (deg)"
+    table["metric.attitude_angle.rms"] = np.degrees(2.0 * table["metric.attitude.rms"])
+    assert chosen(table, {})[0].label == "attitude angle, RMS (deg)"
     assert of_metric("tilt_deg_max").heading == "tilt deg, largest"  # of somebody's own
-    demand = {"metric": "attitude_max", "below": 1e-3, "in": 0.9}  # of the vector part
+    demand = {"metric": "attitude.max", "below": 1e-3, "in": 0.9}  # of the vector part
     text = demanded(of_requirement("p", Requirement.model_validate(demand)))
     assert text.startswith("attitude, largest below 0.001 (an angle of 0.115 deg) in 90 %")
 
@@ -307,7 +307,7 @@ def test_the_attitude_is_shown_in_degrees_where_it_was_measured_so() -> None:
 def test_medians_are_those_of_the_report_however_many_flights_failed(failing: float) -> None:
     table = made_table(runs=60, failing=failing)
     shown = medians(table, {law: law for law in table["law"]}, 1)
-    reported = {s.law: s for s in league(table, "metric.attitude_rms").standings}
+    reported = {s.law: s for s in league(table, "metric.attitude.rms").standings}
     (group,) = shown.groups
     for law, complete, median, _ in group.rows:
         assert complete == f"{60 - reported[law].failures} of 60"

@@ -36,7 +36,7 @@ CONTENT: dict[str, Any] = {
         "robot.links[*].mass": {"normal": 1.0, "sigma": 0.05, "relative": True},
         "scenario.sensors": {"choice": ["fine", "ideal"]},
     },
-    "require": {"pointing": {"metric": "attitude_max", "from_s": 0.1, "below": 1e-6, "in": 0.9}},
+    "require": {"pointing": {"metric": "attitude.max", "from_s": 0.1, "below": 1e-6, "in": 0.9}},
 }
 
 
@@ -105,7 +105,7 @@ def test_a_flight_by_hand_is_a_row_beside_the_tables(undisturbed: FlownCampaign)
     assert (row["run"][0], row["law"][0], row["digest"][0]) == (3, "by hand", ours["digest"])
     assert row["vary.scenario.sensors"][0] == ours["vary.scenario.sensors"]
     other = Scenario(actuators="none", controller="ctc", duration=0.2).fly()
-    with pytest.raises(InputError, match="attitude_drift_max, which is no column of"):
+    with pytest.raises(InputError, match=r"attitude_drift\.max, which is no column of"):
         undisturbed.row_of(other, 3, "by hand")
 
 
@@ -134,7 +134,7 @@ def test_it_stops_at_a_precision_whoever_flies_it(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     content = {**CONTENT, "laws": ["tde_stc"], "scenario": {"duration": 0.005}}
-    content["require"] = {"p": {"metric": "attitude_max", "below": 1.0, "in": 0.9}}
+    content["require"] = {"p": {"metric": "attitude.max", "below": 1.0, "in": 0.9}}
     content["vary"] = {"scenario.case": {"grid": ["1", "2"]}}
     content["until"] = {"half_width": 0.4, "runs": 50}
     monkeypatch.setattr(precision, "CHECKED_EVERY", 5)
@@ -196,7 +196,7 @@ def test_the_stop_is_the_first_look_at_which_all_are_narrow_at_each_point(
         "laws": both,
         "vary": {"scenario.sensors": {"grid": sensors[:points]}},
         "require": {
-            name: {"metric": "attitude_max", "below": bound, "in": 0.9}
+            name: {"metric": "attitude.max", "below": bound, "in": 0.9}
             for name, bound in bounds.items()
         },
         "until": {"half_width": half_width, "runs": points * most},

@@ -51,7 +51,7 @@ CONTENT: dict[str, Any] = {
     "require": {
         "small": {"metric": "overshoot", "below": 1e-3, "in": 0.9},
         "late": {"metric": "overshoot", "from_s": 0.1, "to_s": 0.15, "below": 1e-3, "in": 0.9},
-        "pointing": {"metric": "attitude_max", "below": 1e-3, "in": 0.9},
+        "pointing": {"metric": "attitude.max", "below": 1e-3, "in": 0.9},
     },
 }
 
@@ -147,7 +147,7 @@ def test_a_function_of_this_session_is_flown_in_this_process() -> None:
         ({"m": "mine"}, "metrics: metric 'mine': a metric is named as file.py:FUNCTION"),
         ({"m": 3}, "metrics: a function or file.py:FUNCTION was expected, got 3"),
         ({"a b": "mine.py:nan"}, "metrics: 'a b' is no name of a metric"),
-        ({"attitude_rms": "mine.py:nan"}, "attitude_rms is the name of a metric that every flight"),
+        ({"attitude.rms": "mine.py:nan"}, "'attitude.rms' is no name of a metric"),
     ],
 )
 def test_a_mistake_is_told_before_the_first_flight(metrics: dict[str, Any], why: str) -> None:

@@ -71,7 +71,7 @@ def test_holm_lies_between_no_correction_and_bonferroni(p_values: list[float]) -
 
 
 def test_the_league_ranks_what_is_shown() -> None:
-    found = league(made_table(200, failing=0.0), "metric.attitude_rms")
+    found = league(made_table(200, failing=0.0), "metric.attitude.rms")
     assert [(s.law, s.rank) for s in found.standings] == [
         ("ctc", 1),
         ("tde_stc", 2),
@@ -83,14 +83,14 @@ def test_the_league_ranks_what_is_shown() -> None:
 
 def test_laws_that_are_not_told_apart_share_a_rank() -> None:
     table = made_table(30, laws=("a", "b"), failing=0.0)
-    table["metric.attitude_rms"] = np.random.default_rng(0).uniform(size=len(table))
-    assert [s.rank for s in league(table, "metric.attitude_rms").standings] == [1, 1]
+    table["metric.attitude.rms"] = np.random.default_rng(0).uniform(size=len(table))
+    assert [s.rank for s in league(table, "metric.attitude.rms").standings] == [1, 1]
 
 
 def test_only_runs_that_both_flew_are_compared() -> None:
     table = made_table(50, laws=("a", "b"))
     (found,) = compare_all(
-        table[(table["law"] == "a") | (table["run"] < 20)], "metric.attitude_rms"
+        table[(table["law"] == "a") | (table["run"] < 20)], "metric.attitude.rms"
     )
     assert found.runs == 20
 
@@ -181,8 +181,8 @@ def test_words_are_told_by_groups() -> None:
 
 def test_nothing_is_said_of_what_does_not_vary() -> None:
     table = made_table(50, failing=1.1)
-    assert sensitivity(table, "ctc", "metric.attitude_rms") is None
-    assert sensitivity(made_table(5), "ctc", "metric.attitude_rms") is None
+    assert sensitivity(table, "ctc", "metric.attitude.rms") is None
+    assert sensitivity(made_table(5), "ctc", "metric.attitude.rms") is None
 
 
 def ishigami(x: np.ndarray) -> np.ndarray:

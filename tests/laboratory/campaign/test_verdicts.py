@@ -187,7 +187,7 @@ def test_a_fixed_sample_shows_nothing_before_it_is_complete() -> None:
     found = judge(demand_of(1.0), rows([0.5] * 5000), None)
     assert (found.word, found.limits, found.bound) == ("undecided", (0.0, 1.0), None)
     table = made_table(100, laws=("ctc", "tde_stc"), failing=0.0)
-    require = {"pointing": {"metric": "attitude_max", "below": 1.0, "in": 0.9}}
+    require = {"pointing": {"metric": "attitude.max", "below": 1.0, "in": 0.9}}
     for key, words in (
         ({"fixed_runs": True}, ("undecided", "met")),
         ({"design": "latin_hypercube"}, ("undecided", "met")),

@@ -21,7 +21,7 @@ from scene_pages import Scene, plot_data
 from space_robot.analysis import analyze as report_of
 from space_robot.analysis import excerpt
 from space_robot.analysis.described import robot_of
-from space_robot.analysis.metrics import tracking_error
+from space_robot.analysis.errors import tracking_error
 from space_robot.cli.main import main
 from space_robot.flight.plan import Flight, FlightPlan, resolve
 from space_robot.flight.simulate import simulate
@@ -262,21 +262,23 @@ def test_a_bag_that_nobody_finished_is_analysed_and_said_so(
 def test_a_robot_that_is_not_here_costs_only_its_figures(analyze: Run, tmp_path: Path) -> None:
     flight = Flight(resolve(FlightPlan(duration=0.05)))
     log = simulate(flight)
+    log.scenario = None
     log.flight.pop("robot_file", None)
     log.flight["robot"] = "elsewhere"
     report = report_of(log)
-    assert report["pointing"] is None
-    assert "unknown robot 'elsewhere'" in report["unavailable"]["pointing"]
-    assert report["rms"]["mean_axis"]["attitude"] > 0.0
+    assert "boresight.rms" not in report["metrics"]
+    assert "unknown robot 'elsewhere'" in report["unavailable"]["end_effector"]
+    assert report["metrics"]["attitude.rms"] > 0.0
     log.flight["robot"] = "seven_joint"
-    assert "has the joints" in report_of(log)["unavailable"]["pointing"]
+    assert "has the joints" in report_of(log)["unavailable"]["end_effector"]
 
 
 def test_band_and_window_are_those_of_the_options(analyze: Run, bags: tuple[Path, Path]) -> None:
     result = analyze(bags[0], "--json", "--band", "1e-9", "--window", "0.01")
-    base = json.loads(result.out)["base_pointing"]
+    report = json.loads(result.out)
+    base, metrics = report["pointing"], report["metrics"]
     assert (base["band_deg"], base["window_s"]) == (1e-9, 0.01)
-    assert base["half_cone_arcsec"]["within_band"] < 1.0
-    assert 0.0 < base["half_cone_arcsec"]["jitter_rms"] < base["half_cone_arcsec"]["max"]
+    assert metrics["half_cone.within_band"] < 1.0
+    assert 0.0 < metrics["half_cone.jitter_rms"] < metrics["half_cone.max"]
     refused = analyze(bags[0], "--band", "0")
     assert refused.code == 2

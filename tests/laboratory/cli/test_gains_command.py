@@ -272,5 +272,5 @@ def test_all_laws_fly_with_what_reality_brings(law: str, case: str, echo: float)
     study = Study.model_validate({"scenario": scenario, "laws": [f"{law}=robust"], "vary": off})
     row = RowFlyer.of(study, 1, 1)(Task(0, f"{law}=robust"))
     assert row.is_complete
-    assert row.metrics["attitude_rms"] < 1e-3
-    assert row.metrics["joints_4_6_rms"] < 0.05
+    assert row.metrics["attitude.rms"] < 1e-3
+    assert row.metrics["joints_4_6.rms"] < 0.05

@@ -230,7 +230,7 @@ def test_a_start_elsewhere_is_told_with_its_distance_and_torques(
     joints = [*JOINTS[:joint], JOINTS[joint] + 5.0, *JOINTS[joint + 1 :]]
     with pytest.warns(UserWarning, match="^start: "):
         flight = started(-turn.as_quat(scalar_first=True), joints).fly()
-    step = flight.metrics["start_step"]
+    step = flight.report()["start_step"]
     assert step["attitude_deg"] == pytest.approx(np.degrees(turn.magnitude()), abs=1e-4)
     assert (step["joint"], step["unit"]) == (f"joint{joint + 1}", "rad")
     assert step["joint_error"] == pytest.approx(np.radians(5.0))

@@ -57,9 +57,9 @@ def test_verdicts_on_the_claims(time_delay_flights: list[Result]) -> None:
 def test_tde_smc_chatters_as_the_prototype_did(time_delay_flights: list[Result]) -> None:
     """103, 2.6 and 0.33 N m/s."""
     variation = {
-        r.row.controller: r.chatter["total_variation_per_s"]["base_torque"]
+        r.row.controller: r.metrics["base_torque.variation"]
         for r in time_delay_flights
-        if r.chatter is not None
+        if r.chatters
     }
     assert variation["tde_smc"] == pytest.approx(103.0, rel=0.05)
     assert variation["tde_tsmc"] == pytest.approx(2.6, rel=0.05)
@@ -80,12 +80,12 @@ def test_rows_fly_with_sensors_that_are_not_ideal() -> None:
     ]
     assert ideal.parameters["navigation"] == "direct"
     assert noisy.parameters["navigation"]["tracker_across"] == 1e-5
-    assert ideal.rms != noisy.rms
+    assert ideal.metrics != noisy.metrics
 
 
 def test_printed_computed_torque_gains_diverge_within_ticks() -> None:
     result = fly(Planned(TableRow("ctc", "1"), Variant("printed", True), shown=False), None, None)
-    assert result.rms is None
+    assert result.metrics is None
     assert result.diverged_tick is not None
     assert result.diverged_tick < 20
     (cell, *_) = cells([result])

@@ -183,7 +183,7 @@ def test_the_tool_ends_at_its_goal_and_its_distance_from_the_path_is_plotted(flo
         np.testing.assert_allclose(goal.rotation, rotation[0], atol=1e-4)
     assert np.linalg.norm(goals[-1].position - goals[0].position) > 0.07
     (tool,) = [q for q in quantities_of(log, robot) if q.title == "tool error"]
-    assert tool.values.max() == flight.metrics["tool"]["largest_m"]
+    assert tool.values.max() == flight.metrics["tool.max"]
     plain = flown("paper")
     assert not any("/goal_" in name for name in Scene(page_of(robot, a=plain)).names())
     assert "tool error" not in [q.title for q in quantities_of(plain, shown_robot(plain))]

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 import space_robot as sr
 from space_robot import Scenario
-from space_robot.analysis.attitude_drift import controls_base
+from space_robot.analysis.errors import controls_base
 from space_robot.flight.batch.batch import FlightBatch
 from space_robot.flight.batch.benches import Benches
 from space_robot.flight.batch.sharing import batch_key, batches, reason_to_fly_alone

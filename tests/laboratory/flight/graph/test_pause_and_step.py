@@ -16,7 +16,7 @@ import pytest
 from bags import messages_of
 from flights import PausedFlight, simulated, space_robot_here
 
-from space_robot.analysis.tool_error import leads_tool
+from space_robot.analysis.tool_path import leads_tool
 from space_robot_model.robot.find import find_robot
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.bag.reader import read_flight
