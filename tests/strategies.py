@@ -15,7 +15,7 @@ from space_robot_model.robot import Robot
 from space_robot_model.robot.inertia import inertia_tensor
 from space_robot_model.robot.parts import Base, Body, Gear, JointFriction, RobotTree, Spring, Tool
 from space_robot_msgs_py.bag.flight_log import FlightLog
-from space_robot_msgs_py.samples import Timebase
+from space_robot_msgs_py.samples import LawInForce, Timebase
 
 Array = NDArray[np.float64]
 
@@ -308,9 +308,10 @@ def random_log(
     log.commanded_torque[rng.random(ticks) < 0.1] = np.nan
     if wall_clock:
         log.latency_s = np.where(rng.random(ticks) < 0.2, np.nan, rng.exponential(3e-4, ticks))
+    h_bar = tuple(rng.uniform(0.5, 50.0, n + 3).tolist())
+    log.laws = (LawInForce(0, "tde_stc", {"h_bar": h_bar}, is_first=True),)
     log.flight = {
         "controller": "tde_stc",
-        "gains_used": {"h_bar": rng.uniform(0.5, 50.0, n + 3).tolist()},
         "command_latency_ticks": latency_ticks,
         "parameters": {"plant": LIMITS},
     }

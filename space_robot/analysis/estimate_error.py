@@ -15,16 +15,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from space_robot_control.controller.gains import build_law, split_gains
 from space_robot_control.controller.settings import ControllerNodeSettings
-from space_robot_control.laws.names import require_shipped_law
 from space_robot_control.navigation.rate_filters import low_pass_weight
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.bag.law_history import laws_of
 from space_robot_msgs_py.errors import InputError
 
 from .analysed_log import AnalysedLog
-from .described import DIRECT, NotDescribedError, check_files, navigation_of, parameters_of
+from .described import DIRECT, navigation_of, parameters_of
 from .generalised_motion import applied_force, continuous_error, mean_acceleration, measured_rows
 from .series import Definition, TimeSeries, series
 
@@ -50,8 +48,7 @@ def estimate_error(flight: AnalysedLog) -> TimeSeries:
     """Return the error of the time-delay estimate of the laws in force."""
     log = flight.log
     axes = {f"estimate_error_{name}": index for name, index in flight.groups.items()}
-    h_bar, smoothing = estimator(log)
-    values = errors_of(log, h_bar, smoothing, rest=log.first_tick == 0)
+    values = errors_of(log, recorded_h_bar, smoothing_of(log), rest=log.first_tick == 0)
     return TimeSeries(axes, values, _unknown(log))
 
 
@@ -149,30 +146,23 @@ def _unknown(log: FlightLog) -> str:
     return "three measured states in a row are needed"
 
 
-def estimator(log: FlightLog) -> tuple[HBar, float]:
-    """Find h_bar of the laws' time-delay estimate, and the weight of its low-pass (0: none).
+def smoothing_of(log: FlightLog) -> float:
+    """Return the weight of a new pair in the low-pass of the laws' time-delay estimate; 0: none.
 
     Raises:
-        InputError: the law is not recorded, and has no estimate or is not described; or its
-            estimate is not of the states measured.
+        InputError: the laws are not recorded, or their estimate is not of the states measured.
     """
     if navigation_of(log) != DIRECT:
         raise InputError("the filtered states that N_hat is formed of are not recorded")
-    if log.laws:
-        h_bar = recorded_h_bar
-    else:
-        described = _described_h_bar(log)
-
-        def h_bar(log: FlightLog) -> Array:
-            return described
-
+    if not log.laws:
+        raise InputError("the laws in force were not recorded")
     if log.scenario is not None:
         filter_hz = log.scenario.controller.acceleration_filter_hz
     else:
         key, recorded = "acceleration_filter_hz", parameters_of(log, ControllerNodeSettings.node)
         known = {key: recorded[key]} if key in recorded else {}
         filter_hz = ControllerNodeSettings.resolve(known).acceleration_filter_hz
-    return h_bar, low_pass_weight(filter_hz, log.timebase.period)
+    return low_pass_weight(filter_hz, log.timebase.period)
 
 
 def recorded_h_bar(log: FlightLog) -> Array:
@@ -188,27 +178,3 @@ def recorded_h_bar(log: FlightLog) -> Array:
     ticks = np.arange(log.first_tick, log.first_tick + log.ticks)
     which = np.searchsorted([law.tick for law in laws], ticks, side="right")
     return np.array(rows)[which]
-
-
-def _described_h_bar(log: FlightLog) -> Array:
-    """Return h_bar of a bag without the laws in force, at its description's word."""
-    flight = log.flight
-    if flight.get("swaps"):
-        raise NotDescribedError("laws were swapped in flight, so no one h_bar holds")
-    if not (name := flight.get("controller")):
-        raise NotDescribedError("the bag does not say which law was flown")
-    if isinstance(gains := flight.get("gains_used"), dict):
-        h_bar = np.array(gains.get("h_bar", ()), dtype=np.float64)
-    else:
-        chosen: dict[str, Any] = {key: flight[key] for key in ("robot", "gains") if key in flight}
-        recorded, _ = split_gains(parameters_of(log, ControllerNodeSettings.node))
-        chosen |= {**recorded, "controller": name}
-        check_files(log, chosen)
-        if not log.trusted:
-            require_shipped_law(str(name))
-        h_bar = build_law(str(name), ControllerNodeSettings.resolve(chosen), log.axes).h_bar
-    if not h_bar.any():
-        raise NotDescribedError(f"{name} has no time-delay estimate with a constant h_bar")
-    if h_bar.shape not in ((log.axes,), (1,)):
-        raise NotDescribedError(f"gains_used of the bag: h_bar: {log.axes} values were expected")
-    return np.broadcast_to(h_bar, log.axes)

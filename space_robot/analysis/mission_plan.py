@@ -23,7 +23,6 @@ from space_robot_msgs_py.errors import InputError
 from space_robot_sim.environment.orbit import OrbitSettings
 
 from ..flight.mission_demand import PieceDemand, SourceDemand, excess, mission_demand
-from .joint_margins import joint_margins
 
 Array = NDArray[np.float64]
 
@@ -180,3 +179,41 @@ def _row(robot: Robot, number: int, segment: PlannedSegment) -> dict[str, Any]:
         "singular_value": segment.singular_value,
         "free_singular_value": segment.free_singular_value,
     }
+
+
+def joint_margins(robot: Robot, demands: Sequence[MotionDemand]) -> dict[str, Any]:
+    """Return the joints that come nearest to their limits of position, velocity and effort.
+
+    Args:
+        robot: with limits of its joints.
+        demands: of the segments of a mission.
+
+    Returns:
+        By kind of limit ``joint``, ``time_s`` and ``share``: 1 at the limit; positions count from
+        the middle of the joint's range. A kind that no joint has a limit of is missing.
+    """
+    time = np.concatenate([part.time for part in demands])
+    joints = np.concatenate([part.joints for part in demands])
+    effort = np.concatenate([part.torque[:, 3:] for part in demands])
+    lower, upper, fastest, strongest = (
+        np.array([getattr(limits, name) for limits in robot.limits])
+        for name in ("lower", "upper", "velocity", "effort")
+    )
+    has_range = np.isfinite(upper - lower)
+    middle = 0.5 * (np.where(has_range, lower, 0.0) + np.where(has_range, upper, 0.0))
+    shares = {
+        "position": (joints[:, 0] - middle) / np.where(has_range, upper - middle, np.inf),
+        "velocity": joints[:, 1] / fastest,
+        "effort": effort / strongest,
+    }
+    margins = {}
+    for kind, limits in zip(shares, (upper - lower, fastest, strongest), strict=True):
+        if np.isfinite(limits).any():
+            values = np.abs(shares[kind])
+            k, joint = np.unravel_index(int(np.argmax(values)), values.shape)
+            margins[kind] = {
+                "joint": robot.joint_names[int(joint)],
+                "time_s": float(time[k]),
+                "share": float(values[k, joint]),
+            }
+    return margins

@@ -51,6 +51,7 @@ class BenchLog:
         log = flight_log(flight, ticks + is_unanswered)
         assert log.commanded_torque is not None
         assert log.telemetry is not None
+        log.telemetry[:] = np.nan  # where the law was not asked
         width, axes = len(plant.names.commanded), log.axes
         rows, no_law = history.rows(), NoLaw({}, flight.period, axes)
         choice = LawChoice(no_law)

@@ -45,13 +45,11 @@ def flight_log(flight: Flight, ticks: int | None = None) -> FlightLog:
 
 
 def mapped(shape: tuple[int, ...]) -> Array:
-    """Return an array of NaN in a file without a name, which the system writes out as it needs."""
+    """Return an array in a file without a name, which the system writes out as it needs."""
     if not math.prod(shape):
         return np.empty(shape)
     with tempfile.TemporaryFile() as file:
-        array: Array = np.memmap(file, np.float64, "w+", shape=shape)
-    array[:] = np.nan
-    return array
+        return np.memmap(file, np.float64, "w+", shape=shape)
 
 
 def check_room(size: int, what: str) -> None:

@@ -279,25 +279,7 @@ def test_with_trust_it_does_and_the_users_own_word_needs_none(
     assert by_set.law_name == by_set.parameters["controller"] == "tde_stc"
 
 
-def test_analyze_imports_none_and_says_so(
-    tmp_path: Path, ran: Callable[[], bool], bag: Path
-) -> None:
-    log = read_flight(bag)
-    log.laws = ()  # else their numbers are taken
-    log.flight = described(controller=LAW)
-    log.flight.pop("gains_used")
-    report = analyze(log)
-    assert "--trust imports a module:Class" in report["unavailable"]["estimate_error"]
-    assert report["metrics"]["attitude.rms"] >= 0.0
-    assert not ran()
-    log.trusted = True
-    assert "no file for controller 'stranger'" in analyze(log)["unavailable"]["estimate_error"]
-    assert ran()
-
-
-@pytest.mark.parametrize(
-    ("key", "figure"), [("robot", "pointing"), ("gains", "estimate_error"), ("case", "saturation")]
-)
+@pytest.mark.parametrize(("key", "figure"), [("robot", "end_effector"), ("case", "saturation")])
 def test_analyze_reads_no_file_that_a_bag_names(
     bag: Path, tmp_path: Path, key: str, figure: str
 ) -> None:

@@ -95,7 +95,7 @@ def test_what_is_special_in_a_row(report: Report) -> None:
     report["metrics"] |= {"attitude.settling": np.inf, "half_cone.max": 7200.0, "own": 3.0}
     report["unfinished"], report["damage"] = "cut", ["a", "b"]
     log = random_log(6, 300, 0)
-    log.flight = {}
+    log.flight, log.laws = {}, ()
     rows = rows_of(comparison_table({"one": report, "other": analyze(log)}))
     assert rows["attitude.settling (s)"][0] == "never"
     assert rows["half_cone.max (arcsec)"][0] == "2 deg"

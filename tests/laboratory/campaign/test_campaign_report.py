@@ -297,7 +297,7 @@ def test_the_attitude_is_shown_in_degrees_where_it_was_measured_so() -> None:
     table = made_table(runs=60)
     table["metric.attitude_angle.rms"] = np.degrees(2.0 * table["metric.attitude.rms"])
     assert chosen(table, {})[0].label == "attitude angle, RMS (deg)"
-    assert of_metric("tilt_deg_max").heading == "tilt deg, largest"  # of somebody's own
+    assert of_metric("tilt_deg_max").heading == "tilt deg max"  # of somebody's own
     demand = {"metric": "attitude.max", "below": 1e-3, "in": 0.9}  # of the vector part
     text = demanded(of_requirement("p", Requirement.model_validate(demand)))
     assert text.startswith("attitude, largest below 0.001 (an angle of 0.115 deg) in 90 %")

@@ -8,11 +8,11 @@ import signal
 import time
 from collections import Counter
 from collections.abc import Callable
+from dataclasses import replace
 from itertools import count
 from pathlib import Path
 
 import numpy as np
-import psutil
 import pytest
 from flights import forked_space_robot, planned
 from matrix.scenarios import difference
@@ -23,7 +23,6 @@ from space_robot.flight.bag_path import check_bag_path, default_bag
 from space_robot.flight.ending import COMPLETE, DIVERGED, FAILED, UNANSWERED, Ending
 from space_robot.flight.plan import Flight
 from space_robot.flight.simulate import simulate
-from space_robot.processes import memory
 from space_robot_control.laws import Signals
 from space_robot_control.laws.base import LawError
 from space_robot_msgs_py import topics
@@ -75,7 +74,11 @@ def test_every_tick_is_in_log_and_bag(
     """The report is that of the bag."""
     with pytest.raises(kind) as caught:
         simulate(make(), tmp_path / "bag")
-    log, read = caught.value.log, read_flight(tmp_path / "bag")
+    read = read_flight(tmp_path / "bag")
+    log = getattr(caught.value, "log", None)
+    if log is None:  # that of a mistake in a law is in its bag only
+        assert kind is LawError
+        log = replace(read, telemetry=np.full((sent, 4, 9), np.nan))
     assert (log.ticks, log.unanswered) == (sent, sent - answered)
     assert np.isfinite(log.commanded_torque[: min(answered, 130)]).all()
     assert np.isnan(log.commanded_torque[answered:]).all()
@@ -172,10 +175,10 @@ def test_the_output_of_a_command_that_compiles_stays_clean(
 # Long ones
 
 
-def test_the_longest_flight_flies_and_can_be_interrupted(tmp_path: Path) -> None:
-    """It ended in a traceback before its first tick."""
+def test_a_long_flight_flies_and_can_be_interrupted(tmp_path: Path) -> None:
+    """An hour, whose log is in files."""
     bag = tmp_path / "bag"
-    process = forked_space_robot("simulate", "--duration", "1e6", "--bag", str(bag))
+    process = forked_space_robot("simulate", "--duration", "3600", "--bag", str(bag))
     while not (bag / "bag_0.mcap").exists() or (bag / "bag_0.mcap").stat().st_size < 1_000_000:
         assert process.poll() is None
         time.sleep(0.02)
@@ -187,16 +190,6 @@ def test_the_longest_flight_flies_and_can_be_interrupted(tmp_path: Path) -> None
     assert not list(bag.glob("*.part"))
 
 
-def test_a_whole_flight_in_memory_that_does_not_fit_is_refused(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    """Of those who need it whole: `stability`, and Python."""
-    told = psutil.virtual_memory().available
-    assert memory.available_bytes() == pytest.approx(told, rel=0.2)
-    with pytest.raises(InputError, match=r"duration 1e\+06 s: the whole flight .* GB are free"):
+def test_a_log_for_which_there_is_no_room_is_refused() -> None:
+    with pytest.raises(InputError, match=r"duration 1e\+06 s: the log .* GB are free: fly a short"):
         simulate(planned(duration=1e6))
-    monkeypatch.setattr(memory, "available_bytes", lambda: 20 * 1000)
-    simulate(planned(duration=0.01))
-    monkeypatch.setattr(memory, "available_bytes", lambda: 20 * 800)
-    with pytest.raises(InputError, match="fly a shorter one"):
-        simulate(planned(duration=0.01))

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from space_robot.analysis import analyze
-from space_robot.analysis.estimate_error import HBar, errors_of, estimator
+from space_robot.analysis.estimate_error import HBar, errors_of, recorded_h_bar
 from space_robot.analysis.excerpt import excerpt
 from space_robot.flight.plan import Flight, FlightPlan, resolve
 from space_robot.flight.replay.run import RecordedLaws
@@ -159,7 +159,7 @@ def test_the_estimates_error_is_taken_with_the_h_bar_in_force(swapped: FlightLog
 
     alone = [errors(lambda _, law=law: np.array(law.gains["h_bar"])) for law in log.laws[::2]]
     expected = np.vstack([alone[0][:200], np.full((200, 9), np.nan), alone[1][400:]])
-    np.testing.assert_array_equal(errors(estimator(log)[0]), expected)
+    np.testing.assert_array_equal(errors(recorded_h_bar), expected)
 
 
 def test_where_no_law_has_an_estimate_there_is_no_error_of_it(swapped: FlightLog) -> None:

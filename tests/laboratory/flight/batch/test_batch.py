@@ -47,7 +47,7 @@ def together(flights: Sequence[Flight]) -> list[Flown]:
             continue
         for block in FlightBatch([flight for _, flight in group]).fly():
             assert numbers[block.flight] not in flown
-            flown[numbers[block.flight]] = block.log, str(block.error or "")
+            flown[numbers[block.flight]] = block.log, block.ending.reason
     return [flown[number] for number in range(len(flights))]
 
 
@@ -186,18 +186,13 @@ def test_brief_logs_have_what_metrics_need(options: dict[str, Any]) -> None:
     assert controls_base(full) == controls_base(brief)
 
 
-def test_a_flight_longer_than_a_block_is_flown_block_by_block(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    monkeypatch.setattr("space_robot_msgs_py.bag.flight_log.BLOCK_TICKS", 60)
-    blocks = [[], []]  # type: list[list[FlightLog]]
-    for block in FlightBatch(some(2, sensors="fine")).fly():
-        blocks[block.flight].append(block.log)
-    for number, flight in enumerate(some(2, sensors="fine")):
-        assert [log.ticks for log in blocks[number]] == [60, 60, 60, 20]
-        for name, column in simulate(flight).columns.items():
-            parts = b"".join(log.columns[name].tobytes() for log in blocks[number])
-            assert parts == column.tobytes(), name
+def test_logs_too_large_for_memory_lie_in_a_file(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("space_robot.flight.batch.lane_log.LARGE", 1000)
+    for flown, flight in zip(
+        FlightBatch(some(2, sensors="fine")).fly(), some(2, sensors="fine"), strict=True
+    ):
+        assert isinstance(flown.log.quaternion, np.memmap)
+        assert difference(flown.log, simulate(flight)) == ""
 
 
 # Benches
