@@ -125,7 +125,7 @@ def text_of(name: str, value: float) -> str:
         return "never" if unit == "s" else str(value)
     if unit == "arcsec" and value >= 3600.0:
         return f"{value / 3600.0:.3g} deg"
-    return f"{value:.4g}"
+    return f"{value:.0f}" if unit == "ticks" else f"{value:.4g}"
 
 
 def _groups(reports: Sequence[Report], names: Sequence[str]) -> list[Group]:
