@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from space_robot_model.hardware.base_actuators import BaseActuatorSettings
 from space_robot_model.robot import Robot
-from space_robot_msgs_py.bag.flight_log import BLOCK_TICKS, FlightLog
+from space_robot_msgs_py.bag.flight_log import BLOCK_TICKS, FlightLog, block_bounds
 from space_robot_msgs_py.topics import BASE_AXES
 
 from . import described
@@ -101,9 +101,8 @@ class AnalysedLog:
         return list(names[place])
 
     def blocks(self) -> Iterator[tuple[int, int]]:
-        """Yield first row and stop of each block, small enough for temporary arrays."""
-        for start in range(0, self.log.ticks, BLOCK_TICKS):
-            yield start, min(start + BLOCK_TICKS, self.log.ticks)
+        """Return first row and stop of each block, small enough for temporary arrays."""
+        return block_bounds(self.log.ticks)
 
     def part(self, window: range) -> AnalysedLog:
         """Return the rows in a window as a flight of their own."""

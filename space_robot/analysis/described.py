@@ -42,11 +42,9 @@ IDEAL = "ideal"
 """Name of the sensors without error."""
 MOST_LETTERS = 400
 """Of the joints' names in an error."""
-_LATER = {"disturbance.table", "disturbance.table_scale"}
-"""Settings that bags of earlier releases do not have: their flights had the defaults."""
 _NUMBERS = {
     name for schema in (EnvironmentSettings, ActuatorSettings) for name, _ in leaves(schema)
-} - _LATER
+}
 DIRECT = "direct"
 """Name of the navigation without filter."""
 
@@ -75,7 +73,6 @@ def start_step_of(log: FlightLog) -> dict[str, Any] | None:
     zero = StartStep(0.0, "", 0.0, "", "", "", 0.0, 0.0)._asdict()
     if not isinstance(step, dict):
         return None
-    step = {"rate_deg_s": 0.0, **step}  # bags of starts at rest do not say it
     if set(step) != set(zero):
         return None
     return step if all(type(step[key]) is type(value) for key, value in zero.items()) else None

@@ -53,32 +53,6 @@ class TimeSeries(NamedTuple):
     """Makes further metrics of the statistics."""
 
 
-class Summary(NamedTuple):
-    """Sums over the known rows of a series."""
-
-    rms: Array
-    """(k,) of each axis."""
-    largest: dict[str, float]
-    """The largest size of each column."""
-    end: dict[str, float]
-    """The size of each column at the last known row."""
-
-    def statistics(self, axes: Mapping[str, AxisIndex], group: SeriesGroup) -> dict[str, float]:
-        """Return the statistics that each column has, by the metrics' names."""
-        numbers = {}
-        for column, index in axes.items():
-            each = self.rms[index]
-            values: dict[str, float] = {
-                "rms": float(np.mean(each)),
-                "rms_eq64": norm(each) / len(each),
-                "max": self.largest[column],
-                "end": self.end[column],
-            }
-            for statistic in group.quantity(column).statistics:
-                numbers[f"{column}.{statistic}"] = values[statistic]
-        return numbers
-
-
 STATISTICS = {
     "rms": "root mean square, mean over the axes (Table V of the paper)",
     "rms_eq64": "a third of the vector's root mean square (eq. (64))",
@@ -121,12 +95,40 @@ class SeriesGroup(MetricGroup):
     derived: Mapping[str, Definition]
 
     def evaluate(self, flight: AnalysedLog, window: range) -> dict[str, float]:
-        """Sum up the rows in a window."""
+        """Return the statistics over the known rows in a window.
+
+        Raises:
+            InputError: there are none.
+        """
         series = self.source(flight)
         if series is None:
             return {}
-        summary = self.summarise(flight, series, window)
-        numbers = summary.statistics(series.axes, self)
+        count, squares = 0, np.zeros(1)
+        largest, last = dict.fromkeys(series.axes, 0.0), np.zeros((1, 0))
+        for start, values in self.blocks(flight, series):
+            rows = values[max(window.start - start, 0) : max(window.stop - start, 0)]
+            sums = np.einsum("ij,ij->j", rows, rows)
+            if np.isnan(sums).any():
+                rows = rows[~np.isnan(rows).any(axis=1)]
+                sums = np.einsum("ij,ij->j", rows, rows)
+            if len(rows):
+                count, squares, last = count + len(rows), squares + sums, rows[-1:].copy()
+                for column, axes in series.axes.items():
+                    size = float(self._size(column, rows[:, axes]).max())
+                    largest[column] = max(largest[column], size)
+        if not count:
+            raise InputError(series.unknown)
+        rms, numbers = np.sqrt(squares / count), dict[str, float]()
+        for column, axes in series.axes.items():
+            each = rms[axes]
+            statistics = {
+                "rms": float(np.mean(each)),
+                "rms_eq64": norm(each) / len(each),
+                "max": largest[column],
+                "end": float(self._size(column, last[:, axes])[0]),
+            }
+            for name in self.quantity(column).statistics:
+                numbers[f"{column}.{name}"] = statistics[name]
         return numbers | (series.derive(numbers) if series.derive else {})
 
     def names(self, flight: AnalysedLog) -> list[str]:
@@ -165,30 +167,6 @@ class SeriesGroup(MetricGroup):
         if series := self.source(flight):
             for start, values in self.blocks(flight, series):
                 yield start, {c: self._size(c, values[:, axes]) for c, axes in series.axes.items()}
-
-    def summarise(self, flight: AnalysedLog, series: TimeSeries, window: range) -> Summary:
-        """Sum up the known rows in a window.
-
-        Raises:
-            InputError: there are none.
-        """
-        count, squares = 0, np.zeros(1)
-        largest, last = dict.fromkeys(series.axes, 0.0), np.zeros((1, 0))
-        for start, values in self.blocks(flight, series):
-            rows = values[max(window.start - start, 0) : max(window.stop - start, 0)]
-            sums = np.einsum("ij,ij->j", rows, rows)
-            if np.isnan(sums).any():
-                rows = rows[~np.isnan(rows).any(axis=1)]
-                sums = np.einsum("ij,ij->j", rows, rows)
-            if len(rows):
-                count, squares, last = count + len(rows), squares + sums, rows[-1:].copy()
-                for column, axes in series.axes.items():
-                    size = float(self._size(column, rows[:, axes]).max())
-                    largest[column] = max(largest[column], size)
-        if not count:
-            raise InputError(series.unknown)
-        end = {c: float(self._size(c, last[:, axes])[0]) for c, axes in series.axes.items()}
-        return Summary(np.sqrt(squares / count), largest, end)
 
     def _size(self, column: str, values: Array) -> Array:
         """(N,) size of a column (N, axes) at each row."""

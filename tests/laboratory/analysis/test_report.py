@@ -37,7 +37,7 @@ def test_a_report_does_not_depend_on_the_blocks(monkeypatch: pytest.MonkeyPatch)
     own = {"case": "3", "sensors": "fine", "actuators": "small_wheels", "orbit": "iss"}
     log = Scenario(**own, swaps=["1.5:tde_smc"], duration=3.0).fly().check().log
     expected = analyze(log)
-    monkeypatch.setattr("space_robot.analysis.analysed_log.BLOCK_TICKS", 1700)
+    monkeypatch.setattr("space_robot_msgs_py.bag.flight_log.BLOCK_TICKS", 1700)
     for part in (log, replace(log, scenario=None)):
         found = analyze(part)
         assert list(found["metrics"]) == list(expected["metrics"])
