@@ -186,6 +186,8 @@ def test_a_yaml_is_read_in_its_folder_or_has_the_text(tmp_path: Path) -> None:
     robot = Robot.from_yaml(tmp_path / "robot.yaml")
     assert (robot.name, robot.mass[0]) == ("mine", 10.0)
     text = GOOD.replace('upper="2"', 'upper="-2"')
+    with pytest.raises(InputError, match="with --repair"):
+        Robot.from_dict({"robot": {"urdf_text": text}})
     repaired = Robot.from_dict({"robot": {"urdf_text": text, "repair": True}})
     assert (len(repaired.repairs), repaired.limits[0].lower) == (1, -2.0)
 
