@@ -6,19 +6,17 @@ from functools import partial
 from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import AfterValidator, Field
 
 from space_robot_msgs_py.config.validation import StrictModel
 from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.samples import MOST_TORQUERS, RobotNames
 
+from ..elementary.matrices import Array
 from ..robot import Robot
 from .sheets import NO_VECTORS, MountedSheet, Positive, Vectors, are_directions, directions
 from .thrusters import ThrusterSettings
 from .wheels import WheelSettings
-
-Array = NDArray[np.float64]
 
 BaseActuation = Literal["ideal", "hardware", "none"]
 LEAST_SHARE = 1e-6

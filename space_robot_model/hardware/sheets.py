@@ -5,16 +5,13 @@ from __future__ import annotations
 from typing import Annotated, ClassVar, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import BaseModel, Field
 
 from space_robot_msgs_py.config.files import named_file, node_parameters
 from space_robot_msgs_py.config.validation import StrictModel, validate
 from space_robot_msgs_py.errors import InputError
 
-from ..elementary.matrices import direction_norm, unit_rows
-
-Array = NDArray[np.float64]
+from ..elementary.matrices import Array, direction_norm, unit_rows
 
 Sheet = TypeVar("Sheet", bound=BaseModel)
 

@@ -6,12 +6,12 @@ from functools import partial
 from typing import Annotated, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import AfterValidator, Field
 
 from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.samples import MOST_THRUSTERS
 
+from ..elementary.matrices import Array
 from .sheets import (
     FEWEST,
     NO_VECTORS,
@@ -23,9 +23,6 @@ from .sheets import (
     directions,
     vectors,
 )
-
-Array = NDArray[np.float64]
-
 
 STANDARD_GRAVITY = 9.80665
 """m/s2."""

@@ -6,15 +6,13 @@ from functools import partial
 from typing import Annotated, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import AfterValidator, Field
 
 from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.samples import MOST_WHEELS
 
+from ..elementary.matrices import Array
 from .sheets import NO_VECTORS, MountedSheet, Positive, Sizes, Vectors, are_directions, directions
-
-Array = NDArray[np.float64]
 
 PER_WHEEL = "one value for all wheels, or one per wheel"
 

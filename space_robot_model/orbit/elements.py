@@ -6,16 +6,13 @@ import math
 from typing import Annotated
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field, model_validator
 from typing_extensions import Self
 
 from space_robot_msgs_py.config.validation import StrictModel
 
-from ..elementary.matrices import norm
+from ..elementary.matrices import Array, norm
 from ..elementary.rotations import plain_sin_cos
-
-Array = NDArray[np.float64]
 
 MU = 3.986004418e14
 """Gravitational parameter of the Earth, m3/s2."""

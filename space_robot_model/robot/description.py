@@ -7,15 +7,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..elementary.matrices import norms
+from ..elementary.matrices import Array, norms
 from .files import gear_document
 from .parts import MANY_TURNS
 from .robot import Robot
 from .shapes import plates_of
-
-Array = NDArray[np.float64]
 
 FAR = 100.0
 """Distance between two joints that asks for a remark, m."""

@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field, model_validator
 from typing_extensions import Self
 
@@ -16,15 +15,13 @@ from space_robot_msgs_py.config.text import choices
 from space_robot_msgs_py.config.validation import StrictModel, one_of, short, validate
 from space_robot_msgs_py.errors import InputError
 
-from ..elementary.matrices import product
+from ..elementary.matrices import Array, product
 from ..elementary.rotations import rpy_of_rotation
 from .inertia import inertia_elements
 from .names import BASE
 from .parts import Body, Drive, Gear, Name, Plate, Plates, RobotPart, RobotTree, Spring, Visual
 from .urdf import UrdfRobot, parse_urdf, read_urdf
 from .urdf_xml import IDENTITY
-
-Array = NDArray[np.float64]
 
 
 class RobotDocument(StrictModel):

@@ -11,7 +11,6 @@ from dataclasses import dataclass, field, replace
 from typing import Any, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from space_robot_msgs_py.config.text import choices
 from space_robot_msgs_py.config.validation import short
@@ -19,11 +18,10 @@ from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.samples import MOST_PASSIVE
 
 from ..dynamics.model import MOST_JOINTS
-from ..elementary.matrices import norm, product, rotate_tensor
+from ..elementary.matrices import Array, norm, product, rotate_tensor
 from .names import first_repeated, other_meaning
 from .parts import Base, Body, JointFriction, Plate, RobotTree, Tool, Visual
 
-Array = NDArray[np.float64]
 Part = TypeVar("Part", Tool, Visual, Plate)
 SETTINGS_FRICTION = JointFriction(np.nan, np.nan)
 

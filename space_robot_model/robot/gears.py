@@ -6,14 +6,11 @@ from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..elementary.matrices import solve
+from ..elementary.matrices import Array, solve
 from .dynamics import mass_matrix
 from .placements import BodyFrame, base_axes, body_frames
 from .robot import Robot
-
-Array = NDArray[np.float64]
 
 
 def geared_joints(robot: Robot) -> list[int]:

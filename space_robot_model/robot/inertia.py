@@ -5,12 +5,9 @@ from __future__ import annotations
 from typing import Annotated
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import AfterValidator, Field
 
-from ..elementary.matrices import rotate_tensor
-
-Array = NDArray[np.float64]
+from ..elementary.matrices import Array, rotate_tensor
 
 
 def inertia_tensor(values: list[float]) -> Array:

@@ -7,13 +7,10 @@ from functools import reduce
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..elementary.matrices import product
+from ..elementary.matrices import Array, product
 from .placements import BodyFrame, base_axes, body_frames, cross, to_base, to_inertial
 from .robot import Robot
-
-Array = NDArray[np.float64]
 
 _BATCH = 8192
 """Rows per batch, so that all vectors of a batch fit into the processor's cache."""

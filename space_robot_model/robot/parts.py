@@ -12,7 +12,6 @@ from dataclasses import InitVar, dataclass, field, replace
 from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import (
     AfterValidator,
     BeforeValidator,
@@ -30,12 +29,10 @@ from typing_extensions import Self
 from space_robot_msgs_py.config.text import choices
 from space_robot_msgs_py.config.validation import short
 
-from ..elementary.matrices import norm, product
+from ..elementary.matrices import Array, norm, product
 from ..elementary.rotations import exact_sines_cosines, rotation_of_rpy
 from .inertia import LARGEST_MASS, InertiaElement, check_inertia, inertia_tensor
 from .names import BASE, first_repeated, other_meaning
-
-Array = NDArray[np.float64]
 
 MOST_LINKS = 4000
 """Maximum number of links in a robot's file, including fixed ones."""

@@ -6,18 +6,15 @@ from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from space_robot_msgs_py.samples import RobotState
 from space_robot_msgs_py.topics import BASE_FRAME, INERTIAL_FRAME
 from space_robot_msgs_py.wire.viewers import POSE, FramePair
 
 from ..elementary.functions import sines_cosines
-from ..elementary.matrices import norm
+from ..elementary.matrices import Array, norm
 from .names import BASE
 from .robot import Robot
-
-Array = NDArray[np.float64]
 
 XYZW = [1, 2, 3, 0]
 """Indices that bring a quaternion ``[w, x, y, z]`` into ROS's order."""

@@ -20,7 +20,7 @@ from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.topics import BASE_AXES
 
 from ..dynamics.model import Model
-from ..elementary.matrices import product
+from ..elementary.matrices import Array, product
 from ..elementary.rotations import plain_sin_cos
 from .files import exact_document, read_content
 from .flatten import Part, arrays_of
@@ -40,7 +40,6 @@ from .parts import (
 )
 from .urdf import UrdfRobot, read_urdf
 
-Array = NDArray[np.float64]
 RANK_TOLERANCE = 1e-7
 """Singular values below this share of the largest count as zero."""
 

@@ -7,15 +7,13 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..elementary.matrices import product
+from ..elementary.matrices import Array, product
 from .parts import Colour, Plate, Visual
 
 if TYPE_CHECKING:
     from .robot import Robot
 
-Array = NDArray[np.float64]
 BASE_COLOUR: Colour = (0.80, 0.66, 0.30, 1.0)
 LINK_COLOUR: Colour = (0.82, 0.83, 0.86, 1.0)
 JOINT_COLOUR: Colour = (0.25, 0.28, 0.33, 1.0)

@@ -7,17 +7,14 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from space_robot_msgs_py.config.text import nearest
 from space_robot_msgs_py.config.validation import short
 
-from ..elementary.matrices import norm
+from ..elementary.matrices import Array, norm
 from .parts import JointFriction, JointLimits
 from .urdf_links import UrdfLink, read_name
 from .urdf_xml import Element, Fields, Report, UrdfFrame
-
-Array = NDArray[np.float64]
 
 KINDS = {
     "revolute": "revolute",

@@ -11,16 +11,13 @@ from urllib.parse import unquote
 from xml.sax.saxutils import quoteattr, unescape
 
 import numpy as np
-from numpy.typing import NDArray
 
 from space_robot_msgs_py.config.validation import short
 from space_robot_msgs_py.errors import InputError
 
-from ..elementary.matrices import rotate_tensor
+from ..elementary.matrices import Array, rotate_tensor
 from .parts import Colour, Visual
 from .urdf_xml import Element, Fields, Report, UrdfFrame, short_tag
-
-Array = NDArray[np.float64]
 
 ELEMENTS = ("inertial", "visual", "collision")
 EXTENSIONS = ("contact", "gravity", "self_collision_checking", "sensor", "verbose")

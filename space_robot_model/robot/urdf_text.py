@@ -18,9 +18,8 @@ from urllib.parse import quote
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..elementary.matrices import product
+from ..elementary.matrices import Array, product
 from ..elementary.rotations import rpy_of_rotation
 from .inertia import inertia_elements
 from .parts import Colour, JointLimits, Visual
@@ -30,7 +29,6 @@ from .shapes import shapes_of
 from .urdf_links import MOMENTS
 from .urdf_xml import LARGEST
 
-Array = NDArray[np.float64]
 Materials = dict[Colour, str]
 
 

@@ -8,18 +8,16 @@ from dataclasses import dataclass, replace
 from typing import Literal, cast
 
 import numpy as np
-from numpy.typing import NDArray
 
 from space_robot_msgs_py.config.validation import one_of, short
 
-from ..elementary.matrices import product, rotate_tensor
+from ..elementary.matrices import Array, product, rotate_tensor
 from .inertia import inertia_defect, nearest_inertia
 from .parts import Base, Body, RobotTree, Tool, Visual
 from .urdf_joints import UrdfJoint
 from .urdf_links import MASSLESS, UrdfLink
 from .urdf_xml import IDENTITY, UrdfFrame
 
-Array = NDArray[np.float64]
 Kind = Literal["revolute", "prismatic", "fixed"]
 
 MOUNT = "`space-robot new --on` mounts an arm on a satellite"

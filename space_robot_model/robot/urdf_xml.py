@@ -10,14 +10,12 @@ from typing import Any, NamedTuple
 from xml.parsers import expat
 
 import numpy as np
-from numpy.typing import NDArray
 
 from space_robot_msgs_py.config.validation import short
 from space_robot_msgs_py.errors import InputError
 
+from ..elementary.matrices import Array
 from ..elementary.rotations import rotation_of_rpy
-
-Array = NDArray[np.float64]
 
 DEEPEST = 100
 """Maximum depth of nested elements."""

@@ -25,7 +25,7 @@ from strategies import (
 from space_robot_model.robot import Robot
 from space_robot_model.robot.find import find_robot, robot_names
 from space_robot_model.robot.inertia import inertia_tensor
-from space_robot_model.robot.kinematics import manipulability, tool_state
+from space_robot_model.robot.kinematics import tool_state
 from space_robot_model.robot.markers import RobotMarkers
 from space_robot_model.robot.parts import RobotTree, Visual
 from space_robot_model.robot.placements import (
@@ -207,12 +207,6 @@ def test_the_base_moves_the_whole_as_a_rigid_body_and_a_null_space_does_not_move
     scale = float(np.max(np.abs(state.coupling)))
     np.testing.assert_allclose(state.coupling @ basis, 0.0, atol=1e-12 * scale)
     np.testing.assert_allclose(state.free @ basis, state.held @ basis, atol=1e-12)
-
-
-def test_manipulability_is_the_product_of_the_singular_values() -> None:
-    jacobian = find_robot("paper").tool_jacobian(np.full(6, 0.4), UPRIGHT, "free")
-    expected = np.prod(np.linalg.svd(jacobian, compute_uv=False))
-    assert manipulability(jacobian) == pytest.approx(expected, rel=1e-9)
 
 
 def test_unknown_names_are_refused_in_one_line() -> None:
