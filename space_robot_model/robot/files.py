@@ -19,7 +19,19 @@ from ..elementary.matrices import Array, product
 from ..elementary.rotations import rpy_of_rotation
 from .inertia import inertia_elements
 from .names import BASE
-from .parts import Body, Drive, Gear, Name, Plate, Plates, RobotPart, RobotTree, Spring, Visual
+from .parts import (
+    Body,
+    Drive,
+    Gear,
+    Name,
+    Plate,
+    Plates,
+    RobotPart,
+    RobotTree,
+    Spring,
+    Visual,
+    moved,
+)
 from .urdf import UrdfRobot, parse_urdf, read_urdf
 from .urdf_xml import IDENTITY
 
@@ -103,10 +115,8 @@ class UrdfReference(RobotPart):
             if name not in names:
                 key, advice = f"robot.plates.{number}.link", choices(name, names)
                 raise InputError(f"{where}: {key}: no link {short(name)}: {advice}")
-            frame, own = urdf.frames.get(name, IDENTITY), plate.normalised
-            normal = product(frame.rotation.T, own.normal)
-            centre = product(frame.rotation.T, own.centre - frame.position)
-            placed.append(replace(own, link=name, normal=normal, centre=centre))
+            frame = urdf.frames.get(name, IDENTITY)
+            placed.append(moved(plate.normalised, frame.rotation.T, frame.inside, link=name))
         return placed
 
 

@@ -8,8 +8,9 @@ to the last bit.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import InitVar, dataclass, field, replace
-from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple
+from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple, TypeVar
 
 import numpy as np
 from pydantic import (
@@ -451,6 +452,21 @@ class Plate(RobotPart):
 
 
 Plates = Annotated[list[Plate], Field(max_length=MOST_PLATES)]
+Part = TypeVar("Part", Tool, Visual, Plate)
+
+
+def moved(part: Part, rotation: Array, move: Callable[[Array], Array], **names: Any) -> Part:
+    """Return a part in another frame: its axes or normal turned, its origin or centre moved.
+
+    Args:
+        part: of a link.
+        rotation: (3, 3) of its directions.
+        move: of a position (3,), m.
+        names: of its link and body there.
+    """
+    axes, at = ("normal", "centre") if isinstance(part, Plate) else ("rotation", "position")
+    names[axes], names[at] = product(rotation, getattr(part, axes)), move(getattr(part, at))
+    return replace(part, **names)
 
 
 def _distinct_joints(links: list[Body]) -> list[Body]:

@@ -23,7 +23,7 @@ from ..dynamics.model import Model
 from ..elementary.matrices import Array, product
 from ..elementary.rotations import plain_sin_cos
 from .files import exact_document, read_content
-from .flatten import Part, arrays_of
+from .flatten import arrays_of
 from .inertia import inertia_elements, inertia_tensor
 from .parts import (
     UNLIMITED,
@@ -32,6 +32,7 @@ from .parts import (
     Gear,
     JointFriction,
     JointLimits,
+    Part,
     Plate,
     RobotTree,
     Spring,

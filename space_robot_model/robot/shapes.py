@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..elementary.matrices import Array, product
-from .parts import Colour, Plate, Visual
+from .parts import Colour, Plate, Visual, moved
 
 if TYPE_CHECKING:
     from .robot import Robot
@@ -146,7 +145,9 @@ def plates_of(robot: Robot) -> tuple[Plate, ...]:
 
 
 def _plates(shape: Visual) -> Iterator[Plate]:
-    """Yield the plates of a shape that is not a mesh."""
+    def at(centre: Array) -> Array:
+        return shape.position + product(shape.rotation, centre)
+
     if shape.shape == "cylinder":
         plates = _of_cylinder(*shape.size)
     elif shape.shape == "sphere":
@@ -155,12 +156,7 @@ def _plates(shape: Visual) -> Iterator[Plate]:
     else:
         plates = _of_box(shape.size)
     for plate in plates:
-        yield replace(
-            plate,
-            normal=product(shape.rotation, plate.normal),
-            centre=shape.position + product(shape.rotation, plate.centre),
-            body=shape.body,
-        )
+        yield moved(plate, shape.rotation, at, body=shape.body)
 
 
 def _of_box(edges: tuple[float, ...]) -> Iterator[Plate]:

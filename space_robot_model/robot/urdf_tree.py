@@ -13,7 +13,7 @@ from space_robot_msgs_py.config.validation import one_of, short
 
 from ..elementary.matrices import Array, product, rotate_tensor
 from .inertia import inertia_defect, nearest_inertia
-from .parts import Base, Body, RobotTree, Tool, Visual
+from .parts import Base, Body, RobotTree, Tool, Visual, moved
 from .urdf_joints import UrdfJoint
 from .urdf_links import MASSLESS, UrdfLink
 from .urdf_xml import IDENTITY, UrdfFrame
@@ -264,14 +264,15 @@ def make_tree(
     frames, root = moved_frames(tree), links[tree.base]
     base = Base(root.mass, *_matter(root, IDENTITY), root.name)
     own = [_link(links[child], edge, frames) for child, edge in tree.edges.items()]
-    visuals = [
-        visual
-        for child in (tree.base, *tree.edges)
-        for visual in _visuals(links[child], frames.get(child, IDENTITY))
-    ]
-    return RobotTree(
-        name, base, own, tools=[_tool(tool, frames) for tool in tools], visuals=visuals
-    )
+    visuals, ends = [], []
+    for child in (tree.base, *tree.edges):
+        frame = frames.get(child, IDENTITY)
+        for visual in links[child].visuals:
+            visuals.append(moved(visual, frame.rotation.T, frame.inside, link=child))
+    for tool in tools:
+        frame = frames.get(tool, IDENTITY)
+        ends.append(Tool(tool, frame.rotation.T, frame.inside(np.zeros(3)), link=tool))
+    return RobotTree(name, base, own, tools=ends, visuals=visuals)
 
 
 def moved_frames(tree: Tree) -> dict[str, UrdfFrame]:
@@ -332,25 +333,4 @@ def _link(link: UrdfLink, edge: Edge, frames: Mapping[str, UrdfFrame]) -> Body:
 
 def _matter(link: UrdfLink, frame: UrdfFrame) -> tuple[Array, Array]:
     """Return inertia and centre of mass in a frame that is relative to the link's."""
-    turn = frame.rotation.T
-    return rotate_tensor(turn, link.inertia), product(turn, link.com - frame.position)
-
-
-def _visuals(link: UrdfLink, frame: UrdfFrame) -> list[Visual]:
-    turn, at = frame.rotation.T, frame.position
-    return [
-        replace(
-            visual,
-            rotation=product(turn, visual.rotation),
-            position=product(turn, visual.position - at),
-            link=link.name,
-        )
-        for visual in link.visuals
-    ]
-
-
-def _tool(name: str, frames: Mapping[str, UrdfFrame]) -> Tool:
-    """Return the frame of a link as a tool."""
-    frame = frames.get(name, IDENTITY)
-    turn = frame.rotation.T
-    return Tool(name, turn, -product(turn, frame.position), link=name)
+    return rotate_tensor(frame.rotation.T, link.inertia), frame.inside(link.com)

@@ -14,7 +14,7 @@ import numpy as np
 from space_robot_msgs_py.config.validation import short
 from space_robot_msgs_py.errors import InputError
 
-from ..elementary.matrices import Array
+from ..elementary.matrices import Array, product
 from ..elementary.rotations import rotation_of_rpy
 
 DEEPEST = 100
@@ -160,6 +160,10 @@ class UrdfFrame(NamedTuple):
     """(3, 3) its axes, as columns, in the axes of the other."""
     position: Array
     """(3,) position, m, in the axes of the other."""
+
+    def inside(self, point: Array) -> Array:
+        """Return a point (3,) of the other frame in this one, m."""
+        return product(self.rotation.T, point - self.position)
 
 
 IDENTITY = UrdfFrame(np.eye(3), np.zeros(3))
