@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from pathlib import Path
+import os.path
 from typing import Any
 
 import numpy as np
@@ -39,7 +39,7 @@ def describe(robot: Robot) -> dict[str, Any]:
                 "body": robot.body_names[seen.body],
                 "shape": seen.shape,
                 "size": list(seen.size),
-                **({"mesh": seen.mesh, "found": _is_file(seen.mesh)} if seen.mesh else {}),
+                **({"mesh": seen.mesh, "found": os.path.isfile(seen.mesh)} if seen.mesh else {}),
             }
             for seen in robot.visuals
         ],
@@ -116,10 +116,3 @@ def _plates(robot: Robot) -> dict[str, Any]:
 
 def _numbers(values: Array) -> list[float]:
     return [float(value) + 0.0 for value in values]  # without negative zeros
-
-
-def _is_file(name: str) -> bool:
-    try:
-        return Path(name).is_file()
-    except (OSError, ValueError):
-        return False

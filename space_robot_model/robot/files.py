@@ -32,7 +32,7 @@ from .parts import (
     Visual,
     moved,
 )
-from .urdf import UrdfRobot, parse_urdf, read_urdf
+from .urdf import UrdfRobot, read_urdf
 from .urdf_xml import IDENTITY
 
 
@@ -77,7 +77,7 @@ class UrdfReference(RobotPart):
             urdf = read_urdf(folder / self.urdf, self.base, self.repair, self.tools)
         else:
             path = folder / f"{self.name or 'robot'}.urdf"
-            urdf = parse_urdf(self.urdf_text, path, self.base, self.repair, self.tools)
+            urdf = read_urdf(path, self.base, self.repair, self.tools, self.urdf_text)
         tree = urdf.tree
         joints = {link.joint_label: link for link in tree.links}
         moving = [name for name, link in joints.items() if link.moves]

@@ -71,7 +71,7 @@ def flexible_model(robot: Robot, joint_positions: Array) -> FlexibleModel:
     """Return the matrices of small motions about a configuration (N,), rad or m, at rest."""
     upright = np.array([1.0, 0.0, 0.0, 0.0])
     base = base_axes(upright[:, np.newaxis])
-    walk = body_frames(robot, (base[0], base[1], base[2]), joint_positions[:, np.newaxis])
+    walk = body_frames(robot, base, joint_positions[:, np.newaxis])
     rows, reflected = rotor_rows(robot, {frame.body: frame for frame in walk})
     size = 6 + robot.joint_count
     matrices = [np.zeros((size + len(rows), size + len(rows))) for _ in range(3)]
@@ -108,7 +108,7 @@ def motor_momentum(
     if not motor_velocities.shape[1]:
         return total.T
     axes = base_axes(quaternion.T)
-    frames = {f.body: f for f in body_frames(robot, (axes[0], axes[1], axes[2]), joint_positions.T)}
+    frames = {f.body: f for f in body_frames(robot, axes, joint_positions.T)}
     for k, joint in enumerate(joints):
         gear = robot.gears[joint]
         assert gear

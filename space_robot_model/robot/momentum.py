@@ -9,11 +9,8 @@ from typing import NamedTuple
 import numpy as np
 
 from ..elementary.matrices import Array, product
-from .placements import BodyFrame, base_axes, body_frames, cross, to_base, to_inertial
+from .placements import BATCH, BodyFrame, base_axes, body_frames, cross, to_base, to_inertial
 from .robot import Robot
-
-_BATCH = 8192
-"""Rows per batch, so that all vectors of a batch fit into the processor's cache."""
 
 
 class Motion(NamedTuple):
@@ -57,19 +54,12 @@ def robot_momentum(robot: Robot, motion: Motion) -> RobotMomentum:
 
     ``r`` and ``v`` are those of the common CoM, so the velocity of the base is not needed. Wheels
     count as locked to the base; their spin momentum is not included.
-
-    Raises:
-        ValueError: an array has the wrong shape.
     """
-    rows, n = len(motion.quaternion), robot.joint_count
-    wanted = ((rows, 4), (rows, 3), (rows, n), (rows, n))
-    for name, array, shape in zip(motion._fields, motion, wanted, strict=True):
-        if array.shape != shape:
-            raise ValueError(f"{name}: shape {shape} was expected, got {array.shape}")
+    rows = len(motion.quaternion)
     momentum = RobotMomentum(*(np.empty((rows, 3)) for _ in RobotMomentum._fields))
     mass = float(np.sum(robot.mass))
-    for start in range(0, rows, _BATCH):
-        part = slice(start, start + _BATCH)
+    for start in range(0, rows, BATCH):
+        part = slice(start, start + BATCH)
         bodies = list(_bodies(robot, Motion(*(array[part].T for array in motion))))
         centre = _sum(body.mass * body.com for body in bodies) / mass
         velocity = _sum(body.mass * body.velocity for body in bodies) / mass
@@ -92,7 +82,7 @@ def _bodies(robot: Robot, motion: Motion) -> Iterator[_Body]:
     omega = {0: to_inertial(axes, motion.omega_base)}
     frames: dict[int, BodyFrame] = {}
     velocity = {0: np.zeros_like(omega[0])}
-    for frame in body_frames(robot, (axes[0], axes[1], axes[2]), motion.joint_positions):
+    for frame in body_frames(robot, axes, motion.joint_positions):
         body, joint = frame.body, frame.body - 1
         if body:
             parent, rate = int(robot.parent[joint]), motion.joint_velocities[joint]

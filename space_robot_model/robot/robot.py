@@ -371,8 +371,27 @@ class Robot:
 
     @cached_property
     def model(self) -> Model:
-        """The constants of the compiled algorithms."""
-        return model_of(self)
+        """The constants of the compiled algorithms, with joints in the order of visits."""
+        model, count, order = Model.allocate(self.n), self.joint_count, list(self.order)
+        bodies = [0, *(joint + 1 for joint in order)]
+        row_of_body = {body: row for row, body in enumerate(bodies)}
+        assign(model, joint_count=count, actuated_count=self.n)
+        model.mass[: count + 1] = self.mass[bodies]
+        model.inertia[: count + 1] = inertia_elements(self.inertia[bodies])
+        model.com[: count + 1] = self.com[bodies]
+        model.rotation[:count] = self.rotation[order].reshape(count, 9)
+        model.offset[:count] = self.offset[order]
+        model.is_prismatic[:count] = self.is_prismatic[order]
+        for row, joint in enumerate(order):
+            parent = row_of_body[int(self.parent[joint])]
+            model.row[joint], model.parent[row] = row, parent
+            model.continues[row] = parent == row
+            if parent != row:
+                model.branches[parent] = 1.0
+            if joint >= self.n:
+                spring = self.springs[joint - self.n]
+                model.stiffness[row], model.damping[row], model.rest[row] = spring
+        return model
 
 
 def _locked(link: Body, position: float) -> Body:
@@ -393,30 +412,6 @@ def _locked(link: Body, position: float) -> Body:
         friction=None,
         passive=None,
     )
-
-
-def model_of(robot: Robot) -> Model:
-    """Return the `Model` of a robot, with joints in the order of visits."""
-    model, count, order = Model.allocate(robot.n), robot.joint_count, list(robot.order)
-    bodies = [0, *(joint + 1 for joint in order)]
-    row_of_body = {body: row for row, body in enumerate(bodies)}
-    assign(model, joint_count=count, actuated_count=robot.n)
-    model.mass[: count + 1] = robot.mass[bodies]
-    model.inertia[: count + 1] = inertia_elements(robot.inertia[bodies])
-    model.com[: count + 1] = robot.com[bodies]
-    model.rotation[:count] = robot.rotation[order].reshape(count, 9)
-    model.offset[:count] = robot.offset[order]
-    model.is_prismatic[:count] = robot.is_prismatic[order]
-    for row, joint in enumerate(order):
-        parent = row_of_body[int(robot.parent[joint])]
-        model.row[joint], model.parent[row] = row, parent
-        model.continues[row] = parent == row
-        if parent != row:
-            model.branches[parent] = 1.0
-        if joint >= robot.n:
-            spring = robot.springs[joint - robot.n]
-            model.stiffness[row], model.damping[row], model.rest[row] = spring
-    return model
 
 
 HTML_HEADS = ("body", "mass, kg", "moved by", "on", "range", "velocity", "effort")

@@ -54,6 +54,7 @@ def read_urdf(
     base: str | None = None,
     repair: bool = False,
     tools: Sequence[str] | None = None,
+    text: str | None = None,
 ) -> UrdfRobot:
     """Read a URDF file, or a xacro file if that package is installed.
 
@@ -64,23 +65,14 @@ def read_urdf(
         repair: repair defects where possible, and list them in ``findings``.
         tools: links whose frames are end effectors, the first one *the* tool; None: the frames at
             the ends of the branches, those with the most joints to the base first.
+        text: read instead of the file; ``path`` is its name, for errors and meshes.
 
     Raises:
         InputError: the file is not a URDF, or has a defect; names link or joint, line, value and
             the possible repair.
     """
     path = Path(path)
-    return parse_urdf(expand_urdf(path), path, base, repair, tools)
-
-
-def parse_urdf(
-    text: str,
-    path: Path,
-    base: str | None = None,
-    repair: bool = False,
-    tools: Sequence[str] | None = None,
-) -> UrdfRobot:
-    """Read the text of a URDF as `read_urdf`; ``path`` is its name, for errors and meshes."""
+    text = expand_urdf(path) if text is None else text
     report = Report(str(path))
     root = parse_xml(text, report.where)
     name = _robot_name(root, path, report)
@@ -107,7 +99,9 @@ def _robot_name(root: Element, path: Path, report: Report) -> str:
     """Return the robot's name, after checking the root element."""
     if root.tag != "robot":
         raise Fields(report, f"<{short_tag(root.tag)}>").error(root, "the root must be <robot>")
-    for element in _all_elements(root):
+    elements = [root]
+    for element in elements:
+        elements += element.children
         if element.tag.startswith("xacro:"):
             advice = f"xacro must be expanded first: rename the file to end in {XACRO}"
             raise Fields(report, f"<{short_tag(element.tag)}>").error(element, advice)
@@ -132,13 +126,6 @@ def _check_counts(root: Element, report: Report) -> None:
         raise InputError(
             f"{report.where}: at most {MOST_JOINTS} moving joints can be flown, got {moving}"
         )
-
-
-def _all_elements(root: Element) -> list[Element]:
-    elements = [root]
-    for element in elements:
-        elements += element.children
-    return elements
 
 
 def _check_moving(tree: Tree, report: Report) -> None:

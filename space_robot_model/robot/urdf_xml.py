@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Collection, Iterator
-from dataclasses import asdict, dataclass, field
-from typing import Any, NamedTuple
+from dataclasses import dataclass, field
+from typing import NamedTuple
 from xml.parsers import expat
 
 import numpy as np
@@ -106,11 +106,6 @@ class Finding:
     def __str__(self) -> str:
         """Return defect and repair in one line."""
         return f"line {self.line}: {self._named()}: {self.repair}"
-
-    @property
-    def told(self) -> dict[str, Any]:
-        """Return the finding as a mapping."""
-        return asdict(self)
 
     def _named(self) -> str:
         return f"{self.part}: {self.defect}{f', got {self.value}' if self.value else ''}"

@@ -22,6 +22,7 @@ from strategies import (
     random_tree,
 )
 
+from space_robot_model.elementary.rotations import quaternion_of_rotation
 from space_robot_model.robot import Robot
 from space_robot_model.robot.find import find_robot, robot_names
 from space_robot_model.robot.inertia import inertia_tensor
@@ -37,7 +38,6 @@ from space_robot_model.robot.placements import (
     tool_pose,
     tool_poses,
     tool_transforms,
-    wxyz,
 )
 from space_robot_model.robot.shapes import BASE_COLOUR, LINK_COLOUR, even_box, shapes_of
 from space_robot_msgs_py import topics
@@ -126,7 +126,7 @@ def test_bodies_and_tools_are_where_pinocchio_has_them(seed: int, kinds: list[st
 def test_quaternions_are_scipys(seed: int) -> None:
     """Half turns, where a plain formula divides by zero, among them."""
     turn = random_rotation(np.random.default_rng(seed))
-    found, there = wxyz(turn), Rotation.from_matrix(turn).as_quat()[[3, 0, 1, 2]]
+    found, there = quaternion_of_rotation(turn), Rotation.from_matrix(turn).as_quat()[[3, 0, 1, 2]]
     np.testing.assert_allclose(found * np.sign(found @ there), there, atol=1e-15)
 
 
@@ -139,8 +139,6 @@ def test_of_many_ticks_each_tool_is_that_of_its_own(paper_robot: Robot) -> None:
         alone = tool_pose(paper_robot, quaternion[k : k + 1], theta[k : k + 1])
         np.testing.assert_array_equal(rotation[k], alone[0][0])
         np.testing.assert_array_equal(position[k], alone[1][0])
-    with pytest.raises(ValueError, match=r"\(N, 6\).*\(2, 5\)"):
-        tool_pose(paper_robot, np.ones((2, 4)), np.ones((2, 5)))
 
 
 class ToolOracle(TreeOracle):

@@ -18,7 +18,7 @@ from urdf_defects import DEFECTS, GOOD
 from space_robot_model.robot import Robot
 from space_robot_model.robot.inertia import nearest_inertia
 from space_robot_model.robot.parts import MOST_LINKS, JointFriction, JointLimits, Spring
-from space_robot_model.robot.urdf import MOST_MOVING, parse_urdf, read_urdf
+from space_robot_model.robot.urdf import MOST_MOVING, read_urdf
 from space_robot_model.robot.urdf_links import mesh_path
 from space_robot_msgs_py.errors import InputError
 
@@ -297,4 +297,4 @@ def test_links_are_counted_before_one_is_read(
 
     monkeypatch.setattr("space_robot_model.robot.urdf.read_links", read)
     with pytest.raises(InputError, match=said):
-        parse_urdf(text, Path("my.urdf"))
+        read_urdf(Path("my.urdf"), text=text)
