@@ -57,11 +57,7 @@ class MountedSheet(StrictModel):
         return len(vectors(getattr(self, next(iter(type(self).model_fields)))))
 
     def values(self, name: str) -> Array:
-        """Return the values (count,) of the setting ``name``, one per actuator.
-
-        Raises:
-            InputError: neither one value, nor one per actuator.
-        """
+        """Return the values (count,) of the setting ``name``, one per actuator."""
         if not self.count:
             return np.empty(0)
         what = self.section[:-1].replace("_", " ")
@@ -75,11 +71,7 @@ class MountedSheet(StrictModel):
 
 
 def per_axis(sheet: object, name: str, n: int) -> Array:
-    """Return the values (n+3,) of a setting: of base x, y, z, then of ``n`` joints.
-
-    Raises:
-        InputError: neither one value, nor one per axis.
-    """
+    """Return the values (n+3,) of a setting: of base x, y, z, then of ``n`` joints."""
     allowed = f"{n + 3} are allowed: base x, y, z and {n} joints"
     return _spread(getattr(sheet, name), name, n + 3, allowed)
 
@@ -106,11 +98,7 @@ def are_vectors(flat: list[float], most: int) -> list[float]:
 
 
 def are_directions(flat: list[float], most: int) -> list[float]:
-    """Return ``flat`` if all its vectors can be scaled to norm 1, see `are_vectors`.
-
-    Raises:
-        ValueError: a vector is too short or too long.
-    """
+    """Return ``flat`` if all its vectors can be scaled to norm 1, see `are_vectors`."""
     for i, vector in enumerate(vectors(are_vectors(flat, most)), 1):
         direction_norm(vector, f"vector {i}")
     return flat

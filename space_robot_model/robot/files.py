@@ -98,7 +98,6 @@ class UrdfReference(RobotPart):
         )
 
     def _with_drive(self, link: Body) -> Body:
-        """Return a link with its spring or drive."""
         name = link.joint_label
         if not (spring := self.passive.get(name)):
             return replace(link, drive=self.drives.get(name))
@@ -107,7 +106,6 @@ class UrdfReference(RobotPart):
         return replace(link, passive=spring, friction=friction)
 
     def _placed(self, urdf: UrdfRobot, where: str) -> Plates:
-        """Return the plates in the axes of the bodies."""
         names = [urdf.tree.base.name, *(link.name for link in urdf.tree.links)]
         placed = []
         for number, plate in enumerate(self.plates):
@@ -137,9 +135,6 @@ def read_content(content: dict[str, Any], folder: Path, where: str) -> RobotTree
         content: of the YAML.
         folder: of the YAML.
         where: name of the YAML, for errors.
-
-    Raises:
-        InputError: the YAML or the URDF is invalid.
     """
     if is_urdf(content):
         return validate(_UrdfDocument, content, where).robot.read(folder, where)
@@ -233,7 +228,6 @@ def gear_document(gear: Gear) -> dict[str, Any]:
 
 
 def _on_link(part: Plate | Visual, link: str) -> dict[str, Any]:
-    """Return a plate or visual as in a file."""
     entry: dict[str, Any] = {"link": link} | _plain(replace(part, link=""))
     if isinstance(part, Plate):
         return entry | {"normal": _numbers(part.normal), "centre": _numbers(part.centre)}
@@ -246,5 +240,5 @@ def _origin(rotation: Array, position: Array) -> dict[str, Any]:
 
 
 def _numbers(values: Array) -> list[float]:
-    """Return floats without negative zeros."""
+    # adding 0 makes negative zeros positive, which a reader would take for a sign
     return [float(value) + 0.0 for value in values]

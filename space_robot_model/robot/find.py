@@ -118,7 +118,6 @@ def robot_files(robot: str) -> RobotFiles:
 
 
 def _file_here(path: Path) -> str:
-    """Return a suggestion of a robot's file with the same stem; empty if there is none."""
     stem = path.parent / path.stem
     files = (Path(f"{stem}{suffix}") for suffix in (*URDF, *YAML))
     same = next((str(file) for file in files if os.path.isfile(file)), "")
@@ -286,7 +285,7 @@ def read_robot_file(file: Path, base: str | None = None, repair: bool = False) -
 
 @lru_cache(maxsize=16)
 def _of_yaml(where: str, text: str) -> RobotSource:
-    """Return the source of a YAML text; cached, since many flights use the same robot."""
+    # cached, since a campaign flies the same robot thousands of times
     return RobotSource(where, parse_yaml(text), text)
 
 

@@ -208,7 +208,6 @@ def _outwards(tree: RobotTree, where: str) -> Iterator[Body]:
 
 
 def _merge(body: MovedBody, where: str) -> None:
-    """Make a body the rigid union of its members."""
     body.mass = sum(mass for mass, _, _ in body.members)
     if not body.mass > 0.0:
         raise InputError(f"{where}: moving body {body.name!r} has no mass ({body.mass:g} kg)")

@@ -58,10 +58,6 @@ def tool_state(
         quaternion_wxyz: (4,) base attitude, unit.
         joint_positions: (N,) of all joints, rad, or m of prismatic ones.
         tool: name of one of ``robot.tools``; None: the first.
-
-    Raises:
-        InputError: an argument has another type or shape, the quaternion is not unit, or there is
-            no such tool.
     """
     check_robot(robot)
     order, columns = list(robot.order), list(robot.model_rows)

@@ -155,9 +155,6 @@ def mission_layer(path: Path, node: str, robot: str) -> Tree:
         path: of the file.
         node: plant or mission.
         robot: name or path of the robot, whose joints are the columns of a trajectory.
-
-    Raises:
-        InputError: the file cannot be read, or is none of these.
     """
     if path.suffix in TRAJECTORIES:
         settings = trajectory_document(path, robot).parameters()
@@ -169,11 +166,7 @@ def mission_layer(path: Path, node: str, robot: str) -> Tree:
 
 
 def document_settings(content: Mapping[str, Any], where: str) -> Tree:
-    """Return a mission's document as settings of mission and plant.
-
-    Raises:
-        InputError: naming ``where``, key, value given and values allowed.
-    """
+    """Return a mission's document as settings of mission and plant."""
     return validate(MissionDocument, content, where).parameters()
 
 

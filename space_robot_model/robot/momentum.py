@@ -98,7 +98,6 @@ def _bodies(robot: Robot, motion: Motion) -> Iterator[_Body]:
 
 
 def _body(robot: Robot, frame: BodyFrame, velocity: Array, omega: Array) -> _Body:
-    """Return the body of a frame that moves with ``velocity``."""
     turn = np.array((frame.x, frame.y, frame.z))
     arm = frame.on_outer_axes(robot.com[frame.body])
     spin = to_inertial(turn, product(robot.inertia[frame.body], to_base(turn, omega)))

@@ -83,7 +83,6 @@ class RobotPart:
     )
 
     def _set(self, **values: Any) -> None:
-        """Complete a frozen part that is being made."""
         for name, value in values.items():
             object.__setattr__(self, name, value)
 

@@ -98,7 +98,7 @@ def body_frames(robot: Robot, axes: Array, joint_positions: Array) -> Iterator[B
 
 
 def _combined(vectors: tuple[Array, Array, Array], factors: Array) -> Array:
-    """Return the linear combination of the vectors, skipping the factors that are zero."""
+    # most factors are zero or one, and rows are long: zeros are skipped
     terms = [
         factor * vector for factor, vector in zip(factors, vectors, strict=True) if factor != 0.0
     ]

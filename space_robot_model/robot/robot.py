@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -257,11 +257,7 @@ class Robot:
         return Robot.of_tree(replace(tree, links=links))
 
     def with_springs(self, springs: Mapping[str, Spring]) -> Robot:
-        """Return the robot with springs instead of motors in those of its joints that are named.
-
-        Raises:
-            InputError: no joint with a motor is left.
-        """
+        """Return the robot with springs instead of motors in those of its joints that are named."""
         if not springs:
             return self
         tree = self.tree
@@ -278,9 +274,6 @@ class Robot:
 
         Args:
             values: (..., n) in degrees, or m for prismatic joints.
-
-        Raises:
-            InputError: not numbers, or not n.
         """
         numbers, n = self._of_joints(values), self.n
         return np.where(self.is_prismatic[:n], numbers, np.radians(numbers))
@@ -340,9 +333,6 @@ class Robot:
         1992): a column (N,) each, N - 3 of them in general.
 
         Args: see `tool_jacobian`.
-
-        Raises:
-            InputError: an argument has another type or shape.
         """
         from .kinematics import tool_state
 
@@ -418,27 +408,19 @@ HTML_HEADS = ("body", "mass, kg", "moved by", "on", "range", "velocity", "effort
 
 
 def _html(robot: Robot) -> str:
-    """Return the table of a robot: a row per body, with the joint that moves it."""
-    passive = len(robot.passive_names)
+    passive, masses = len(robot.passive_names), [f"{mass:.6g}" for mass in robot.mass]
     words = [
         f"{robot.name}: {float(robot.mass.sum()):g} kg",
         f"{robot.n} joints with a motor",
         *([f"{passive} with a spring"] if passive else []),
-        *([f"tools: {', '.join(tool.name for tool in robot.tools)}"] if robot.tools else []),
+        f"tools: {', '.join(tool.name for tool in robot.tools)}",
     ]
-    return html_table(HTML_HEADS, _html_rows(robot), ", ".join(words))
-
-
-def _html_rows(robot: Robot) -> Iterator[list[str]]:
-    yield [robot.body_names[0], f"{robot.mass[0]:.6g}", *[""] * 5]
-    for number, joint in enumerate(robot.all_joint_names):
-        yield [
-            robot.body_names[number + 1],
-            f"{robot.mass[number + 1]:.6g}",
-            joint,
-            robot.body_names[robot.parent[number]],
-            *_html_limits(robot, number),
-        ]
+    rows = [[robot.body_names[0], masses[0], *[""] * 5]]
+    for joint, name in enumerate(robot.all_joint_names):
+        carrier = robot.body_names[robot.parent[joint]]
+        moved = [robot.body_names[joint + 1], masses[joint + 1], name, carrier]
+        rows.append([*moved, *_html_limits(robot, joint)])
+    return html_table(HTML_HEADS, rows, ", ".join(words))
 
 
 def _html_limits(robot: Robot, number: int) -> list[str]:

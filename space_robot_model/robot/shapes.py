@@ -116,7 +116,6 @@ def _tube(start: Array, end: Array, radius: float, body: int) -> Iterator[Visual
 
 
 def _turn_to(z: Array) -> Array:
-    """Return a rotation matrix with a unit vector as its third column."""
     x = np.cross(np.eye(3)[np.argmin(np.abs(z))], z)
     x /= np.linalg.norm(x)
     return np.column_stack((x, np.cross(z, x), z))

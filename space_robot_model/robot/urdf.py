@@ -96,7 +96,6 @@ def read_urdf(
 
 
 def _robot_name(root: Element, path: Path, report: Report) -> str:
-    """Return the robot's name, after checking the root element."""
     if root.tag != "robot":
         raise Fields(report, f"<{short_tag(root.tag)}>").error(root, "the root must be <robot>")
     elements = [root]
@@ -114,10 +113,7 @@ def _robot_name(root: Element, path: Path, report: Report) -> str:
 
 
 def _check_counts(root: Element, report: Report) -> None:
-    """Check the number of links and joints before they are read.
-
-    Some joints may be locked later, so more than can be flown are allowed.
-    """
+    # before they are read, which takes time; some joints may be locked later, so more are allowed
     links = len(list(root.all("link")))
     if links > MOST_LINKS:
         raise InputError(f"{report.where}: at most {MOST_LINKS} links can be read, got {links}")
@@ -129,7 +125,6 @@ def _check_counts(root: Element, report: Report) -> None:
 
 
 def _check_moving(tree: Tree, report: Report) -> None:
-    """Check that there are moving joints, with allowed names."""
     moving = [edge.joint for edge in tree.edges.values() if edge.moves]
     if not moving:
         raise InputError(f"{report.where}: no moving joint: a robot needs at least one")

@@ -103,7 +103,6 @@ def _read(file: Path, repair: bool) -> tuple[Element, str]:
 
 
 def _body(mount: Mount) -> tuple[Element, str]:
-    """Return a satellite of one link."""
     values = dict(zip(MOMENTS, map(repr, mount.inertia), strict=True))
     mass = Element("mass", 0, {"value": repr(mount.mass)})
     inertial = Element("inertial", 0, {}, [mass, Element("inertia", 0, values)])

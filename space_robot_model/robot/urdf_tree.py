@@ -239,7 +239,6 @@ def solid_inertia(mass: float, visuals: tuple[Visual, ...]) -> tuple[Array, str]
 
 
 def _solid(mass: float, shape: str, size: tuple[float, ...]) -> list[float]:
-    """Return the principal moments of a homogeneous solid, kg m2, in its axes."""
     if shape == "sphere":
         return [0.4 * mass * size[0] * size[0]] * 3
     if shape == "cylinder":
@@ -305,7 +304,6 @@ def end_frames(links: Mapping[str, UrdfLink], tree: Tree) -> list[str]:
 
 
 def _link(link: UrdfLink, edge: Edge, frames: Mapping[str, UrdfFrame]) -> Body:
-    """Return a link with its joint, in the frame of its body."""
     joint, parent = edge.joint, frames.get(edge.parent, IDENTITY)
     rotation = parent.rotation.T
     if edge.is_reversed:
@@ -332,5 +330,4 @@ def _link(link: UrdfLink, edge: Edge, frames: Mapping[str, UrdfFrame]) -> Body:
 
 
 def _matter(link: UrdfLink, frame: UrdfFrame) -> tuple[Array, Array]:
-    """Return inertia and centre of mass in a frame that is relative to the link's."""
     return rotate_tensor(frame.rotation.T, link.inertia), frame.inside(link.com)
