@@ -21,8 +21,8 @@ from .sheets import (
     Positive,
     Sizes,
     Vectors,
-    are_directions,
-    are_vectors,
+    check_directions,
+    check_vectors,
     directions,
     vectors,
 )
@@ -33,8 +33,8 @@ LEAST_SHARE = 1e-6
 STANDARD_GRAVITY = 9.80665
 """m/s2."""
 PER_THRUSTER = "one value for all thrusters, or one per thruster"
-Positions = Annotated[Vectors, AfterValidator(partial(are_vectors, most=MOST_THRUSTERS))]
-Directions = Annotated[Vectors, AfterValidator(partial(are_directions, most=MOST_THRUSTERS))]
+Positions = Annotated[Vectors, AfterValidator(partial(check_vectors, most=MOST_THRUSTERS))]
+Directions = Annotated[Vectors, AfterValidator(partial(check_directions, most=MOST_THRUSTERS))]
 Times = Annotated[list[Annotated[float, Field(ge=0.0, le=1.0)]], FEWEST]
 PER_WHEEL = "one value for all wheels, or one per wheel"
 
@@ -47,7 +47,7 @@ class WheelSettings(MountedSheet):
 
     section: ClassVar[str] = "wheels"
 
-    axes: Annotated[Vectors, AfterValidator(partial(are_directions, most=MOST_WHEELS))] = Field(
+    axes: Annotated[Vectors, AfterValidator(partial(check_directions, most=MOST_WHEELS))] = Field(
         NO_VECTORS,
         description="spin axes in the base frame: x, y, z of each wheel, one after the other "
         "([0.0]: no wheels)",
@@ -94,6 +94,7 @@ class WheelSettings(MountedSheet):
                 f"wheels.initial_speed stores {stored[i]:g} N m s in wheel_{i + 1}, "
                 f"max_momentum is {limits[i]:g}"
             )
+        # the base without its rotors, whose inertia is part of the file's
         moments = np.linalg.eigvalsh(base_inertia - (axes.T * inertia) @ axes)
         if not moments[0] > 0.0:
             raise InputError(
@@ -181,7 +182,7 @@ class MagneticTorquerSettings(MountedSheet):
 
     section: ClassVar[str] = "magnetic_torquers"
 
-    axes: Annotated[Vectors, AfterValidator(partial(are_directions, most=MOST_TORQUERS))] = Field(
+    axes: Annotated[Vectors, AfterValidator(partial(check_directions, most=MOST_TORQUERS))] = Field(
         NO_VECTORS,
         description="directions of the dipoles in the base frame: x, y, z of each torquer, one "
         "after the other ([0.0]: no torquers)",
@@ -292,6 +293,7 @@ def _check_torques(settings: BaseActuatorSettings) -> None:
         return
     sizes = np.linalg.norm(torques, axis=1)
     turning = torques[sizes > LEAST_SHARE * sizes.max()] if sizes.max() > 0.0 else torques[:0]
+    # wheels push either way, thrusters one way: only sums with factors above 0 are allowed
     columns = np.vstack([axes, -axes, turning / np.linalg.norm(turning, axis=1)[:, None]]).T
     for i, name in enumerate("xyz"):
         for sign in (1.0, -1.0):

@@ -83,7 +83,7 @@ def _spread(numbers: list[float], key: str, count: int, allowed: str) -> Array:
     return values
 
 
-def are_vectors(flat: list[float], most: int) -> list[float]:
+def check_vectors(flat: list[float], most: int) -> list[float]:
     """Return ``flat`` if it has x, y, z of at most ``most`` vectors, or none (``[0.0]``).
 
     Raises:
@@ -97,9 +97,9 @@ def are_vectors(flat: list[float], most: int) -> list[float]:
     return flat
 
 
-def are_directions(flat: list[float], most: int) -> list[float]:
-    """Return ``flat`` if all its vectors can be scaled to norm 1, see `are_vectors`."""
-    for i, vector in enumerate(vectors(are_vectors(flat, most)), 1):
+def check_directions(flat: list[float], most: int) -> list[float]:
+    """Return ``flat`` if all its vectors can be scaled to norm 1, see `check_vectors`."""
+    for i, vector in enumerate(vectors(check_vectors(flat, most)), 1):
         direction_norm(vector, f"vector {i}")
     return flat
 

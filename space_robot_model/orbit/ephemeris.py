@@ -122,6 +122,7 @@ class Ephemeris:
         from .propagation import STEP, propagate  # slow to import
 
         if latest >= (known := len(self._nodes) - 1) * STEP or not known:
+            # half as many again: asked tick by tick it seldom propagates
             extended = np.empty((int(max(latest, 0.0) / STEP) + 2 + known // 2, 18))
             extended[: known + 1] = self._nodes
             propagate(extended, known + 1, self.has_j2)

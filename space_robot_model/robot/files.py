@@ -66,7 +66,7 @@ class UrdfReference(RobotPart):
     """Links whose frames are tools, in order of rank; default: the ends of the branches."""
 
     @model_validator(mode="after")
-    def _one_source(self) -> Self:
+    def _check_source(self) -> Self:
         if bool(self.urdf) == bool(self.urdf_text):
             raise ValueError("either urdf or urdf_text is needed, and not both")
         return self
@@ -159,7 +159,7 @@ def _plain(value: Any, name: str = "") -> Any:
     return value
 
 
-def document_of(tree: RobotTree) -> dict[str, Any]:
+def readable_document(tree: RobotTree) -> dict[str, Any]:
     """Return the mapping from which `Robot.from_dict` builds the same robot, of a flattened tree.
 
     Frames are written in degrees, so numbers may differ from the robot's in their last digits. The

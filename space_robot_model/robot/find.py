@@ -34,7 +34,7 @@ from space_robot_msgs_py.config.validation import read_yaml, short
 from space_robot_msgs_py.config.yaml_text import check_readable, is_folder, parse_yaml, read_file
 from space_robot_msgs_py.errors import InputError, explained_by
 
-from .files import document_of, is_urdf
+from .files import is_urdf, readable_document
 from .robot import Robot
 
 YAML, URDF = (".yaml", ".yml"), (".urdf", ".xacro")
@@ -273,24 +273,24 @@ def read_robot_file(file: Path, base: str | None = None, repair: bool = False) -
     """
     if file.suffix in URDF:
         head = f"From {file.name}{f', base {base}' if base else ''}."
-        return _of_robot(Robot.from_urdf(file, base, repair), file, head)
+        return _robot_source(Robot.from_urdf(file, base, repair), file, head)
     if base or repair:
         raise InputError(f"{file}: not a URDF, so base and repair cannot be chosen")
     content = read_yaml(file)
     if not is_urdf(content):
-        return _of_yaml(str(file), read_file(file))
+        return _yaml_source(str(file), read_file(file))
     head = f"From {file.name} and the URDF that it refers to."
-    return _of_robot(Robot.from_yaml(file), file, head)
+    return _robot_source(Robot.from_yaml(file), file, head)
 
 
 @lru_cache(maxsize=16)
-def _of_yaml(where: str, text: str) -> RobotSource:
+def _yaml_source(where: str, text: str) -> RobotSource:
     # cached, since a campaign flies the same robot thousands of times
     return RobotSource(where, parse_yaml(text), text)
 
 
-def _of_robot(robot: Robot, file: Path, head: str) -> RobotSource:
-    content = document_of(robot.tree)
+def _robot_source(robot: Robot, file: Path, head: str) -> RobotSource:
+    content = readable_document(robot.tree)
     comments = [head, *(f"Repaired: {text}" for text in robot.repairs)]
     text = "".join(f"# {line}\n" for line in comments) + yaml.safe_dump(
         content, sort_keys=False, default_flow_style=None, width=10_000, allow_unicode=True

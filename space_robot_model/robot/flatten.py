@@ -59,7 +59,7 @@ class Place:
         return at if self.shift is None else self.shift + at
 
 
-def arrays_of(tree: RobotTree, where: str = "robot") -> dict[str, Any]:
+def robot_arrays(tree: RobotTree, where: str = "robot") -> dict[str, Any]:
     """Return the fields of a `Robot`.
 
     Joints come branch by branch in the order of ``tree.links``, parents before children, the
@@ -76,8 +76,10 @@ def arrays_of(tree: RobotTree, where: str = "robot") -> dict[str, Any]:
     walked, places = _walk(tree, where)
     for body in walked:
         _merge(body, where)
+    # numbers of a program may have the base's centre of mass elsewhere, see `Robot.nominal`
     if not tree.exact:
         places = _put_base_at_com(walked, places)
+    # a stable sort: actuated joints first, each group branch by branch
     outer = sorted(walked[1:], key=lambda body: _joint(body).passive is not None)
     joints = [_joint(body) for body in outer]
     actuated = [joint for joint in joints if not joint.passive]
@@ -129,6 +131,7 @@ def arrays_of(tree: RobotTree, where: str = "robot") -> dict[str, Any]:
 
 def axes_with_z(axis: Array) -> Array:
     """Return a rotation with the unit vector ``axis`` as third column; exact for z, -x, ..."""
+    # the axis of the frame that is farthest from it, so that nothing small is divided by
     helper = np.zeros(3)
     helper[np.argmin(np.abs(axis))] = 1.0
     x = helper - product(helper, axis) * axis
@@ -190,6 +193,7 @@ def _outwards(tree: RobotTree, where: str) -> Iterator[Body]:
                 "one by its number"
             )
     children: dict[str, list[Body]] = {name: [] for name in names}
+    # children are taken from the end of their list: reversed, so that the first comes first
     for link in reversed(tree.links):
         if link.parent not in children:
             raise InputError(
@@ -211,6 +215,7 @@ def _merge(body: MovedBody, where: str) -> None:
     body.mass = sum(mass for mass, _, _ in body.members)
     if not body.mass > 0.0:
         raise InputError(f"{where}: moving body {body.name!r} has no mass ({body.mass:g} kg)")
+    # a single member keeps its numbers to the bit: no sum, no division
     heavy = [member for member in body.members if member[0] > 0.0]
     _, body.com, body.inertia = heavy[0]
     if len(heavy) > 1:

@@ -60,6 +60,7 @@ class FlexibleModel(NamedTuple):
     def fastest(self) -> float:
         """Largest absolute eigenvalue, rad/s."""
         size = len(self.inertia)
+        # first-order form of M xdd + D xd + K x = 0
         system = np.zeros((2 * size, 2 * size))
         system[:size, size:] = np.eye(size)
         system[size:, :size] = -solve(self.inertia, self.stiffness)
@@ -82,6 +83,7 @@ def flexible_model(robot: Robot, joint_positions: Array) -> FlexibleModel:
     for k, joint in enumerate(geared_joints(robot)):
         gear, places = robot.gears[joint], np.ix_((6 + joint, size + k), (6 + joint, size + k))
         assert gear
+        # the torque of a gear, K (theta_m - theta), acts on both sides
         couple = np.array([[1.0, -1.0], [-1.0, 1.0]])
         stiffness[places] += gear.stiffness * couple
         damping[places] += gear.damping * couple

@@ -90,10 +90,12 @@ def nearest_inertia(inertia: Array) -> Array | None:
     from ..elementary.linear_algebra import principal_axes  # slow to import
 
     moments, axes = principal_axes(inertia)
+    # eigenvalues of S, on the same axes
     second = 0.5 * np.sum(moments) - moments
     largest = float(np.max(second))
     if largest <= 0.0:
         return None
     second = np.maximum(second, SLENDER * largest)
     nearest = rotate_tensor(axes, np.diag(np.sum(second) - second))
+    # rounding has made it unsymmetric
     return 0.5 * (nearest + nearest.T)

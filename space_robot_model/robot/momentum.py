@@ -86,6 +86,7 @@ def _bodies(robot: Robot, motion: Motion) -> Iterator[_Body]:
         body, joint = frame.body, frame.body - 1
         if body:
             parent, rate = int(robot.parent[joint]), motion.joint_velocities[joint]
+            # also of a prismatic joint: its link turns with the parent about the parent's origin
             link = frame.origin - frames[parent].origin
             velocity[body] = velocity[parent] + cross(omega[parent], link)
             omega[body] = omega[parent]

@@ -213,6 +213,7 @@ class RobotPoses:
         self._sliding, self._turning = order[self.slides[1:]], order[~self.slides[1:]]
         self._slid, self._turned = np.flatnonzero(self.slides), 1 + np.flatnonzero(~self.slides[1:])
         self._axes = robot.rotation[self._sliding][:, :, 2]
+        # a turn about z only mixes x with y and z with w, so two products make the quaternion
         x, y, z, w = self._at_zero[self._turned, 3:].T
         # factors of the cosine and of the sine in q0 (cos theta/2, 0, 0, sin theta/2)
         self._even, self._odd = np.column_stack((x, y, z, w)), np.column_stack((y, -x, w, -z))

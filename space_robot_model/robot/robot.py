@@ -23,7 +23,7 @@ from ..dynamics.model import Model
 from ..elementary.matrices import Array, product
 from ..elementary.rotations import plain_sin_cos
 from .files import exact_document, read_content
-from .flatten import arrays_of
+from .flatten import robot_arrays
 from .inertia import inertia_elements, inertia_tensor
 from .parts import (
     UNLIMITED,
@@ -140,13 +140,13 @@ class Robot:
         return BASE_AXES + self.joint_names
 
     @classmethod
-    def of_tree(cls, tree: RobotTree, where: str = "robot") -> Robot:
+    def from_tree(cls, tree: RobotTree, where: str = "robot") -> Robot:
         """Build the arrays from the parts of a robot, see `space_robot_model.robot.flatten`.
 
         Raises:
             InputError: not a tree, or one that cannot be flown; ``where`` names the file.
         """
-        return cls(**arrays_of(tree, where))
+        return cls(**robot_arrays(tree, where))
 
     @classmethod
     def from_yaml(cls, path: str | Path) -> Robot:
@@ -176,8 +176,8 @@ class Robot:
             raise InputError(f"{where}: a mapping was expected, got {short(content)}")
         read = read_content(content, folder or Path(), where)
         if isinstance(read, RobotTree):
-            return replace(cls.of_tree(read, where), source=where)
-        return cls._of_urdf(read, where)
+            return replace(cls.from_tree(read, where), source=where)
+        return cls._from_urdf(read, where)
 
     @classmethod
     def from_urdf(cls, path: str | Path, base: str | None = None, repair: bool = False) -> Robot:
@@ -192,12 +192,12 @@ class Robot:
             InputError: invalid file; names link or joint, line, value and the repair, if any.
         """
         file = as_path(path, "path")
-        return cls._of_urdf(read_urdf(file, base, repair), str(file))
+        return cls._from_urdf(read_urdf(file, base, repair), str(file))
 
     @classmethod
-    def _of_urdf(cls, urdf: UrdfRobot, where: str) -> Robot:
+    def _from_urdf(cls, urdf: UrdfRobot, where: str) -> Robot:
         repairs = tuple(map(str, urdf.findings))
-        return replace(cls.of_tree(urdf.tree, where), repairs=repairs, source=where)
+        return replace(cls.from_tree(urdf.tree, where), repairs=repairs, source=where)
 
     def _repr_html_(self) -> str:
         """Show bodies, joints and limits in a notebook."""
@@ -205,7 +205,7 @@ class Robot:
 
     @property
     def tree(self) -> RobotTree:
-        """The parts from which `of_tree` builds this robot, branch by branch."""
+        """The parts from which `from_tree` builds this robot, branch by branch."""
         base = Base(float(self.mass[0]), self.inertia[0], self.com[0], self.body_names[0])
         return RobotTree(
             self.name,
@@ -254,7 +254,7 @@ class Robot:
             return self
         tree = self.tree  # with the order of the actuated joints
         links = [_locked(link, link.passive.rest) if link.passive else link for link in tree.links]
-        return Robot.of_tree(replace(tree, links=links))
+        return Robot.from_tree(replace(tree, links=links))
 
     def with_springs(self, springs: Mapping[str, Spring]) -> Robot:
         """Return the robot with springs instead of motors in those of its joints that are named."""
@@ -267,7 +267,7 @@ class Robot:
             else link
             for link in tree.links
         ]
-        return replace(Robot.of_tree(replace(tree, links=links), self.where), source=self.source)
+        return replace(Robot.from_tree(replace(tree, links=links), self.where), source=self.source)
 
     def from_degrees(self, values: ArrayLike) -> Array:
         """Convert positions of the n actuated joints to rad; m of prismatic joints are kept.
@@ -275,15 +275,15 @@ class Robot:
         Args:
             values: (..., n) in degrees, or m for prismatic joints.
         """
-        numbers, n = self._of_joints(values), self.n
+        numbers, n = self._joint_numbers(values), self.n
         return np.where(self.is_prismatic[:n], numbers, np.radians(numbers))
 
     def to_degrees(self, values: ArrayLike) -> Array:
         """Convert positions (..., n) in rad to degrees; m of prismatic joints are kept."""
-        numbers, n = self._of_joints(values), self.n
+        numbers, n = self._joint_numbers(values), self.n
         return np.where(self.is_prismatic[:n], numbers, np.degrees(numbers))
 
-    def _of_joints(self, values: ArrayLike) -> Array:
+    def _joint_numbers(self, values: ArrayLike) -> Array:
         numbers = as_numbers(values, "values")
         if numbers.shape[-1:] != (self.n,):
             raise InputError(
@@ -338,6 +338,7 @@ class Robot:
 
         coupling = tool_state(self, quaternion_wxyz, joint_positions).coupling
         _, values, axes = np.linalg.svd(coupling)
+        # rows of V^T beyond the rank span the null space
         rank = np.count_nonzero(values > RANK_TOLERANCE * values.max(initial=0.0))
         basis: Array = axes[rank:].T
         return basis
@@ -375,6 +376,7 @@ class Robot:
         for row, joint in enumerate(order):
             parent = row_of_body[int(self.parent[joint])]
             model.row[joint], model.parent[row] = row, parent
+            # the parent was visited just before: its values are still in registers
             model.continues[row] = parent == row
             if parent != row:
                 model.branches[parent] = 1.0
@@ -392,6 +394,7 @@ def _locked(link: Body, position: float) -> Body:
     else:
         s, c = plain_sin_cos(position)
         turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+        # the offset is in the link's own axes, which have turned
         offset, rotation = product(turn.T, offset), product(rotation, turn)
     return replace(
         link,

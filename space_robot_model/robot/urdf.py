@@ -88,6 +88,7 @@ def read_urdf(
         one_of(tool, links, "link", f" for a tool of {report.where}")
     if (repeated := first_repeated(tools or ())) is not None:
         raise InputError(f"{report.where}: tools: link {short(repeated)} occurs twice")
+    # all defects have been collected, the first one is told with the count of the others
     if not repair:
         report.refuse_defects()
     frames = end_frames(links, tree) if tools is None else tools

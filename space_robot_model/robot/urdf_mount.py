@@ -73,6 +73,7 @@ def mounted_urdf(arm: Path, mount: Mount, repair: bool) -> Mounted:
     new_names = {}
     for tag, name in names:
         new = name
+        # arm_x may be the name of another link of the arm
         while (tag, new) in taken or (new != name and (tag, new) in names):
             new = f"arm_{new}"
         new_names[tag, name] = new

@@ -88,6 +88,7 @@ def build_tree(
     while waiting:
         name = waiting.pop()
         tree.order.append(name)
+        # the stack gives the last one first
         for other, edge in reversed(neighbours[name]):
             if name == tree.base or edge.joint is not tree.edges[name].joint:
                 tree.edges[other] = edge
@@ -138,6 +139,7 @@ def mend_massless(links: Mapping[str, UrdfLink], tree: Tree) -> None:
     Raises:
         InputError: a massless body carries others, so its motion is undefined.
     """
+    # locking a joint merges two bodies, which may be massless still
     while True:
         carriers = tree.carriers()
         mass = dict.fromkeys(carriers.values(), 0.0)
@@ -205,6 +207,7 @@ def mend_inertias(links: Mapping[str, UrdfLink], tree: Tree) -> None:
         defect, moments = inertia_defect(link.mass, link.inertia)
         if not defect:
             continue
+        # zero has nothing near it but a point
         nearest = nearest_inertia(link.inertia) if "zero" not in defect else None
         repair = "raised to the nearest physical one"
         if nearest is None or inertia_defect(link.mass, nearest)[0]:
@@ -306,6 +309,7 @@ def end_frames(links: Mapping[str, UrdfLink], tree: Tree) -> list[str]:
 def _link(link: UrdfLink, edge: Edge, frames: Mapping[str, UrdfFrame]) -> Body:
     joint, parent = edge.joint, frames.get(edge.parent, IDENTITY)
     rotation = parent.rotation.T
+    # seen from the child: the joint turns the other way, about an axis through the parent's frame
     if edge.is_reversed:
         offset, axis = -parent.position, -joint.axis
     else:

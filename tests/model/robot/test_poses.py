@@ -75,7 +75,7 @@ def test_bodies_and_tools_are_where_pinocchio_has_them(seed: int, kinds: list[st
     """For a state of a flight, for tf, and for all ticks of a log; merged bodies too."""
     rng = np.random.default_rng(seed)
     tree = random_tree(rng, kinds)
-    robot, ticks = Robot.of_tree(tree), 3
+    robot, ticks = Robot.from_tree(tree), 3
     oracle = TreeOracle(pinocchio_tree(tree), BASE, robot.all_joint_names, seed)
     quaternion = np.array([random_quaternion(rng) for _ in range(ticks)])
     theta = rng.uniform(-4.0, 4.0, (ticks, robot.joint_count))
@@ -177,7 +177,7 @@ def test_jacobians_of_all_tools_are_pinocchios_at_zero_momentum(
     kinds: list[str], seed: int
 ) -> None:
     tree = random_tree(np.random.default_rng(seed), kinds)
-    robot = Robot.of_tree(tree)
+    robot = Robot.from_tree(tree)
     for tool in robot.tools:
         oracle = ToolOracle(robot, tree, tool.name, seed)
         posture = oracle.attitude(), oracle.positions
@@ -262,7 +262,7 @@ def random_state(robot: Robot, rng: np.random.Generator) -> RobotState:
 def test_markers_are_where_their_bodies_have_them(seed: int, kinds: list[str]) -> None:
     """Decoded from the message, to 1e-9; the bodies' poses are Pinocchio's, as shown above."""
     rng = np.random.default_rng(seed)
-    robot = Robot.of_tree(random_tree(rng, kinds))
+    robot = Robot.from_tree(random_tree(rng, kinds))
     state, poses = random_state(robot, rng), RobotPoses(robot)
     found, where = poses.at(state), {INERTIAL_FRAME: pin.SE3.Identity()}
     for (parent, child), pose in zip(poses.frames, found, strict=True):

@@ -50,7 +50,7 @@ from space_robot_sim.environment.disturbance_table import TIME
 def test_dynamics_are_pinocchios(seed: int, kinds: list[str]) -> None:
     """Branches, prismatic, fixed and passive joints about any axis, told in any order."""
     tree = random_tree(np.random.default_rng(seed), kinds)
-    robot = Robot.of_tree(tree)
+    robot = Robot.from_tree(tree)
     oracle = TreeOracle(pinocchio_tree(tree), BASE, robot.all_joint_names, seed)
     assert_same_dynamics(robot, oracle, seed)
 
@@ -60,7 +60,7 @@ def test_dynamics_are_pinocchios(seed: int, kinds: list[str]) -> None:
 def test_nominal_robot_is_locked_at_rest(seed: int, kinds: list[str]) -> None:
     """Pinocchio's tree with fixed joints where the springs are at rest, in the base's own frame."""
     tree = random_tree(np.random.default_rng(seed), kinds)
-    robot = Robot.of_tree(tree)
+    robot = Robot.from_tree(tree)
     own = pinocchio_tree(tree)
     locked = pinocchio_tree(replace(tree, links=[_locked(link) for link in tree.links]))
     base_com = own.inertias[own.getJointId("root")].lever
@@ -118,7 +118,7 @@ BAD: list[tuple[list[Body], str]] = [
 @pytest.mark.parametrize(("links", "said"), BAD, ids=range(len(BAD)))
 def test_what_is_no_tree_is_said_in_one_line(links: list[Body], said: str) -> None:
     with pytest.raises(InputError) as raised:
-        Robot.of_tree(RobotTree("bad", HULL, links), "file.yaml")
+        Robot.from_tree(RobotTree("bad", HULL, links), "file.yaml")
     assert str(raised.value).startswith("file.yaml: ")
     assert said in str(raised.value)
     assert "\n" not in str(raised.value)
@@ -135,7 +135,7 @@ def test_many_bodies_in_a_row_are_walked_without_recursion() -> None:
         )
         for k in range(3000)
     ]
-    assert Robot.of_tree(RobotTree("long", HULL, chain[::-1])).mass.tolist() == [5.0, 3000.0]
+    assert Robot.from_tree(RobotTree("long", HULL, chain[::-1])).mass.tolist() == [5.0, 3000.0]
 
 
 def motion_of(states: list) -> Motion:
@@ -178,7 +178,7 @@ TREE = ("revolute", "passive revolute", "prismatic", "revolute", "fixed", "passi
 
 def tree(seed: int) -> tuple[Robot, np.random.Generator]:
     rng = np.random.default_rng(seed)
-    return random_gears(rng, Robot.of_tree(random_tree(rng, TREE))), rng
+    return random_gears(rng, Robot.from_tree(random_tree(rng, TREE))), rng
 
 
 @given(SEEDS)

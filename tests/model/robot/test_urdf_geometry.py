@@ -108,7 +108,7 @@ def test_shapes_and_frames_are_where_pinocchio_has_them(seed: int, count: int) -
     masses = [part.name for part in parts(read_urdf(FILE, text=text)) if part.mass]
     for base in ("link0", str(rng.choice(masses))):
         found = read_urdf(FILE, base, tools=links, text=text)
-        robot = Robot.of_tree(found.tree)
+        robot = Robot.from_tree(found.tree)
         poses = body_poses(robot, np.array([angles[name] for name in robot.joint_names]))
         tools = [poses[t.body] * pin.SE3(t.rotation, t.position) for t in robot.tools]
         assert [tool.name for tool in robot.tools] == links
@@ -145,7 +145,7 @@ def test_a_mounted_arm_is_pinocchios_of_a_urdf_written_by_hand(
     mount = Mount(file, xyz=xyz, rpy=rpy) if has_file else Mount(None, 300.0, inertia, xyz, rpy)
     mounted = mounted_urdf(DATA / "ground_arm.urdf", mount, repair=False)
     assert mounted.name == ("ground_arm_on_sat" if has_file else "ground_arm_on_satellite")
-    robot = Robot.of_tree(read_urdf(FILE, text=mounted.text).tree)
+    robot = Robot.from_tree(read_urdf(FILE, text=mounted.text).tree)
     assert robot.joint_names == ("shoulder", "elbow")
     arm = (DATA / "ground_arm.urdf").read_text("utf-8").replace('"base_link"', '"foot"')
     seat = f'<origin xyz="{words(list(xyz))}" rpy="{words(list(rpy))}"/><parent link="{name}"/>'
@@ -410,7 +410,7 @@ def test_a_robot_or_one_line(path: Path, text: str | bytes, base: str | None) ->
         try:
             with np.errstate(all="raise", under="ignore"):
                 found = read_urdf(path, base, repair)
-                robot = Robot.of_tree(found.tree, where=str(path))
+                robot = Robot.from_tree(found.tree, where=str(path))
         except InputError as error:
             said = str(error)
             assert said.isprintable()
