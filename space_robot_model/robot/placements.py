@@ -81,7 +81,7 @@ def body_frames(robot: Robot, axes: Array, joint_positions: Array) -> Iterator[B
         axes: (3, 3, T) of the base, those of `base_axes` for an inertial outer frame.
         joint_positions: (N, T) of all joints, rad, or m for prismatic ones.
     """
-    frames = {0: BodyFrame(0, *axes, np.zeros_like(axes[0]))}
+    frames = {0: BodyFrame(0, axes[0], axes[1], axes[2], np.zeros_like(axes[0]))}
     yield frames[0]
     for joint in robot.order:
         _, x, y, z, origin = frames[int(robot.parent[joint])]

@@ -51,7 +51,8 @@ def urdf_text(robot: Robot, name: str = "") -> str:
     joints = urdf_joint_names(robot)
     taken = {*joints, *frames.bodies, *frames.tools}
     tree, numbers = robot.tree, (0, *(joint + 1 for joint in robot.order))
-    for body, part in zip(numbers, (tree.base, *tree.links), strict=True):
+    parts: list[Base | Body] = [tree.base, *tree.links]
+    for body, part in zip(numbers, parts, strict=True):
         if isinstance(part, Body):
             parent, child = frames.bodies[robot.parent[body - 1]], frames.bodies[body]
             _add_joint(root, part, _Ends(joints[body - 1], parent, child))
