@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from ..elementary.matrices import Array, norms
-from .files import gear_document
+from ..elementary.matrices import norms
+from .files import gear_document, plain_numbers
 from .parts import MANY_TURNS
 from .robot import Robot
 from .shapes import plates_of
@@ -31,7 +31,11 @@ def describe(robot: Robot) -> dict[str, Any]:
         "bodies": [_body(robot, number) for number in range(robot.joint_count + 1)],
         "joints": [_joint(robot, number) for number in range(robot.joint_count)],
         "tools": [
-            {"name": t.name, "body": robot.body_names[t.body], "position": _numbers(t.position)}
+            {
+                "name": t.name,
+                "body": robot.body_names[t.body],
+                "position": plain_numbers(t.position),
+            }
             for t in robot.tools
         ],
         "shapes": [
@@ -72,9 +76,9 @@ def _body(robot: Robot, number: int) -> dict[str, Any]:
         "name": robot.body_names[number],
         "joint": robot.all_joint_names[number - 1] if number else None,
         "mass": float(robot.mass[number]),
-        "com": _numbers(robot.com[number]),
-        "inertia": [_numbers(row) for row in robot.inertia[number]],
-        "principal_moments": _numbers(np.linalg.eigvalsh(robot.inertia[number])),
+        "com": plain_numbers(robot.com[number]),
+        "inertia": [plain_numbers(row) for row in robot.inertia[number]],
+        "principal_moments": plain_numbers(np.linalg.eigvalsh(robot.inertia[number])),
     }
 
 
@@ -112,7 +116,3 @@ def _plates(robot: Robot) -> dict[str, Any]:
             if name in areas
         ],
     }
-
-
-def _numbers(values: Array) -> list[float]:
-    return [float(value) + 0.0 for value in values]  # without negative zeros

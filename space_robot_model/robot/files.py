@@ -169,7 +169,10 @@ def readable_document(tree: RobotTree) -> dict[str, Any]:
     links = sorted(tree.links, key=lambda link: link.passive is not None)
     robot: dict[str, Any] = {
         "name": tree.name,
-        "base": {"mass": tree.base.mass, "inertia": _numbers(inertia_elements(tree.base.inertia))},
+        "base": {
+            "mass": tree.base.mass,
+            "inertia": plain_numbers(inertia_elements(tree.base.inertia)),
+        },
         "links": [_link(link, carriers[link.parent]) for link in links],
         "tools": [
             {
@@ -198,8 +201,8 @@ def _link(link: Body, parent: str) -> dict[str, Any]:
         "joint": link.joint,
         "origin": _origin(link.rotation, product(link.rotation, link.offset)),
         "mass": link.mass,
-        "inertia": _numbers(inertia_elements(link.inertia)),
-        "com": _numbers(link.com),
+        "inertia": plain_numbers(inertia_elements(link.inertia)),
+        "com": plain_numbers(link.com),
     }
     if link.friction:
         entry["friction"] = link.friction._asdict()
@@ -230,15 +233,19 @@ def gear_document(gear: Gear) -> dict[str, Any]:
 def _on_link(part: Plate | Visual, link: str) -> dict[str, Any]:
     entry: dict[str, Any] = {"link": link} | _plain(replace(part, link=""))
     if isinstance(part, Plate):
-        return entry | {"normal": _numbers(part.normal), "centre": _numbers(part.centre)}
+        return entry | {"normal": plain_numbers(part.normal), "centre": plain_numbers(part.centre)}
     del entry["rotation"], entry["position"]
     return entry | {"origin": _origin(part.rotation, part.position)}
 
 
 def _origin(rotation: Array, position: Array) -> dict[str, Any]:
-    return {"xyz": _numbers(position), "rpy_deg": _numbers(np.degrees(rpy_of_rotation(rotation)))}
+    return {
+        "xyz": plain_numbers(position),
+        "rpy_deg": plain_numbers(np.degrees(rpy_of_rotation(rotation))),
+    }
 
 
-def _numbers(values: Array) -> list[float]:
+def plain_numbers(values: Array) -> list[float]:
+    """Return floats for a file."""
     # adding 0 makes negative zeros positive, which a reader would take for a sign
     return [float(value) + 0.0 for value in values]

@@ -46,8 +46,9 @@ LARGEST_MASS, LARGEST_INERTIA = 1e20, 1e20
 """Of a body, kg and kg m2: products of larger numbers overflow."""
 Mass = Annotated[float, Field(gt=0.0, le=LARGEST_MASS)]
 InertiaElement = Annotated[float, Field(ge=-LARGEST_INERTIA, le=LARGEST_INERTIA)]
-InertiaElements = Annotated[list[InertiaElement], Field(min_length=6, max_length=6)]
-Inertia = Annotated[InertiaElements, AfterValidator(check_inertia)]
+Inertia = Annotated[
+    list[InertiaElement], Field(min_length=6, max_length=6), AfterValidator(check_inertia)
+]
 
 LEAST_GYRATION = 1e-6
 """Radius of gyration below which a body counts as a point, m."""

@@ -33,8 +33,7 @@ from space_robot_model.robot.find import find_robot
 from space_robot_model.robot.flatten import SETTINGS_FRICTION
 from space_robot_model.robot.inertia import SLENDER, inertia_tensor
 from space_robot_model.robot.parts import Base, Body, Visual
-from space_robot_model.robot.urdf import UrdfRobot, read_urdf
-from space_robot_model.robot.urdf_mount import Mount, mounted_urdf
+from space_robot_model.robot.urdf import Mount, UrdfRobot, mounted_urdf, read_urdf
 from space_robot_model.robot.urdf_tree import solid_inertia
 from space_robot_msgs_py.errors import InputError
 
