@@ -273,12 +273,11 @@ class Framed(RobotPart):
         has_parameters = (alpha_deg, a, d) != (None, None, None)
         if origin and has_parameters:
             raise ValueError("a frame has either origin, or alpha_deg, a and d, not both")
-        # a position in parent axes; the offset is on the joint's
-        if origin:
+        if origin:  # a position in parent axes; the offset is on the joint's
             rotation = origin.rotation
             self._take(rotation, product(rotation.T, origin.xyz))
-        # Rx(alpha) Tx(a) Rz(theta) Tz(d): at zero a is along x, d along z of this frame
         elif has_parameters:
+            # Rx(alpha) Tx(a) Rz(theta) Tz(d): at zero a is along x, d along z of this frame
             s, c = exact_sines_cosines(np.radians(alpha_deg or 0.0))  # exact at right angles
             turn = np.array([[1.0, 0.0, 0.0], [0.0, c, -s], [0.0, s, c]])
             self._take(turn, np.array([a or 0.0, 0.0, d or 0.0]))
