@@ -13,11 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from space_robot_model.elementary.matrices import product
-from space_robot_model.hardware.capability import ThrusterTorques, carried_momentum, wheel_loads
-from space_robot_model.hardware.thrusters import ThrusterSettings
-from space_robot_model.hardware.wheels import WheelSettings
+from space_robot_model.hardware.base_actuators import ThrusterSettings, WheelSettings
 from space_robot_msgs_py.bag.flight_log import FlightLog
 
+from ..flight.capability import ThrusterTorques, carried_momentum, wheel_loads
 from .base_demand import Demand, axes_of
 from .wheel_saturation import ROUNDING, WheelMotion, WheelRows
 

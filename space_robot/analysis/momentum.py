@@ -17,8 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from space_robot_model.elementary.matrices import norm, product, unit_rows
-from space_robot_model.hardware.base_actuators import BaseActuatorSettings
-from space_robot_model.hardware.wheels import WheelSettings
+from space_robot_model.hardware.base_actuators import BaseActuatorSettings, WheelSettings
 from space_robot_model.robot import Robot
 from space_robot_model.robot.gears import motor_momentum
 from space_robot_model.robot.momentum import Motion, robot_momentum

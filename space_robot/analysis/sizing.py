@@ -9,11 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from space_robot_model.hardware.base_actuators import BaseActuatorSettings
-from space_robot_model.hardware.capability import largest_momentum, largest_torque
 from space_robot_msgs_py.bag.flight_log import FlightLog, Metric
 from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.topics import BASE_AXES
 
+from ..flight.capability import largest_momentum, largest_torque
 from .base_demand import BaseDemand
 from .loads import Load, LoadRequirement, OtherThrusterLoad, OtherWheelLoad, ThrusterLoad, WheelLoad
 from .metrics import AxisMaximum, AxisRms

@@ -29,7 +29,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from space_robot_model.elementary.matrices import product
-from space_robot_model.hardware.thrusters import ThrusterSettings
+from space_robot_model.hardware.base_actuators import ThrusterSettings
 from space_robot_msgs_py.compiled.kernels import kernel, subroutine
 from space_robot_msgs_py.compiled.records import Record, assign, nested, shaped
 from space_robot_msgs_py.samples import MOST_THRUSTERS

@@ -25,7 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from space_robot_model.dynamics.algebra import Vector, add, dot, scale, subtract, vector
-from space_robot_model.hardware.wheels import WheelSettings
+from space_robot_model.hardware.base_actuators import WheelSettings
 from space_robot_msgs_py.compiled.kernels import kernel, subroutine
 from space_robot_msgs_py.compiled.records import Record, assign, nested, shaped
 from space_robot_msgs_py.samples import MOST_WHEELS

@@ -16,8 +16,9 @@ from numpy.typing import NDArray
 
 from space_robot_model.dynamics.model import Model
 from space_robot_model.dynamics.rho_space import RhoSpaceModel
+from space_robot_model.dynamics.tool_kinematics import ToolKinematics
 from space_robot_model.robot import Robot
-from space_robot_model.robot.kinematics import ToolState, tool_state
+from space_robot_model.robot.kinematics import tool_state
 from space_robot_msgs_py.compiled.kernels import RecordFunction, keep_types
 from space_robot_msgs_py.compiled.records import (
     Block,
@@ -53,7 +54,7 @@ class SignalsView(RecordView):
     robot: Robot
     """The robot as the controller knows it, without payload."""
 
-    def tool_state(self, tool: str | None = None) -> ToolState:
+    def tool_state(self, tool: str | None = None) -> ToolKinematics:
         """Return pose and Jacobians of a tool of the nominal robot; see `Signals.tool_state`."""
         signals: Any = self
         return tool_state(self.robot, signals.quaternion, signals.joint_positions, tool)
@@ -108,7 +109,7 @@ class Signals(Record):
     robot: Robot
     """The same robot; for laws in Python only."""
 
-    def tool_state(self, tool: str | None = None) -> ToolState:
+    def tool_state(self, tool: str | None = None) -> ToolKinematics:
         """Return pose and Jacobians of a tool of the nominal robot; for laws in Python only.
 
         Args:

@@ -108,7 +108,7 @@ class Impact:
             wheel_inertia: (W,) kg m2 of the rotors about their axes.
         """
         base = base_axes(quaternion[:, np.newaxis])
-        walk = body_frames(holding, (base[0], base[1], base[2]), joint_positions[:, np.newaxis])
+        walk = body_frames(holding, base, joint_positions[:, np.newaxis])
         frames = {frame.body: frame for frame in walk}
         carrier = frames[grasp.body]
         axes = _axes(carrier)

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from space_robot_model.dynamics.model import Model
-from space_robot_model.hardware.wheels import WheelSettings
+from space_robot_model.hardware.base_actuators import WheelSettings
 from space_robot_model.robot import Robot
 from space_robot_model.robot.gears import flexible_model, geared_joints
 from space_robot_msgs_py.compiled.records import assign

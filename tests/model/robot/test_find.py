@@ -22,7 +22,7 @@ from space_robot_control.laws import laws
 from space_robot_model.robot.find import (
     RobotChoice,
     find_robot,
-    mission_file,
+    mission_layers,
     new_command,
     robot_as_path,
     robot_files,
@@ -90,7 +90,7 @@ def test_a_folder_is_a_robot(folder: Path, name: str, monkeypatch: pytest.Monkey
     monkeypatch.chdir(folder.parent)
     found = robot_files(name)
     assert found.name == "mine"
-    assert mission_file(name).samefile(folder / "mission.yaml")
+    assert mission_layers(name, "")[0].samefile(folder / "mission.yaml")
     assert gain_files(name, "default")["ctc"].samefile(folder / "gains/tuned/ctc.yaml")
     assert Flight(resolve(FlightPlan(robot=name, duration=0.1))).description["mission"] == "mine"
 
