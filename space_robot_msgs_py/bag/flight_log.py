@@ -10,11 +10,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from .. import topics
 from ..compiled.records import Block
 from ..samples import (
     ALL_FIELDS,
     ORBIT_FIELDS,
     PASSIVE_FIELDS,
+    SIGNALS,
     STATE_FIELDS,
     LawInForce,
     MeasuredSignals,
@@ -33,8 +35,13 @@ BLOCK_TICKS = 60_000
 """Rows of a block but the last: 30 s at 2 kHz, the paper's whole mission."""
 REFERENCE = ("reference_joints", "reference_base")
 """The columns the desired motion fills."""
-MEASURED_COLUMNS = (*STATE_FIELDS, *PASSIVE_FIELDS, "magnetic_field")
-"""Columns that `FlightLog` and `MeasuredStates` have in common."""
+MEASURED_COLUMNS = tuple(
+    name
+    for name, declared in SIGNALS.items()
+    if declared.is_sent_on(topics.STATES)
+    and declared.is_sent_on((*topics.TRUTH, topics.TRUTH_ORBIT))
+)
+"""Columns that `FlightLog` and `MeasuredStates` have in common: messages tell both of them."""
 
 
 def of_nan(shape: tuple[int, ...]) -> Array:
@@ -75,6 +82,16 @@ class MeasuredStates(MeasuredSignals):
     def each(self, change: Callable[[str, Array], Array]) -> MeasuredStates:
         """Return what ``change`` makes of each column, given its name."""
         return MeasuredStates(*(change(name, column) for name, column in self.columns.items()))
+
+
+MEASURED_APART = {
+    name: field.topic
+    for name in MEASURED_COLUMNS
+    if name not in signals_of(MeasuredSignals)
+    for field in SIGNALS[name].fields
+    if field.topic in topics.STATES
+}
+"""Topic of each measured column of a sensor that not every robot has."""
 
 
 @dataclass(eq=False, repr=False, kw_only=True)
@@ -265,21 +282,27 @@ class FlightLog(StateSignals):
         self.actuator_commands[rows] = torques[:, self.axes :]
 
     def record_measured(
-        self, new: Callable[[tuple[int, ...]], Array] = of_nan, has_magnetometer: bool = False
+        self, new: Callable[[tuple[int, ...]], Array] = of_nan, names: RobotNames | None = None
     ) -> None:
-        """Allocate columns of NaN for measured states and the law's error."""
+        """Allocate columns of NaN for measured states and the law's error.
+
+        ``names``: of what the robot has (None: no sensor that not every robot has).
+        """
         self.measured = MeasuredStates.unknown(self, new)
-        if not has_magnetometer:
-            self.measured.magnetic_field = np.empty((self.ticks, 0))
+        for name, topic in MEASURED_APART.items():
+            if not (names and getattr(names, topic.of)):
+                setattr(self.measured, name, np.empty((self.ticks, 0)))
         self.assumed_error = np.full_like(self.applied_torque, np.nan)
 
     def as_measured(self) -> FlightLog:
         """The flight as the flight software knows it, with `measured` as its states."""
         if self.measured is None:
             return self
-        columns: dict[str, Any] = self.measured.columns
-        if not self.measured.magnetic_field.size:
-            del columns["magnetic_field"]
+        columns: dict[str, Any] = {
+            name: column
+            for name, column in self.measured.columns.items()
+            if column.size or name not in MEASURED_APART
+        }
         return replace(self, **columns, measured=None, assumed_error=None)
 
     def state(self, tick: int) -> RobotState:
