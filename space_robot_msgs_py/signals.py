@@ -6,7 +6,7 @@ the columns of a log, the content of messages, what is read from bags, and the r
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from enum import Enum
 from typing import Any, NamedTuple
@@ -73,10 +73,6 @@ class Signal(Field):
     def within(self, column: str) -> Signal:
         """Return the declaration with the `column` that has it behind others."""
         return replace(self, column=column)
-
-    def is_sent_on(self, sent: Collection[Topic]) -> bool:
-        """Return True if messages of one of these topics carry the signal."""
-        return any(field.topic in sent for field in self.fields)
 
     def width(self, names: Any) -> int:
         """Return how many numbers a robot with these `RobotNames` has in a message."""

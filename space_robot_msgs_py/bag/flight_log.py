@@ -35,13 +35,15 @@ BLOCK_TICKS = 60_000
 """Rows of a block but the last: 30 s at 2 kHz, the paper's whole mission."""
 REFERENCE = ("reference_joints", "reference_base")
 """The columns the desired motion fills."""
-MEASURED_COLUMNS = tuple(
-    name
-    for name, declared in SIGNALS.items()
-    if declared.is_sent_on(topics.STATES)
-    and declared.is_sent_on((*topics.TRUTH, topics.TRUTH_ORBIT))
-)
-"""Columns that `FlightLog` and `MeasuredStates` have in common: messages tell both of them."""
+MEASURED_APART = {
+    name: field.topic
+    for name in ORBIT_FIELDS
+    for field in SIGNALS[name].fields
+    if field.topic in topics.STATES
+}
+"""Topic of each signal of an orbit that a sensor measures."""
+MEASURED_COLUMNS = (*STATE_FIELDS, *PASSIVE_FIELDS, *MEASURED_APART)
+"""Columns that `FlightLog` and `MeasuredStates` have in common."""
 
 
 def of_nan(shape: tuple[int, ...]) -> Array:
@@ -82,16 +84,6 @@ class MeasuredStates(MeasuredSignals):
     def each(self, change: Callable[[str, Array], Array]) -> MeasuredStates:
         """Return what ``change`` makes of each column, given its name."""
         return MeasuredStates(*(change(name, column) for name, column in self.columns.items()))
-
-
-MEASURED_APART = {
-    name: field.topic
-    for name in MEASURED_COLUMNS
-    if name not in signals_of(MeasuredSignals)
-    for field in SIGNALS[name].fields
-    if field.topic in topics.STATES
-}
-"""Topic of each measured column of a sensor that not every robot has."""
 
 
 @dataclass(eq=False, repr=False, kw_only=True)
@@ -286,7 +278,7 @@ class FlightLog(StateSignals):
     ) -> None:
         """Allocate columns of NaN for measured states and the law's error.
 
-        ``names``: of what the robot has (None: no sensor that not every robot has).
+        ``names``: of what the robot has (None: none of the sensors `MEASURED_APART`).
         """
         self.measured = MeasuredStates.unknown(self, new)
         for name, topic in MEASURED_APART.items():
@@ -298,11 +290,10 @@ class FlightLog(StateSignals):
         """The flight as the flight software knows it, with `measured` as its states."""
         if self.measured is None:
             return self
-        columns: dict[str, Any] = {
-            name: column
-            for name, column in self.measured.columns.items()
-            if column.size or name not in MEASURED_APART
-        }
+        columns: dict[str, Any] = self.measured.columns
+        for name in MEASURED_APART:
+            if not columns[name].size:
+                del columns[name]
         return replace(self, **columns, measured=None, assumed_error=None)
 
     def state(self, tick: int) -> RobotState:
