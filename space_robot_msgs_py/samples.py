@@ -25,6 +25,8 @@ MOST_WHEELS, MOST_THRUSTERS, MOST_TORQUERS, MOST_PASSIVE, MOST_GEARS = 8, 24, 6,
 """The base has no more reaction wheels, thrusters and magnetic torquers, a robot no more passive
 joints and gears. Records have room for as many, so that their number is no part of the layout, and
 another number compiles nothing anew."""
+MOST_ACTUATORS = MOST_WHEELS + MOST_THRUSTERS + MOST_TORQUERS
+"""The base has no more of all that a command has a number for."""
 
 
 class RobotNames(NamedTuple):
@@ -134,7 +136,7 @@ WHEELS = Each("wheels", lambda n: MOST_WHEELS)
 THRUSTERS = Each("thrusters", lambda n: MOST_THRUSTERS)
 PASSIVE = Each("passive", lambda n: MOST_PASSIVE)
 GEARED = Each("geared", lambda n: n)
-ACTUATORS = Each("actuators", lambda n: MOST_WHEELS + MOST_THRUSTERS + MOST_TORQUERS)
+ACTUATORS = Each("actuators", lambda n: MOST_ACTUATORS)
 INERTIAL, BASE = "inertial axes", "base axes"
 SOURCES = ("gravity_gradient", "drag", "sunlight", "magnetic")
 """Sources of the external torques of a state; magnetic is the torque of the base's residual dipole,

@@ -21,7 +21,7 @@ from space_robot_model.dynamics.algebra import subtract, vector
 from space_robot_model.hardware.base_actuators import BaseActuatorSettings
 from space_robot_msgs_py.compiled.kernels import RecordFunction, kernel, subroutine
 from space_robot_msgs_py.compiled.records import Record, assign, nested, shaped
-from space_robot_msgs_py.samples import MOST_THRUSTERS, MOST_TORQUERS, MOST_WHEELS
+from space_robot_msgs_py.samples import MOST_ACTUATORS, MOST_WHEELS
 
 from .settings import AllocationSettings
 from .thrusters import AssumedThrusters, expect_torque, modulate
@@ -47,7 +47,7 @@ class Allocation(Record):
     """Speeds of the wheels at the present tick, rad/s."""
     reported_torques: Array = shaped(lambda n: (MOST_WHEELS,))
     """Torques of the wheels' motors since the last tick, N m."""
-    command: Array = shaped(lambda n: (MOST_WHEELS + MOST_THRUSTERS + MOST_TORQUERS,))
+    command: Array = shaped(lambda n: (MOST_ACTUATORS,))
     """Torque of each wheel's motor, N m, force of each thruster, N, dipole of each magnetic
     torquer, A m2."""
 

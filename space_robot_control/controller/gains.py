@@ -19,7 +19,7 @@ from space_robot_msgs_py.config.yaml_text import check_readable, is_folder
 from space_robot_msgs_py.errors import InputError, SpaceRobotError
 
 from ..laws import ControlLaw, find_law, laws
-from .settings import DEFAULT, DEFAULT_SETS, OF_THE_SET, ControllerNodeSettings
+from .settings import DEFAULT, DEFAULT_SETS, OF_THE_SET, OTHERS, ControllerNodeSettings
 
 Array = NDArray[np.float64]
 
@@ -58,8 +58,9 @@ def gain_files(robot: str, gain_set: str) -> dict[str, Path]:
     if gain_set == DEFAULT:
         if not (folder / DEFAULT_SETS).is_file():
             return _files(folder)
-        chosen = read_yaml(folder / DEFAULT_SETS)
-        return {law: folder / str(name) / f"{law}.yaml" for law, name in chosen.items()}
+        chosen = {law: str(name) for law, name in read_yaml(folder / DEFAULT_SETS).items()}
+        others = _files(folder / chosen.pop(OTHERS)) if OTHERS in chosen else {}
+        return {**others, **{law: folder / s / f"{law}.yaml" for law, s in chosen.items()}}
     one_of(gain_set, [DEFAULT, *_sets(folder)], "gain set", f" of robot {short(files.name)}")
     return _files(folder / gain_set)
 

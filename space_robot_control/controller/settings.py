@@ -21,9 +21,9 @@ from ..navigation.settings import NavigationFilterSettings, NavigationMode, comp
 
 OF_THE_SET = "controller.yaml"
 """A file of a gain set with the controller's parameters that belong to its gains; need not be."""
-DEFAULT, DEFAULT_SETS = "default", "default_sets.yaml"
-"""The set that is flown unless another is named, and the file of a robot's gains that says for each
-law which one that is; without such a file the set is the robot's folder of gains itself."""
+DEFAULT, DEFAULT_SETS, OTHERS = "default", "default_sets.yaml", "others"
+"""The set that is flown unless another is named, and the file of a robot's gains that says for a
+law, or for all others, which one that is; without such a file it is the folder of gains itself."""
 
 
 def set_file(robot: str, gains: str) -> list[Path]:

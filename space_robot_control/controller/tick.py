@@ -23,7 +23,7 @@ from space_robot_model.dynamics.rho_space import force_for
 from space_robot_msgs_py.compiled.kernels import RecordFunction, kernel
 from space_robot_msgs_py.compiled.lanes import uniform
 from space_robot_msgs_py.compiled.records import Block, Record, nested, shaped
-from space_robot_msgs_py.samples import MOST_THRUSTERS, MOST_TORQUERS, MOST_WHEELS, Reference
+from space_robot_msgs_py.samples import MOST_ACTUATORS, Reference
 from space_robot_msgs_py.wire.stamp_guard import accept
 
 from ..laws.base import LawCode
@@ -88,7 +88,7 @@ class Supervision(Record):
     held_since: float = shaped(lambda n: (), "Tick at which holding began")
     rejected: Array = shaped(lambda n: (STATUSES,))
     """Number of states not used, or whose reference was not, by status."""
-    command: Array = shaped(lambda n: (n + 3 + MOST_WHEELS + MOST_THRUSTERS + MOST_TORQUERS,))
+    command: Array = shaped(lambda n: (n + 3 + MOST_ACTUATORS,))
     """Answer to the last state: torque of every axis, N m, then what is asked of each of the
     base's actuators, N m and N."""
 

@@ -120,6 +120,7 @@ class FlightSoftware:
             "MOST_PAIRS": wheels * (wheels - 1) // 2,
             "MOST_THRUSTERS": len(names.thrusters),
             "MOST_TORQUERS": len(names.torquers),
+            "MOST_ACTUATORS": len(names.actuators),
             "RING": ring,
         }
 

@@ -10,11 +10,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from .. import topics
 from ..compiled.records import Block
 from ..samples import (
     ALL_FIELDS,
     ORBIT_FIELDS,
     PASSIVE_FIELDS,
+    SIGNALS,
     STATE_FIELDS,
     LawInForce,
     MeasuredSignals,
@@ -33,7 +35,14 @@ BLOCK_TICKS = 60_000
 """Rows of a block but the last: 30 s at 2 kHz, the paper's whole mission."""
 REFERENCE = ("reference_joints", "reference_base")
 """The columns the desired motion fills."""
-MEASURED_COLUMNS = (*STATE_FIELDS, *PASSIVE_FIELDS, "magnetic_field")
+MEASURED_APART = {
+    name: field.topic
+    for name in ORBIT_FIELDS
+    for field in SIGNALS[name].fields
+    if field.topic in topics.STATES
+}
+"""Topic of each signal of an orbit that a sensor measures."""
+MEASURED_COLUMNS = (*STATE_FIELDS, *PASSIVE_FIELDS, *MEASURED_APART)
 """Columns that `FlightLog` and `MeasuredStates` have in common."""
 
 
@@ -265,12 +274,16 @@ class FlightLog(StateSignals):
         self.actuator_commands[rows] = torques[:, self.axes :]
 
     def record_measured(
-        self, new: Callable[[tuple[int, ...]], Array] = of_nan, has_magnetometer: bool = False
+        self, new: Callable[[tuple[int, ...]], Array] = of_nan, names: RobotNames | None = None
     ) -> None:
-        """Allocate columns of NaN for measured states and the law's error."""
+        """Allocate columns of NaN for measured states and the law's error.
+
+        ``names``: of what the robot has (None: none of the sensors `MEASURED_APART`).
+        """
         self.measured = MeasuredStates.unknown(self, new)
-        if not has_magnetometer:
-            self.measured.magnetic_field = np.empty((self.ticks, 0))
+        for name, topic in MEASURED_APART.items():
+            if not (names and getattr(names, topic.of)):
+                setattr(self.measured, name, np.empty((self.ticks, 0)))
         self.assumed_error = np.full_like(self.applied_torque, np.nan)
 
     def as_measured(self) -> FlightLog:
@@ -278,8 +291,9 @@ class FlightLog(StateSignals):
         if self.measured is None:
             return self
         columns: dict[str, Any] = self.measured.columns
-        if not self.measured.magnetic_field.size:
-            del columns["magnetic_field"]
+        for name in MEASURED_APART:
+            if not columns[name].size:
+                del columns[name]
         return replace(self, **columns, measured=None, assumed_error=None)
 
     def state(self, tick: int) -> RobotState:

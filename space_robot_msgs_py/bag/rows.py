@@ -27,7 +27,7 @@ from ..wire.definitions import decode
 from ..wire.messages import TELEMETRY_ROWS, SampleColumn, describe
 from ..wire.telemetry import LawCodec
 from .batch import NO_STAMP, Array, Batch, FieldReader, Integers, Places
-from .flight_log import FlightLog, MeasuredStates
+from .flight_log import MEASURED_APART, FlightLog, MeasuredStates
 from .message_accounting import LONGEST_JUMP, MessageAccounting
 
 _GROWTH = 1.25
@@ -73,8 +73,8 @@ class Rows:
         self._unnamed = set(NAMING)
         self._true: MeasuredStates | None = None
         """True states, once one has arrived; after `split_truth` the measured states."""
-        self._magnetometer = SimpleNamespace(magnetic_field=np.empty((0, 0)))
-        """The field as measured; the true one is in the log."""
+        self._apart = SimpleNamespace(**{name: np.empty((0, 0)) for name in MEASURED_APART})
+        """What sensors with a topic of their own measured; the true columns are in the log."""
         self._errors: list[tuple[Integers, Array]] = []
         """Ticks and e of the telemetry."""
         self._laws: list[LawInForce] = []
@@ -115,8 +115,8 @@ class Rows:
         reader = self._readers.get(topic)
         if not reader or not reader.description.columns:
             return
-        is_field = topic is topics.MAGNETOMETER
-        self._widen(self._magnetometer if is_field else self.log, reader.description.columns)
+        is_apart = topic in MEASURED_APART.values()
+        self._widen(self._apart if is_apart else self.log, reader.description.columns)
         if topic.per_tick:
             near = ticks < self._rows
             if not near.all():
@@ -171,7 +171,8 @@ class Rows:
         if self._true is None:
             return
         measured = MeasuredStates.of(self.log)
-        measured.magnetic_field = self._magnetometer.magnetic_field
+        for name, column in vars(self._apart).items():
+            setattr(measured, name, column)
         for name in STATE_FIELDS + PASSIVE_FIELDS:
             setattr(self.log, name, getattr(self._true, name))
         self.log.measured = self._true = measured
@@ -219,7 +220,7 @@ class Rows:
             self._believed += length * len(ticks)
             self._grow(int(ticks.max()) + length)
         places, rows = _by_place(ticks, rows, self._rows)
-        target: Any = self._magnetometer if topic is topics.MAGNETOMETER else self.log
+        target: Any = self._apart if topic in MEASURED_APART.values() else self.log
         if topic in topics.TRUTH:
             target = self._true = self._true or MeasuredStates.unknown(self.log)
         start = 0
@@ -246,8 +247,8 @@ class Rows:
 
     def _columns(self) -> list[NDArray[Any]]:
         true = {} if self._true is None else self._true.columns
-        field = self._magnetometer.magnetic_field
-        return [*self.log.columns.values(), *true.values(), *self._sent_ns.values(), field]
+        apart = vars(self._apart).values()
+        return [*self.log.columns.values(), *true.values(), *self._sent_ns.values(), *apart]
 
     def _grow(self, ticks: int) -> None:
         """Make room, within what can be believed; memory that is not touched costs nothing."""

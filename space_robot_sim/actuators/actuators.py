@@ -29,7 +29,7 @@ from space_robot_msgs_py.compiled.kernels import kernel
 from space_robot_msgs_py.compiled.lanes import uniform, whole
 from space_robot_msgs_py.compiled.records import nested, shaped
 from space_robot_msgs_py.errors import InputError
-from space_robot_msgs_py.samples import MOST_THRUSTERS, MOST_TORQUERS, MOST_WHEELS, State
+from space_robot_msgs_py.samples import MOST_ACTUATORS, State
 
 from ..component import Component, Installation
 from ..faults.schedule import Schedule
@@ -70,8 +70,7 @@ class ActuatorSettings(BaseActuatorSettings, DriveSettings):
 
 
 def _latency(settings: ActuatorSettings, at: Installation) -> Array:
-    numbers = at.n + 3 + MOST_WHEELS + MOST_THRUSTERS + MOST_TORQUERS
-    latency = np.full(numbers, float(settings.command_latency_ticks))
+    latency = np.full(at.n + 3 + MOST_ACTUATORS, float(settings.command_latency_ticks))
     if settings.thruster_count:
         first = at.n + 3 + settings.wheel_count
         delays = settings.thrusters.ticks("delay", at.period)
@@ -94,13 +93,9 @@ class Actuators(Component):
     """1 if the base receives the commanded torque; 0 if it has hardware or no actuators."""
     saturated_ticks: float = shaped(lambda n: ())
     """Number of ticks in which a torque was at its limit."""
-    latency: Array = shaped(
-        lambda n: (n + 3 + MOST_WHEELS + MOST_THRUSTERS + MOST_TORQUERS,),
-        uniform=True,
-        source=_latency,
-    )
+    latency: Array = shaped(lambda n: (n + 3 + MOST_ACTUATORS,), uniform=True, source=_latency)
     """Ticks by which each number of a command is late."""
-    due: Array = shaped(lambda n: (n + 3 + MOST_WHEELS + MOST_THRUSTERS + MOST_TORQUERS,))
+    due: Array = shaped(lambda n: (n + 3 + MOST_ACTUATORS,))
     """The command due at the current tick."""
     base_wrench: Array = shaped(lambda n: (6,))
     """Force, N, and torque, N m, on base axes, of all that acts on the base but the wheels."""
