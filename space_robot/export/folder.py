@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 
 from space_robot_control.flight_code.folder import Exported
-from space_robot_control.flight_code.library import write_sources
+from space_robot_control.flight_code.instances import write_sources
 from space_robot_msgs_py.errors import InputError
 
 from ..console.files import whole_folder

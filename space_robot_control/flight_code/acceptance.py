@@ -20,7 +20,7 @@ from ..controller.controller import Controller
 from ..controller.supervisor import MODES, Supervisor
 from ..controller.tick import ANSWERED, NEW
 from .folder import Exported
-from .library import fill_measurement, fill_reference
+from .instances import fill_measurement, fill_reference
 
 Array = NDArray[np.float64]
 
@@ -113,17 +113,17 @@ class RecordingSupervisor(Supervisor):
         """Tick that was judged to be new and is not answered yet; -1: none."""
 
     def judge_stamp(self, tick: int) -> int:
-        """Return the standing of a state by its stamp."""
+        """Return the status of a state's stamp."""
         self.finish()
-        standing = super().judge_stamp(tick)
-        if standing == NEW:
+        status = super().judge_stamp(tick)
+        if status == NEW:
             self._judged = tick
-            return standing
-        is_known = standing == ANSWERED
+            return status
+        is_known = status == ANSWERED
         result = int(self._record.reason) if is_known else REFUSED
         command = Command(tick, self._command.torque) if is_known else None
         self._recording.add(STEP, result, self, tick, None, command)
-        return standing
+        return status
 
     def answer(self, state: RobotState, reference: Block) -> Command:
         """Return the command for a state."""

@@ -19,7 +19,7 @@ from ..controller.supervisor import Supervisor
 from ..laws import ControlLaw
 
 if TYPE_CHECKING:
-    from .library import FlightCode
+    from .instances import FlightCode
 
 Array = NDArray[np.float64]
 TELEMETRY = ("s", "u", "N_hat", "e")
@@ -43,7 +43,7 @@ class _SupervisorWithCode(Supervisor):
 
     def deactivate(self, tick: int) -> Command:
         """Return the zero-torque command that ends a flight."""
-        self._flight_code.stand_down(tick)
+        self._flight_code.deactivate(tick)
         return super().deactivate(tick)
 
 
@@ -54,10 +54,10 @@ class CodeSupervisor(_SupervisorWithCode):
     """
 
     def judge_stamp(self, tick: int) -> int:
-        """Return the standing of a state by its stamp."""
-        standing = self._flight_code.judge_stamp(tick)
+        """Return the status of a state's stamp."""
+        status = self._flight_code.judge_stamp(tick)
         self._flight_code.write_condition(self._record)
-        return standing
+        return status
 
     def answer(self, state: RobotState, reference: Block) -> Command:
         """Return the command for a state."""
@@ -69,7 +69,8 @@ class CodeSupervisor(_SupervisorWithCode):
 
     def telemetry(self) -> tuple[Array, Array, Array, Array]:
         """Telemetry of the last tick."""
-        return self._flight_code.telemetry
+        s, u, n_hat, error = self._flight_code.telemetry
+        return s, u, n_hat, error
 
     @property
     def diagnosis(self) -> Diagnosis:
@@ -81,15 +82,15 @@ class ShadowSupervisor(_SupervisorWithCode):
     """Supervisor that compares every answer of the kernels with that of the flight code in C."""
 
     def judge_stamp(self, tick: int) -> int:
-        """Return the standing of a state by its stamp.
+        """Return the status of a state's stamp.
 
         Raises:
             ShadowError: C judges differently.
         """
-        standing, other = super().judge_stamp(tick), self._flight_code.judge_stamp(tick)
-        if standing != other:
-            raise ShadowError(f"at tick {tick} Python judges the stamp as {standing}, C as {other}")
-        return standing
+        status, other = super().judge_stamp(tick), self._flight_code.judge_stamp(tick)
+        if status != other:
+            raise ShadowError(f"at tick {tick} Python judges the stamp as {status}, C as {other}")
+        return status
 
     def answer(self, state: RobotState, reference: Block) -> Command:
         """Return the command for a state.
@@ -144,8 +145,7 @@ def supervisor_of(
         )
     # most flights need no translator
     from .folder import Exported
-    from .library import FlightLibrary
-    from .remote import FlightComputer
+    from .instances import FlightComputer, FlightLibrary
     from .software import FlightSoftware
 
     exported = Exported(FlightSoftware.of(controller, laws, [], limits, {}), settings.robot)

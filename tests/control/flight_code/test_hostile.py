@@ -29,7 +29,7 @@ from space_robot_control.flight_code.acceptance import (
     spoiled_reference,
 )
 from space_robot_control.flight_code.folder import Exported
-from space_robot_control.flight_code.library import CONDITION, FlightLibrary
+from space_robot_control.flight_code.instances import CONDITION, FlightLibrary
 from space_robot_control.flight_code.supervisors import bits
 from space_robot_msgs_py.samples import Reference, RobotState
 
