@@ -148,7 +148,7 @@ def supervisor_of(
     from .instances import FlightComputer, FlightLibrary
     from .software import FlightSoftware
 
-    exported = Exported(FlightSoftware.of(controller, laws, [], limits, {}), settings.robot)
+    exported = Exported(FlightSoftware(controller, laws, [], limits, {}), settings.robot)
     if settings.controller_code.startswith("udp:"):
         _, host, port = settings.controller_code.split(":")
         return CodeSupervisor(controller, settings, FlightComputer(exported, host, int(port)))
