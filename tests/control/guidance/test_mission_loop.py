@@ -18,10 +18,15 @@ from space_robot_msgs_py.wire.telemetry import ClockCodec, ReferenceCodec
 
 pytest.importorskip("rclpy")
 
-from space_robot_control.guidance import loop, mission_changes
-from space_robot_control.guidance.loop import CLOCK_WAIT_S, GREET_S, MOST_AT_ONCE, MissionLoop
+from space_robot_control.guidance import loop
+from space_robot_control.guidance.loop import (
+    CLOCK_WAIT_S,
+    GREET_S,
+    MOST_AT_ONCE,
+    TOLD_S,
+    MissionLoop,
+)
 from space_robot_control.guidance.mission import Mission
-from space_robot_control.guidance.mission_changes import TOLD_S
 from space_robot_msgs_py.ros.loop import Level
 
 CHUNK, LEAD = 10, 35
@@ -66,7 +71,6 @@ class Bench:
         patch.setattr(time, "monotonic", lambda: self.now)
         for name in ("RawPublisher", "RawSubscription"):
             patch.setattr(loop, name, Topic)
-        patch.setattr(mission_changes, "RawSubscription", Topic)
         self.settings = MissionNodeSettings.resolve({"chunk_ticks": chunk, "lead_ticks": LEAD})
         self.node: Any = Node()
         self.loop = MissionLoop(self.node, self.settings)
