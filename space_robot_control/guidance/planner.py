@@ -63,10 +63,10 @@ class Planner:
 
     @cached_property
     def _origin(self) -> Array:
-        from .tool_paths import ToolFollower
+        from .tool_paths import ToolPoses
 
-        pose = ToolFollower(self._robot, None).pose(*self._first)
-        return pose.position - pose.from_base
+        position, from_base, _ = ToolPoses(self._robot, None).pose(*self._first)
+        return position - from_base
 
     @np.errstate(all="ignore")  # numbers that overflow are refused, in one line
     def plan(
