@@ -48,32 +48,34 @@ class TrajectoryPoint(NamedTuple):
     accelerations: Sequence[float]
 
 
-def braking(begin: float, joints: Array, rates: Array, base: BaseMotion) -> Piece:
-    """Return the piece that brings a moving reference to rest.
+def brought_to_rest(
+    robot: Robot, begin: float, joints: Array, rates: Array, base: BaseMotion
+) -> list[Piece]:
+    """Return the piece that brings a moving reference to rest, or none if it is at rest.
 
     Args:
+        robot: as the flight software knows it; the piece is checked against its limits.
         begin: s.
         joints: (3, n) reference of the joints at ``begin``.
         rates: (10,) reference of the base.
         base: how the base goes on; one without a course comes to rest.
     """
+    base_rate = 0.0 if base.course else np.abs(rates[4:]).max()
+    if not max(np.abs(joints[1:]).max(), base_rate) > AT_REST:
+        return []
     rest = np.zeros_like(joints)
     rest[0] = joints[0] + 0.5 * BRAKE_S * joints[1]
     spline = QuinticSpline(np.array([0.0, BRAKE_S]), np.array([joints, rest]))
     turn, course = _onwards(begin, rates, base), SplineCourse(begin, spline)
     end = begin + BRAKE_S
     attitude = turn.at(np.array([end]))[0, :4]
-    return Piece(begin, end, course, turn, rest[0], attitude, "braking", base.mode)
+    piece = Piece(begin, end, course, turn, rest[0], attitude, "braking", base.mode)
+    check_piece(robot, piece)
+    return [piece]
 
 
 def _onwards(begin: float, rates: Array, base: BaseMotion) -> Course:
     return base.course or BrakedTurn(begin, BRAKE_S, rates[:4], rates[4:7], rates[7:])
-
-
-def is_moving(joints: Array, rates: Array, base: BaseMotion) -> bool:
-    """Return whether a reference (3, n) and (10,) moves that is to come to rest."""
-    of_base = 0.0 if base.course else np.abs(rates[4:]).max()
-    return bool(max(np.abs(joints[1:]).max(), of_base) > AT_REST)
 
 
 @np.errstate(all="ignore")  # numbers that overflow are refused, in one line
@@ -93,15 +95,15 @@ def joined(
     state; of one that is joined late also those that the joints cannot reach in time any more.
 
     Args:
-        robot: as the flight software knows it.
+        robot: see `brought_to_rest`, as ``begin``, ``joints``, ``rates`` and ``base``.
         names: of the joints, in the order of the points' numbers.
         points: with rising times from 0 on; velocities and accelerations that are missing are
             those of a cubic spline through the positions. It ends at rest unless the last point
             says otherwise.
         begin: s.
-        joints: (3, n) reference of the joints at ``begin``.
-        rates: (10,) reference of the base.
-        base: how the base goes on; one without a course comes to rest.
+        joints: of the reference.
+        rates: of the reference.
+        base: of the reference.
         late: s, from the trajectory's start to ``begin``.
 
     Raises:
@@ -195,15 +197,7 @@ class GoalTolerances(NamedTuple):
 
     @classmethod
     def read(cls, goal: Any, names: Sequence[str]) -> GoalTolerances:
-        """Read those of a goal.
-
-        Args:
-            goal: a FollowJointTrajectory.Goal.
-            names: of the n joints.
-
-        Raises:
-            InputError: a joint is unknown, or a number is negative or none.
-        """
+        """Read those of a FollowJointTrajectory.Goal for n joints."""
         duration = goal.goal_time_tolerance
         seconds = duration.sec + 1e-9 * duration.nanosec
         return cls(
@@ -222,11 +216,7 @@ class GoalTolerances(NamedTuple):
     ) -> GoalVerdict | None:
         """Compare measured joints with a trajectory; None: the goal goes on.
 
-        Args:
-            piece: the trajectory.
-            names: of the n joints.
-            time: (T,) s, rising.
-            measured: (T, 2, n) positions and velocities at these times.
+        ``measured`` (T, 2, n) are positions and velocities at rising times (T,), s.
         """
         error = np.abs(measured - piece.joints.at(np.minimum(time, piece.end))[:, :2])
         is_after = time >= piece.end

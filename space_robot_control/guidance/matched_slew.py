@@ -50,13 +50,7 @@ class MatchedSlew:
     """
 
     def __init__(self, begin: float, span: float, before: Course, after: Course) -> None:
-        """Match the ends.
-
-        Args:
-            begin: s, when the base leaves ``before``.
-            span: s until it is on ``after``, above 0.
-            before: of the base, up to ``begin``.
-            after: of the base, from ``begin + span`` on.
+        """Match the ends: the base leaves ``before`` at ``begin`` and is on ``after`` a span later.
 
         Raises:
             InputError: the rates at the begin would carry the base once round in this time.
@@ -93,13 +87,10 @@ class MatchedSlew:
 
 @kernel
 def match_into(old: Array, new: Array, turn: Array) -> None:
-    """Write what leads from one motion to another at the same time.
+    """Write what leads from one motion (10,) of the base to another at the same time.
 
-    Args:
-        old: (10,) quaternion, velocity and acceleration on the base's axes.
-        new: (10,) the same of the other motion.
-        turn: (3, 3) written: rotation vector from the new attitude to the old one, the shorter
-            way, rad, its rate and second derivative.
+    ``turn`` (3, 3) is written: the rotation vector from the new attitude to the old one, the
+    shorter way, rad, its rate and second derivative.
     """
     q = multiply((new[0], -new[1], -new[2], -new[3]), (old[0], old[1], old[2], old[3]))
     if q[0] < 0.0:

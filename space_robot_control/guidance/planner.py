@@ -45,7 +45,7 @@ class Planner:
         joints: Array,
         quaternion: Array,
         limits: MissionLimits,
-        ephemeris: Callable[[], Ephemeris | None] = lambda: None,
+        ephemeris: Callable[[], Ephemeris | None],
     ) -> None:
         """Begin a plan.
 
@@ -56,7 +56,7 @@ class Planner:
             limits: of fast segments, beside those of the joints.
             ephemeris: returns that of the assumed orbit; None: there is none.
         """
-        self._robot, self._limits, self._ephemeris = robot.nominal, limits, ephemeris
+        self._robot, self._limits, self._ephemeris = robot, limits, ephemeris
         self._first = quaternion, joints
         self.base = BaseMotion(quaternion)
         """How the base goes on after the last planned segment."""

@@ -50,16 +50,10 @@ class PointingCourse:
     def __init__(
         self, goal: PointingGoal, ephemeris: Ephemeris | None, begin: float, near: Array
     ) -> None:
-        """Take what points where.
+        """Take what points where from ``begin``, s, on.
 
-        Args:
-            goal: the keys of the segment.
-            ephemeris: of the assumed orbit; None: there is none.
-            begin: s, of the segment.
-            near: (4,) quaternion in whose hemisphere the first one is.
-
-        Raises:
-            InputError: there is no orbit or no target, but one is needed; names the key.
+        ``near`` (4,) is a quaternion in whose hemisphere the first one is. Without an orbit
+        ``ephemeris`` is None, and only fixed directions can be pointed at.
         """
         first: str | list[float] = goal.direction or goal.point
         for key, name in (("point", first), ("about", goal.about)):

@@ -103,20 +103,14 @@ class Segment(StrictModel):
         return " and ".join(words)
 
     def joints(self, start: SegmentStart) -> JointMaker:
-        """Return what makes the course of the joints from a start.
-
-        Raises:
-            InputError: they cannot move so.
-        """
+        """Return what makes the course of the joints from a start."""
         rise = np.zeros_like(start.joints)
         return lambda span, _: QuinticLeg(start.time, span, start.joints, rise)
 
     def courses(self, start: SegmentStart, turn: Callable[[float], Course]) -> Maker:
         """Return what makes the courses of joints and base from a start.
 
-        Args:
-            start: of the segment.
-            turn: makes the course of a base that is not free in a duration, s.
+        ``turn`` makes the course of a base that is not free in a duration, s.
         """
         make = self.joints(start)
 
@@ -253,11 +247,7 @@ SEGMENT_KEYS = (
 
 
 def posture(robot: Robot, values: Sequence[float], key: str) -> Array:
-    """Return the positions (n,) of joints that are written in degrees, rad or m.
-
-    Raises:
-        InputError: there are too few or too many values, or one is too large; names the key.
-    """
+    """Return the positions (n,), rad or m, of joints that a key has in degrees or m."""
     if len(values) != robot.n:
         raise InputError(f"{key}: {robot.n} values were expected, got {len(values)}")
     positions = robot.from_degrees(values)
@@ -307,11 +297,7 @@ def _segment(text: str, where: str) -> Segment:
 
 
 def read_pointing(text: str, where: str) -> PointingGoal:
-    """Return what the base points at, written as YAML text.
-
-    Raises:
-        InputError: it is wrong; names ``where``.
-    """
+    """Return what the base points at, written as YAML text; an error names ``where``."""
     content = _parsed(text, where)
     content = {"point": content} if isinstance(content, str) else content
     _check_keys(content, where, tuple(PointingGoal.model_fields))

@@ -36,11 +36,7 @@ class TrajectoryTable:
     """A trajectory of joints and base, by cubic splines through its rows."""
 
     def __init__(self, columns: Columns, joint_names: Sequence[str]) -> None:
-        """Check the columns and make the splines.
-
-        Raises:
-            InputError: a column is missing, times do not rise, or rates do not belong to positions.
-        """
+        """Check the columns and make the splines."""
         missing = [name for name in (TIME, *joint_names) if name not in columns]
         if missing:
             raise InputError(f"trajectory: {missing_column(short(missing[0]), columns)}")
@@ -94,9 +90,6 @@ class TrajectoryTable:
         """Return the courses of joints and base from a time, posture and motion of the base on.
 
         Without columns of its attitude the base goes on as it moves.
-
-        Raises:
-            InputError: the trajectory begins elsewhere.
         """
         away = np.abs(self._joints.values[0] - joints)
         if away.max() > SAME_PLACE:
