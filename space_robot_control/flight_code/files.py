@@ -119,9 +119,8 @@ class Files:
         declared = record.fields()[name]
         if not isinstance(declared, RecordField):
             return any(self.has(declared, inner) for inner in declared.fields())
-        return lang.FieldName(record, name) in self.fields and 0 not in self.program.shape(
-            record, name
-        )
+        is_empty = 0 in self.program.shape(record, name)  # C has no such arrays
+        return lang.FieldName(record, name) in self.fields and not is_empty
 
     def name_of(self, function: Function) -> str:
         """Return a function's name in C."""
@@ -232,26 +231,19 @@ class Files:
         return number not in self._roots and self._calling_rooms[number] == {home}
 
     def _function_names(self) -> dict[int, str]:
-        bare = {f: f.body.__name__.lstrip("_") for f in self.functions}
         names: dict[int, str] = {}
-        taken: set[str] = set()
         for function in self.functions:
-            alike = [f for f in self.functions if bare[f] == bare[function]]
-            name = bare[function]
+            name = function.body.__name__.lstrip("_")
+            alike = [f for f in self.functions if f.body.__name__.lstrip("_") == name]
             if len({f.body for f in alike}) > 1:
                 name = f"{function.body.__module__.rpartition('.')[2]}_{name}"
-            if (
-                len(alike) > 1
-                and function.label
-                and sum(f.body is function.body for f in alike) > 1
-            ):
+            if function.label and sum(f.body is function.body for f in alike) > 1:
                 name = f"{name}_{function.label}"
-            fresh, count = name, 1
-            while fresh in taken:
+            fresh, count = f"{lang.PREFIX}{name}", 1
+            while fresh in names.values():
                 count += 1
-                fresh = f"{name}_{count}"
-            taken.add(fresh)
-            names[self.program.functions.index(function)] = f"{lang.PREFIX}{fresh}"
+                fresh = f"{lang.PREFIX}{name}_{count}"
+            names[self.program.functions.index(function)] = fresh
         return names
 
     def _constant_names(self) -> dict[int, str]:

@@ -86,11 +86,6 @@ class Exported:
         count = len(self.software.controller.names.commanded)
         return np.dtype([("tick", np.int64), ("command", np.float64, (count,))])
 
-    @property
-    def rooms(self) -> list[str]:
-        """Names of the files of C in ``src``."""
-        return sorted(path.name for path in self.sources if path.suffix == ".c")
-
     def render(self, template: str, **content: Any) -> str:
         """Return a file made from a template."""
         software = self.software

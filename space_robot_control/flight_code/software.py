@@ -160,9 +160,6 @@ def translate(software: FlightSoftware) -> Translated:
 
     Every translation tells which numbers no kernel writes. In the next one they are known, so
     branches that they decide for good are left out, and what is written only there.
-
-    Raises:
-        InputError: a kernel has no translation; names file, line and what to write instead.
     """
     constants: dict[lang.FieldName, float] | None = None
     known: dict[lang.FieldName, float] = {}

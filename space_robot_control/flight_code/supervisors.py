@@ -82,22 +82,14 @@ class ShadowSupervisor(_SupervisorWithCode):
     """Supervisor that compares every answer of the kernels with that of the flight code in C."""
 
     def judge_stamp(self, tick: int) -> int:
-        """Return the status of a state's stamp.
-
-        Raises:
-            ShadowError: C judges differently.
-        """
+        """Return the status of a state's stamp, or raise a `ShadowError`."""
         status, other = super().judge_stamp(tick), self._flight_code.judge_stamp(tick)
         if status != other:
             raise ShadowError(f"at tick {tick} Python judges the stamp as {status}, C as {other}")
         return status
 
     def answer(self, state: RobotState, reference: Block) -> Command:
-        """Return the command for a state.
-
-        Raises:
-            ShadowError: C answers differently; names the first number that differs.
-        """
+        """Return the command for a state, or raise a `ShadowError`."""
         command, code = super().answer(state, reference), self._flight_code
         names = self.controller.names
         code.answer(state, reference)
@@ -127,13 +119,7 @@ def supervisor_of(
 ) -> Supervisor:
     """Return the supervisor that the settings ask for.
 
-    Args:
-        controller: with the law in force at the start.
-        laws: all laws that it may be given, that one first.
-        settings: of the controller's node.
-
-    Raises:
-        InputError: a law cannot be exported, or there is no compiler or no flight computer.
+    ``laws`` are all laws that the controller may be given, that at the start first.
     """
     limits = settings.hold_ticks, settings.longest_jump
     if settings.answers_in_python:

@@ -68,15 +68,13 @@ def _integer(arguments: tuple[Value, ...]) -> Value:
     return replace(value, type=lang.INT, text=f"py_int({value.text})", rank=lang.ATOM)
 
 
-def negated(arguments: tuple[Value, ...]) -> Value:
-    """Return ``not x``."""
+def _negated(arguments: tuple[Value, ...]) -> Value:
     value = cast(arguments[0], lang.BOOL)
     constant = None if value.constant is None else not value.constant
     return replace(value, text=f"!{value.at(lang.UNARY)}", rank=lang.UNARY, constant=constant)
 
 
-def chosen(arguments: tuple[Value, ...]) -> Value:
-    """Return ``then if condition else otherwise``."""
+def _chosen(arguments: tuple[Value, ...]) -> Value:
     condition, then, otherwise = arguments
     condition = cast(condition, lang.BOOL)
     kind = lang.joined(then.type, otherwise.type)
@@ -109,12 +107,12 @@ WORDS: dict[Any, Word] = {
     np.isfinite: _exact("py_isfinite", lang.BOOL),
     np.isnan: _exact("py_isnan", lang.BOOL),
     math.isnan: _exact("py_isnan", lang.BOOL),
-    lanes.where: chosen,
+    lanes.where: _chosen,
     lanes.uniform: lambda a: a[0],
     lanes.whole: _integer,
     lanes.any_lane: lambda a: cast(a[0], lang.BOOL),
     lanes.all_lanes: lambda a: cast(a[0], lang.BOOL),
-    lanes.negated: negated,
+    lanes.negated: _negated,
 }
 """Functions that kernels may call beside one another."""
 ARITHMETIC: dict[type[ast.operator], tuple[str, int, Callable[[Any, Any], Any]]] = {
@@ -149,11 +147,7 @@ class Expressions:
         """Conditions, as dumped syntax, that are known in a part of the function."""
 
     def translate(self, node: ast.expr) -> Value:
-        """Return the value of an expression.
-
-        Raises:
-            RefusedError: it is not of the language.
-        """
+        """Return the value of an expression; `RefusedError` if it is not of the language."""
         if self.facts and (known := self.facts.get(ast.dump(node))) is not None:
             return number_of(known)
         method = getattr(self, f"_{type(node).__name__.lower()}", None)
@@ -224,11 +218,7 @@ class Expressions:
 
     @staticmethod
     def length(array: Value) -> Value:
-        """Return the length of an array.
-
-        Raises:
-            RefusedError: it is not known when the code is exported.
-        """
+        """Return the length of an array, which must be known when the code is exported."""
         length = array.type.shape[0]
         if length is None:
             raise RefusedError("the length of a slice with variable ends", "give it as an argument")
@@ -319,7 +309,7 @@ class Expressions:
     def _unaryop(self, node: ast.UnaryOp) -> Value:
         value = self.translate(node.operand)
         if isinstance(node.op, ast.Not):
-            return negated((value,))
+            return _negated((value,))
         if not isinstance(node.op, ast.USub) or value.type not in (lang.FLOAT, lang.INT):
             raise RefusedError(f"the operator of {ast.unparse(node)}", "use plain arithmetic")
         constant = None if value.constant is None else -value.constant
@@ -327,10 +317,7 @@ class Expressions:
         return replace(value, text=text, rank=lang.UNARY, constant=constant)
 
     def _binop(self, node: ast.BinOp) -> Value:
-        return self.operation(node.op, self.translate(node.left), self.translate(node.right))
-
-    def operation(self, op: ast.operator, left: Value, right: Value) -> Value:
-        """Return ``left op right``."""
+        op, left, right = node.op, self.translate(node.left), self.translate(node.right)
         lang.check_order((left, right))
         calls = max(left.calls, right.calls)
         if isinstance(op, (ast.BitAnd, ast.BitOr)):
@@ -413,7 +400,7 @@ class Expressions:
         condition = cast(self.translate(node.test), lang.BOOL)
         if condition.constant is not None:
             return self.translate(node.body if condition.constant else node.orelse)
-        return chosen((condition, self.translate(node.body), self.translate(node.orelse)))
+        return _chosen((condition, self.translate(node.body), self.translate(node.orelse)))
 
     def _call(self, node: ast.Call) -> Value:
         function = self.translate(node.func)

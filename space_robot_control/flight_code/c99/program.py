@@ -55,6 +55,11 @@ class Function:
     stores: frozenset[lang.FieldName]
     """Fields of records that it writes."""
 
+    @property
+    def head(self) -> list[tuple[str, bool]]:
+        """Names of its parameters, and which are written."""
+        return [(parameter.name, parameter.is_written) for parameter in self.parameters]
+
 
 @cache
 def syntax_of(body: Callable[..., Any]) -> tuple[ast.FunctionDef, str]:
@@ -72,11 +77,7 @@ def syntax_of(body: Callable[..., Any]) -> tuple[ast.FunctionDef, str]:
 def translated(
     program: Any, body: Callable[..., Any], kinds: tuple[lang.Type, ...], label: str
 ) -> Function:
-    """Translate a kernel of a program for types of arguments; ``label`` is a bundle's.
-
-    Raises:
-        NotInSubsetError: a construct has no translation.
-    """
+    """Translate a kernel of a program for types of arguments; ``label`` is a bundle's."""
     types: dict[str, lang.Type] = {}
     result: lang.Type = None
     for _ in range(MOST_PASSES):
@@ -91,11 +92,15 @@ def translated(
     for value in translation.names.values():
         if isinstance(value.type, ArrayOf) and len(value.type.shape) > 1:
             written |= value.roots  # C99 cannot pass variable rows as constant ones
-    lines = declared(translation.lines, _declarations(translation, written))
+    declarations = {
+        name: program.declaration(kind, name, name in written)
+        for name, kind in translation.types.items()
+        if name not in translation.own and not isinstance(kind, Known)
+    }
+    lines = declared(translation.lines, declarations)
     text = "\n".join(lines)
     is_used = {p: bool(re.search(rf"\b{p}\b", text)) for p, _ in translation.parameters}
-    own = {argument.arg for argument in translation.tree.args.args}
-    kept = [(p, kind) for p, kind in translation.parameters if is_used[p] or p in own]
+    kept = [(p, kind) for p, kind in translation.parameters if is_used[p] or p in translation.own]
     ignored = [f"    (void){p};" for p, _ in kept if not is_used[p]]
     return Function(
         body,
@@ -106,14 +111,6 @@ def translated(
         tuple(ignored + lines),
         frozenset(translation.stores),
     )
-
-
-def _declarations(translation: Statements, written: set[str]) -> dict[str, str]:
-    return {
-        name: translation.program.declaration(kind, name, name in written)
-        for name, kind in translation.types.items()
-        if name not in translation.own and not isinstance(kind, Known)
-    }
 
 
 def passed(function: Function, arguments: tuple[Value, ...]) -> list[Value]:
@@ -127,16 +124,6 @@ def passed(function: Function, arguments: tuple[Value, ...]) -> list[Value]:
         elif names:
             values.append(argument)
     return values
-
-
-def kind_of_argument(value: Value) -> lang.Type:
-    """Return the type of a parameter for an argument; a truth value that is known is bound."""
-    is_bound = value.is_bound or (value.type == lang.BOOL and value.constant is not None)
-    return Known(value.constant) if is_bound else value.type
-
-
-def _names(function: Function) -> list[tuple[str, bool]]:
-    return [(p.name, p.is_written) for p in function.parameters]
 
 
 class Constant(NamedTuple):
@@ -156,12 +143,10 @@ class KernelProgram:
     def __init__(
         self, sizes: Mapping[str, int], joints: int, target: lang.C99 | None = None
     ) -> None:
-        """Begin.
+        """Begin, for n joints, of which the shapes of records are functions.
 
-        Args:
-            sizes: numbers that stand for constants of modules, by name, as capacities of arrays.
-            joints: n, of which the shapes of records are functions.
-            target: the language that is written; None: C99.
+        ``sizes`` stand for constants of modules by name, as capacities of arrays; ``target`` is the
+        language that is written, C99 if none is given.
         """
         self.sizes, self.joints, self.target = dict(sizes), joints, target or lang.C99()
         self.constants: dict[lang.FieldName, float] = {}
@@ -262,7 +247,13 @@ class KernelProgram:
         tree, file = syntax_of(body)
         if len(tree.args.args) != len(arguments):
             raise RefusedError(f"a call of {tree.name}() without all arguments", "give them all")
-        kinds = tuple(map(kind_of_argument, arguments))
+        # a truth value that is known is bound
+        kinds = tuple(
+            Known(a.constant)
+            if a.is_bound or (a.type == lang.BOOL and a.constant is not None)
+            else a.type
+            for a in arguments
+        )
         if (body, kinds) in self._known:
             return self._known[body, kinds]
         if body in self._active:
@@ -274,7 +265,7 @@ class KernelProgram:
         self._active.pop()
         number = len(self.functions)
         for k, old in enumerate(self.functions):
-            if old.body is body and old.lines == new.lines and _names(old) == _names(new):
+            if old.body is body and old.lines == new.lines and old.head == new.head:
                 pairs = zip(old.parameters, new.parameters, strict=True)
                 merged = tuple(replace(p, type=lang.joined(p.type, q.type)) for p, q in pairs)
                 self.functions[k] = replace(old, parameters=merged)

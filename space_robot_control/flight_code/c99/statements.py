@@ -7,7 +7,7 @@ import re
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
-from functools import cache
+from functools import cache, reduce
 from typing import Any
 
 from . import language as lang
@@ -36,10 +36,7 @@ class Statements(Expressions):
         file: str,
         kinds: Sequence[lang.Type],
     ) -> None:
-        """Translate the body of ``tree``, the syntax of ``function``, which stands in ``file``.
-
-        ``kinds`` are the types of the arguments.
-        """
+        """Translate the body of ``tree``, the syntax of ``function``, for types of arguments."""
         super().__init__(program, function)
         self.tree, self.file = tree, file
         self.first_line = function.__code__.co_firstlineno
@@ -86,11 +83,7 @@ class Statements(Expressions):
         return Value(kind, name, roots=frozenset({name}))
 
     def body(self) -> None:
-        """Translate all statements.
-
-        Raises:
-            NotInSubsetError: one has no translation.
-        """
+        """Translate all statements."""
         try:
             self.assigned = assigned_in(self.tree)
         except RefusedError as refusal:
@@ -338,9 +331,7 @@ class Statements(Expressions):
         lists: list[tuple[str, lang.Type, str]] = []
         for k, target in enumerate(targets):
             values = [self.translate(row[k]) for row in rows]
-            kind: lang.Type = None
-            for value in values:
-                kind = lang.joined(kind, value.type)
+            kind = reduce(lang.joined, (value.type for value in values))
             table = self._fresh(f"{ast.unparse(target)}s")
             texts = ", ".join(cast(value, kind).text for value in values)
             self.emit(f"const {kind.name} {table}[{len(rows)}] = {{{texts}}};")
@@ -376,7 +367,7 @@ class Statements(Expressions):
             self.emit(f"{'' if value.type == lang.VOID else '(void)'}{value.text};")
 
     def _pass_statement(self, node: ast.Pass) -> None:
-        """Do nothing."""
+        pass
 
     def _leave_statement(self, node: ast.stmt) -> bool:
         self.emit(f"{type(node).__name__.lower()};")
@@ -399,10 +390,7 @@ class Statements(Expressions):
 
 def names_in(nodes: Iterable[ast.AST], stored: bool = False) -> Counter[str]:
     """Return how often names are mentioned; ``stored``: how often they get a value."""
-    counted: Counter[str] = Counter()
-    for node in nodes:
-        counted.update(_names_in(node, stored))
-    return counted
+    return sum((_names_in(node, stored) for node in nodes), Counter[str]())
 
 
 @cache
@@ -413,11 +401,7 @@ def _names_in(node: ast.AST, stored: bool) -> Counter[str]:
 
 @cache
 def assigned_in(tree: ast.FunctionDef) -> Counter[str]:
-    """Return how often names get a value in a function.
-
-    Raises:
-        RefusedError: what a loop counts is mentioned outside of it, where it differs in C.
-    """
+    """Return how often names get a value in a function; refuse names that C cannot have so."""
     inside: Counter[str] = Counter()
     for loop in (n for n in ast.walk(tree) if isinstance(n, ast.For)):
         for name in names_in([loop.target]):
