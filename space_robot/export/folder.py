@@ -57,7 +57,7 @@ def write_folder(
         written = []
         for flight in flights:
             flight.recording.write(acceptance / f"{flight.name}.bin")
-            written.append((flight.name, flight.about, len(flight.recording)))
+            written.append((flight.name, flight.about, len(flight.recording.records)))
             advance()
         for file in BUILD_FILES:
             (new / file).write_text(exported.render(file), encoding="utf-8")

@@ -199,18 +199,19 @@ def entries(translated: Translated, part: Part) -> Iterator[Entry]:
 def _entries(
     translated: Translated, record: type[Record], numbers: Any, path: str, source: str
 ) -> Iterator[Entry]:
-    said = descriptions(record)
+    texts = descriptions(record)
     for name, kind in translated.kept(record):
         inside = f"{path}.{name}"
         if not isinstance(kind, tuple):
             yield from _entries(translated, kind, numbers[name], inside, source)
             continue
         kept = numbers_of(kind, numbers[name])
+        # by bits: -0.0 is not zero
         is_table = lang.FieldName(record, name) in translated.tables
         if is_table or not np.any(kept.view(np.int64)):
             continue
         constant = f"SR_{inside.replace('.', '_').upper()}"
-        about = comment(f"{inside}: {said.get(name, 'see its struct.')}{source}")
+        about = comment(f"{inside}: {texts.get(name, 'see its struct.')}{source}")
         if not kind:
             define = f"{about}#define {constant} ({literal(float(kept))})\n"
             yield Entry(define, f"state->{inside} = {constant};")

@@ -130,7 +130,7 @@ class FlightLibrary(FlightCode):
         gains = self._library.space_robot_gains(
             ctypes.c_void_p(self._state.ctypes.data), place, ctypes.byref(count)
         )
-        numbers = np.concatenate([*law.gain_values.values(), np.zeros(0)])
+        numbers = np.concatenate([*law.gain_values.values(), np.zeros(0)])  # it may have no gains
         assert count.value == len(numbers)
         for k, number in enumerate(numbers):
             gains[k] = number
@@ -215,7 +215,7 @@ def fill_reference(wanted: NDArray[Any], reference: Block) -> None:
 def fill_measurement(measurement: NDArray[Any], state: RobotState) -> None:
     """Write a state into a ``space_robot_measurement``."""
     measurement["tick"] = state.tick
-    inside = measurement["state"]
+    inside = measurement["state"]  # sized for this robot, the state for the largest
     for name in inside.dtype.names or ():
         field = inside[name]
         field[0] = getattr(state, name)[: field.shape[1]]
@@ -249,6 +249,7 @@ def build_library(sources: Mapping[PurePosixPath, str], flags: Sequence[str] = F
     compiler = find_compiler()
     command = [compiler, *flags, "-shared", "-fPIC"]
     version = subprocess.run([compiler, "--version"], capture_output=True, check=False).stdout
+    # with another compiler or other flags the same text is another library
     digest = hashlib.sha256(version + repr(command).encode())
     for path, text in sorted(sources.items()):
         digest.update(f"{path}\0{text}\0".encode())
@@ -270,5 +271,5 @@ def build_library(sources: Mapping[PurePosixPath, str], flags: Sequence[str] = F
             reason = next((line for line in run.stderr.splitlines() if "error" in line), run.stderr)
             raise InputError(f"{compiler} cannot compile the flight code: {reason.strip()}")
         shutil.move(built, temporary := library.with_suffix(f".{os.getpid()}"))
-        os.replace(temporary, library)
+        os.replace(temporary, library)  # at once: another process may read it
     return library

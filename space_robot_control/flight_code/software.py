@@ -169,6 +169,7 @@ def translate(software: FlightSoftware) -> Translated:
         reached = reachable(program, roots.values())
         written = {field for function in reached for field in function.stores}
         known = _constants(software, program, written)
+    # what a user fills, and gains and memories of laws, have all their fields
     whole: list[type[Record]] = [State, Reference]
     whole += [part.record for part in software.parts if "_" in part.name]
     files = Files(program, list(roots.values()), whole, _room)

@@ -111,6 +111,7 @@ def shortest_duration(
 def _shares(
     robot: Robot, limits: MissionLimits, joints: Course, base: Course, begin: float, span: float
 ) -> Iterator[tuple[float, str]]:
+    # k times the duration: 1/k of rates and momenta, 1/k^2 of accelerations and torques
     asked = demand(robot, joints, base, begin, begin + span)
     rates = np.max(np.abs(asked.joints[:, 1]), axis=0)
     accelerations = np.max(np.abs(asked.joints[:, 2]), axis=0)

@@ -42,7 +42,7 @@ MOST_AWAY = 4.0 * np.pi
 
 
 def reactionless_course(start: SegmentStart, goal: Array) -> JointMaker:
-    """Return what makes the course along a reactionless path towards a goal (n,), rad or m."""
+    """Return the course along a reactionless path to a goal (n,) as a function of the duration."""
     robot, away = start.robot, np.abs(goal - start.joints)
     if away.max() > MOST_AWAY:
         name = robot.joint_names[int(np.argmax(away))]
@@ -117,6 +117,7 @@ def integrate_into(
                 momentum[k] = 0.0
                 for j in range(n):
                     momentum[k] += work.coupling[k, j] * slopes[stage, j]
+            # H~^+ H~ (theta_goal - theta), the part of the way that has momentum, is taken off it
             least_squares_into(work.coupling, momentum, scratch, direction)
             for j in range(n):
                 slopes[stage, j] -= direction[j]

@@ -48,7 +48,7 @@ class TrajectoryPoint(NamedTuple):
     accelerations: Sequence[float]
 
 
-def brought_to_rest(
+def braking_pieces(
     robot: Robot, begin: float, joints: Array, rates: Array, base: BaseMotion
 ) -> list[Piece]:
     """Return the piece that brings a moving reference to rest, or none if it is at rest.
@@ -79,7 +79,7 @@ def _onwards(begin: float, rates: Array, base: BaseMotion) -> Course:
 
 
 @np.errstate(all="ignore")  # numbers that overflow are refused, in one line
-def joined(
+def joined_trajectory(
     robot: Robot,
     names: Sequence[str],
     points: Sequence[TrajectoryPoint],
@@ -95,7 +95,7 @@ def joined(
     state; of one that is joined late also those that the joints cannot reach in time any more.
 
     Args:
-        robot: see `brought_to_rest`, as ``begin``, ``joints``, ``rates`` and ``base``.
+        robot: see `braking_pieces`, as ``begin``, ``joints``, ``rates`` and ``base``.
         names: of the joints, in the order of the points' numbers.
         points: with rising times from 0 on; velocities and accelerations that are missing are
             those of a cubic spline through the positions. It ends at rest unless the last point
@@ -154,7 +154,7 @@ def _states(
     final = _row(last, order, "velocities") if len(last) else np.zeros(len(order))
     spline = CubicSpline(times, positions, joints[1], final)
     states = spline.at(times)
-    states[0] = joints
+    states[0] = joints  # nothing jumps, not even the acceleration
     states[-1, 2] = 0.0
     for k, point in enumerate(points, 1):
         if len(point.velocities):
@@ -197,7 +197,7 @@ class GoalTolerances(NamedTuple):
 
     @classmethod
     def read(cls, goal: Any, names: Sequence[str]) -> GoalTolerances:
-        """Read those of a FollowJointTrajectory.Goal for n joints."""
+        """Read the tolerances of a FollowJointTrajectory.Goal for n joints."""
         duration = goal.goal_time_tolerance
         seconds = duration.sec + 1e-9 * duration.nanosec
         return cls(
@@ -227,6 +227,7 @@ class GoalTolerances(NamedTuple):
             return GoalVerdict("PATH_TOLERANCE_VIOLATED", text)
         reached = (error <= self.goal).all(axis=(1, 2)) & is_after
         late = time > piece.end + self.time
+        # `True` behind the last time: never late
         if reached.any() and np.argmax(reached) <= np.argmax([*late, True]):
             return GoalVerdict("SUCCESSFUL")
         if late.any():
@@ -253,6 +254,7 @@ def _limits(what: str, entries: Sequence[Any], names: Sequence[str]) -> Array:
 
 
 def _excess(what: str, names: Sequence[str], time: float, error: Array, limits: Array) -> str:
+    # a number that is missing is the largest error
     ratio = np.where(np.isnan(error) & np.isfinite(limits), np.inf, error / limits)
     order, joint = divmod(int(np.nanargmax(ratio)), len(names))
     return (

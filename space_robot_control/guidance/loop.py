@@ -37,17 +37,17 @@ if TYPE_CHECKING:
 
 MOST_AT_ONCE = 100
 """Messages taken before the stream goes on: somebody may flood the topic."""
-CLOCK_WAIT_S = GREET_S = 0.05
+CLOCK_WAIT_S = RESEND_S = 0.05
 MOST_OWED_S = 60.0
 """A mission that was stopped for longer (simulated time) does not send what it owes."""
 
 GOTO = "goto"
 UNFORESEEN = (ArithmeticError, AttributeError, LookupError, MemoryError, TypeError, ValueError)
 """What planning raises for numbers that no check has foreseen; the flight must go on."""
-TOLD_S = 1.0
+WARNING_S = 1.0
 """Time for which a refusal is the node's mode in /diagnostics, from where `fly` prints it, s."""
-MOST_TOLD = 20
-"""Refusals that wait to be told, if somebody floods the topic."""
+MOST_WARNINGS = 20
+"""Refusals that wait to be reported, if somebody floods the topic."""
 
 
 class MissionChanges:
@@ -72,8 +72,8 @@ class MissionChanges:
         self.latest: Piece | None = None
         """The last motion that was asked for in flight."""
         self.counts = {"trajectories accepted": 0, "trajectories refused": 0}
-        self._warnings, self._warning = deque[str](maxlen=MOST_TOLD), ""
-        self._told_until = 0.0
+        self._warnings, self._warning = deque[str](maxlen=MOST_WARNINGS), ""
+        self._warning_until = 0.0
 
     @property
     def time(self) -> float:
@@ -82,7 +82,8 @@ class MissionChanges:
 
     def joints(self) -> NDArray[np.float64]:
         """Return the reference (3, n) of the joints at this time."""
-        return self._mission.chunk(self._ticks()[0], 1).joints[0]
+        joints: NDArray[np.float64] = self._mission.chunk(self._ticks()[0], 1).joints[0]
+        return joints
 
     def take(self) -> None:
         """Follow the trajectory that has come last, if any."""
@@ -92,7 +93,7 @@ class MissionChanges:
             except MessageError as error:
                 self.refuse(str(error))
             except InputError:
-                pass  # has been told
+                pass  # `follow` has reported it
 
     def follow(self, trajectory: Any) -> None:
         """Follow a trajectory_msgs/JointTrajectory; a refused one leaves the mission as it was."""
@@ -148,7 +149,7 @@ class MissionChanges:
         self._node.log(f"{piece.motion} from t = {piece.begin:.4f} s to {piece.end:.4f} s")
 
     def refuse(self, reason: str) -> None:
-        """Count and tell a refused trajectory."""
+        """Count and report a refused trajectory."""
         self.counts["trajectories refused"] += 1
         self.warn(f"refused a trajectory: {reason}")
 
@@ -158,11 +159,11 @@ class MissionChanges:
         self._node.log(self._warnings[-1])
 
     def next_warning(self) -> str:
-        """Return what was refused or failed, each at one call at least, the last for a second."""
+        """Return the warning to report: each one at least once, the last one for a second."""
         now = time.monotonic()
         if self._warnings:
-            self._warning, self._told_until = self._warnings.popleft(), now + TOLD_S
-        return self._warning if now < self._told_until else ""
+            self._warning, self._warning_until = self._warnings.popleft(), now + WARNING_S
+        return self._warning if now < self._warning_until else ""
 
 
 class MissionLoop:
@@ -190,7 +191,7 @@ class MissionLoop:
         self._next = 0
         """The first tick that the stream has not reached."""
         self._invalid_stamps, self._listeners = 0, 0
-        self._greet_at = 0.0
+        self._resend_at = 0.0
         self._changes = MissionChanges(
             node,
             self._mission,
@@ -215,8 +216,8 @@ class MissionLoop:
     def step(self) -> Wait | None:
         """Send due chunks and read the clock."""
         now = time.monotonic()
-        if now >= self._greet_at:
-            self._greet_at = now + GREET_S
+        if now >= self._resend_at:
+            self._resend_at = now + RESEND_S
             self._resend_pending()
             self._changes.take()
         has_taken = self._take_clock()
@@ -244,6 +245,7 @@ class MissionLoop:
 
     def _resend_pending(self) -> None:
         listeners = self._joints.listener_count + self._base.listener_count
+        # topics keep nothing for subscribers that come later
         if listeners > self._listeners:
             self._next = min(self._next, self._chunk_start(max(self._stamps.last, 0)))
         self._listeners = listeners
@@ -268,11 +270,11 @@ class MissionLoop:
             except MessageError:  # not this graph's clock
                 self._invalid_stamps += 1
                 continue
-            if tick != self._stamps.last and not self._believe(tick):
+            if tick != self._stamps.last and not self._accept(tick):
                 self._invalid_stamps += 1
         return True
 
-    def _believe(self, tick: int) -> bool:
+    def _accept(self, tick: int) -> bool:
         stamps, last = self._stamps, self._stamps.last
         if not stamps.passes(tick):
             return False

@@ -103,6 +103,7 @@ def match_into(old: Array, new: Array, turn: Array) -> None:
     back = (q[0], -q[1], -q[2], -q[3])
     carried = rotated(back, vector(new, 4))
     omega = subtract(vector(old, 4), carried)
+    # the axes on which `carried` is written turn with omega: its derivative there has -omega x it
     alpha = add(subtract(vector(old, 7), rotated(back, vector(new, 7))), cross(omega, carried))
     rate = by_inverse_jacobian(phi, omega)
     second = by_inverse_jacobian(phi, subtract(alpha, jacobian_rate(phi, rate)))
@@ -143,7 +144,7 @@ def coefficients(phi: Vector) -> tuple[float, float, float, float]:
     """Return ``a``, ``b`` and their derivatives with respect to t, divided by t."""
     ratio, cosine = half_turn(phi)
     square, sine = dot(phi, phi), ratio * cosine  # sin(t) / t
-    a = 0.5 * ratio * ratio
+    a = 0.5 * ratio * ratio  # 1 - cos t = 2 sin^2(t / 2), which loses no digits for small t
     if square < SMALL * SMALL:
         return (
             a,
@@ -179,6 +180,6 @@ def by_inverse_jacobian(phi: Vector, omega: Vector) -> Vector:
     square = dot(phi, phi)
     factor = 1.0 / 12.0 + square / 720.0
     if square > SMALL * SMALL:
-        factor = (1.0 - cosine / ratio) / square
+        factor = (1.0 - cosine / ratio) / square  # (1 - (t / 2) cot(t / 2)) / t^2
     across = cross(phi, omega)
     return add(add(omega, scale(across, 0.5)), scale(cross(phi, across), factor))

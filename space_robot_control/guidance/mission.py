@@ -209,10 +209,10 @@ class Mission:
         points or is on its way there. Return the planned segment; one that is refused leaves the
         mission as it was.
         """
-        from .live import brought_to_rest
+        from .live import braking_pieces
 
         begin, joints, rates, base = self._state_at(tick)
-        before = brought_to_rest(self._robot, begin, joints, rates, base)
+        before = braking_pieces(self._robot, begin, joints, rates, base)
         if before:
             begin, joints = before[0].end, before[0].goal[np.newaxis]
             base = base._replace(quaternion=before[0].attitude)
@@ -239,12 +239,12 @@ class Mission:
 
         Args:
             tick: the first one whose reference may change.
-            names: of the joints, see `joined`.
-            points: of the trajectory, see `joined`.
+            names: of the joints, see `joined_trajectory`.
+            points: of the trajectory, see `joined_trajectory`.
             start: s, simulated time of the trajectory's start; None: at ``tick``. What was planned
                 is flown until then; a trajectory that has started already is joined.
         """
-        from .live import START_WITHIN_S, brought_to_rest, joined
+        from .live import START_WITHIN_S, braking_pieces, joined_trajectory
 
         late = 0.0
         if start is not None:
@@ -255,11 +255,11 @@ class Mission:
                 )
             tick = max(tick, math.ceil(start / self.period - ROUNDING))
             late = max(0.0, tick * self.period - start)
-        piece = joined(self._robot, names, points, *self._state_at(tick), late)
+        piece = joined_trajectory(self._robot, names, points, *self._state_at(tick), late)
         end = np.array([piece.end])
         joints, rates = piece.joints.at(end)[0], piece.base.at(end)[0]
         base = BaseMotion(rates[:4], piece.base if piece.mode else None, piece.mode)
-        after = brought_to_rest(self._robot, piece.end, joints, rates, base)
+        after = braking_pieces(self._robot, piece.end, joints, rates, base)
         self._replace([piece, *after])
         return piece
 

@@ -123,7 +123,7 @@ class Planner:
         goal = None if segment.base == "free" else segment.base
         quaternion, before = base.quaternion, base.before or base.course
         _check_turning(segment, base)
-        if goal is None or goal == base.mode:
+        if goal is None or goal == base.mode:  # it goes on as it moves
             return LedBase(lambda _: base.held, base.course, base.mode)
         if isinstance(goal, PointingGoal):
             from .matched_slew import MatchedSlew

@@ -106,6 +106,7 @@ class ToolCourses:
             return course
         self._tool.pose(self._quaternion, self._start.joints)
         coupling = self._tool.work.coupling[:, self._tool.rows]
+        # weights are relative to this robot's mass, by the mean square of a joint's momentum
         mean = float(np.sum(coupling * coupling)) / coupling.shape[1]
         least = self._largest_torque(course, base, span)
         for weight in MOMENTUM_WEIGHTS:
@@ -153,7 +154,8 @@ class ToolCourses:
         if self._goal.frame == "orbit":
             raise InputError("base: free does not go with tool.frame: orbit")
         positions, rotations = self._path(np.empty((0, 4)), quintic(share)[0])
-        # in a long one knots are far apart: the same path is followed in less time
+        # in a long one knots are far apart: the same path is followed in less time, as without
+        # momentum the motion of the base depends on the path alone
         slower = float(times[1]) / KNOT_S if len(times) == MOST_KNOTS else 1.0
         twists = _twists(positions, rotations, share, span / slower)
         out, attitudes = np.empty((len(times), len(tool.rows))), np.empty((len(times), 4))
@@ -179,17 +181,17 @@ class ToolCourses:
         turn = _matrix(goal.unit_quaternion) if goal.is_given else None
         xyz = None if goal.xyz is None else np.array(goal.xyz)
         if goal.frame in ("base", "orbit"):
-            axes = np.array([_matrix(attitude) for attitude in attitudes])
+            axes = _matrices(attitudes)
             back, is_shift = axes[0].T, goal.frame == "orbit"
             first = product(back, position if is_shift else from_base)
             last = first if xyz is None else first + xyz if is_shift else xyz
             line = _line(first, last, share)
-            positions = np.array([product(a, p) for a, p in zip(axes, line, strict=True)])
+            positions = _products(axes, line)
             if turn is None:
                 return positions, np.empty((0, 3, 3))
             rotation = product(back, rotation)
             inner = _turned(rotation, product(turn, rotation) if is_shift else turn, share)
-            return positions, np.array([product(a, r) for a, r in zip(axes, inner, strict=True)])
+            return positions, _products(axes, inner)
         end = position
         if xyz is not None:
             end = (position if goal.frame == "start" else self._start.origin()) + xyz
@@ -228,16 +230,15 @@ class ToolCourses:
             if len(rotations):
                 turn = multiplied(carried, fixed * BACK)
                 turn = _matrices(unit_rows(still + share * (turn - still)))
-                rotations[near] = np.array(
-                    [product(t, r) for t, r in zip(turn, rotations[near], strict=True)]
-                )
+                rotations[near] = _products(turn, rotations[near])
             positions[near] += share * away
 
 
 def _turns(vectors: Array) -> Array:
     angles = norms(vectors)
     sines, cosines = sines_cosines(0.5 * angles)
-    return np.column_stack((cosines, vectors * (sines / np.maximum(angles, 1e-300))[:, np.newaxis]))
+    shares = sines / np.maximum(angles, 1e-300)  # 0 of a vector that is 0
+    return np.column_stack((cosines, vectors * shares[:, np.newaxis]))
 
 
 def _matrices(quaternions: Array) -> Array:
@@ -250,6 +251,10 @@ def _matrix(quaternion: Array) -> Array:
     return matrix
 
 
+def _products(matrices: Array, others: Array) -> Array:
+    return np.array([product(a, b) for a, b in zip(matrices, others, strict=True)])
+
+
 def _line(first: Array, last: Array, share: Array) -> Array:
     return first + (last - first) * share[:, np.newaxis]
 
@@ -258,7 +263,7 @@ def _turned(first: Array, last: Array, share: Array) -> Array:
     start, goal = quaternion_of_rotation(first), quaternion_of_rotation(last)
     axis, angle = turn_between(start, goal)
     steps = multiplied(start, turned_by(axis, angle * share))
-    return np.array([_matrix(step) for step in steps])
+    return _matrices(steps)
 
 
 def _twists(positions: Array, rotations: Array, share: Array, span: float) -> Array:

@@ -108,6 +108,7 @@ class TrajectoryTable:
         if base.course is not None:
             motion = base.course.at(np.array([begin]))[0]
             sign = 1.0 if product(first, motion[:4]) >= 0.0 else -1.0
+            # it goes on with the base's rate: qdot = q (0, omega) / 2
             rate = 0.5 * sign * multiplied(motion[:4], np.append(0.0, motion[4:7]))
             attitude = CubicSpline(self._time, attitude.values, rate, np.zeros(4))
         return course, AttitudeCourse(begin, attitude)
@@ -124,6 +125,7 @@ def _quaternions(columns: Columns) -> Array:
             "1.001 is allowed"
         )
     rows = unit_rows(rows)
+    # q and -q are one attitude, but a spline from one to the other would pass near zero
     products = dot_rows(rows[1:], rows[:-1])
     rows[1:] *= np.cumprod(np.where(products < 0.0, -1.0, 1.0), axis=0)
     return rows

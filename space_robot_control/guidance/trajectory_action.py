@@ -91,9 +91,9 @@ class TrajectoryAction:
     to rest.
     """
 
-    def __init__(self, node: ManagedNode[Any], action: Any, motions: MissionChanges) -> None:
+    def __init__(self, node: ManagedNode[Any], action: Any, changes: MissionChanges) -> None:
         """Offer the action, a control_msgs.action.FollowJointTrajectory."""
-        self._node, self._action, self._motions = node, action, motions
+        self._node, self._action, self._changes = node, action, changes
         self._goal: ServerGoalHandle | None = None
         """The last one."""
         self._is_closed = False
@@ -120,22 +120,22 @@ class TrajectoryAction:
                 getattr(request, name) for name in OF_OTHER_JOINTS
             ):
                 raise InputError("multi_dof_trajectory and its tolerances are not for this robot")
-            self._tolerances = GoalTolerances.read(request, self._motions.names.joints)
+            self._tolerances = GoalTolerances.read(request, self._changes.names.joints)
         except InputError as error:
-            self._motions.refuse(str(error))
+            self._changes.refuse(str(error))
             return GoalResponse.REJECT
         try:
-            self._motions.follow(request.trajectory)
+            self._changes.follow(request.trajectory)
         except InputError:
             return GoalResponse.REJECT
         if any(e.acceleration > 0.0 for e in (*request.path_tolerance, *request.goal_tolerance)):
-            self._motions.warn("accelerations are not measured: their tolerances are ignored")
+            self._changes.warn("accelerations are not measured: their tolerances are ignored")
         return GoalResponse.ACCEPT
 
     def _start(self, goal: ServerGoalHandle) -> None:
-        self._goal, piece = goal, self._motions.latest
+        self._goal, piece = goal, self._changes.latest
         assert piece is not None
-        pursuit = Pursuit(self._node, piece, self._tolerances, self._motions.names)
+        pursuit = Pursuit(self._node, piece, self._tolerances, self._changes.names)
         goal.execute(partial(self._lead, pursuit=pursuit))
 
     def _cancel(self, goal: ServerGoalHandle) -> CancelResponse:
@@ -145,9 +145,9 @@ class TrajectoryAction:
 
     def _stop(self, what: str) -> bool:
         try:
-            self._motions.stop()
+            self._changes.stop()
         except InputError as error:  # a joint would leave its limits meanwhile
-            self._motions.warn(f"refused {what}: {error}")
+            self._changes.warn(f"refused {what}: {error}")
             return False
         return True
 
@@ -158,7 +158,7 @@ class TrajectoryAction:
                 await self._pause(goal, pursuit)
         code, text = verdict
         if code.endswith("VIOLATED"):
-            self._motions.warn(f"a goal is aborted, the reference is brought to rest: {text}")
+            self._changes.warn(f"a goal is aborted, the reference is brought to rest: {text}")
             self._stop("to bring the reference to rest")
         if code != "SUCCESSFUL":
             goal.abort()
@@ -177,14 +177,14 @@ class TrajectoryAction:
             return GoalVerdict("INVALID_GOAL", "the mission has ended")
         if goal.is_cancel_requested:
             return GoalVerdict("SUCCESSFUL", "the reference is brought to rest")
-        if self._motions.latest is not pursuit.piece:
+        if self._changes.latest is not pursuit.piece:
             return GoalVerdict("INVALID_GOAL", "another motion took its place")
-        return pursuit.verdict(self._motions.time)
+        return pursuit.verdict(self._changes.time)
 
     def _feedback(self) -> Any:
-        motions, feedback = self._motions, self._action.Feedback()
-        feedback.header.stamp = Time(nanoseconds=round(motions.time * 1e9)).to_msg()
-        feedback.joint_names = list(motions.names.joints)
+        changes, feedback = self._changes, self._action.Feedback()
+        feedback.header.stamp = Time(nanoseconds=round(changes.time * 1e9)).to_msg()
+        feedback.joint_names = list(changes.names.joints)
         desired = feedback.desired
-        desired.positions, desired.velocities, desired.accelerations = motions.joints().tolist()
+        desired.positions, desired.velocities, desired.accelerations = changes.joints().tolist()
         return feedback

@@ -167,6 +167,7 @@ class Expressions:
         if node.id in self.names:
             return self.names[node.id]
         module = self.function.__globals__
+        # capacities of arrays: Python's are for any robot, C's are exact
         if node.id in self.program.sizes and node.id in module:
             return number_of(self.program.sizes[node.id])
         if node.id in module:
@@ -177,6 +178,7 @@ class Expressions:
         if isinstance(value, bool):
             return number_of(value)
         if isinstance(value, (float, int)):
+            # its number is known, but C reads it by its name, too
             text = self.program.named(self.function.__module__, name, value)
             return replace(number_of(value), text=text, rank=lang.ATOM)
         return Value(Known(value), name)
@@ -339,13 +341,14 @@ class Expressions:
             return left
         if kind == lang.INT and sign == "+" and left.constant == 0:
             return right
-        if sign == "<<":
+        if sign == "<<":  # a plain literal is an int, of 32 bits
             left = replace(left, text=f"INT64_C({left.text})") if left.text.isdigit() else left
         if rank == lang.ATOM:
             if kind != lang.INT:
                 raise RefusedError("a remainder of floats", "use np.floor")
             text = f"{sign}({left.text}, {right.text})"
         else:
+            # (a - b) - c needs no parentheses, a - (b - c) keeps them: roundings stay in order
             text = f"{left.at(rank)} {sign} {right.at(rank + 1)}"
         return Value(kind, text, rank, constant, calls=calls)
 

@@ -189,7 +189,7 @@ def literal(number: float) -> str:
         return "(double)NAN"
     if math.isinf(number):
         return "(double)INFINITY" if number > 0 else "-(double)INFINITY"
-    text = repr(float(number))
+    text = repr(float(number))  # the shortest text that reads back as the same bits
     return text if any(c in text for c in ".e") else f"{text}.0"
 
 
@@ -244,6 +244,7 @@ def joined(one: Type, other: Type) -> Type:
         return other
     if {one, other} <= {FLOAT, INT}:
         return FLOAT
+    # arrays of different lengths: a pointer to the first row fits both
     are_arrays = isinstance(one, ArrayOf) and isinstance(other, ArrayOf)
     if are_arrays and one.shape[1:] == other.shape[1:]:
         return ArrayOf((None, *one.shape[1:]))

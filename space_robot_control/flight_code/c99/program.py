@@ -80,7 +80,7 @@ def translated(
     """Translate a kernel of a program for types of arguments; ``label`` is a bundle's."""
     types: dict[str, lang.Type] = {}
     result: lang.Type = None
-    for _ in range(MOST_PASSES):
+    for _ in range(MOST_PASSES):  # an integer may turn out to be a float at the end of a loop
         translation = Statements(program, body, *syntax_of(body), kinds)
         translation.types |= types
         translation.result = result
@@ -167,6 +167,7 @@ class KernelProgram:
         self.records[id(record)] = record
         declared = record.fields()[name]
         assert isinstance(declared, RecordField)
+        # a shape is a lambda that reads capacities of its module: here it reads the export's
         shape: Any = declared.shape
         resized = FunctionType(
             shape.__code__, {**shape.__globals__, **self.sizes}, None, None, shape.__closure__
@@ -256,7 +257,7 @@ class KernelProgram:
         )
         if (body, kinds) in self._known:
             return self._known[body, kinds]
-        if body in self._active:
+        if body in self._active:  # a flight computer's stack is bounded
             line = body.__code__.co_firstlineno
             raise lang.NotInSubsetError(file, line, "recursion", "write a loop")
         labels = [kind.label for kind in kinds if isinstance(kind, lang.Bundle)]
@@ -265,6 +266,7 @@ class KernelProgram:
         self._active.pop()
         number = len(self.functions)
         for k, old in enumerate(self.functions):
+            # lengths that are not read make no other function
             if old.body is body and old.lines == new.lines and old.head == new.head:
                 pairs = zip(old.parameters, new.parameters, strict=True)
                 merged = tuple(replace(p, type=lang.joined(p.type, q.type)) for p, q in pairs)

@@ -123,6 +123,7 @@ class Statements(Expressions):
                 test = test.args[0]
             else:
                 break
+        # what a call returns or an attribute holds may be another value the next time
         is_plain = not any(isinstance(n, (ast.Call, ast.Attribute)) for n in ast.walk(test))
         names = names_in([test])
         if is_plain and names.keys() <= self.names.keys() and all(map(self._is_steady_name, names)):
@@ -139,6 +140,7 @@ class Statements(Expressions):
             self._assign_together(node.targets[0], node.value)
             return
         value = self.translate(node.value)
+        # a = b = f() calls once
         if len(node.targets) > 1 and (value.calls or isinstance(value.type, lang.TupleOf)):
             value = self._named("value", value)
         for target in node.targets:
@@ -161,6 +163,8 @@ class Statements(Expressions):
                 self._assign(part, Value(kind, item, lang.POSTFIX))
             return
         values = [self.translate(part) for part in source.elts]
+        # Python evaluates all values before it stores the first: C needs names for those that
+        # earlier targets change
         for k in range(1, len(values)):
             written = [ast.unparse(earlier) for earlier in target.elts[:k]]
             mentioned = {ast.unparse(n) for n in ast.walk(source.elts[k])}
@@ -193,6 +197,7 @@ class Statements(Expressions):
         roots = frozenset({name}) | value.roots | self._roots.get(name, frozenset())
         self._roots[name] = roots
         local = Value(kind, name, constant=known, roots=roots, fields=value.fields)
+        # an integer or truth value that is known is written as a number, and decides branches
         if known is not None and kind == lang.INT:
             local = replace(number_of(known), roots=frozenset())
         elif known is not None and kind == lang.BOOL:
@@ -258,6 +263,7 @@ class Statements(Expressions):
         first, lines = len(self.lines), self.lines
         is_left = self._inside(node.orelse) and is_left
         self.facts = known
+        # an else with nothing but one chain of ifs becomes "else if"
         level = INDENT * (self._depth + 1)
         heads = [line[len(level) :] for line in lines[first:] if line[len(level) :][:1] != " "]
         if heads and heads[0][:4] == "if (" and all(head[:1] == "}" for head in heads[1:]):
@@ -302,12 +308,15 @@ class Statements(Expressions):
         if by not in (1, -1):
             raise RefusedError("a loop with another step than 1 or -1", "compute the index")
         is_known = start.constant is not None and stop.constant is not None
+        # a loop without turns: a base may have no wheels, and C has no arrays of length 0
         if is_known and (stop.constant - start.constant) * by <= 0:
             return
+        # Python evaluates a range's end once, C before every turn of its loop
         stop_text = stop.at(lang.SUM)
         if stop.constant is None and not self._is_steady(ends[1], node):
             stop_text = self._fresh("end")
             self.emit(f"const int64_t {stop_text} = {stop.text};")
+        # loops that count by _ may be nested
         shown = self._fresh("round") if name == "_" else name
         self.names[name] = Value(lang.INT, shown)
         sign, change = ("<", "++") if by == 1 else (">", "--")
@@ -431,7 +440,7 @@ def declared(lines: Sequence[str], declarations: Mapping[str, str]) -> list[str]
         places = [k for k, line in enumerate(done) if mention.search(line)]
         for place in reversed(places):  # what nobody reads
             _, is_value, source = done[place].partition(value)
-            if len(places) == 1 and is_value and "(" not in source:
+            if len(places) == 1 and is_value and "(" not in source:  # a call may write
                 del done[place]
                 places = []
         if not places:
@@ -444,6 +453,7 @@ def declared(lines: Sequence[str], declarations: Mapping[str, str]) -> list[str]
         if first == places[0] and done[first].strip().startswith(value):
             done[first] = done[first].replace(value, f"{declaration} = ")
         else:
+            # in a loop it keeps its value from one turn to the next, as in Python
             place, level = (0, 1) if is_in_loop else (first, level)
             done.insert(place, f"{INDENT * level}{declaration};")
     return [line.replace(MARK, "") for line in done]
