@@ -14,10 +14,10 @@ from space_robot_control.flight_code.acceptance import (
     REFERENCE_SHARE,
     SHARE,
     RecordingSupervisor,
+    add_noise,
+    corrupt_state,
+    corrupted_reference,
     hostile_ticks,
-    shake,
-    spoil,
-    spoiled_reference,
 )
 from space_robot_control.flight_code.folder import Exported
 from space_robot_msgs_py.errors import FlightError
@@ -143,15 +143,15 @@ def _hostile(plan: FlightPlan, exported: Exported, laws: Sequence[str]) -> Recor
         state = flight.plant.state.copy()
         state.tick = tick
         noise = 0.0 if random.random() < REPEATED else 10.0 ** random.uniform(-6, -1)
-        shake(state, noise, random)
+        add_noise(state, noise, random)
         wheels.measure(state, commanded, k)
         is_hostile = random.random() < SHARE and k % PHASE > QUIET_TICKS
         reference = references[k : k + 1]
-        spoil(state, wheels.count, random, reference["quaternion"][0], is_hostile)
+        corrupt_state(state, wheels.count, random, reference["quaternion"][0], is_hostile)
         if supervisor.answered < 0:
             reference = np.full_like(reference.view(np.float64), np.nan).view(reference.dtype)
         elif random.random() < REFERENCE_SHARE:
-            reference = spoiled_reference(reference, random)
+            reference = corrupted_reference(reference, random)
         commanded = supervisor.answer(state, reference).torque
     supervisor.finish()
     return supervisor

@@ -130,13 +130,13 @@ def weighted_sum(telemetry: tuple[Array, ...]) -> np.uint64:
     return total
 
 
-def shake(state: RobotState, size: float, random: np.random.Generator) -> None:
+def add_noise(state: RobotState, size: float, random: np.random.Generator) -> None:
     """Add noise of a ``size`` to all numbers of a state; its quaternion stays unit."""
     state.numbers[:] += size * random.normal(size=state.numbers.size)
     state.quaternion[:] /= np.sqrt(state.quaternion @ state.quaternion)
 
 
-def spoil(
+def corrupt_state(
     state: RobotState,
     wheels: int,
     random: np.random.Generator,
@@ -170,14 +170,14 @@ def spoil(
     state.wheel_velocities[wheels:] = state.wheel_torques[wheels:] = 0.0
 
 
-def spoiled_reference(reference: Block, random: np.random.Generator) -> Block:
+def corrupted_reference(reference: Block, random: np.random.Generator) -> Block:
     """Return a reference with some, or all, of its numbers changed."""
-    spoiled = reference.copy()
-    for part in Reference.parts(spoiled):
+    corrupted = reference.copy()
+    for part in Reference.parts(corrupted):
         numbers = part.reshape(-1)
         places = random.integers(numbers.size, size=random.choice([0, 1, 3, numbers.size]))
         numbers[places] = random.choice(VALUES, size=places.size)
-    return spoiled
+    return corrupted
 
 
 def hostile_ticks(count: int, random: np.random.Generator) -> Iterator[int]:

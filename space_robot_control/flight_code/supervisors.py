@@ -99,12 +99,12 @@ class ShadowSupervisor(_SupervisorWithCode):
         return command
 
     @staticmethod
-    def _compare(tick: int, what: str, names: Sequence[str], python: Array, c: Array) -> None:
+    def _compare(tick: int, number: str, names: Sequence[str], python: Array, c: Array) -> None:
         different = np.flatnonzero(bits(python) != bits(c))
         if different.size:
             k = int(different[0])
             values = f"{float(python[k])!r} in Python and {float(c[k])!r} in C"
-            raise ShadowError(f"at tick {tick} the {what} {names[k]} is {values}")
+            raise ShadowError(f"at tick {tick} the {number} {names[k]} is {values}")
 
 
 def bits(numbers: Array) -> NDArray[np.int64]:

@@ -164,16 +164,15 @@ def _states(
     return states
 
 
-def _row(values: Sequence[float], order: Sequence[int], what: str) -> Array:
+def _row(values: Sequence[float], order: Sequence[int], quantity: str) -> Array:
     if len(values) != len(order):
-        raise InputError(f"a point has {len(values)} {what} of {len(order)} joints")
+        raise InputError(f"a point has {len(values)} {quantity} of {len(order)} joints")
     row = np.array(values, dtype=np.float64)[list(order)]
     if not np.all(np.isfinite(row)):
-        raise InputError(f"a point has {what} that are not finite")
-    if np.abs(row).max() > MOST[what]:
-        raise InputError(
-            f"a point has {what} of {np.abs(row).max():g}, at most {MOST[what]:g} can be flown"
-        )
+        raise InputError(f"a point has {quantity} that are not finite")
+    largest, most = np.abs(row).max(), MOST[quantity]
+    if largest > most:
+        raise InputError(f"a point has {quantity} of {largest:g}, at most {most:g} can be flown")
     return row
 
 
@@ -237,27 +236,27 @@ class GoalTolerances(NamedTuple):
         return None
 
 
-def _limits(what: str, entries: Sequence[Any], names: Sequence[str]) -> Array:
+def _limits(key: str, entries: Sequence[Any], names: Sequence[str]) -> Array:
     limits = np.full((len(MEASURED), len(names)), np.inf)
     for entry in entries:
-        joint = list(names).index(one_of(entry.name, names, "joint", f" of {what}"))
+        joint = list(names).index(one_of(entry.name, names, "joint", f" of {key}"))
         for order, quantity in enumerate(MEASURED):
             value = getattr(entry, quantity)
             if value > 0.0:
                 limits[order, joint] = value
             elif value not in NO_LIMIT:
                 raise InputError(
-                    f"{what}: {quantity} of joint {entry.name!r}: a number above 0 was expected, "
+                    f"{key}: {quantity} of joint {entry.name!r}: a number above 0 was expected, "
                     f"or 0 or -1 for no limit, got {value:g}"
                 )
     return limits
 
 
-def _excess(what: str, names: Sequence[str], time: float, error: Array, limits: Array) -> str:
+def _excess(key: str, names: Sequence[str], time: float, error: Array, limits: Array) -> str:
     # a number that is missing is the largest error
     ratio = np.where(np.isnan(error) & np.isfinite(limits), np.inf, error / limits)
     order, joint = divmod(int(np.nanargmax(ratio)), len(names))
     return (
         f"the {MEASURED[order]} of joint {names[joint]!r} is off by {error[order, joint]:.4g} at "
-        f"t = {time:.4f} s, {what} is {limits[order, joint]:g}"
+        f"t = {time:.4f} s, {key} is {limits[order, joint]:g}"
     )

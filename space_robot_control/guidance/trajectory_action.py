@@ -29,7 +29,7 @@ from .courses import Piece
 from .live import GoalTolerances, GoalVerdict
 
 if TYPE_CHECKING:
-    from .loop import MissionChanges
+    from .mission_changes import MissionChanges
 
 Array = NDArray[np.float64]
 
@@ -143,11 +143,11 @@ class TrajectoryAction:
             return CancelResponse.REJECT
         return CancelResponse.ACCEPT if self._stop("to cancel a goal") else CancelResponse.REJECT
 
-    def _stop(self, what: str) -> bool:
+    def _stop(self, purpose: str) -> bool:
         try:
             self._changes.stop()
         except InputError as error:  # a joint would leave its limits meanwhile
-            self._changes.warn(f"refused {what}: {error}")
+            self._changes.warn(f"refused {purpose}: {error}")
             return False
         return True
 

@@ -21,17 +21,17 @@ TERNARY, OR, AND, BITS, EQUAL, RELATION, SHIFT, SUM, PRODUCT, UNARY, POSTFIX, AT
 class NotInSubsetError(InputError):
     """A construct that has no translation to C."""
 
-    def __init__(self, file: str, line: int, what: str, instead: str) -> None:
+    def __init__(self, file: str, line: int, construct: str, instead: str) -> None:
         """Name the place, the construct, and what to write instead."""
-        super().__init__(f"{file}, line {line}: {what} cannot be exported as C: {instead}")
+        super().__init__(f"{file}, line {line}: {construct} cannot be exported as C: {instead}")
 
 
 class RefusedError(Exception):
     """A construct is refused; the place is added by the caller who knows it."""
 
-    def __init__(self, what: str, instead: str) -> None:
-        super().__init__(what)
-        self.what, self.instead = what, instead
+    def __init__(self, construct: str, instead: str) -> None:
+        super().__init__(construct)
+        self.construct, self.instead = construct, instead
 
 
 @dataclass(frozen=True)

@@ -93,7 +93,7 @@ class Statements(Expressions):
     def refused(self, node: ast.AST, refusal: RefusedError) -> lang.NotInSubsetError:
         """Return the error for a refused construct."""
         line = self.first_line + getattr(node, "lineno", 1) - 1
-        return lang.NotInSubsetError(self.file, line, refusal.what, refusal.instead)
+        return lang.NotInSubsetError(self.file, line, refusal.construct, refusal.instead)
 
     def emit(self, line: str) -> None:
         """Add a line."""

@@ -18,15 +18,10 @@ from space_robot_msgs_py.wire.telemetry import ClockCodec, ReferenceCodec
 
 pytest.importorskip("rclpy")
 
-from space_robot_control.guidance import loop
-from space_robot_control.guidance.loop import (
-    CLOCK_WAIT_S,
-    MOST_AT_ONCE,
-    RESEND_S,
-    WARNING_S,
-    MissionLoop,
-)
+from space_robot_control.guidance import loop, mission_changes
+from space_robot_control.guidance.loop import CLOCK_WAIT_S, MOST_AT_ONCE, RESEND_S, MissionLoop
 from space_robot_control.guidance.mission import Mission
+from space_robot_control.guidance.mission_changes import WARNING_S
 from space_robot_msgs_py.ros.loop import Level
 
 CHUNK, LEAD = 10, 35
@@ -71,6 +66,7 @@ class Bench:
         patch.setattr(time, "monotonic", lambda: self.now)
         for name in ("RawPublisher", "RawSubscription"):
             patch.setattr(loop, name, Topic)
+        patch.setattr(mission_changes, "RawSubscription", Topic)
         self.settings = MissionNodeSettings.resolve({"chunk_ticks": chunk, "lead_ticks": LEAD})
         self.node: Any = Node()
         self.loop = MissionLoop(self.node, self.settings)
