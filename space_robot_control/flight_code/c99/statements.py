@@ -1,11 +1,11 @@
-"""Statements of kernels as statements of C, and where C declares the local names."""
+"""Statements of kernels as statements of C; local names are declared later, by `.program`."""
 
 from __future__ import annotations
 
 import ast
 import re
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from functools import cache, reduce
 from typing import Any
@@ -424,55 +424,3 @@ def assigned_in(tree: ast.FunctionDef) -> Counter[str]:
         if mentioned[name] != count and name != "_":
             raise RefusedError(f"{name!r} outside of its loop", "use another name")
     return names_in([tree], stored=True)
-
-
-def declared(lines: Sequence[str], declarations: Mapping[str, str]) -> list[str]:
-    """Return lines in which each name is declared in the innermost block that has it.
-
-    Args:
-        lines: of a function, indented, with a `MARK` around a name that gets a value.
-        declarations: of each local name.
-    """
-    done = list(lines)
-    for name, declaration in declarations.items():
-        value = f"{MARK}{name}{MARK} = "
-        mention = re.compile(rf"(?<![\w.>:]){name}\b")
-        places = [k for k, line in enumerate(done) if mention.search(line)]
-        for place in reversed(places):  # what nobody reads
-            _, is_value, source = done[place].partition(value)
-            if len(places) == 1 and is_value and "(" not in source:  # a call may write
-                del done[place]
-                places = []
-        if not places:
-            continue
-        first, level = places[0], _level(done[places[0]])
-        while not _is_in_block(done, first, level, places[-1]):
-            level -= 1
-            first = _beginning(done, first, level)
-        is_in_loop = any(_is_loop_around(done, k, first) for k in range(first))
-        if first == places[0] and done[first].strip().startswith(value):
-            done[first] = done[first].replace(value, f"{declaration} = ")
-        else:
-            # in a loop it keeps its value from one turn to the next, as in Python
-            place, level = (0, 1) if is_in_loop else (first, level)
-            done.insert(place, f"{INDENT * level}{declaration};")
-    return [line.replace(MARK, "") for line in done]
-
-
-def _level(line: str) -> int:
-    return (len(line) - len(line.lstrip())) // len(INDENT)
-
-
-def _is_in_block(lines: Sequence[str], first: int, level: int, last: int) -> bool:
-    return all(_level(line) >= level for line in lines[first : last + 1])
-
-
-def _beginning(lines: Sequence[str], place: int, level: int) -> int:
-    while _level(lines[place]) > level or lines[place].strip().startswith("}"):
-        place -= 1
-    return place
-
-
-def _is_loop_around(lines: Sequence[str], head: int, place: int) -> bool:
-    level, is_loop = _level(lines[head]), lines[head].strip().startswith(("for (", "while ("))
-    return is_loop and all(_level(line) > level for line in lines[head + 1 : place + 1])
