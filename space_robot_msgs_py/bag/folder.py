@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Iterator, Sequence
 from itertools import islice
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 from mcap.writer import MCAP0_MAGIC
 from pydantic import BaseModel, Field, ValidationError
@@ -15,7 +15,6 @@ from ..config.text import MOST_COMPARED, MOST_NEAR, nearest, printable
 from ..config.validation import read_yaml, validate
 from ..config.yaml_text import parse_yaml
 from ..errors import InputError
-from ..topics import Topic
 from .batch import Batch
 from .mcap_storage import McapStorage
 from .writer import DESCRIPTION, METADATA
@@ -55,11 +54,6 @@ class BagInformation(BaseModel):
         """Number of messages per topic."""
         return {t.topic_metadata.name: t.message_count for t in self.topics_with_message_count}
 
-    @property
-    def compressed(self) -> bool:
-        """True if rosbag2 itself compressed files or messages, rather than MCAP its chunks."""
-        return self.compression_mode.lower() in ("file", "message")
-
 
 def read_information(path: Path) -> BagInformation:
     """Read the metadata in a bag's folder.
@@ -81,31 +75,6 @@ def _information_in(file: Storage) -> BagInformation | None:
         return BagInformation.model_validate(parse_yaml(text))
     except (InputError, ValidationError):
         return None
-
-
-class Storage(Protocol):
-    """A file with messages, or a whole folder that rosbag2 compressed."""
-
-    counts: Counter[str] | None
-    """Messages per topic, from the file itself; None: not recorded."""
-    metadata: dict[str, dict[str, str]]
-    """The metadata records in it, by name."""
-    has_end: bool
-    """True if its writer closed it, as far as it is known."""
-
-    def topics(self) -> dict[str, str]:
-        """Return the type by topic."""
-
-    def batches(self) -> Iterator[Batch]:
-        """Yield all messages."""
-
-    @property
-    def incomplete(self) -> bool:
-        """True if something could not be read; known after `batches`."""
-
-    @property
-    def damage(self) -> list[str]:
-        """Damage, one sentence each; complete after `batches`."""
 
 
 class Bag:
@@ -178,13 +147,6 @@ class Bag:
             counts[batch.topic] += len(batch)
         return counts
 
-    def messages(self, *wanted: Topic) -> Iterator[tuple[str, bytes]]:
-        """Yield topic name and bytes of messages of some topics, in order for each topic."""
-        names = {topic.full_name for topic in wanted}
-        for batch in self.batches():
-            if batch.topic in names:
-                yield from ((batch.topic, batch.message(i)) for i in range(len(batch)))
-
 
 def some_of(names: Sequence[str]) -> str:
     """Return the first of some names, and how many there are more; a bag may have thousands."""
@@ -194,18 +156,19 @@ def some_of(names: Sequence[str]) -> str:
 
 
 class RosbagsStorage:
-    """A db3 file, or the folder of a bag that rosbag2 compressed."""
+    """A db3 file, or the folder of a bag that rosbag2 compressed; has what `McapStorage` has."""
 
     def __init__(self, path: Path) -> None:
-        """Look at it.
+        """Read the topics.
 
         Raises:
             InputError: it cannot be read.
         """
-        self._path, self._fault = path, ""
+        self._path = path
         self.counts: Counter[str] | None = None
         self.metadata: dict[str, dict[str, str]] = {}
-        self.has_end = True
+        self.damage: list[str] = []
+        self.has_end, self.incomplete = True, False
         try:
             with _reader(path) as reader:
                 self._types = {str(c.topic): str(c.msgtype) for c in reader.connections}
@@ -216,19 +179,9 @@ class RosbagsStorage:
         """Return the type by topic."""
         return self._types
 
-    @property
-    def incomplete(self) -> bool:
-        """True if the messages could not be read to their end."""
-        return bool(self._fault)
-
-    @property
-    def damage(self) -> list[str]:
-        """The sentence that says so."""
-        return [self._fault] if self._fault else []
-
     def batches(self) -> Iterator[Batch]:
         """Yield all messages by log time; they end where they can no longer be read."""
-        self._fault = ""
+        self.damage, self.incomplete = [], False
         waiting: dict[str, list[tuple[int, bytes]]] = {name: [] for name in self._types}
         try:
             with _reader(self._path) as reader:
@@ -239,10 +192,14 @@ class RosbagsStorage:
                         yield Batch.of(name, self._types[name], waiting[name])
                         waiting[name] = []
         except Exception as error:  # likewise
-            self._fault = f"{self._path.name}: cannot be read to its end ({_line(error)})"
+            self.damage = [f"{self._path.name}: cannot be read to its end ({_line(error)})"]
+            self.incomplete = True
         for name, messages in waiting.items():
             if messages:
                 yield Batch.of(name, self._types[name], messages)
+
+
+Storage = McapStorage | RosbagsStorage
 
 
 def _reader(path: Path) -> Reader:
@@ -274,7 +231,8 @@ def open_bag(path: Path) -> Bag:
             information = read_information(path)
         except InputError as error:
             damage = [str(error)]
-    if information and information.compressed:
+    # by rosbag2 itself, rather than chunks by MCAP
+    if information and information.compression_mode.lower() in ("file", "message"):
         for name in information.relative_file_paths:
             _check_regular(path / Path(name).name)
         return Bag([RosbagsStorage(path)], information, [], closed)
