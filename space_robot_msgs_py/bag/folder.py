@@ -9,11 +9,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from mcap.writer import MCAP0_MAGIC
-from pydantic import BaseModel, Field, ValidationError
+from pydantic import BaseModel, Field
 
 from ..config.text import MOST_COMPARED, MOST_NEAR, nearest, printable
 from ..config.validation import read_yaml, validate
-from ..config.yaml_text import parse_yaml
 from ..errors import InputError
 from .batch import Batch
 from .mcap_storage import McapStorage
@@ -68,15 +67,6 @@ def read_information(path: Path) -> BagInformation:
     return validate(BagInformation, content, str(file))
 
 
-def _information_in(file: Storage) -> BagInformation | None:
-    """Return the copy of the metadata in an MCAP file; None if there is none."""
-    try:
-        text = file.metadata.get("rosbag2", {}).get("serialized_metadata", "")
-        return BagInformation.model_validate(parse_yaml(text))
-    except (InputError, ValidationError):
-        return None
-
-
 class Bag:
     """Files of a bag, with the metadata of rosbag2."""
 
@@ -123,12 +113,11 @@ class Bag:
     def custom_data(self) -> dict[str, str]:
         """Return the custom data of this project's recorder; empty for other recorders.
 
-        From metadata.yaml, its copy in the file, or what was noted when recording began.
+        From metadata.yaml, or what was noted when recording began and ended.
         """
-        for information in (self._information, *map(_information_in, self._files[::-1])):
-            if information and information.custom_data:
-                return information.noted
-        return next((m for f in self._files if (m := f.metadata.get(DESCRIPTION))), {})
+        if self._information and self._information.custom_data:
+            return self._information.noted
+        return next((m for f in self._files[::-1] if (m := f.metadata.get(DESCRIPTION))), {})
 
     @property
     def incomplete(self) -> bool:
