@@ -61,9 +61,6 @@ class RecorderLoop:
             node: its node.
             settings: its parameters.
             gives_way: True to yield to other processes after each message.
-
-        Raises:
-            InputError: the flight is not JSON, or the bag cannot be created.
         """
         self._node, self._settings, self._gives_way = node, settings, gives_way
         try:
@@ -173,7 +170,6 @@ class RecorderLoop:
         return any(map(self._node.count_publishers, self._names.values()))
 
     def _take_round(self) -> tuple[bool, bool]:
-        """Take some messages of each topic; return if any was timely, and if more wait."""
         is_timely = waiting = False  # in turns: a backlog of one topic must not delay the others
         for entry in self._inputs:
             taken, timely = self._take_some(entry)
@@ -229,11 +225,7 @@ class RecorderLoop:
 
 
 def set_aside(bag: Path) -> Path:
-    """Rename a bag that is closed to ``<bag>_before_reset_<number>``, the first free; return that.
-
-    Raises:
-        InputError: it cannot be renamed.
-    """
+    """Rename a closed bag to ``<bag>_before_reset_<number>``, the first free; return that."""
     names = (bag.with_name(f"{bag.name}_before_reset_{number}") for number in itertools.count(1))
     free = next(name for name in names if not name.exists())
     try:

@@ -21,10 +21,10 @@ from .signals import Each, Reporter, signal, signals_of
 
 Array = NDArray[np.float64]
 
-MOST_WHEELS, MOST_THRUSTERS, MOST_TORQUERS, MOST_PASSIVE, MOST_GEARS = 8, 24, 6, 24, 64
+MOST_WHEELS, MOST_THRUSTERS, MOST_TORQUERS, MOST_PASSIVE = 8, 24, 6, 24
 """The base has no more reaction wheels, thrusters and magnetic torquers, a robot no more passive
-joints and gears. Records have room for as many, so that their number is no part of the layout, and
-another number compiles nothing anew."""
+joints. Records have room for as many, so that their number is no part of the layout, and another
+number compiles nothing anew."""
 
 
 class RobotNames(NamedTuple):

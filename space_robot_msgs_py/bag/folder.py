@@ -55,11 +55,7 @@ class BagInformation(BaseModel):
 
 
 def read_information(path: Path) -> BagInformation:
-    """Read the metadata in a bag's folder.
-
-    Raises:
-        InputError: there is none, or it is no rosbag2 metadata.
-    """
+    """Read the metadata in a bag's folder."""
     file = path / METADATA
     content = read_yaml(file).get("rosbag2_bagfile_information")
     if not isinstance(content, dict):
@@ -148,11 +144,7 @@ class RosbagsStorage:
     """A db3 file, or the folder of a bag that rosbag2 compressed; has what `McapStorage` has."""
 
     def __init__(self, path: Path) -> None:
-        """Read the topics.
-
-        Raises:
-            InputError: it cannot be read.
-        """
+        """Read the topics."""
         self._path = path
         self.counts: Counter[str] | None = None
         self.metadata: dict[str, dict[str, str]] = {}
@@ -238,7 +230,6 @@ def open_bag(path: Path) -> Bag:
 
 
 def _suggestion(folder: Path, name: str = "") -> str:
-    """Return the bags in a folder as a suggestion: those with a similar name, or any of them."""
     try:
         entries = sorted(islice(folder.iterdir(), MOST_COMPARED))
         bags = {file.name: file for file in entries if (file / METADATA).is_file()}
@@ -252,7 +243,6 @@ def _suggestion(folder: Path, name: str = "") -> str:
 def _listed(
     path: Path, information: BagInformation, existing: list[Path], damage: list[str]
 ) -> list[Path]:
-    """Return the existing files that metadata.yaml names, in its order."""
     names = [Path(name).name for name in information.relative_file_paths]
     files = [path / name for name in names if (path / name).exists()]
     missing = [name for name in names if not (path / name).exists()]

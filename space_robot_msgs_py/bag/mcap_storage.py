@@ -135,7 +135,6 @@ class McapStorage:
             self.metadata[record.name] = record.metadata
 
     def _read_summary(self, file: BinaryIO) -> None:
-        """Take the channels and counts that are repeated at the end of the file."""
         file.seek(0)
         try:
             summary = make_reader(file).get_summary()
@@ -153,7 +152,6 @@ class McapStorage:
                     self.counts[self._channels[number].topic] += count
 
     def _batches_in(self, pieces: list[bytes]) -> Iterator[Batch]:
-        """Yield the messages of several pieces, a batch a topic."""
         data = np.frombuffer(b"".join(pieces), np.uint8)
         messages = np.empty((5, len(data) // LEAST_MESSAGE + 1), np.int64)
         count = at = 0

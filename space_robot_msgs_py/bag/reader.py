@@ -178,11 +178,7 @@ def missing_ticks(whole: NDArray[np.bool_], timebase: Timebase) -> list[str]:
 
 
 def first_states(bag: Bag, selection: Selection) -> tuple[RobotNames, list[int]]:
-    """Return the names of the joints, and the first stamps in ns.
-
-    Raises:
-        InputError: there is none, or none that can be read.
-    """
+    """Return the names of the joints, and the first stamps in ns."""
     names: tuple[str, ...] = ()
     moved: tuple[str, ...] = ()
     """The joints of the first reference that names no others; the rest have no motor."""
@@ -206,7 +202,6 @@ def first_states(bag: Bag, selection: Selection) -> tuple[RobotNames, list[int]]
 
 
 def _empty_rows(bag: Bag, selection: Selection, flight: dict[str, Any], damage: list[str]) -> Rows:
-    """Return rows for the joints and the period of the bag's first states."""
     names, stamps = first_states(bag, selection)
     timebase, doubt = timebase_of(stamps, flight)
     damage += doubt
@@ -216,7 +211,6 @@ def _empty_rows(bag: Bag, selection: Selection, flight: dict[str, Any], damage: 
 
 
 def _joint_names(topic: topics.Topic, batch: Batch) -> Iterator[tuple[str, ...]]:
-    """Yield the joints in each message of a batch that can be read."""
     for i in range(len(batch)):
         with suppress(MessageError):
             message = decode(batch.message(i), topic.type)

@@ -100,9 +100,6 @@ class BagRecorder:
 
         A file of the bag that has ``split_size`` bytes is followed by another (0: never).
         ``names``: full name of each topic, by its own; None: that in the ``namespace``.
-
-        Raises:
-            InputError: the bag exists already, or cannot be written.
         """
         self._flight, self._excused = dict(flight), topics_with_allowed_gaps(flight)
         own = {topic.name: topic.in_namespace(namespace) for topic in topics.RECORDED}

@@ -129,7 +129,6 @@ class Rows:
                 self._is_wall_clock |= bool(np.any(sent_ns != batch.log_ns[which]))
 
     def _learn_names(self, topic: topics.Topic, batch: Batch) -> None:
-        """Take the names of actuators and gears from the first message with some, if it has any."""
         log, axes = self.log, self._names.axes
         for i in range(len(batch)):
             try:
@@ -158,7 +157,7 @@ class Rows:
         self._readers[topic] = FieldReader(describe(topic, robot, log.timebase))
 
     def _widen(self, target: Any, columns: tuple[SampleColumn, ...]) -> None:
-        """Make room for what some robots have only: columns that are not as wide yet."""
+        # the first message of wheels, gears or an orbit tells that the robot has them
         for name, first, length in columns:
             column = getattr(target, name)
             if column.ndim == 2 and column.shape[1] < first + length:
@@ -196,7 +195,6 @@ class Rows:
         return log
 
     def _ticks(self, topic: topics.Topic, batch: Batch) -> tuple[Integers, NDArray[np.bool_]]:
-        """Return (M,) ticks, and whether a message has one."""
         if not topic.has_stamp:
             numbers, known = np.zeros(len(batch)), np.zeros(len(batch), np.bool_)
             for which, values in self._readers[topic].read(batch):
@@ -230,7 +228,6 @@ class Rows:
             start += length
 
     def _note_errors(self, values: Array) -> None:
-        """Note e of messages (M, ...) with the tick and the rows of telemetry, if they are ours."""
         axes = self.log.axes
         if values.shape[1] == 1 + len(TELEMETRY_ROWS) * axes:
             first = 1 + TELEMETRY_ROWS.index("e") * axes
@@ -250,7 +247,7 @@ class Rows:
         return [*self.log.columns.values(), *true.values(), *self._sent_ns.values(), field]
 
     def _grow(self, ticks: int) -> None:
-        """Make room, within what can be believed; memory that is not touched costs nothing."""
+        # memory that is not touched costs nothing, but a wrong stamp must not cost gigabytes
         before = self._rows
         ticks = min(ticks, LONGEST_JUMP + self._believed)
         if ticks <= before:

@@ -109,12 +109,11 @@ class Selection:
 
 
 def _is_type(kind: str, topic: graph.Topic) -> bool:
-    """Return True if a topic's type in a bag is ours, in ROS's or in DDS' spelling."""
+    # DDS has no /msg/ in the names of types
     return kind.replace("/msg/", "/") == topic.type.replace("/msg/", "/")
 
 
 def _noted_remappings(noted: Mapping[str, str]) -> dict[str, str]:
-    """Return our topic by the one that it was recorded as, as our recorder noted it."""
     try:
         remappings = parse_json(noted.get(TOPICS_KEY, "{}"))
         ours = list(remappings.values())
@@ -135,9 +134,6 @@ def find_namespace(bag: Bag, wanted: str | None, known: Collection[str], is_ours
 
     Returns:
         The root namespace if the bag has no robot: who reads it says what is missing.
-
-    Raises:
-        InputError: it has several robots, or none in the namespace that is wanted.
     """
     needed = [topic for topic in REQUIRED if topic.full_name not in known]
     namespaces = _count_namespaces(bag.topics(), needed)
@@ -164,7 +160,6 @@ def find_namespace(bag: Bag, wanted: str | None, known: Collection[str], is_ours
 
 
 def _count_namespaces(kinds: Mapping[str, str], needed: Collection[graph.Topic]) -> Counter[str]:
-    """Count by namespace the needed topics that are in a bag (type by full name)."""
     counts: Counter[str] = Counter()
     for name, kind in kinds.items():
         for topic in needed:

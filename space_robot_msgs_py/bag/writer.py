@@ -83,11 +83,7 @@ class BagWriter:
             raise InputError(f"{path}: no bag can be written there ({error.strerror})") from None
 
     def write(self, topic: Topic, log_ns: int, publish_ns: int, sequence: int, data: bytes) -> None:
-        """Add a message to the open chunk; the first after a full file begins another one.
-
-        Raises:
-            OSError: the next file cannot be begun.
-        """
+        """Add a message to the open chunk; the first after a full file begins another one."""
         channel, sequence = self._channels[topic.name], sequence & 0xFFFFFFFF
         if self._is_full:
             self._is_full = False
@@ -102,11 +98,7 @@ class BagWriter:
             self._latched[channel] = (publish_ns, sequence, data)
 
     def describe(self, description: Mapping[str, str]) -> None:
-        """Note more, or what is known better, in this file, those to come and at the end.
-
-        Raises:
-            OSError: that failed.
-        """
+        """Note more, or what is known better, in this file, those to come and at the end."""
         self._description |= description
         self._add_records(self._description, ())
         self._whole_bytes = self._files[-1].size
@@ -131,9 +123,6 @@ class BagWriter:
 
         Args:
             custom: what goes, with the description, into the bag's custom data.
-
-        Raises:
-            OSError: that failed.
         """
         self._end_file(custom)
         information = self._information({**self._description, **custom}, self._topics)
@@ -209,7 +198,6 @@ class BagWriter:
 
 
 def _times(files: Sequence[_McapFile]) -> tuple[dict[str, int], dict[str, int]]:
-    """Return the time of the first message in some files, and the time to the last one."""
     spans_ns = [file.span_ns for file in files if file.span_ns]
     first = min((first for first, _ in spans_ns), default=_NEVER_NS)
     last = max((last for _, last in spans_ns), default=_NEVER_NS)

@@ -22,11 +22,7 @@ _EXTRA = re.compile(r"extra\s*==\s*['\"]([\w-]+)['\"]")
 
 @cache
 def config_directory() -> Path:
-    """Return the ``config/`` folder of the source tree, or the one installed under ``share/``.
-
-    Raises:
-        InputError: the installation is incomplete.
-    """
+    """Return the ``config/`` folder of the source tree, or the one installed under ``share/``."""
     for parent in Path(__file__).resolve().parents:
         for folder in (parent / "config", parent / "share/space_robot/config"):
             if (folder / GRAPH_FILE).is_file():

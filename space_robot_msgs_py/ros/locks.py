@@ -149,7 +149,7 @@ def _holder(descriptor: int) -> Holder:
 
 
 def _open(path: Path) -> int:
-    """Open a lock file for all users, since a domain is shared by the whole machine."""
+    # for all users: the whole machine shares a domain
     flags = os.O_RDWR | os.O_NOFOLLOW
     try:
         if path.exists():  # Linux refuses O_CREAT for other users' files in /tmp

@@ -100,7 +100,6 @@ class NodeScheduler:
         return self._rest(now) if is_idle else True
 
     def _serve_inactive(self) -> bool:
-        """Wait for service calls while no node is active; return False when all are shut down."""
         timeout_s = PERIOD_S / len(self._nodes)
         for upkeep in self._upkeeps:
             upkeep.run(timeout_s)
@@ -112,7 +111,6 @@ class NodeScheduler:
         self._upkeep_at = max(due, time.monotonic() + UPKEEP_GAP_S)
 
     def _rest(self, now: float) -> bool:
-        """Run due upkeep, or wait until a node has work; return False at the end."""
         if now >= self._upkeep_at:
             self._serve_one()
             return True

@@ -43,9 +43,6 @@ def declare_settings(node: Node, schema: type[Schema], changeable: tuple[str, ..
 
     All are read-only except the ``changeable`` ones. The schema checks types and ranges first, with
     clearer messages than ROS.
-
-    Raises:
-        InputError: an invalid file or parameter.
     """
     fields = dict(leaves(schema))
     own = overrides(node)
@@ -74,11 +71,7 @@ def overrides(node: Node) -> dict[str, Any]:
 
 
 def refuse_unknown(node: Node) -> None:
-    """Refuse undeclared parameters, which ROS would ignore silently.
-
-    Raises:
-        InputError: an unknown parameter; lists the existing ones.
-    """
+    """Refuse undeclared parameters, which ROS would ignore silently."""
     allowed = sorted(declared_parameters(node))
     for name in overrides(node):
         if name not in allowed:

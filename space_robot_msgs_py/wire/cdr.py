@@ -97,8 +97,6 @@ class MessageLayout:
 
 
 class _Walk:
-    """Writes the fields of a message in the order of its definition."""
-
     def __init__(self) -> None:
         self.body = bytearray()
         self.changing: list[tuple[int, int]] = []

@@ -154,7 +154,6 @@ class MessageDescription:
             yield from self._runs_of_part(point, order, f"points[{i}].")
 
     def _runs_of_part(self, part: Any, order: list[int], prefix: str) -> Iterator[Run]:
-        """Yield the numbers of a message, or of a point in it."""
         for path, columns in self.fields.items():
             values, _, is_of_body = path.partition("[")
             count = len(getattr(part, values)) if path in ROWS or is_of_body else 1
@@ -175,11 +174,7 @@ class MessageDescription:
         return self.learn(MessageLayout(self.topic.type, self.content(rows)).data)
 
     def learn(self, data: bytes) -> Numbers:
-        """Return the layout of any message of the topic.
-
-        Raises:
-            MessageError: the bytes are not a message of this topic and robot.
-        """
+        """Return the layout of any message of the topic."""
         message = decode(data, self.topic.type)
         runs = list(self.runs(message))
         layout = MessageLayout(self.topic.type, message)
@@ -225,11 +220,7 @@ def describe(
 
 
 def name_order(names: Sequence[str], expected: Sequence[str], topic: str) -> list[int]:
-    """Return the index of each expected name in ``names``.
-
-    Raises:
-        MessageError: the names are not the expected ones.
-    """
+    """Return the index of each expected name in ``names``."""
     if sorted(names) != sorted(expected):
         raise MessageError(f"{topic}: names {list(names)}, expected {list(expected)}", "names")
     return [list(names).index(name) for name in expected]
