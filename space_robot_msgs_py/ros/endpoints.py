@@ -23,7 +23,7 @@ from .. import topics
 from ..errors import MessageError
 from ..topics import Topic
 from ..wire.definitions import decode
-from .rclpy_internals import SubscriptionWaitSet, raw_publish, take_serialized
+from .rclpy_internals import raw_publish, take_serialized
 
 
 class PolledCallbackGroup(CallbackGroup):
@@ -189,22 +189,6 @@ class RawSubscription:
         data, info = taken
         sequence = info["publication_sequence_number"]
         return Received(data, info["source_timestamp"], 0 if sequence == NOT_COUNTED else sequence)
-
-
-class Waiter:
-    """Waits until one of some subscriptions has a message."""
-
-    def __init__(self, node: Node) -> None:
-        """Create the waiter; ``node`` is any node of the process."""
-        self._context = node.context
-        self._sets: dict[int, SubscriptionWaitSet] = {}
-
-    def wait(self, inputs: Sequence[RawSubscription], timeout_s: float) -> None:
-        """Sleep until there is a message, or until the timeout."""
-        size = len(inputs)
-        if size not in self._sets:
-            self._sets[size] = SubscriptionWaitSet(self._context, size)
-        self._sets[size].wait([entry.handle for entry in inputs], timeout_s)
 
 
 # /simulation/paused tells all nodes of a pause, so that watchdogs ignore it.

@@ -111,11 +111,6 @@ def living_nodes(name: str, namespace: str = "") -> Iterator[tuple[int, str]]:
             yield int(domain), own_namespace
 
 
-def newest_node(name: str, namespace: str = "") -> tuple[int, str] | None:
-    """Return the first of `living_nodes`; None if there is none."""
-    return next(living_nodes(name, namespace), None)
-
-
 def _holders(paths: Iterable[Path]) -> list[Holder]:
     holders = []
     for path in sorted(paths):

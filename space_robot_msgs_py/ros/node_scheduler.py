@@ -11,9 +11,9 @@ from operator import attrgetter
 from pathlib import Path
 from typing import Any
 
-from .endpoints import Waiter
 from .loop import Loop, Wait
 from .managed_node import ManagedNode
+from .rclpy_internals import SubscriptionWaiter
 
 SPIN_S = 300e-6
 """Time of polling and yielding before sleeping in the wait set. Not under SCHED_FIFO, where
@@ -78,7 +78,7 @@ class NodeScheduler:
         self._scheduled = [ScheduledNode(node, is_alone=len(nodes) == 1) for node in nodes]
         self._upkeeps = [Upkeep(node) for node in nodes]
         self._upkeep_at = 0.0
-        self._waiter = Waiter(nodes[0])
+        self._waiter = SubscriptionWaiter(nodes[0].context)
         self._is_alone = len(nodes) == 1
         for scheduled in self._scheduled if not self._is_alone else []:
             scheduled.node.let_others_work = partial(self._step_others, scheduled)
@@ -122,8 +122,8 @@ class NodeScheduler:
             for scheduled in active:
                 scheduled.step_at = min(scheduled.step_at, scheduled.wake_at)
             return True
-        if inputs := [entry for scheduled in active for entry in scheduled.wait.inputs]:
-            self._waiter.wait(inputs, left)
+        if handles := [entry.handle for node in active for entry in node.wait.inputs]:
+            self._waiter.wait(handles, left)
             for scheduled in active:
                 scheduled.step_at = 0.0
         else:
