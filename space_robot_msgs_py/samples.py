@@ -7,7 +7,7 @@ float64, allocated once by the owner and overwritten in place.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -42,30 +42,6 @@ class RobotNames(NamedTuple):
     """True for a robot with an orbit, whose state tells of it."""
     torquers: tuple[str, ...] = ()
     """Magnetic torquers of the base."""
-
-    @classmethod
-    def of(
-        cls,
-        joints: Sequence[str],
-        actuators: Sequence[str] = (),
-        wheel_count: int = 0,
-        passive: Sequence[str] = (),
-        geared: Sequence[str] = (),
-        torquer_count: int = 0,
-    ) -> RobotNames:
-        """Take the joints' names and those of the base's ``actuators``.
-
-        These are wheels, then thrusters, then magnetic torquers.
-        """
-        behind = len(actuators) - torquer_count
-        return cls(
-            tuple(joints),
-            tuple(actuators[:wheel_count]),
-            tuple(actuators[wheel_count:behind]),
-            tuple(passive),
-            tuple(geared),
-            torquers=tuple(actuators[behind:]),
-        )
 
     @property
     def axes(self) -> tuple[str, ...]:

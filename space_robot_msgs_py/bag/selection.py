@@ -5,11 +5,9 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Collection, Iterator, Mapping
 
-from space_robot_msgs_py.config.validation import full_namespace
-
 from .. import topics as graph
 from ..config.text import parse_json
-from ..config.validation import one_of
+from ..config.validation import full_namespace, one_of
 from ..errors import InputError
 from .batch import Batch
 from .folder import Bag, some_of

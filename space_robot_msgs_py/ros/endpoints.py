@@ -33,13 +33,6 @@ class PolledCallbackGroup(CallbackGroup):
         """Allow none."""
         return False
 
-    def beginning_execution(self, entity: Any) -> bool:
-        """Allow none."""
-        return False
-
-    def ending_execution(self, entity: Any) -> None:
-        """Do nothing."""
-
 
 def full_name_of(info: TopicEndpointInfo) -> str:
     """Return the full name of an endpoint's node."""

@@ -230,7 +230,7 @@ def test_no_place_for_the_next_file_keeps_those_before(messages: Messages, tmp_p
 
 def test_recorder_counts_what_is_missing_and_drops_what_is_repeated(tmp_path: Path) -> None:
     recorder = BagRecorder(tmp_path / "bag", {}, TIMEBASE)
-    codec, state = StateCodec(RobotNames.of(("j",)), TIMEBASE), RobotState.allocate(1)
+    codec, state = StateCodec(RobotNames(("j",)), TIMEBASE), RobotState.allocate(1)
     for state.tick in (0, 1, 1, 2, 5, 6):
         joints, base = codec.encode(state)
         recorder.record(topics.JOINT_STATES, joints)
