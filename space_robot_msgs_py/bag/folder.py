@@ -218,7 +218,7 @@ def open_bag(path: Path) -> Bag:
             _check_regular(path / Path(name).name)
         return Bag([RosbagsStorage(path)], information, [], closed)
     files = [file for suffix in _STORAGES for file in path.glob(f"*{suffix}")]
-    files.sort(key=lambda file: (len(file.name), file.name))
+    files.sort(key=lambda file: (len(file.name), file.name))  # _10 behind _9
     if information:
         files = _listed(path, information, files, damage)
     if not files and damage:

@@ -40,9 +40,9 @@ from .selection import REQUIRED, Selection
 
 DEFAULT_PERIOD = 0.0005
 """Period of a bag without a description, s."""
-_STAMPS_LOOKED_AT = 200
+_STAMPS_READ = 200
 _STRETCHES = 3
-"""Stretches without a whole tick that are told."""
+"""Maximum number of listed stretches without a whole tick."""
 
 
 def read_flight(
@@ -191,7 +191,7 @@ def first_states(bag: Bag, selection: Selection) -> tuple[RobotNames, list[int]]
         elif topic is topics.REFERENCE_JOINTS and not moved:
             referenced += dict.fromkeys(_joint_names(topic, batch))
         moved = next((known for known in referenced if known and set(known) <= set(names)), ())
-        if len(stamps) >= _STAMPS_LOOKED_AT and moved:
+        if len(stamps) >= _STAMPS_READ and moved:
             break
     if not names:
         raise missing(topics.JOINT_STATES, bag, selection)

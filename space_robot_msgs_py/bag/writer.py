@@ -14,9 +14,7 @@ from pathlib import Path
 from typing import IO, Any, Literal, cast
 
 import yaml
-from mcap.data_stream import RecordBuilder
-from mcap.records import DataEnd, Footer
-from mcap.writer import MCAP0_MAGIC, CompressionType, IndexType, Writer
+from mcap.writer import CompressionType, IndexType, Writer
 
 from ..errors import InputError
 from ..topics import Topic
@@ -127,12 +125,13 @@ class BagWriter:
         self._end_file(custom)
         information = self._information({**self._description, **custom}, self._topics)
         text = _to_yaml({"rosbag2_bagfile_information": information})
+        # a bag that has the file is finished, so it must appear whole
         part = self.path / f"{METADATA}.part"
         part.write_text(text, encoding="utf-8")
         part.replace(self.path / METADATA)
 
     def abandon(self) -> None:
-        """After a failure: leave the whole chunks and, if there is room, a valid MCAP end."""
+        """Leave the whole chunks, after a failure."""
         self._files[-1].abandon(self._whole_bytes)
 
     def _begin_file(self) -> None:
@@ -239,6 +238,7 @@ class _McapFile:
         """Number of messages by channel."""
         self.span_ns: tuple[int, int] | None = None
         """First and last log time (None: no message)."""
+        # what is written is with the kernel, and survives this process
         self._file = path.open("xb", buffering=0)
         self.writer = Writer(
             cast(IO[Any], self),
@@ -275,16 +275,11 @@ class _McapFile:
         self._file.close()
 
     def abandon(self, size: int) -> None:
-        """Keep the first ``size`` bytes and, if there is room, end the file."""
-        if self._file.closed:
-            return
-        end = RecordBuilder()
-        DataEnd(0).write(end)
-        Footer(0, 0, 0).write(end)
-        with suppress(OSError):
-            self._file.truncate(size)
-            os.pwrite(self._file.fileno(), end.end() + MCAP0_MAGIC, size)
-        self._file.close()
+        """Keep the first ``size`` bytes, as a killed recorder leaves a file."""
+        if not self._file.closed:
+            with suppress(OSError):
+                self._file.truncate(size)
+            self._file.close()
 
     def remove(self) -> None:
         """Close and delete the file."""

@@ -77,8 +77,7 @@ def choices(name: str, allowed: Iterable[str], also: str = "", listing: str = ""
 
 
 def _shown(name: str) -> str:
-    text = printable(name[: LONGEST_SHOWN + 1])
-    return text if len(text) <= LONGEST_SHOWN else f"{text[: LONGEST_SHOWN - 3]}..."
+    return printable(shortened(name, LONGEST_SHOWN))
 
 
 def nearest(name: str, allowed: Sequence[str]) -> list[str]:

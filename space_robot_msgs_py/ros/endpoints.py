@@ -155,7 +155,7 @@ class RawSubscription:
         self._subscription = node.create_subscription(
             message_type(topic.type),
             topic.name,
-            lambda message: None,
+            lambda message: None,  # never called: the loop takes messages itself
             profile,
             raw=True,
             callback_group=group,

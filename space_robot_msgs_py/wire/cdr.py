@@ -24,7 +24,7 @@ from .definitions import jazzy
 
 Bytes = NDArray[np.uint8]
 
-ENCAPSULATION = b"\x00\x01\x00\x00"
+ENCAPSULATION = b"\x00\x01\x00\x00"  # little endian, no options
 BODY = len(ENCAPSULATION)
 BIG_ENDIAN = b"\x00\x00"
 """First bytes of a big-endian message."""
@@ -33,22 +33,12 @@ _BIG_STAMP = struct.Struct(">iI")
 TIME = "builtin_interfaces/msg/Time"
 _PRIMITIVES = {
     name: struct.Struct(f"<{letter}")
-    for name, letter in {
-        "bool": "?",
-        "byte": "B",
-        "octet": "B",
-        "char": "B",
-        "uint8": "B",
-        "int8": "b",
-        "uint16": "H",
-        "int16": "h",
-        "uint32": "I",
-        "int32": "i",
-        "uint64": "Q",
-        "int64": "q",
-        "float32": "f",
-        "float64": "d",
-    }.items()
+    for letter, names in (
+        *(("?", "bool"), ("B", "byte octet char uint8"), ("b", "int8"), ("H", "uint16")),
+        *(("h", "int16"), ("I", "uint32"), ("i", "int32"), ("Q", "uint64"), ("q", "int64")),
+        *(("f", "float32"), ("d", "float64")),
+    )
+    for name in names.split()
 }
 _LENGTH = _PRIMITIVES["uint32"]
 _NUMBER = (Nodetype.BASE, ("float64", 0))
