@@ -30,7 +30,7 @@ TURN = 100
 """Maximum number of messages taken of a topic before the next one has its turn."""
 REPORTS = 5
 """Maximum number of reports read in a round: each takes a tenth of a millisecond."""
-LOOK_PERIOD_S = 0.02
+CHECK_PERIOD_S = 0.02
 """Period of checks for publishers of topics that only some flights have."""
 AHEAD_OF_NEED = (topics.REFERENCE_JOINTS, topics.REFERENCE_BASE)
 """Topics sent ahead of need: messages that came during a pause belong to the time after it, too."""
@@ -77,7 +77,7 @@ class RecorderLoop:
         ]
         self._unsent = [topic for topic in topics.RECORDED if topic.is_optional]
         """Optional topics without publisher so far."""
-        self._look_at = 0.0
+        self._check_at = 0.0
         """Time of the next check for their publishers, monotonic clock."""
         self._recorder = BagRecorder(
             path,
@@ -159,9 +159,9 @@ class RecorderLoop:
 
     def _subscribe_to_optional(self) -> None:
         # a plant that publishes them waits for this subscription
-        if (now := time.monotonic()) < self._look_at:
+        if (now := time.monotonic()) < self._check_at:
             return
-        self._look_at = now + LOOK_PERIOD_S
+        self._check_at = now + CHECK_PERIOD_S
         for topic in [t for t in self._unsent if self._node.count_publishers(self._names[t])]:
             self._unsent.remove(topic)
             self._inputs.append(self._listen_to(topic))

@@ -28,7 +28,7 @@ number compiles nothing anew."""
 
 
 class RobotNames(NamedTuple):
-    """The names that a robot's numbers go by in messages."""
+    """Names of a robot's numbers in messages."""
 
     joints: tuple[str, ...]
     """Those with motors."""
@@ -39,7 +39,7 @@ class RobotNames(NamedTuple):
     geared: tuple[str, ...] = ()
     """Those of `joints` with a gear, whose motors move apart from them."""
     in_orbit: bool = False
-    """True for a robot with an orbit, whose state tells of it."""
+    """True for a robot in an orbit, whose state includes it."""
     torquers: tuple[str, ...] = ()
     """Magnetic torquers of the base."""
 
@@ -75,7 +75,7 @@ class RobotNames(NamedTuple):
 
 
 class Timebase(NamedTuple):
-    """Ticks to stamps and back, in integers: never a clock's difference."""
+    """Conversion of ticks and stamps, in integers."""
 
     period_ns: int
 
@@ -235,7 +235,7 @@ class CommandSignals:
 
 
 class TelemetrySignals:
-    """What a control law tells of itself."""
+    """Telemetry of a control law."""
 
     s: Array = signal(Reporter.OTHERS, AXES, "rad/s", "", "sliding variable").sent(
         topics.SIGNALS, "velocity"
@@ -260,7 +260,7 @@ STATE_FIELDS = (*SENSED_FIELDS, "applied_torque")
 
 
 class RobotState(StateSignals):
-    """What the plant measures at a tick, and what it applied over the interval just ended.
+    """Measurements at a tick, and what the plant applied over the interval that ended with it.
 
     Each signal of `StateSignals` is an attribute, a view of ``block``, which compiled code reads
     whole.
@@ -276,13 +276,13 @@ class RobotState(StateSignals):
 
     @classmethod
     def allocate(cls, n: int) -> RobotState:
-        """A state for ``n`` joints, at rest at the origin."""
+        """Return a state for ``n`` joints, at rest at the origin."""
         state = cls(0, State.block(n))
         state.quaternion[0] = 1.0
         return state
 
     def copy(self) -> RobotState:
-        """The same state in memory of its own."""
+        """Return the same state in memory of its own."""
         return RobotState(self.tick, self.block.copy())
 
     def __reduce__(self) -> tuple[Any, ...]:
@@ -326,14 +326,14 @@ class Reference(Record):
 
     @staticmethod
     def parts(references: Block) -> tuple[Array, Array]:
-        """Views (k, 3, n) and (k, 10) of the joints' and the base's part of k references."""
+        """Return views (k, 3, n) and (k, 10) of the joints' and the base's part of k references."""
         k, size = len(references), references.itemsize // 8
         numbers = references.view(np.float64).reshape(k, size)
         return numbers[:, :-10].reshape(k, 3, (size - 10) // 3), numbers[:, -10:]
 
     @classmethod
     def at_rest(cls, n: int) -> Block:
-        """A block of one that asks for rest at zero."""
+        """Return a block of one reference, at rest at zero."""
         block = cls.block(n)
         block[0].quaternion[0] = 1.0
         return block
@@ -388,6 +388,6 @@ class LawInForce(NamedTuple):
 
 
 def in_order(laws: Iterable[LawInForce]) -> tuple[LawInForce, ...]:
-    """Laws by rising tick; of several of one tick the last, under which it was answered."""
+    """Return the laws by rising tick; of several at one tick the last, which answered it."""
     last_of_tick = {law.tick: law for law in laws}
     return tuple(law for _, law in sorted(last_of_tick.items()))

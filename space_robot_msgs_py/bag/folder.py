@@ -80,8 +80,8 @@ class Bag:
             files: in the order of their writing.
             information: metadata.yaml's (None: there is none that can be read).
             damage: what is wrong with the folder, a sentence each.
-            closed: nothing but the files can say that the bag is unfinished.
-            lacks_files: some that metadata.yaml names are not there.
+            closed: False if the bag is unfinished for lack of a metadata.yaml.
+            lacks_files: True if files that metadata.yaml names are missing.
         """
         self._files, self._damage = files, damage
         self.finished = closed and all(file.has_end for file in files)

@@ -33,6 +33,7 @@ class LawChange(NamedTuple):
 
 def same(one: LawInForce, other: LawInForce) -> bool:
     """Return True if two laws are the same with the same gains, to the last bit."""
+    # compared as integers, NaN is itself, and -0.0 is not 0.0
     return (
         one.name == other.name
         and one.gains.keys() == other.gains.keys()

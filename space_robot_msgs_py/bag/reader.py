@@ -220,9 +220,9 @@ def _joint_names(topic: topics.Topic, batch: Batch) -> Iterator[tuple[str, ...]]
 def timebase_of(
     first_stamps: Sequence[int], flight: Mapping[str, Any]
 ) -> tuple[Timebase, list[str]]:
-    """Return the period of the flight: as described, if the stamps (ns) are not against it.
+    """Return the timebase of a flight, and a warning if the stamps (ns) contradict its description.
 
-    With it what is wrong with the description's.
+    The described period is taken unless they do.
     """
     described = flight.get("period")
     steps = np.diff(np.array(first_stamps, np.int64))

@@ -133,8 +133,6 @@ class BagRecorder:
     def record(self, topic: topics.Topic, data: bytes, sent_ns: int = 0, sequence: int = 0) -> None:
         """Add one serialized message.
 
-        One whose stamp cannot be right is kept at the time of the last good one.
-
         Args:
             topic: it came on.
             data: the message.
@@ -153,6 +151,7 @@ class BagRecorder:
             counted.invalid_stamps += 1
         if not is_new or self.failure:
             return
+        # one whose stamp cannot be right is kept at the time of the last good one
         log_ns = self._timebase.stamp_ns(max(0, min(tick, counted.last)))
         try:
             self._writer.write(self._written[topic.name], log_ns, sent_ns or log_ns, tick, data)

@@ -1,4 +1,4 @@
-"""The messages of a bag that are ours: by topic, in a namespace or remapped, of the right type."""
+"""Messages of one robot's topics in a bag, by namespace, remapping and type."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from .folder import Bag, some_of
 from .recorder import FLIGHT_KEY, TOPICS_KEY
 
 REQUIRED = (graph.JOINT_STATES, graph.BASE_STATE, graph.REFERENCE_JOINTS, graph.REFERENCE_BASE)
-"""Topics that a flight cannot be read without."""
+"""Topics without which a flight cannot be read."""
 
 
 class Selection:
@@ -25,7 +25,7 @@ class Selection:
 
         Args:
             bag: a bag.
-            remap: our topic by theirs; it then stands for ours, even if the bag has ours too.
+            remap: our name of a topic by the bag's; a topic with our name is then ignored.
             namespace: the robot's; None: that of the only one in the bag.
 
         Raises:
@@ -34,7 +34,7 @@ class Selection:
         """
         self._bag, self._remap = bag, dict(remap)
         self.wrong: dict[str, str] = {}
-        """What is wrong with the type, by our topic."""
+        """Why a topic cannot be read, by our name of it."""
         for theirs, ours in self._remap.items():
             one_of(ours, graph.BY_NAME, "topic", f" to take {theirs} for")
             if list(self._remap.values()).count(ours) > 1:
@@ -99,7 +99,7 @@ class Selection:
     def _fits(self, topic: graph.Topic, kind: str, encoding: str) -> bool:
         if encoding != "cdr":
             self.wrong[topic.full_name] = f"encoded as {encoding!r}, 'cdr' is needed"
-        elif kind and not _is_type(kind, topic):
+        elif kind and not _is_type(kind, topic):  # unknown without definitions
             self.wrong[topic.full_name] = f"of type {kind}, {topic.type} is needed"
         else:
             return True

@@ -25,6 +25,7 @@ class StrictModel(BaseModel):
     Only an integer may stand for a float, and a number for a name (``case: 1``).
     """
 
+    # built at first use: a command needs few of all schemas
     model_config = ConfigDict(
         extra="forbid", frozen=True, allow_inf_nan=False, strict=True, defer_build=True
     )
@@ -32,7 +33,7 @@ class StrictModel(BaseModel):
     @field_validator("*", mode="before")
     @classmethod
     def _meant(cls, value: Any, field: ValidationInfo) -> Any:
-        if isinstance(value, tuple):
+        if isinstance(value, tuple):  # in strict models no list
             return list(value)
         wanted = cls.model_fields[field.field_name or ""].annotation
         if wanted is str and isinstance(value, (int, float)) and not isinstance(value, bool):

@@ -13,6 +13,7 @@ from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 from rclpy.callback_groups import CallbackGroup
+from rclpy.duration import Duration
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.serialization import serialize_message
@@ -99,18 +100,13 @@ class RawPublisher:
         namespace = self._node.get_namespace().rstrip("/")
         return name if name.startswith("/") else f"{namespace}/{name}"
 
-    def flush(self, timeout_s: float) -> None:
-        """Wait until all subscribers have acknowledged all sent messages."""
-        from rclpy.duration import Duration
-
-        self._publisher.wait_for_all_acked(Duration(seconds=timeout_s))
-
 
 def flush(outputs: Sequence[RawPublisher], timeout_s: float) -> None:
-    """Call `RawPublisher.flush` of all publishers, with a common ``timeout_s``."""
+    """Wait until all subscribers have acknowledged all messages sent by some publishers."""
     until = time.monotonic() + timeout_s
     for output in outputs:
-        output.flush(max(0.0, until - time.monotonic()))
+        left_s = max(0.0, until - time.monotonic())
+        output._publisher.wait_for_all_acked(Duration(seconds=left_s))
 
 
 NOT_COUNTED = (1 << 64) - 1

@@ -188,7 +188,7 @@ class ManagedNode(LifecycleNode, Generic[Schema]):
         return self._try(configure, undo=self._release)
 
     def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Start the loop."""
+        """Let the scheduler start the loop, once its subscribers are there."""
         self.is_active = True
         return TransitionCallbackReturn.SUCCESS
 
@@ -245,6 +245,7 @@ class ManagedNode(LifecycleNode, Generic[Schema]):
             if loop is not None:
                 loop.close()
         finally:
+            # all that was created since the constructor: the next configuration creates it anew
             publishers, subscriptions, parameters = self._entities()
             for publisher in publishers - self._own[0]:
                 self.destroy_publisher(publisher)

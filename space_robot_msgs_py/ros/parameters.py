@@ -52,6 +52,7 @@ def declare_settings(node: Node, schema: type[Schema], changeable: tuple[str, ..
         node.get_logger().info(
             f"a tick lasts {settings.period:g} s; the shipped gains are for {usual:g} s"
         )
+    # the overrides are in these values already
     for name, value in flatten(settings.model_dump()):
         node.declare_parameter(
             name, value, descriptor(fields[name], name not in changeable), ignore_override=True
@@ -82,4 +83,5 @@ def refuse_unknown(node: Node) -> None:
 
 
 def _plain(value: Any) -> Any:
+    # rclpy has lists of numbers as array.array
     return list(value) if hasattr(value, "typecode") else value

@@ -101,6 +101,7 @@ async def change_state(node: Node, name: str, transition: str) -> None:
     Raises:
         FlightError: the other node refuses or does not answer.
     """
+    # the answer comes while the callback that waits for it has not returned
     client = node.create_client(
         ChangeState, f"{name}/change_state", callback_group=ReentrantCallbackGroup()
     )

@@ -1,4 +1,4 @@
-"""Messages for viewers and for others' nodes: frames, shapes, the base, the robot's URDF."""
+"""Messages for viewers and other nodes: frames, shapes, the base, the robot's URDF."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ CUBE, SPHERE, CYLINDER, MESH = 1, 2, 3, 10
 DELETE_ALL = 3
 """Action of visualization_msgs/Marker that deletes all; adding is 0."""
 UNKNOWN = [-1.0, *[0.0] * 8]
-"""Covariance of what a sensor_msgs/Imu does not tell."""
+"""Covariance of a quantity that a sensor_msgs/Imu lacks."""
 _CARRIER = struct.Struct("<4sIII")
 """Encapsulation header, no dimensions, no offset, length of the data."""
 
