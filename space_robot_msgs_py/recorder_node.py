@@ -57,10 +57,7 @@ class RecorderLoop:
     ) -> None:
         """Open the bag and subscribe to the topics that every flight has.
 
-        Args:
-            node: its node.
-            settings: its parameters.
-            gives_way: True to yield to other processes after each message.
+        With ``gives_way`` it yields to other processes after each message.
         """
         self._node, self._settings, self._gives_way = node, settings, gives_way
         try:
@@ -133,7 +130,7 @@ class RecorderLoop:
             self._recorder.flush_if_due()
             if is_timely or self._recorder.is_behind:
                 last_arrival = time.monotonic()  # a round may last longer than the silence
-            elif not (busy or self._has_publishers()):
+            elif not (busy or any(map(self._node.count_publishers, self._names.values()))):
                 break
             if not busy:
                 time.sleep(self._settings.drain_period)
@@ -166,9 +163,6 @@ class RecorderLoop:
             self._unsent.remove(topic)
             self._inputs.append(self._listen_to(topic))
 
-    def _has_publishers(self) -> bool:
-        return any(map(self._node.count_publishers, self._names.values()))
-
     def _take_round(self) -> tuple[bool, bool]:
         is_timely = waiting = False  # in turns: a backlog of one topic must not delay the others
         for entry in self._inputs:
@@ -176,7 +170,9 @@ class RecorderLoop:
             is_timely, waiting = is_timely or timely > 0, waiting or taken == TURN
         self._take_description()
         self._take_counts()
-        self._log_failure()
+        if self.failure and not self._is_failure_logged:
+            self._is_failure_logged = True
+            self._node.log(f"the bag is no longer written: {self.failure}; the flight goes on")
         return is_timely, waiting
 
     def _take_some(self, entry: RawSubscription) -> tuple[int, int]:
@@ -217,11 +213,6 @@ class RecorderLoop:
     @property
     def _end_ns(self) -> int:
         return NEVER_NS if self._until_ns is None else self._until_ns
-
-    def _log_failure(self) -> None:
-        if self.failure and not self._is_failure_logged:
-            self._is_failure_logged = True
-            self._node.log(f"the bag is no longer written: {self.failure}; the flight goes on")
 
 
 def set_aside(bag: Path) -> Path:

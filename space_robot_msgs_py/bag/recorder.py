@@ -133,11 +133,8 @@ class BagRecorder:
     def record(self, topic: topics.Topic, data: bytes, sent_ns: int = 0, sequence: int = 0) -> None:
         """Add one serialized message.
 
-        Args:
-            topic: it came on.
-            data: the message.
-            sent_ns: when, by the sender's clock (0: not known).
-            sequence: its place among all of its publisher, from 1 on (0: not known).
+        ``sent_ns``: when, by the sender's clock; ``sequence``: the publisher's number of it, from 1
+        on; 0: not known.
         """
         name = topic.full_name
         self._sequences[name].take(sequence)
@@ -162,11 +159,7 @@ class BagRecorder:
                 self.flush()
 
     def describe(self, flown: Any) -> None:
-        """Add to the flight's description what the plant says, where nobody has said more.
-
-        Args:
-            flown: the plant's description; no mapping: it is ignored.
-        """
+        """Add the plant's description, a mapping, unless the flight's has the robot already."""
         if not isinstance(flown, dict) or ROBOT_KEY in self._flight:
             return
         self._flight = flown | self._flight
@@ -178,12 +171,7 @@ class BagRecorder:
                 self._fail(error)
 
     def note_sent(self, topic_name: str, count: int) -> None:
-        """Record how many messages a node reports to have sent on a topic.
-
-        Args:
-            topic_name: the topic; others than those recorded are ignored.
-            count: messages.
-        """
+        """Take the number of messages that a node reports to have sent on a recorded topic."""
         if sequences := self._sequences.get(topic_name):
             sequences.note_sent(count)
 

@@ -24,7 +24,7 @@ from ..samples import (
 )
 from ..signals import Each, carried_by
 from ..wire.definitions import decode
-from ..wire.messages import TELEMETRY_ROWS, SampleColumn, describe
+from ..wire.messages import TELEMETRY_ROWS, describe
 from ..wire.telemetry import LawCodec
 from .batch import NO_STAMP, Array, Batch, FieldReader, Integers, Places
 from .flight_log import FlightLog, MeasuredStates
@@ -46,13 +46,7 @@ class Rows:
     """Takes batches in their order; the log grows with its ticks."""
 
     def __init__(self, names: RobotNames, timebase: Timebase, origin_ns: int) -> None:
-        """Begin with no tick.
-
-        Args:
-            names: of the joints, in the order of the columns.
-            timebase: of the stamps.
-            origin_ns: stamp of tick 0.
-        """
+        """Begin with no tick; ``origin_ns`` is the stamp of tick 0."""
         self.log = FlightLog.allocate(0, names, timebase)
         self.log.commanded_torque = np.empty((0, len(names.axes)))
         self.accounting: dict[str, MessageAccounting] = {}
@@ -115,8 +109,12 @@ class Rows:
         reader = self._readers.get(topic)
         if not reader or not reader.description.columns:
             return
-        is_field = topic is topics.MAGNETOMETER
-        self._widen(self._magnetometer if is_field else self.log, reader.description.columns)
+        target = self._magnetometer if topic is topics.MAGNETOMETER else self.log
+        for name, first, length in reader.description.columns:
+            column = getattr(target, name)
+            # the first message of wheels, gears or an orbit shows that the robot has them
+            if column.ndim == 2 and column.shape[1] < first + length:
+                setattr(target, name, np.full((self._rows, first + length), np.nan))
         if topic.per_tick:
             near = ticks < self._rows
             if not near.all():
@@ -155,13 +153,6 @@ class Rows:
         named: dict[str, Any] = {"wheels" if topic is topics.COMMAND else topic.of: names}
         robot = self._names._replace(**named)
         self._readers[topic] = FieldReader(describe(topic, robot, log.timebase))
-
-    def _widen(self, target: Any, columns: tuple[SampleColumn, ...]) -> None:
-        # the first message of wheels, gears or an orbit tells that the robot has them
-        for name, first, length in columns:
-            column = getattr(target, name)
-            if column.ndim == 2 and column.shape[1] < first + length:
-                setattr(target, name, np.full((self._rows, first + length), np.nan))
 
     def split_truth(self) -> None:
         """Make the true states those of the log, if both their halves came; call it at the end."""

@@ -117,11 +117,7 @@ class BagWriter:
             self._is_full = 0 < self._split_size <= file.size
 
     def close(self, custom: Mapping[str, str]) -> None:
-        """Finish the last file and write metadata.yaml, after a `flush`.
-
-        Args:
-            custom: what goes, with the description, into the bag's custom data.
-        """
+        """Finish the last file and write metadata.yaml with more custom data, after a `flush`."""
         self._end_file(custom)
         information = self._information({**self._description, **custom}, self._topics)
         text = _to_yaml({"rosbag2_bagfile_information": information})

@@ -91,14 +91,15 @@ class RawPublisher:
         nodes = [node for node, _, topic in awaited if topic.strip("/") in ("", self.topic.name)]
         infos = self._node.get_subscriptions_info_by_topic(self.topic.name)
         listening = {full_name_of(info) for info in infos}
-        missing = [name for name in nodes if self._full_node_name(name) not in listening]
+        here = self._node.get_namespace().rstrip("/")
+        missing = [
+            name
+            for name in nodes
+            if (name if name.startswith("/") else f"{here}/{name}") not in listening
+        ]
         if not missing and self.listener_count < len(nodes):
             return nodes  # discovered, but not all matched with this publisher yet
         return missing
-
-    def _full_node_name(self, name: str) -> str:
-        namespace = self._node.get_namespace().rstrip("/")
-        return name if name.startswith("/") else f"{namespace}/{name}"
 
 
 def flush(outputs: Sequence[RawPublisher], timeout_s: float) -> None:
@@ -134,14 +135,9 @@ class RawSubscription:
         depth: int = 0,
         best_effort: bool = False,
     ) -> None:
-        """Subscribe.
+        """Subscribe, with the topic's own depth if ``depth`` is 0.
 
-        Args:
-            node: that subscribes.
-            topic: name, type and quality of service.
-            group: callback group that excludes it from executors.
-            depth: of the queue (0: that of the topic).
-            best_effort: True for best effort, so that the publisher never waits or resends.
+        With ``best_effort`` the publisher never waits or resends.
         """
         self.topic, self._node = topic, node
         profile = qos(topic)

@@ -96,11 +96,9 @@ def nodes_in(domain: int, namespace: str = ROOT) -> list[Holder]:
 
 
 def living_nodes(name: str, namespace: str = "") -> Iterator[tuple[int, str]]:
-    """Yield domain and namespace of this machine's nodes with a name, the newest first.
+    """Yield domain and namespace of this machine's nodes, the newest first.
 
-    Args:
-        name: of the node, without namespace.
-        namespace: of the node; empty: any.
+    Nodes have the ``name`` (without namespace) and the ``namespace``; empty: any.
     """
     start, end = _path("").stem, f".{name}.lock"
     files = _path("").parent.glob(f"{start}*@*{end}")

@@ -50,11 +50,7 @@ class Upkeep:
         return min(self._next_call, self._next_report)
 
     def run(self, timeout_s: float = 0.0) -> None:
-        """Execute a waiting service call or report the health, if due.
-
-        Args:
-            timeout_s: time to wait for a call; only without flight.
-        """
+        """Execute a service call or report the health, if due; only idle nodes wait for calls."""
         now = time.monotonic()
         serves_calls = timeout_s > 0.0 or self._next_call <= min(now, self._next_report)
         if serves_calls:

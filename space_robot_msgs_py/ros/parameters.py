@@ -16,17 +16,12 @@ from .rclpy_internals import declared_parameters, parameter_overrides
 Schema = TypeVar("Schema", bound=NodeSettings)
 
 
-def _bounds(field: Any) -> tuple[float | None, float | None]:
+def descriptor(field: Any, read_only: bool) -> ParameterDescriptor:
+    """Return the ROS descriptor of a schema's field: description and range."""
     low = high = None
     for item in field.metadata:
         low = next((getattr(item, k) for k in ("ge", "gt") if hasattr(item, k)), low)
         high = next((getattr(item, k) for k in ("le", "lt") if hasattr(item, k)), high)
-    return low, high
-
-
-def descriptor(field: Any, read_only: bool) -> ParameterDescriptor:
-    """Return the ROS descriptor of a schema's field: description and range."""
-    low, high = _bounds(field)
     result = ParameterDescriptor(description=field.description or "", read_only=read_only)
     if low is not None and high is not None:
         if field.annotation is int:

@@ -113,9 +113,7 @@ def forget_parameters(node: Node, names: Iterable[str]) -> None:
 def guard_change_state(node: LifecycleNode, refused: Callable[[], None]) -> None:
     """Refuse transitions that do not exist in the present state, on which rclpy would crash.
 
-    Args:
-        node: not in an executor yet.
-        refused: called for each such transition.
+    ``refused`` is called for each. To be called before the node is in an executor.
     """
     service = node._service_change_state
     change_state = service.callback

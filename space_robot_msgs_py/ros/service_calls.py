@@ -91,12 +91,7 @@ def until(condition: Callable[[], bool]) -> Generator[None, None, None]:
 
 
 async def change_state(node: Node, name: str, transition: str) -> None:
-    """Request a lifecycle transition of another node, from within a service callback.
-
-    Args:
-        node: that asks.
-        name: of the other node in its namespace.
-        transition: ``configure``, ``activate``, ``deactivate`` or ``cleanup``.
+    """Request a lifecycle transition of the node ``name``, from within a service callback.
 
     Raises:
         FlightError: the other node refuses or does not answer.

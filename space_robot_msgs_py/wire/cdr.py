@@ -162,11 +162,7 @@ def _value(content: Any, name: str) -> Any:
 
 
 def header_stamp_ns(data: bytes, at: int = 0) -> int:
-    """Return the stamp, ns, of a serialized message that starts with a Header or a Time.
-
-    Args:
-        data: the message, little or big endian.
-        at: number of bytes before the stamp.
+    """Return the stamp, ns, of a message whose Header or Time stands behind ``at`` bytes.
 
     Raises:
         MessageError: the message is too short.

@@ -39,14 +39,10 @@ class NumbersCodec:
         runs: Sequence[tuple[str, int]],
         timebase: Timebase,
     ) -> None:
-        """Compute the layout of the message.
+        """Compute the layout of the message with the constant fields ``content``.
 
-        Args:
-            type_name: type of the message.
-            content: its constant fields.
-            runs: path of the first of some consecutive numbers, such as ``pose.position``, and how
-                many they are.
-            timebase: conversion between ticks and stamps.
+        ``runs``: path of the first of some consecutive numbers, such as ``pose.position``, and how
+        many they are.
         """
         self._timebase = timebase
         layout = MessageLayout(type_name, content)
