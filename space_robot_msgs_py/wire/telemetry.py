@@ -109,7 +109,7 @@ class TelemetryCodec:
         self._numbers[0] = tick
         for target, row in zip(self._rows, rows, strict=True):
             target[:] = row
-        return self._codec.encode(None, self._numbers)
+        return self._codec.encode(0, self._numbers)
 
     @staticmethod
     def decode(data: bytes) -> tuple[int, Array]:

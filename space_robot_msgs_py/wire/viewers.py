@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from .. import topics
 from ..samples import Timebase
 from ..topics import Topic
-from .cdr import BODY, ENCAPSULATION, STAMP, MessageLayout
-from .messages import body
+from .cdr import ENCAPSULATION, MessageLayout
+from .messages import Numbers, WritableMessage
 
 Array = NDArray[np.float64]
 
@@ -44,22 +44,14 @@ class NumbersCodec:
         ``runs``: path of the first of some consecutive numbers, such as ``pose.position``, and how
         many they are.
         """
-        self._timebase = timebase
-        layout = MessageLayout(type_name, content)
-        self._wire = np.zeros(BODY + layout.pattern.shape[1], np.uint8)[BODY:]
-        self._wire[:] = layout.pattern[0]
-        self._body = body(self._wire)
-        starts = [((layout.slots[path].offset - BODY) // 8, count) for path, count in runs]
-        self._at = np.array([start + k for start, count in starts for k in range(count)], np.intp)
-        self._stamps = layout.stamps
+        self._timebase, layout = timebase, MessageLayout(type_name, content)
+        offsets = [layout.slots[path].offset + 8 * k for path, count in runs for k in range(count)]
+        numbers = Numbers(layout, np.array(offsets, np.uint64))
+        self._message = WritableMessage(numbers, layout.stamps)
 
     def encode(self, tick: int, numbers: Array) -> bytes:
         """Return the message of a tick, from its numbers in the order of the runs."""
-        self._body[self._at] = numbers.reshape(-1)
-        stamp = divmod(self._timebase.stamp_ns(tick), 1_000_000_000)
-        for place in self._stamps:
-            STAMP.pack_into(self._wire.data, place, *stamp)
-        return self._wire.tobytes()
+        return self._message.serialized(self._timebase.stamp_ns(tick), numbers.reshape(-1))
 
 
 class FramePair(NamedTuple):
