@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from bags import read_accounts
+from bags import messages_of, read_accounts
 from paths import CONFIG, ROOT
 
 import space_robot.cli as room_of_commands
@@ -22,7 +22,6 @@ from space_robot.flight.simulate import simulate
 from space_robot_control.laws import laws
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.bag import rows
-from space_robot_msgs_py.bag.folder import open_bag
 from space_robot_msgs_py.bag.recorder import BagRecorder
 from space_robot_msgs_py.samples import CommandSignals, RobotNames
 from space_robot_msgs_py.signals import Reporter, signal
@@ -88,13 +87,13 @@ def test_a_signal_is_one_line_and_its_topic_another(
     codec = Codec(describe(newest, names, flight.timebase))
     simulate(flight, tmp_path / "flown")
     recorder = BagRecorder(tmp_path / "bag", flight.description, flight.timebase)
-    for name, data in open_bag(tmp_path / "flown").messages(*topics.ALL):
-        recorder.record(topics.BY_NAME[name], data)
+    for topic, data in messages_of(tmp_path / "flown"):
+        recorder.record(topic, data)
     for tick in range(20):
         if tick != 9:
             recorder.record(newest, codec.encode(flight.timebase.stamp_ns(tick), np.array([tick])))
     recorder.close()
-    recorded = [data for _, data in open_bag(tmp_path / "bag").messages(newest)]
+    recorded = [data for topic, data in messages_of(tmp_path / "bag") if topic is newest]
     assert [decode(data, newest.type).temperature for data in recorded] == [
         *range(9),
         *range(10, 20),

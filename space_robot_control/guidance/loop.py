@@ -63,7 +63,7 @@ class MissionLoop:
             node,
             self._mission,
             lambda: (max(self._stamps.last, 0), self._next),
-            RobotNames.of(robot.joint_names, passive=robot.passive_names),
+            RobotNames(robot.joint_names, passive=robot.passive_names),
         )
         self._action = self._offer_action()
 

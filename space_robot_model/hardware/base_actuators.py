@@ -240,13 +240,15 @@ class BaseActuatorSettings(StrictModel):
 
     def robot_names(self, robot: Robot) -> RobotNames:
         """Return the names of all measured and commanded quantities of ``robot``."""
-        return RobotNames.of(
+        names, wheels = self.names, self.wheel_count
+        thrusters = wheels + self.thruster_count
+        return RobotNames(
             robot.joint_names,
-            self.names,
-            self.wheel_count,
+            names[:wheels],
+            names[wheels:thrusters],
             robot.passive_names,
             robot.geared_names,
-            self.torquer_count,
+            torquers=names[thrusters:],
         )
 
     def check(self, robot: Robot, file: str) -> None:

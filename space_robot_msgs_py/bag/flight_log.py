@@ -69,7 +69,7 @@ class MeasuredStates(MeasuredSignals):
         cls, log: FlightLog, new: Callable[[tuple[int, ...]], Array] = of_nan
     ) -> MeasuredStates:
         """Return columns of NaN, as many rows as ``log`` has; ``new`` as in `allocate`."""
-        return cls.of(log).each(lambda _, column: new(column.shape))
+        return cls(*(new(getattr(log, name).shape) for name in MEASURED_COLUMNS))
 
     @property
     def angular_velocity(self) -> Array:
@@ -80,10 +80,6 @@ class MeasuredStates(MeasuredSignals):
     def columns(self) -> dict[str, Array]:
         """All of them, by name."""
         return {name: getattr(self, name) for name in MEASURED_COLUMNS}
-
-    def each(self, change: Callable[[str, Array], Array]) -> MeasuredStates:
-        """Return what ``change`` makes of each column, given its name."""
-        return MeasuredStates(*(change(name, column) for name, column in self.columns.items()))
 
 
 @dataclass(eq=False, repr=False, kw_only=True)
@@ -324,10 +320,8 @@ class FlightLog(StateSignals):
 
     def rows(self, start: int, stop: int) -> FlightLog:
         """The rows ``start`` to ``stop``: views, not copies. Counts stay those of the whole log."""
-        rows: dict[str, Any] = {name: column[start:stop] for name, column in self.columns.items()}
-        if self.measured is not None:
-            rows["measured"] = self.measured.each(lambda _, column: column[start:stop])
-        return replace(self, **rows, first_tick=self.first_tick + start)
+        rows = _with_columns(self, lambda column: column[start:stop])
+        return replace(rows, first_tick=self.first_tick + start)
 
 
 def finite_rows(columns: Iterable[Array]) -> NDArray[np.bool_]:
@@ -335,6 +329,13 @@ def finite_rows(columns: Iterable[Array]) -> NDArray[np.bool_]:
     each = (np.isfinite(column.reshape(len(column), -1)).all(axis=1) for column in columns)
     finite_rows: NDArray[np.bool_] = np.logical_and.reduce(list(each))
     return finite_rows
+
+
+def _with_columns(log: FlightLog, change: Callable[[Array], Array]) -> FlightLog:
+    columns: dict[str, Any] = {name: change(column) for name, column in log.columns.items()}
+    if log.measured is not None:
+        columns["measured"] = MeasuredStates(*map(change, log.measured.columns.values()))
+    return replace(log, **columns)
 
 
 def _beside(joints: Array, passive: Array) -> Array:
@@ -383,11 +384,7 @@ def blocks_of(log: FlightLog) -> Iterator[FlightLog]:
 
 def last_rows(log: FlightLog, count: int) -> FlightLog:
     """Copy the last ``count`` rows, or all if there are fewer."""
-    rows = log.rows(max(0, log.ticks - count), log.ticks)
-    columns: dict[str, Any] = {name: column.copy() for name, column in rows.columns.items()}
-    if rows.measured is not None:
-        columns["measured"] = rows.measured.each(lambda _, column: column.copy())
-    return replace(rows, **columns)
+    return _with_columns(log.rows(max(0, log.ticks - count), log.ticks), np.copy)
 
 
 def joined(before: FlightLog | None, log: FlightLog) -> FlightLog:
@@ -399,8 +396,6 @@ def joined(before: FlightLog | None, log: FlightLog) -> FlightLog:
         for name, column in log.columns.items()
     }
     if log.measured is not None and before.measured is not None:
-        measured = before.measured.columns
-        columns["measured"] = log.measured.each(
-            lambda name, column: np.concatenate([measured[name], column])
-        )
+        pairs = zip(before.measured.columns.values(), log.measured.columns.values(), strict=True)
+        columns["measured"] = MeasuredStates(*map(np.concatenate, pairs))
     return replace(log, **columns, first_tick=before.first_tick)

@@ -18,7 +18,6 @@ from space_robot_model.hardware.sensors import SensorSettings
 from space_robot_model.robot import Robot
 from space_robot_msgs_py.config.settings import leaves
 from space_robot_msgs_py.errors import InputError
-from space_robot_msgs_py.samples import RobotNames
 from space_robot_sim.plant.plant import Plant
 from space_robot_sim.plant.settings import PlantNodeSettings
 
@@ -141,7 +140,6 @@ def test_names_are_numbered_wheels_first_and_torquers_last() -> None:
     assert (names.thrusters, names.torquers) == (("thruster_1", "thruster_2"), ("torquer_1",))
     assert settings.names == names.actuators == names.wheels + names.thrusters + names.torquers
     assert names.commanded == (*names.axes, *names.actuators)
-    assert RobotNames.of(PAPER.joint_names, settings.names, 3, torquer_count=1) == names
     assert BaseActuatorSettings().names == ()
 
 
