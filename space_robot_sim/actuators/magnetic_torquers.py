@@ -46,10 +46,12 @@ def magnetise(
     x, y, z = 0.0, 0.0, 0.0
     for k in range(whole(torquers.count)):
         most = torquers.max_dipole[k]
+        # a command that is not a number asks for nothing
         dipole = where(np.isnan(asked[k]), 0.0, max(min(asked[k], most), -most))
         x += dipole * torquers.axis[k, 0]
         y += dipole * torquers.axis[k, 1]
         z += dipole * torquers.axis[k, 2]
+    # torque m x B
     base_wrench[3] += y * magnetic_field[2] - z * magnetic_field[1]
     base_wrench[4] += z * magnetic_field[0] - x * magnetic_field[2]
     base_wrench[5] += x * magnetic_field[1] - y * magnetic_field[0]

@@ -88,11 +88,13 @@ def disturbance_torque(disturbance: Disturbance, time: float, out: Array) -> Non
     On the base about inertial axes, then on the joints.
     """
     frequency = disturbance.angular_frequency
+    # (61): base, joints 1 to 3, joints 4 and up
     for group in range(3):
         first, last = 3 * group, out.size if group == 2 else min(3 * group + 3, out.size)
         amplitude = disturbance.amplitude[group]
         torque = amplitude
         if any_lane(amplitude != 0.0):
+            # a sum of two sines; one of 0 Hz is none, as on the outer joints
             wave = sin_cos(frequency[group, 0] * time)[0] + sin_cos(frequency[group, 1] * time)[0]
             torque = where(amplitude != 0.0, amplitude * wave, 0.0)
         for i in range(first, last):
@@ -176,6 +178,7 @@ class LoadSchedule:
         if not time.size:
             return
         ticks = time / period
+        # 0.1 s / 0.5 ms is not 200 to the last bit
         ticks = np.where(np.abs(ticks - np.round(ticks)) <= ROUNDING, np.round(ticks), ticks)
         knots = np.unique([np.floor(ticks), np.ceil(ticks)])
         within = (ticks[0] <= knots) & (knots <= ticks[-1])

@@ -128,14 +128,9 @@ class DisturbanceTable(NamedTuple):
 
 
 def table_text(text: str, folder: Path = Path()) -> str:
-    """Return the numbers of a table, as text: of a text as they are, or of the file it names.
+    """Return a table as text: the ``text`` itself, or the table of the file that it names.
 
-    Args:
-        text: of a table, a path to a CSV or Parquet file, or empty.
-        folder: where a relative path begins.
-
-    Raises:
-        InputError: the file cannot be read, or its table is wrong.
+    A relative path begins in ``folder``; an empty text is none.
     """
     if not text.strip() or text.startswith(JSON):
         return text

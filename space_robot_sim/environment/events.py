@@ -79,9 +79,6 @@ def parse_events(texts: Iterable[str], folder: Path = Path()) -> list[Event]:
     Args:
         texts: as in ``capture@10:small_satellite``.
         folder: where a target's file may be, see `find_target`.
-
-    Raises:
-        InputError: names the event, what is wrong with it, what is allowed.
     """
     return in_order([_read(text, folder) for text in texts if text.strip()])
 

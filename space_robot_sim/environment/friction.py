@@ -98,5 +98,6 @@ def friction_torque(friction: Friction, velocities: Array, directions: Array, ou
     """
     for i in range(whole(friction.count)):
         rate = velocities[i]
+        # the last term of (27); a joint at rest is locked in place of a torque that holds it
         direction = directions[i] if uniform(friction.set_valued) != 0.0 else np.sign(rate)
         out[i] = friction.coulomb[i] * direction + friction.viscous[i] * rate

@@ -52,6 +52,7 @@ def gravity_difference(r: Vector, d: Vector, has_j2: float) -> tuple[Vector, flo
     c, end = 1.0 + q, add(r, d)
     root = np.sqrt(c)
     c3 = c * root
+    # p_k = (1 + q)^(-k/2) - 1 of the module's formula, the polynomials by Horner's rule
     p3 = -q * (3.0 + q * (3.0 + q)) / (c3 * (1.0 + c3))
     fall = scale(add(d, scale(end, p3)), -MU / (square * distance))
     if uniform(has_j2) != 0.0:
@@ -98,7 +99,7 @@ def add_gravity_gradient(
         place = add(base, com)
         fall, ratio = gravity_difference(r, place, has_j2)
         force = scale(fall, mass)
-        # of the body's extent
+        # of the body's extent: inertia about its centre of mass, from that about its frame
         nearness = 1.0 / (away * ratio)
         u = scale(add(r, place), nearness)
         own = symmetric(data.inertia[i])

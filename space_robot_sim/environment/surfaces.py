@@ -101,7 +101,7 @@ class Surfaces(Component):
 
 
 @kernel
-def press_on_surfaces(
+def fill_surface_wrenches(
     surfaces: Surfaces,
     model: Model,
     velocity: Array,
@@ -133,6 +133,7 @@ def press_on_surfaces(
         for k in range(whole(surfaces.first[i]), whole(surfaces.first[i + 1])):
             plate = surfaces.plates[k]
             normal, centre = vector(plate, NORMAL), vector(plate, CENTRE)
+            # a plate that faces away from the wind, or from the Sun, gets nothing
             facing = plate[DRAG_COEFFICIENT] * plate[AREA] * max(dot(normal, u), 0.0)
             area = area + facing
             arm = add(arm, scale(centre, facing))

@@ -1,8 +1,8 @@
 """Plants of eight flights, stepped together.
 
 Over most steps every joint slides or stands all through, so that all flights take the same course
-(`integrator.glide`). A flight in which a joint stops or breaks away is integrated by itself over
-that step.
+(`integrator.regular_step`). A flight in which a joint stops or breaks away is integrated by itself
+over that step.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from space_robot_msgs_py.compiled.lanes import (
 from space_robot_msgs_py.compiled.records import Block
 
 from ..environment.environment import Environment
-from .integrator import glide, integrate, state_size
+from .integrator import integrate, regular_step, state_size
 from .tick import PlantMemory, begin_interval, end_interval
 
 Array = NDArray[np.float64]
@@ -68,7 +68,7 @@ def move_lanes(memory: PlantMemory, alone: Block, start: float, period: float, f
     step = period / substeps
     for k in range(substeps):
         time = start + k * step
-        goes_on = glide(model, memory.environment, x, time, step, stages)
+        goes_on = regular_step(model, memory.environment, x, time, step, stages)
         moves = goes_on & flies
         for i in range(state_size(model, memory.environment)):
             x[i] = where(moves, stages.end[i], x[i])
@@ -83,6 +83,7 @@ def _move_alone(
     memory: PlantMemory, alone: PlantMemory, lane: int, time: float, step: float
 ) -> None:
     """Integrate the flight of one lane over a step."""
+    # of its block only what changed since is copied: state, actuation, what acts over the tick
     x, stages = memory.x, alone.stages
     actuation = memory.stages.actuation
     for i in range(state_size(alone.model, alone.environment)):

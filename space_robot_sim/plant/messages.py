@@ -81,7 +81,7 @@ class CommandGuard:
         return self.acting
 
 
-NONE = -1
+NO_TICK = -1
 """No tick."""
 
 
@@ -91,7 +91,7 @@ class SentState(NamedTuple):
     messages: tuple[bytes, ...]
     """Its parts, in the order of `StateCodec.topics`."""
     answered_by: int
-    """Tick of the command that will come for it; `NONE`: no command will."""
+    """Tick of the command that will come for it; `NO_TICK`: no command will."""
 
 
 class PlantMessages:
@@ -114,7 +114,7 @@ class PlantMessages:
         if settings.has_message_faults:
             schedule = settings.schedule(names, period)
             self._faults = MessageFaults(schedule, len(names.joints), len(names.passive))
-        self._asked = NONE
+        self._asked = NO_TICK
         """Tick of the newest state that a controller can have answered."""
 
     def send(self, state: RobotState) -> Iterable[SentState]:
@@ -128,7 +128,7 @@ class PlantMessages:
             stamp = awaited_stamp([arriving], state.tick, self._asked)
             if stamp is not None:
                 self._asked = stamp
-            sent.append(SentState(arriving.item, NONE if stamp is None else stamp))
+            sent.append(SentState(arriving.item, NO_TICK if stamp is None else stamp))
         return sent
 
     def take(self, tick: int) -> None:

@@ -113,11 +113,7 @@ class RunControl:
         return was_paused
 
     def step(self, ticks: int) -> int:
-        """Let the plant go so many ``ticks`` on; return the tick at which it is held then.
-
-        Raises:
-            InputError: it is not paused, or still in a step, or that is no number of ticks.
-        """
+        """Let the plant go ``ticks`` further; return the tick at which it is held then."""
         if ticks < 1:
             raise InputError(f"a step takes 1 tick or more, got {ticks}")
         if not self.is_paused:
@@ -128,9 +124,8 @@ class RunControl:
         return self.tick + ticks
 
 
-REPEAT_EVERY_S = 0.5
-REPEAT_FOR_S = 2.0
-"""Who takes messages as best effort may miss the first ones."""
+REPEAT_EVERY_S, REPEAT_FOR_S = 0.5, 2.0
+"""Repetition of messages for a new listener, which may miss the first ones as best effort."""
 
 
 class LateListeners:
@@ -143,7 +138,7 @@ class LateListeners:
         self._until = self._next = 0.0
 
     def begin(self) -> None:
-        """Begin a tick: who listens by now gets its messages."""
+        """Begin a tick: present listeners get its messages."""
         self._counts = None
 
     def are_due(self, now: float) -> bool:

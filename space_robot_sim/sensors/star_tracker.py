@@ -112,6 +112,7 @@ def track_stars(tracker: StarTracker, truth: State, tick: int, measured: State) 
         tracker.taken[place] = 1.0 - tracker.blind[0]
         draws = tracker.draws[tick % BLOCK_TICKS]
         if tick == 0:
+            # a tracker that has been on for long holds a measurement from before the flight
             expose(tracker, tracker.held, draws, tracker.under_way[place])
             _release(tracker, place)
         expose(tracker, truth.quaternion, draws, tracker.under_way[place])
@@ -142,12 +143,14 @@ def expose(tracker: StarTracker, quaternion: Array, draws: Array, out: Array) ->
     sine, cosine = sin_cos(0.5 * angle)
     sine /= where(is_turned, angle, 1.0)
     x, y, z = sine * x, sine * y, sine * z
+    # the noise turns about the base's axes: q (x) noise
     out[0] = where(is_turned, a * cosine - b * x - c * y - d * z, a)
     out[1] = where(is_turned, a * x + b * cosine + c * z - d * y, b)
     out[2] = where(is_turned, a * y + c * cosine + d * x - b * z, c)
     out[3] = where(is_turned, a * z + d * cosine + b * y - c * x, d)
     step = 0.5 * tracker.step[0]
     if any_lane(step > 0.0):
+        # rounded numbers are no unit quaternion any more
         for i in range(4):
             out[i] = in_steps(out[i], step)
         length = np.sqrt(out[0] * out[0] + out[1] * out[1] + out[2] * out[2] + out[3] * out[3])
