@@ -26,7 +26,7 @@ Array = NDArray[np.float64]
 
 
 class Installation(NamedTuple):
-    """What a component's numbers depend on beside its data sheet."""
+    """Numbers of the plant on which a component's depend, beside its data sheet."""
 
     n: int
     """Joints with motors."""
@@ -75,7 +75,7 @@ class Component(Record):
                 value = attrgetter(field.source)(sheet)
             else:
                 value = field.source(sheet, at)
-            if np.ndim(value):  # what there is room for beyond the last one stays zero
+            if np.ndim(value):  # entries beyond the last one stay zero
                 record[name][: len(value)] = value
             else:
                 record[name] = value

@@ -8,8 +8,8 @@ from typing import Any, NamedTuple
 
 from pydantic import ValidationError
 
-from space_robot_control.controller.gains import gains_as_path, split_gains
-from space_robot_control.controller.settings import ControllerNodeSettings
+from space_robot_control.controller.gains import split_gains
+from space_robot_control.controller.settings import ControllerNodeSettings, gains_as_path
 from space_robot_control.guidance.mission import MissionNodeSettings, pointing_start
 from space_robot_control.laws import ControlLaw
 from space_robot_control.navigation.settings import assumed_numbers

@@ -23,9 +23,6 @@ def assumed_actuators(name: str, robot: Robot) -> BaseActuatorSettings:
 
     Parameters of the plant alone (a misaligned wheel, a weak thruster) are left out: the controller
     does not know them.
-
-    Raises:
-        InputError: there is no such file, or it is wrong for ``robot``.
     """
     actuators = read_sheet(BaseActuatorSettings, "actuators", name)
     actuators.check(robot, name)

@@ -70,6 +70,7 @@ def dump_momentum(torquers: AssumedTorquers, momentum: Vector) -> None:
     """
     field = vector(torquers.magnetic_field, 0)
     square = dot(field, field)
+    # m = k (h x B) / |B|^2
     rate = torquers.gain / square if square > LEAST_FIELD * LEAST_FIELD else 0.0
     wanted = scale(cross(momentum, field), rate)
     excess = 1.0
@@ -112,6 +113,7 @@ def find_unloading(unloading: Unloading, wheels: AssumedWheels, torque: Array) -
         unloading.is_active = 1.0
     elif fullest < unloading.to:
         unloading.is_active = 0.0
+    # the wheels have to give what the thrusters take from them, beside the demand
     rate, excess = unloading.rate * unloading.is_active, 1.0
     for k in range(int(wheels.count)):
         load = abs(dot(vector(wheels.healthy.inverse[k], 0), momentum)) * rate

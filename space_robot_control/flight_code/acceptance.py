@@ -17,7 +17,7 @@ from space_robot_msgs_py.compiled.records import Block
 from space_robot_msgs_py.samples import Command, Reference, RobotState
 
 from ..controller.controller import Controller
-from ..controller.supervisor import MODES, Supervisor
+from ..controller.supervisor import Supervisor
 from ..controller.tick import ANSWERED, NEW
 from .folder import Exported
 from .library import fill_measurement, fill_reference
@@ -72,7 +72,7 @@ class AnswerRecording:
         """Add a request, for a state or only its tick, and its answer."""
         record: NDArray[Any] = np.zeros(1, self.dtype)
         record["kind"], record["result"] = kind, result
-        record["mode"] = MODES.index(supervisor.mode)
+        record["mode"] = supervisor.mode
         if isinstance(state, RobotState):
             fill_measurement(record["measurement"], state)
         else:

@@ -88,7 +88,7 @@ class Signals(Record):
     rho: Array = per_axis("rho = [eps_e, theta]")
     rho_rate: Array = per_axis("rhodot")
     rho_step: Array = per_axis("step of rho since the last tick by one of the reference")
-    """Zero while the base's reference goes on where it was; no torque causes it."""
+    """Zero while the base's reference moves continuously; no torque causes it."""
     rate_step: Array = per_axis("step of rhodot by the same")
     applied_force: Array = per_axis("F_S applied over the last interval", "N m")
     paired_force: Array = per_axis("the same through the low-pass of the time-delay pair", "N m")
@@ -241,7 +241,7 @@ class ControlLaw(RecordOwner, ABC):
 
 
 class SomeGains(Record):
-    """Common layout of the gains of any law: at least one gain."""
+    """Common beginning of the gains of all laws, as which compiled loops see them."""
 
     first: Array = per_axis("first gain")
 
@@ -285,11 +285,7 @@ class CompiledLaw(ControlLaw):
 
     @classmethod
     def function(cls, width: int = 1) -> RecordFunction:
-        """Return the kernel, compiled for this law's records of numbers of a width.
-
-        Raises:
-            InputError: it cannot be compiled for that width.
-        """
+        """Return the kernel, compiled for this law's records of numbers of a width."""
         own: list[Any] = [cls.gains_type, cls.memory_type]  # classes are hashable
         return _compiled(cls.kernel, *own, width)
 
@@ -331,14 +327,13 @@ def force_of(law: ControlLaw, signals: Signals, tick: int) -> Array:
         tick: number of the tick, for error messages.
 
     Raises:
-        LawError: its code raised an error or called ``sys.exit``, or the returned value is not
-            an array with one number per axis.
+        LawError: its code failed, or did not return an array with one number per axis.
     """
     try:
         force = law.force(signals)
     except SpaceRobotError:
         raise
-    except BaseException as error:
+    except BaseException as error:  # a law may be the user's own, and call `sys.exit`
         if _is_of_user(error):
             raise
         place = traceback.extract_tb(error.__traceback__)[-1]

@@ -149,11 +149,8 @@ def begin_loads(loads: PrescribedLoads, tick: int, period: float, actuation: Arr
 def add_loads(loads: PrescribedLoads, time: float, wrench: Array, disturbance: Array) -> None:
     """Add the loads at ``time`` (s) within the present tick.
 
-    Args:
-        loads: of the robot.
-        time: s.
-        wrench: (6,) becomes the sum of what the actuators give and the loads on the base.
-        disturbance: (n+3,) N m, opposes motion; loads on joints are taken from it.
+    ``wrench`` (6,) becomes the sum of what the actuators give and the loads on the base; loads on
+    joints are taken from ``disturbance`` (n+3,), which opposes motion.
     """
     since = time - loads.begin[0]
     for i in range(6):
@@ -166,12 +163,9 @@ class LoadSchedule:
     """Segments of a table, in ticks; the rest of a flight depends on its tick alone."""
 
     def __init__(self, time: Array, loads: Array, period: float) -> None:
-        """Place rows in ticks of ``period`` seconds.
+        """Place the rows ``loads`` (K, n+6), see `PrescribedLoads`, in ticks of ``period`` s.
 
-        Args:
-            time: (K,) s, rising; empty: there are no loads.
-            loads: (K, n+6) N and N m, see `PrescribedLoads`.
-            period: s.
+        ``time`` (K,) rises, s; without rows there are no loads.
         """
         self._period = period
         self._first, self._values, self._slopes = np.zeros(0), loads, loads

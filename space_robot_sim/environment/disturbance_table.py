@@ -107,14 +107,9 @@ class DisturbanceTable(NamedTuple):
         return f"{names} from {time[0]:g} to {time[-1]:g} s"
 
     def loads(self, joint_names: Sequence[str], where: str = "disturbance") -> Array:
-        """Return the loads (K, n+6) of the rows: on the base as `BASE`, then on the joints.
+        """Return the loads (K, n+6) of the rows: on the base as `BASE`, then on joints with motors.
 
-        Args:
-            joint_names: of the n joints with motors.
-            where: the table's file, or key, for errors.
-
-        Raises:
-            InputError: a column is neither of the base nor of such a joint.
+        ``where`` names the table's file, or key, in errors.
         """
         names = [*BASE, *joint_names]
         loads = np.zeros((len(self.columns[TIME]), len(names)))

@@ -74,12 +74,7 @@ FORMS = {
 
 
 def parse_events(texts: Iterable[str], folder: Path = Path()) -> list[Event]:
-    """Parse events and sort them by time; empty texts are ignored.
-
-    Args:
-        texts: as in ``capture@10:small_satellite``.
-        folder: where a target's file may be, see `find_target`.
-    """
+    """Parse events and sort them by time; a target's file may be in ``folder``."""
     return in_order([_read(text, folder) for text in texts if text.strip()])
 
 

@@ -83,12 +83,8 @@ def add_gravity_gradient(
 ) -> None:
     """Add gravity to the bias forces of all bodies, which oppose the forces on them.
 
-    Args:
-        model: of the robot.
-        reference: (3,) position of the reference point from the Earth's centre, m.
-        base_position: (3,) of the base's CoM from the reference point, m, inertial axes.
-        has_j2: 1 with the Earth's oblateness, else 0.
-        data: with the bodies' places; ``bias`` is changed.
+    ``reference`` is the reference point's position from the Earth's centre, ``base_position`` that
+    of the base's CoM from there, m, inertial axes; ``data`` has the bodies' places.
     """
     r, base = vector(reference, 0), vector(base_position, 0)
     away = np.sqrt(dot(r, r))

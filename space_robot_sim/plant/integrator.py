@@ -61,7 +61,7 @@ class Stages(Record):
     actuation: Array = shaped(lambda n: (6 + MOST_MOVING,))
     """What the actuators give over the step: force (N) and torque (N m) on the base's axes, which
     turn with it, torques on the joints, actuated ones first, then those of wheels' motors, N m.
-    The force and torque contain the user's own wrench, if there is one."""
+    Force and torque include the user's own wrench."""
     force: Array = shaped(lambda n: (6 + MOST_MOVING,))
     """Generalised force, base part on inertial axes."""
     magnetic: Array = shaped(lambda n: (3,))
@@ -117,16 +117,10 @@ def add_disturbances(
 def state_derivative(
     model: Model, environment: Environment, x: Array, disturbance: Array, stages: Stages, out: Array
 ) -> None:
-    """Write xdot into ``out``: (27).
+    """Write xdot of the state ``x`` (see `Stages`) into ``out``: (27).
 
-    Args:
-        model: the plant's robot.
-        environment: its friction.
-        x: the state, see `Stages`.
-        disturbance: (n+3,) f_d, N m, about inertial axes, then on the actuated joints.
-        stages: ``actuation``, and which joints and wheels slide in which sense and which stand;
-            scratch.
-        out: as ``x``.
+    ``disturbance`` (n+3,) is f_d, N m, about inertial axes, then on the actuated joints. The stages
+    have the actuation, and which joints and wheels slide in which sense and which stand.
     """
     n, friction, data = whole(model.joint_count), environment.friction, stages.data
     quaternion, theta = x[3:7], x[7 : 7 + n]
@@ -305,12 +299,10 @@ def slip_or_stick(
 def regular_step(
     model: Model, environment: Environment, x: Array, time: float, period: float, stages: Stages
 ) -> bool:
-    """Write into ``stages.end`` the state after ``x`` if no joint stops or breaks away.
-
-    In lanes, where those of the others must be found by `integrate`, flight by flight.
+    """Write into ``stages.end`` the state after ``x`` in lanes where no joint stops or breaks away.
 
     Returns:
-        In which lanes that is so.
+        The mask of these lanes; the others are to be integrated by `integrate`, one by one.
     """
     directions, coulomb, end = stages.directions, environment.friction.coulomb, stages.end
     first, sticks = first_velocity(model), uniform(environment.friction.set_valued)

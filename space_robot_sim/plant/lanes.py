@@ -40,16 +40,10 @@ def advance_lanes(
     period: float,
     flies: bool,
 ) -> float:
-    """Fly eight plants from ``tick`` to the next, see `advance`.
+    """Fly eight plants from ``tick`` to the next under a ``torque`` each, see `advance`.
 
-    Args:
-        memory: in lanes.
-        alone: (8,) block of `PlantMemory`, in which a flight is integrated by itself.
-        command_delay_buffer: in lanes, as ``torque``.
-        torque: the command of each flight.
-        tick: at which it is given.
-        period: s.
-        flies: mask of the lanes that count.
+    All are in lanes but ``alone``, a block (8,) in which a flight is integrated by itself.
+    ``flies`` is the mask of the lanes that count.
     """
     begin_interval(memory, command_delay_buffer, torque, tick, period)
     move_lanes(memory, alone, tick * period, period, flies)

@@ -32,8 +32,8 @@ from .outputs import BaseOutput, SceneOutput, TruthOutput
 from .pacing import (
     PAUSED,
     SPIN_BEFORE_DEADLINE_S,
+    ControllerWatch,
     LateListeners,
-    OwnController,
     RunControl,
     WallClock,
 )
@@ -109,10 +109,10 @@ class PlantLoop:
         self._paused_out = PausedOutput(node)
         self._wall_clock = WallClock(settings.period)
         self._silence_s = settings.silence_timeout or math.inf
-        self._own = OwnController(node, self._command_in, settings)
+        self._watch = ControllerWatch(node, self._command_in, settings)
         self._controller_silent = False
         self._by_the_clock = False
-        """True if the tick that is under way lasts its period by the wall clock."""
+        """True if the present tick lasts its period by the wall clock."""
         self._must_give_way = False
         self._is_under_way = False
         """True if the tick's state has been measured."""
@@ -123,14 +123,14 @@ class PlantLoop:
         self._answered_by = NO_TICK
         """Tick of the newest command that can come."""
         self._awaits = False
-        """True if it is waited for, in lockstep."""
+        """True if lockstep waits for it."""
         self._heard = self._heard_before = NO_TICK
         """Newest tick that a command answers: now, and at this tick's begin."""
         self._sent_at = self._awaited_since = 0.0
         self._began_at, self._first_tick = time.monotonic(), 0
         self._answers, self._latency_s, self._latency_max_s = 0, 0.0, 0.0
         self.missed_deadlines = 0
-        """Ticks whose command was not there by their end, be it late or never sent."""
+        """Ticks whose command had not come by their end."""
 
     def begin(self) -> None:
         """Begin with the state of the present tick."""
@@ -156,7 +156,7 @@ class PlantLoop:
             FlightError: the controller that others start does not come, or has fallen silent.
         """
         if not self._is_under_way:
-            if self._own.is_awaited():
+            if self._watch.is_awaited():
                 return HELD
             self._begin_tick()
         if self._by_the_clock:
@@ -209,7 +209,7 @@ class PlantLoop:
             values["latency_max_ms"] = 1e3 * self._latency_max_s
         if self.control.is_paused:
             return Health(PAUSED, values=values)
-        if self._own.is_missing:
+        if self._watch.is_missing:
             return Health(
                 f"waiting for a node that publishes {self._command_in.full_name}", values=values
             )
@@ -257,14 +257,14 @@ class PlantLoop:
         """Wait on for the answer; send the state again, or take the controller for silent."""
         now = time.monotonic()
         if now > self._awaited_since + self._silence_s and self._heard >= 0:
-            self._own.check_silence(self._plant.tick)
+            self._watch.check_silence(self._plant.tick)
             self._node.log(f"no command for {self._silence_s:g} s: the controller is silent")
             self._controller_silent, self._awaits = True, False
             self._wall_clock.start(self._plant.tick)
             self._by_the_clock = True
             return None
         if self._heard < 0:
-            self._own.check_first(now - self._awaited_since, self._guard.refused)
+            self._watch.check_first(now - self._awaited_since, self._guard.refused)
         if now > self._sent_at + ASK_AGAIN_S:
             self._publish()
             self._clock_out.publish(self._clock_sent)
@@ -315,7 +315,7 @@ class PlantLoop:
             clock.start(0)  # time begins when the loop is closed
         elif self._by_the_clock:
             if (tick - self._heard) * self._settings.period > self._silence_s:
-                self._own.check_silence(tick)
+                self._watch.check_silence(tick)
             if clock.slip(tick) and (remark := clock.remark()):
                 self._node.log(remark)
         self.missed_deadlines += guard.answered != tick
@@ -340,7 +340,7 @@ class PlantLoop:
                 self._time_answer()
 
     def _receive(self, data: bytes) -> int | None:
-        """Take a command that has come, if it is good; the tick it answers, if it can be read."""
+        """Accept a command if it is good; return the tick that it answers, if it can be read."""
         guard = self._guard
         try:
             self._commands.decode(data, guard.offered)

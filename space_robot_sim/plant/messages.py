@@ -59,10 +59,11 @@ class CommandGuard:
             self.refused["stamp"] += 1
             return False
         torque = self.offered.torque
-        # a sum takes a third of the time of `isfinite`; finite unless a number is not, or huge
+        # a sum takes a third of the time of `isfinite`; finite, unless a number is not or huge
         if not (math.isfinite(sum(torque.tolist())) or np.isfinite(torque).all()):
             self.refused["not finite"] += 1
             return False
+        # two buffers change places: nothing is allocated in a tick
         self._accepted, self.offered = self.offered, self._accepted
         return True
 
@@ -95,7 +96,7 @@ class SentState(NamedTuple):
 
 
 class PlantMessages:
-    """Hands every state out, and every command in; lost, late, repeated and spoilt as faults say.
+    """Passes states to the controller and commands back, with the faults of messages.
 
     A state that is lost, late or wrongly stamped has no answer to wait for: that is known here,
     so that a flight in lockstep repeats.
@@ -144,7 +145,7 @@ class PlantMessages:
         self._faults.commands.send(tick, offered.torque.copy(), offered.tick)
 
     def end(self, tick: int) -> None:
-        """End the exchange of ``tick``: all that has come for it is there."""
+        """End the exchange of ``tick``, for which no more commands will come."""
         guard = self._guard
         for command in self._faults.commands.arrivals(tick) if self._faults else ():
             guard.offered.tick, guard.offered.torque[:] = command.stamp, command.item

@@ -24,14 +24,7 @@ Array = NDArray[np.float64]
 def mount_wheels(
     wheels: WheelSettings, model: Model, friction: Friction, velocities: Array
 ) -> None:
-    """Mount ``wheels`` on a plant's base, with their velocities at tick 0.
-
-    Args:
-        wheels: which fit the base.
-        model: of the plant's robot.
-        friction: in which that of the wheels is put.
-        velocities: (MOST_WHEELS,) of the wheels in the plant's state, rad/s.
-    """
+    """Mount ``wheels`` on a plant's base, with friction, and their ``velocities`` at tick 0."""
     count = wheels.count
     if not count:
         return
@@ -56,13 +49,8 @@ MOST_SUBSTEPS = 1000
 def mount_gears(robot: Robot, model: Model, friction: Friction, x: Array) -> None:
     """Mount the gears of ``robot`` after the wheels, with motors at rest where their joints are.
 
-    Friction of a joint with a gear acts on the motor's side, seen through the gear.
-
-    Args:
-        robot: of the plant.
-        model: of the same, with its wheels.
-        friction: of joints and wheels; that of geared joints moves to their motors.
-        x: the state at tick 0, see `space_robot_sim.plant.integrator.Stages`.
+    Friction of a joint with a gear acts on the motor's side, seen through the gear. ``x`` is the
+    state at tick 0, see `space_robot_sim.plant.integrator.Stages`.
     """
     joints, n = geared_joints(robot), robot.joint_count
     if not joints:
@@ -117,13 +105,9 @@ def measured_motors(robot: Robot) -> list[int]:
 
 
 def check_springs(robot: Robot, joint_positions: Array, step: float, substeps: int) -> None:
-    """Check that the integrator's steps resolve the springs of the gears.
+    """Check that the integrator's steps of ``step`` s resolve the springs of the gears.
 
-    Args:
-        robot: of the plant.
-        joint_positions: (N,) of all joints at tick 0, rad or m.
-        step: of the integrator, s.
-        substeps: steps in a tick.
+    ``joint_positions`` (N,) are those at tick 0; ``substeps`` make a tick.
     """
     joints = geared_joints(robot)
     if not joints:

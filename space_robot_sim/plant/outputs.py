@@ -117,7 +117,7 @@ class MarkerOutput:
         """Send the shapes of a true state, if somebody listens."""
         if not self._output.listener_count:
             return
-        if not self._output.sent:  # those of the flight before may have other names
+        if not self._output.sent:  # a viewer may still have those of an earlier flight
             self._output.publish(no_markers())
         self._output.publish(self._markers.encode(truth.tick, self._poses.at(truth)))
 

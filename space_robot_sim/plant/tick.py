@@ -40,13 +40,9 @@ Block = NDArray[Any]
 
 @kernel
 def write_truth(model: Model, x: Array, rotation: Array, truth: State) -> None:
-    """Write the plant's state into ``truth``; the torque in there is left alone.
+    """Write the plant's state ``x`` (see `Stages`) into ``truth``; the torque there is left alone.
 
-    Args:
-        model: of the plant's robot.
-        x: the state, see `space_robot_sim.plant.integrator.Stages`.
-        rotation: (3, 3) scratch.
-        truth: angular velocity on base axes.
+    ``rotation`` (3, 3) is scratch.
     """
     n, actuated = whole(model.joint_count), truth.joint_positions.size
     truth.base_position[:] = x[:3]
@@ -85,14 +81,7 @@ def update_surroundings(
 ) -> None:
     """Compute what acts over the tick that begins, and write it into ``truth``.
 
-    Args:
-        model: of the plant's robot.
-        environment: its orbit and surfaces; field and wrenches are written.
-        x: the state, see `space_robot_sim.plant.integrator.Stages`.
-        data: scratch.
-        tick: the tick.
-        period: s.
-        truth: with the base's attitude.
+    ``x`` and the attitude in ``truth`` are those of the tick; ``data`` is scratch.
     """
     orbit, surfaces = environment.orbit, environment.surfaces
     if uniform(orbit.is_on) == 0.0:

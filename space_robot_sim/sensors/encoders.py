@@ -1,6 +1,6 @@
 """Joint encoders: angle in whole steps, rate measured or differenced.
 
-The angle of a prismatic joint is its position; m stands in the place of rad there.
+The angle of a prismatic joint is its position, in m in place of rad.
 """
 
 from __future__ import annotations
