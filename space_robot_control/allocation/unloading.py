@@ -53,7 +53,7 @@ class AssumedTorquers(Record):
     ) -> AssumedTorquers:
         """Read the numbers of the settings for a robot of ``n`` joints."""
         torquers, count = cls.allocate(n), assumed.count
-        gain = settings.magnetic_gain if settings.torquers_unload else 0.0
+        gain = settings.magnetic_gain if settings.dump in ("all", "magnetic") else 0.0
         assign(torquers, count=count, gain=gain)
         torquers.axis[:count] = assumed.unit_axes
         torquers.max_dipole[:count] = assumed.values("max_dipole")
@@ -98,7 +98,7 @@ class Unloading(Record):
     def build(cls, n: int, settings: AllocationSettings) -> Unloading:
         """Read the settings."""
         unloading = cls.allocate(n)
-        above = settings.unload_above if settings.thrusters_unload else np.inf
+        above = settings.unload_above if settings.dump in ("all", "thrusters") else np.inf
         assign(unloading, above=above, to=settings.unload_to, rate=1.0 / settings.unload_time)
         return unloading
 

@@ -54,7 +54,7 @@ class ControllerLoop:
             controller, settings.hold_ticks, settings.longest_jump
         ),
     ) -> None:
-        """Load the laws' compiled code, so that no tick comes late for it.
+        """Make laws, controller and topics.
 
         ``supervisor_of`` makes the supervisor from the controller, its laws and the settings.
         """
@@ -63,7 +63,7 @@ class ControllerLoop:
         self._laws = LawSet(node, settings, robot.n + 3)
         actuators = assumed_actuators(settings.actuators, robot)
         at_rest = RobotState.allocate(robot.n), Reference.at_rest(robot.n)
-        for law in self._laws.laws:  # compiled code is loaded now: no tick or swap is late for it
+        for law in self._laws.laws:  # loads compiled code: no tick or swap must wait for it
             supervisor = Supervisor(Controller(robot, law, settings.period, actuators=actuators), 0)
             supervisor.judge_stamp(at_rest[0].tick)
             supervisor.answer(*at_rest)
@@ -130,7 +130,9 @@ class ControllerLoop:
                 self._states.reject("stamp")
                 return None
             if tick != last:
-                self._accept(tick, last)
+                if self._answering.supervisor.is_new_time and last >= 0:
+                    self._node.log(describe_new_time(tick, last, self._is_resumed))
+                self._is_resumed, self._state_at = False, time.monotonic()
         reference = self._references.at(tick)
         if reference is None:
             is_awaited = self._references.is_awaited
@@ -205,13 +207,6 @@ class ControllerLoop:
                 self._node.report()
         if answering.change:
             self._laws.report(answering.change)
-
-    def _accept(self, tick: int, last: int) -> None:
-        """Accept a state with a plausible stamp, which may begin a new time."""
-        if self._answering.supervisor.is_new_time and last >= 0:
-            self._node.log(describe_new_time(tick, last, self._is_resumed))
-        self._is_resumed = False
-        self._state_at = time.monotonic()
 
 
 class LawSet:

@@ -160,11 +160,7 @@ class StandardServices:
         self._simulation = simulation
         self._features, self._result, self._srv = msg.SimulatorFeatures, msg.Result, srv
         states = msg.SimulationState
-        self._numbers = {
-            SimulationState.STOPPED: states.STATE_STOPPED,
-            SimulationState.PLAYING: states.STATE_PLAYING,
-            SimulationState.PAUSED: states.STATE_PAUSED,
-        }
+        self._numbers = {s: getattr(states, f"STATE_{s.name}") for s in SimulationState}
 
     def get_features(self, request: Any, response: Any) -> Any:
         """Return the supported features."""
