@@ -69,7 +69,7 @@ class Component(Record):
                 if issubclass(field, Component):
                     field._fill(record[name], part, at)
                 continue
-            if field.source is None:
+            if field.source is None:  # state and scratch begin at zero
                 continue
             if isinstance(field.source, str):
                 value = attrgetter(field.source)(sheet)

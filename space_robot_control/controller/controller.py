@@ -65,7 +65,7 @@ class Controller(RecordOwner):
     A copy, also one by `pickle`, has a copy of the law in force and answers the same.
     """
 
-    _views = ("_memory", "_address", "_actuators", "signals", "allocate")
+    _views = ("_memory", "_reference", "_address", "_actuators", "signals", "allocate")
 
     def __init__(
         self,
@@ -129,6 +129,7 @@ class Controller(RecordOwner):
 
     def _look_into_blocks(self) -> None:
         self._memory: ControllerMemory = self.block[0]
+        self._reference: Block = self.block["signals"]["reference"]
         allocated: Block = self.block["allocation"]
         self._address = allocated.ctypes.data
         self._actuators: Array = allocated["command"][0, : len(self.names.actuators)]
@@ -202,9 +203,8 @@ class Controller(RecordOwner):
             LawError: the code of the law failed.
         """
         law = self._law
-        known = law.h_bar, law.estimate, law.needs_model
-        self.block["signals"]["reference"] = reference
-        status = compute_signals(self.block, state.tick, state.block, *known, self.period)
+        self._reference[0] = reference[0]  # five times faster than all fields of an array of one
+        status = compute_signals(self.block, state.tick, state.block, *law.needs, self.period)
         if status != USABLE:
             raise unusable(status, state.tick, state.quaternion)
         return self.command_for(state.tick, force_of(law, self.signals, state.tick))

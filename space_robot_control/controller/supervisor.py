@@ -133,8 +133,7 @@ class Supervisor:
                 self._law, self._code = law, law.code
             answer_state(self.block, controller.block, self._code, controller.allocate, *inputs)
         else:
-            block, estimate, needs_model = controller.block, law.estimate, law.needs_model
-            status = admit_state(self.block, block, law.h_bar, estimate, needs_model, *inputs)
+            status = admit_state(self.block, controller.block, *law.needs, *inputs)
             if is_for_law(status):
                 force = force_of(law, controller.signals, tick)
                 command.torque[:] = controller.command_for(tick, force).torque

@@ -227,6 +227,12 @@ class ControlLaw(RecordOwner, ABC):
         return self.uses_model or self.estimate == NOMINAL_INERTIA
 
     @property
+    def needs(self) -> tuple[Array, int, bool]:
+        """``h_bar``, `estimate` and `needs_model`: what the signals have to hold."""
+        estimate = self.estimate  # once: it takes a microsecond
+        return self.h_bar, estimate, self.uses_model or estimate == NOMINAL_INERTIA
+
+    @property
     def adds_inertia(self) -> bool:
         """True if ``H_S u`` is added to the law's force, see `force_of`."""
         return self.estimate == NOMINAL_INERTIA and self.h_bar.size > 0
@@ -295,8 +301,7 @@ class CompiledLaw(ControlLaw):
         n = len(self.memory.s) - 3
         gains = prefix(self.gains_block, SomeGains.dtype(n))
         memory = prefix(self.memory_block, LawMemory.dtype(n))
-        needs = self.h_bar, self.estimate, self.needs_model, self.adds_inertia
-        return LawCode(self.function(), gains, memory, *needs)
+        return LawCode(self.function(), gains, memory, *self.needs, self.adds_inertia)
 
     def force(self, signals: Signals) -> Array:
         """Run the kernel; ``signals`` is a `Signals.view`."""

@@ -84,6 +84,7 @@ def in_order(events: Sequence[Event]) -> list[Event]:
     Raises:
         InputError: capture while a target is held, or release without a target.
     """
+    # a stable sort: events of one time happen in the user's order
     ordered = sorted(events, key=lambda event: event.time_s)
     held: Capture | None = None
     for event in ordered:

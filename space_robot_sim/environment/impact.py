@@ -168,6 +168,7 @@ class Impact:
         """Write the columns of the base and of the joints between it and the hand."""
         place = self.place
         self.jacobian[:, :6] = np.eye(6)
+        # velocity w x r of the place, for w along each axis
         self.jacobian[:3, 3:6] = np.cross(np.eye(3), place).T
         body = grasp.body
         while body:

@@ -70,6 +70,7 @@ class Plant(RecordOwner):
                 f"robot {robot.name!r} has {n} joints"
             )
         length = direction_norm(settings.initial_quaternion, "initial_quaternion")
+        # only the settings of a node name their files
         settings.check(robot, getattr(settings, "actuators", "given"))
         self.names = settings.robot_names(robot)._replace(in_orbit=settings.has_orbit)
         """Names of all measured and commanded quantities."""
@@ -124,7 +125,7 @@ class Plant(RecordOwner):
         try:
             assign(memory, sensors=Sensors.build(settings, at))
         except InputError as error:
-            file = getattr(settings, "sensors", "given")  # the plant node's settings name it
+            file = getattr(settings, "sensors", "given")
             raise InputError(f"sensors {file}: {error}") from None
         schedule = settings.schedule(self.names, period)
         check_faults(schedule, settings)
@@ -253,6 +254,7 @@ class Plant(RecordOwner):
 
     def save(self) -> PlantSnapshot:
         """Copy all that the rest of the flight depends on, but the commands to come."""
+        # faults keep the sound numbers of what they have changed
         return PlantSnapshot(
             self.tick,
             self.block.copy(),

@@ -67,6 +67,7 @@ class Simulation:
         if self._is_stopped:
             raise InputError("the simulation is stopped: pause it before it is stepped")
         target = loop.control.step(ticks)
+        # a reset or a shutdown replaces the loop: then nobody would end this wait
         await until(lambda: loop.control.is_held or self._node.loop is not loop)
         reached = loop.control.tick
         if reached != target:

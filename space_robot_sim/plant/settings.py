@@ -202,6 +202,7 @@ class PlantNodeSettings(PlantSettings, NodeSettings):
         """Read the settings as `NodeSettings.resolve`, and the file of a table of disturbances."""
         settings = super().resolve(overrides)
         settings.check_orbit(f"{cls.node} parameters")
+        # its numbers in place of its path: bags and nodes need no file
         return settings.with_table(table_text(settings.disturbance.table))
 
     def with_table(self, text: str) -> Self:

@@ -250,9 +250,8 @@ class Way:
                 self.guard.offered.tick, self.guard.offered.torque[:] = stamp, stamp
                 self.exchange.take(tick)
             self.exchange.end(tick)
-            acting.append(
-                int(self.guard.act(tick).torque[0]) if self.guard.answered >= 0 else NO_TICK
-            )
+            torque = self.guard.act(tick).torque
+            acting.append(int(torque[0]) if self.guard.answered >= 0 else NO_TICK)
         return sent, awaited, acting
 
     def _read(self, sent: SentState, state: RobotState) -> int:
