@@ -133,7 +133,8 @@ class Supervisor:
                 self._law, self._code = law, law.code
             answer_state(self.block, controller.block, self._code, controller.allocate, *inputs)
         else:
-            status = admit_state(self.block, controller.block, *law.needs, *inputs)
+            block, (h_bar, estimate, needs_model) = controller.block, law.needs
+            status = admit_state(self.block, block, h_bar, estimate, needs_model, *inputs)
             if is_for_law(status):
                 force = force_of(law, controller.signals, tick)
                 command.torque[:] = controller.command_for(tick, force).torque
