@@ -34,5 +34,5 @@ class MissedCaptures(Metric):
         return {
             exchange.event.label: misses[exchange.tick]
             for exchange in self._captures.exchanges
-            if exchange.tick in misses and exchange.meeting
+            if exchange.tick in misses and exchange.target_state
         }

@@ -17,7 +17,7 @@ from space_robot_msgs_py.compiled.records import Block
 from space_robot_msgs_py.samples import Command, Reference, RobotState
 
 from ..controller.controller import Controller
-from ..controller.supervisor import MODES, Supervisor
+from ..controller.supervisor import Supervisor
 from ..controller.tick import ANSWERED, NEW
 from .folder import Exported
 from .instances import fill_measurement, fill_reference
@@ -71,7 +71,7 @@ class RecordingSupervisor(Supervisor):
     ) -> None:
         record: NDArray[Any] = np.zeros(1, self._dtype)
         record["kind"], record["result"] = kind, result
-        record["mode"] = MODES.index(self.mode)
+        record["mode"] = self.mode
         if isinstance(state, RobotState):
             fill_measurement(record["measurement"], state)
         else:

@@ -102,11 +102,7 @@ class Actuators(Component):
 
 
 def check_faults(schedule: Schedule, settings: BaseActuatorSettings) -> None:
-    """Check that the actuators of a base can have the faults of a flight.
-
-    Raises:
-        InputError: a fault limits the torque of a base that is not ideal.
-    """
+    """Check that the actuators of a base can have the faults of a flight."""
     if settings.base_actuation != "ideal" and schedule.of("saturate_base"):
         raise InputError(
             f"fault saturate_base is for base_actuation ideal, got "
@@ -122,6 +118,7 @@ def reports_given(actuators: Actuators) -> bool:
 
 def command_delay_buffer(actuators: Actuators, names: int) -> Array:
     """Return the ring buffer (ticks, names) of commands in transit, filled with zeros."""
+    # a command that is due at once needs no row
     longest = int(actuators.latency[:names].max(initial=0.0))
     return np.zeros((longest + 1 if longest else 0, names))
 
@@ -156,6 +153,7 @@ def actuate(
     reported[:] = due[: reported.size]
     if uniform(actuators.base_is_ideal) == 0.0:
         reported[:3] = 0.0
+    # the echo of a command is that within its limits, before the errors of the drives
     saturated = limit_torque(actuators.torque_limit, reported)
     drive_torque(actuators.drive, reported, applied)
     if uniform(actuators.base_is_ideal) == 0.0:

@@ -14,7 +14,7 @@ from space_robot_msgs_py.compiled.lane_type import MASK, array_of_lanes
 from space_robot_msgs_py.compiled.lanes import WIDTH
 from space_robot_msgs_py.compiled.record_type import block_type, record_type
 from space_robot_msgs_py.ros.process import hold_to_standard_input, module_command
-from space_robot_msgs_py.samples import Reference, State
+from space_robot_msgs_py.samples import State
 from space_robot_sim.plant.lanes import advance_lanes
 from space_robot_sim.plant.tick import PlantMemory
 
@@ -69,10 +69,8 @@ def _compile_controllers() -> None:
     """Compile the controller's kernels in lanes."""
     controller, row = _block(ControllerMemory), array_of_lanes(1)
     signals: Any = compute_signals
-    inputs = _block(State), _block(Reference)
-    signals.compile(
-        (controller, types.intp, *inputs, row, types.intp, types.boolean, types.float64)
-    )
+    of_law = row, types.intp, types.boolean
+    signals.compile((controller, types.intp, _block(State), *of_law, types.float64))
     transfer: Any = apply_transfer
     transfer.compile((controller, types.intp, row, row))
 

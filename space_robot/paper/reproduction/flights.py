@@ -6,8 +6,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
-from space_robot_control.controller.gains import gain_files
-from space_robot_control.controller.settings import DEFAULT
+from space_robot_control.controller.settings import DEFAULT, gain_files
 from space_robot_control.navigation.settings import NavigationMode
 from space_robot_msgs_py.errors import DivergedError, InputError
 

@@ -16,8 +16,7 @@ from hypothesis import strategies as st
 from paths import CONFIG, DATA
 
 from space_robot.flight.plan import Flight, FlightPlan, resolve
-from space_robot_control.controller.gains import gain_files
-from space_robot_control.controller.settings import ControllerNodeSettings, set_file
+from space_robot_control.controller.settings import ControllerNodeSettings, gain_files, set_file
 from space_robot_control.laws import laws
 from space_robot_model.robot.find import (
     RobotChoice,
