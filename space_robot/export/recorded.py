@@ -14,9 +14,9 @@ from space_robot_control.flight_code.acceptance import (
     REFERENCE_SHARE,
     SHARE,
     RecordingSupervisor,
-    add_noise,
     corrupt_state,
     corrupted_reference,
+    disturb_state,
     hostile_ticks,
 )
 from space_robot_control.flight_code.folder import Exported
@@ -143,7 +143,7 @@ def _hostile(plan: FlightPlan, exported: Exported, laws: Sequence[str]) -> Recor
         state = flight.plant.state.copy()
         state.tick = tick
         noise = 0.0 if random.random() < REPEATED else 10.0 ** random.uniform(-6, -1)
-        add_noise(state, noise, random)
+        disturb_state(state, noise, random)
         wheels.measure(state, commanded, k)
         is_hostile = random.random() < SHARE and k % PHASE > QUIET_TICKS
         reference = references[k : k + 1]

@@ -130,7 +130,7 @@ def weighted_sum(telemetry: tuple[Array, ...]) -> np.uint64:
     return total
 
 
-def add_noise(state: RobotState, size: float, random: np.random.Generator) -> None:
+def disturb_state(state: RobotState, size: float, random: np.random.Generator) -> None:
     """Add noise of a ``size`` to all numbers of a state; its quaternion stays unit."""
     state.numbers[:] += size * random.normal(size=state.numbers.size)
     state.quaternion[:] /= np.sqrt(state.quaternion @ state.quaternion)

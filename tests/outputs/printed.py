@@ -20,10 +20,10 @@ from space_robot.analysis.figures import style
 HERE = Path(__file__).parent
 CHAINS: dict[str, list[str]] = yaml.safe_load((HERE / "commands.yaml").read_text("utf-8"))
 FLOAT = re.compile(r"-?\d+\.\d+(?:e[-+]?\d+)?|-?\d+e[-+]?\d+")
-HASHES = re.compile(r"\b(?=[0-9a-f]*[a-f])(?=[a-f]*\d)[0-9a-f]{8,64}\b")
-"""Digests and commits: of sources, which may change."""
+DIGESTS = re.compile(r"\b(?=[0-9a-f]*[a-f])(?=[a-f]*\d)[0-9a-f]{8,64}\b")
+"""Of sources, which may change, and of commits."""
 VERSIONS = re.compile(r"\b\d+\.\d+(\.\w+)+\b")
-PROGRESS = re.compile(r"\d:\d\d:\d\d")
+PROGRESS = re.compile(r"\d:\d\d:\d\d|^(kernels|flights) \d|^compiling ")
 NOISE = 1e-12
 """Numbers below it are rounding."""
 LONGEST = 400
@@ -70,9 +70,9 @@ def _leaves(key: str, value: Any) -> Iterator[str]:
 
 def _plain(text: str, folder: Path) -> Iterator[str]:
     """Yield lines without what differs from machine to machine, numbers to five digits."""
-    text = VERSIONS.sub("VERSION", HASHES.sub("HASH", text.replace(str(folder), "FOLDER")))
+    text = VERSIONS.sub("VERSION", text.replace(str(folder), "FOLDER"))
     for line in text.splitlines():
-        if line.strip() and not PROGRESS.search(line):
+        if line.strip() and not PROGRESS.search(line) and not DIGESTS.search(line):
             yield FLOAT.sub(_rounded, line).rstrip()[:LONGEST]
 
 

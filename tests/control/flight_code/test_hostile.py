@@ -23,9 +23,9 @@ from space_robot_control.controller.tick import (
     STATUSES,
 )
 from space_robot_control.flight_code.acceptance import (
-    add_noise,
     corrupt_state,
     corrupted_reference,
+    disturb_state,
     hostile_ticks,
 )
 from space_robot_control.flight_code.folder import Exported
@@ -64,7 +64,7 @@ def test_c_answers_like_python(seed: int, law: str, share: float) -> None:
         if standing == NEW:
             state, reference = flight.plant.state.copy(), references[k : k + 1]
             state.tick = tick
-            add_noise(state, 10.0 ** random.uniform(-8, 0), random)
+            disturb_state(state, 10.0 ** random.uniform(-8, 0), random)
             desired = reference["quaternion"][0]
             corrupt_state(state, wheels, random, desired, is_hostile=random.random() < share)
             if random.random() < share:
