@@ -10,7 +10,7 @@ from typing import Annotated, ClassVar, Literal
 
 from pydantic import Field, field_validator
 
-from space_robot_model.robot.find import new_command, robot_files
+from space_robot_model.robot.find import YAML, new_command, robot_files
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.config.files import GIVEN, named_layers
 from space_robot_msgs_py.config.settings import NodeSettings, Texts
@@ -21,7 +21,6 @@ from space_robot_msgs_py.errors import InputError
 from ..allocation.settings import AllocationSettings
 from ..navigation.settings import NavigationFilterSettings, NavigationMode, completed
 
-YAML_FILES = (".yaml", ".yml")
 OF_THE_SET = "controller.yaml"
 """A file of a gain set with the controller's parameters that belong to its gains; need not be."""
 DEFAULT, DEFAULT_SETS, OTHERS = "default", "default_sets.yaml", "others"
@@ -36,7 +35,7 @@ def gain_files(robot: str, gain_set: str) -> dict[str, Path]:
     or ``gains`` in its own folder), or a path to a folder of ``<law>.yaml`` or to one such file.
     """
     path = Path(gain_set)
-    if gain_set.endswith(YAML_FILES):
+    if gain_set.endswith(YAML):
         check_readable(path)
         return {path.stem: path}
     if "/" in gain_set:
@@ -64,7 +63,7 @@ def set_file(robot: str, gain_set: str) -> list[Path]:
     The default set has one if it is the same set for all laws.
     """
     folder = Path(gain_set) if "/" in gain_set else robot_files(robot).gains
-    if folder is None or gain_set.endswith(YAML_FILES):
+    if folder is None or gain_set.endswith(YAML):
         return []
     if gain_set == DEFAULT:
         names = set(_default_sets(folder).values()) or {"."}
